@@ -1,4 +1,4 @@
-//! Reads the exports of tracking programs into a [`Recording`](crate::recording::Recording) with a report.
+//! Reads the exports of tracking programs into a [`Recording`] with a report.
 //! Rate, scale and direction of y have no defaults: what the file does not say the user has to.
 //!
 //! Coordinates keep the file's origin. They are only scaled and, where y points down, mirrored (`y` becomes

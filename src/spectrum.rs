@@ -1,6 +1,6 @@
 //! Components of short records with missing frames.
 //!
-//! [`SpectralAnalysis::of`] takes a record apart: trend, steady and decaying oscillations by least squares on the
+//! [`SpectralAnalysis::from_record`] takes a record apart: trend, steady and decaying oscillations by least squares on the
 //! frames present, one that drifts by its ridge, each with deviations and a verdict (`docs/spectra.md` has
 //! the criteria). It is what `wiperlab spectrum` shows.
 //!

@@ -56,7 +56,7 @@ pub struct CheckpointHeader<B> {
     pub journal: CheckpointKind,
     /// Version of the journal's layout.
     pub layout: u32,
-    /// Fingerprint of problem, data and program, from [`super::checksum`].
+    /// Fingerprint of problem, data and program, from `checksum`.
     pub fingerprint: String,
     /// Version of the program.
     pub version: String,

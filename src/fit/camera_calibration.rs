@@ -3,7 +3,7 @@
 //! A camera measures a deflection `d` as `(1 + scale) d + offset`: its scale is known to half a percent, and a
 //! marker is never exactly on the hinge. Both numbers are unknowns with priors, common to all features of a
 //! recording. Their effect does not need a run of the model, so they are no search parameters: at every point
-//! of the search they minimise the cost ([`CameraFit::estimate`]), and the Jacobian is projected onto the
+//! of the search they minimise the cost (`CameraFit::estimate`), and the Jacobian is projected onto the
 //! complement of their derivatives (variable projection, Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973)
 //! 413, in the form of Kaufman, BIT 15 (1975) 49).
 

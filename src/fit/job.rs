@@ -85,7 +85,7 @@ impl Job {
     /// As [`Self::parse`], for a model whose parameters have the names `known`.
     ///
     /// # Errors
-    /// As [`Self::parse_toml`].
+    /// As `parse_toml`.
     pub fn parse_with_names(file: &str, text: &str, known: &[&str]) -> Result<Self, JobError> {
         let written: as_written::JobFile = parse_toml(file, text)?;
         check_format(file, written.format)?;

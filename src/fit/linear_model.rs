@@ -1,8 +1,8 @@
 //! Linear model of the residuals around a point of the unit box.
 //!
 //! Rows of the Jacobian are the features in the order of the targets, then the priors, then the camera unknowns
-//! ([`CameraFit`]), each in standard deviations; columns are the parameters. Slopes are central differences
-//! with [`DIFFERENCE_STEP`], which is wide enough to average over the scatter of features of sampled traces.
+//! (`CameraFit`), each in standard deviations; columns are the parameters. Slopes are central differences
+//! with `DIFFERENCE_STEP`, which is wide enough to average over the scatter of features of sampled traces.
 
 use super::bounds::{Prior, SearchAxis, clamp_unit};
 use super::camera_calibration::{CameraEstimate, CameraFit};

@@ -8,8 +8,8 @@
 //! - `s^2 = sd^2 + scatter^2 + spread^2` combines the deviation of the target, the scatter of a rough model value
 //!   between neighbouring parameters, and the spread over the starting states. The term `2 ln(s / sd)`
 //!   penalises the spread; without it a fit would prefer points with uncertain features.
-//! - `rho` ([`robust_loss`]) is `r^2` up to `LOSS_KNEE` and logarithmic beyond it, so that a missing peak does
-//!   not dominate the cost. A missing feature costs as much as one that is wrong by a factor of [`MAX_RATIO`].
+//! - `rho` (`robust_loss`) is `r^2` up to `LOSS_KNEE` and logarithmic beyond it, so that a missing peak does
+//!   not dominate the cost. A missing feature costs as much as one that is wrong by a factor of `MAX_RATIO`.
 //! - `d` is the level of the strongest peak above the assigned one. With it the cost is continuous when another
 //!   peak is assigned.
 //!

@@ -4,7 +4,7 @@
 //! flat along its coordinate (its logarithm, or itself), or normal and truncated to the range. The likelihood
 //! of a job on features is `-cost / 2` without the terms of the priors ([`super::objective`]). That of a job on
 //! traces is `-chi^2 / 2`, minimised over the starting states of the segments
-//! ([`super::trace::fit_states_at`]).
+//! (`fit_states_at`).
 
 use super::FitError;
 use super::bounds::{BoundsSpacing, Prior, SearchAxis};

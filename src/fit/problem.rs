@@ -192,7 +192,7 @@ impl Problem {
         Some(TraceModel::new(&sources, &self.job.parameters, &self.constants))
     }
 
-    /// SHA-256 of everything that decides the cost of a point, from [`fingerprint`]: the values of job, scenes
+    /// SHA-256 of everything that decides the cost of a point, from `fingerprint`: the values of job, scenes
     /// and recordings, and the version of the program. Title, seed, budgets and intervals do not count: a fit
     /// can continue with a larger budget.
     #[must_use]

@@ -215,7 +215,7 @@ fn checkpoint_header(
 /// The run of a fit: its problem, its allowance and the journal that it continues.
 #[derive(Debug, Clone, Default)]
 pub struct FitContext<'a> {
-    /// Fingerprint of the problem, from [`crate::checkpoint::fingerprint`].
+    /// Fingerprint of the problem, from `checkpoint::fingerprint`.
     pub fingerprint: &'a str,
     /// Version of the program.
     pub version: &'a str,

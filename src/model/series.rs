@@ -66,7 +66,7 @@ pub(super) struct RightFactors {
 
 /// Taylor coefficients of the motion; `K` is their number, that of `x^0` included.
 ///
-/// After [`Self::expand`] to the order `n` the motion is known up to `x^n`, forces up to `x^(n-1)`.
+/// After `expand` to the order `n` the motion is known up to `x^n`, forces up to `x^(n-1)`.
 #[derive(Debug, Clone)]
 pub struct MotionSeries<const K: usize> {
     /// Velocity of the head along the sweep, m/s; the caller sets it.

@@ -37,7 +37,7 @@ pub trait TangentObserver {
     /// Receives a change of mode, between the pieces that it separates. `d_time_s` are the derivatives of its time,
     /// s per unit of each direction; `None` if they do not exist.
     fn observe_transition(&mut self, _transition: &Transition, _d_time_s: Option<&[f64]>) {}
-    /// Is asked after every piece; `Break` ends the run as [`RunStatus::Interrupted`].
+    /// Is asked after every piece; `Break` ends the run as `RunStatus::Interrupted`.
     fn control_flow(&self) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
