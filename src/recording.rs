@@ -184,7 +184,7 @@ impl Recording {
         let (low, high) = ((*column.get(before)?)?, (*column.get(before + 1)?)?);
         let first = before.checked_sub(STENCIL / 2 - 1);
         let curved = first.and_then(|first| lagrange_through_six(column, first, place));
-        Some(curved.unwrap_or_else(|| low + (place - before as f64) * (high - low)))
+        Some(curved.unwrap_or(low + (place - before as f64) * (high - low)))
     }
 }
 

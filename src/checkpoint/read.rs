@@ -185,8 +185,8 @@ pub const RECHECKED_RECORDS: usize = 8;
 pub fn sample_records(records: usize, seed: u64) -> Vec<usize> {
     let parts = RECHECKED_RECORDS.min(records);
     let mut generator = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let mut draw = |part| generator.random_range(part * records / parts..(part + 1) * records / parts);
-    (0..parts).map(|part| draw(part)).collect()
+    let draw = |part| generator.random_range(part * records / parts..(part + 1) * records / parts);
+    (0..parts).map(draw).collect()
 }
 
 /// Longest line that is read, bytes: many times what the program writes, but a limit for other files.

@@ -80,11 +80,13 @@ pub(crate) struct ReadingKind {
     make: ReadingConstructor,
 }
 
+type SeriesConstructor = fn(&ReadingEntry) -> Result<Vec<(String, Reading)>, KeyRefusal>;
+
 /// Makes readings of an entry.
 enum ReadingConstructor {
     One(fn(&ReadingEntry) -> Result<Reading, KeyRefusal>),
     /// Several readings, each with a suffix of the name of the entry.
-    Series(fn(&ReadingEntry) -> Result<Vec<(String, Reading)>, KeyRefusal>),
+    Series(SeriesConstructor),
     /// A time of a reversal.
     Interval(ReversalInterval),
     /// Of a run, not of a recording.

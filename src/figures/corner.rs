@@ -114,11 +114,11 @@ fn corner_parameter(
 ) -> Option<CornerParameter> {
     let (found, bounds) = (result.parameters.get(&free.name)?, &free.bounds);
     let line = lines.iter().find(|line| line.name == free.name);
-    let estimate = bounds.to_unit(found.estimate);
+    let estimate = bounds.unit_coordinate(found.estimate);
     // an end may have been cut at a bound: the longer half counts
-    let half = found
-        .linear_95
-        .map(|ends| ends.iter().map(|end| (bounds.to_unit(*end) - estimate).abs()).fold(0.0, f64::max));
+    let half = found.linear_95.map(|ends| {
+        ends.iter().map(|end| (bounds.unit_coordinate(*end) - estimate).abs()).fold(0.0, f64::max)
+    });
     let (name, factor) = choose_prefix(line.map_or("", |line| line.unit.as_str()), [found.estimate]);
     let words = format_interval(found.lower_95, found.upper_95, |v| format_digits(v * factor, 4));
     let open = found.lower_95.or(found.upper_95).is_none();
@@ -128,12 +128,16 @@ fn corner_parameter(
         symbol: parameter_symbol(&free.name),
         words: if open { words } else { format!("{words} {name}").trim_end().to_owned() },
         estimate,
-        stated: [found.lower_95, found.upper_95].map(|end| end.map(|v| bounds.to_unit(v))),
+        stated: [found.lower_95, found.upper_95].map(|end| end.map(|v| bounds.unit_coordinate(v))),
         sd: half.map(|half| half / Z_95).filter(|sd| *sd > 0.0),
         prior: free.prior.as_ref().and_then(|prior| prior_in_search_scale(prior, bounds)),
-        truth: line.and_then(|line| line.truth).map(|truth| bounds.to_unit(truth.value)),
-        profile: found.profile.iter().map(|(v, cost)| (bounds.to_unit(*v), likelihood(*cost))).collect(),
-        optima: optima.filter_map(|o| o.values.get(&free.name)).map(|v| bounds.to_unit(*v)).collect(),
+        truth: line.and_then(|line| line.truth).map(|truth| bounds.unit_coordinate(truth.value)),
+        profile: found
+            .profile
+            .iter()
+            .map(|(v, cost)| (bounds.unit_coordinate(*v), likelihood(*cost)))
+            .collect(),
+        optima: optima.filter_map(|o| o.values.get(&free.name)).map(|v| bounds.unit_coordinate(*v)).collect(),
     })
 }
 
@@ -143,7 +147,7 @@ fn prior_in_search_scale(prior: &Prior, bounds: &Bounds) -> Option<(f64, f64)> {
         Prior::Linear { mean, sd } => (mean, sd),
         Prior::Log { mean_ln, sd_ln } => (math::exp(mean_ln), sd_ln * math::exp(mean_ln)),
     };
-    let at = bounds.to_unit(mean);
+    let at = bounds.unit_coordinate(mean);
     Some((at, sd / bounds.slope(at))).filter(|(at, sd)| at.is_finite() && sd.is_finite() && *sd > 0.0)
 }
 
@@ -363,11 +367,11 @@ mod tests {
         assert_eq!(corner.parameters.len(), 5);
         for (free, known) in job.parameters.iter().zip(&corner.parameters) {
             let found = &result.parameters[&free.name];
-            let back = known.stated.map(|end| end.map(|u| free.bounds.from_unit(u)));
+            let back = known.stated.map(|end| end.map(|u| free.bounds.value_at_unit(u)));
             for (drawn, stated) in back.iter().zip([found.lower_95, found.upper_95]) {
                 assert!((drawn.unwrap() / stated.unwrap() - 1.0).abs() < 1e-12, "{}", free.name);
             }
-            let upper = free.bounds.from_unit(known.estimate + Z_95 * known.sd.unwrap());
+            let upper = free.bounds.value_at_unit(known.estimate + Z_95 * known.sd.unwrap());
             assert!((upper / found.linear_95.unwrap()[1] - 1.0).abs() < 1e-3, "{}", free.name);
         }
     }

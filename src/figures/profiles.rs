@@ -124,7 +124,7 @@ const PARABOLA: u32 = 60;
 
 /// Ends of the profile's interval; an end at a bound counts as open, as values beyond were not tried.
 fn closed_interval(parameter: &FreeParameter, found: &ParameterResult) -> [Option<f64>; 2] {
-    let inside = |end: &f64| (AT_BOUND..=1.0 - AT_BOUND).contains(&parameter.bounds.to_unit(*end));
+    let inside = |end: &f64| (AT_BOUND..=1.0 - AT_BOUND).contains(&parameter.bounds.unit_coordinate(*end));
     found.profile_95.map(|end| end.filter(inside))
 }
 
@@ -142,14 +142,14 @@ fn linear_model_parabola(
     let bounds = &parameter.bounds;
     let within = |ends: &[f64; 2]| ends[0] > bounds.lower() || ends[1] < bounds.upper();
     let Some(ends) = found.linear_95.filter(within) else { return Vec::new() };
-    let centre = bounds.to_unit(found.estimate);
-    let half = ends.map(|end| (bounds.to_unit(end) - centre).abs()).into_iter().fold(0.0, f64::max);
+    let centre = bounds.unit_coordinate(found.estimate);
+    let half = ends.map(|end| (bounds.unit_coordinate(end) - centre).abs()).into_iter().fold(0.0, f64::max);
     if half <= 0.0 {
         return Vec::new();
     }
     let offsets = (0..=PARABOLA).map(|i| REACH * (2.0 * f64::from(i) / f64::from(PARABOLA) - 1.0));
     let inside = offsets.filter(|offset| (0.0..=1.0).contains(&(centre + offset * half)));
-    inside.map(|offset| (bounds.from_unit(centre + offset * half), threshold * offset * offset)).collect()
+    inside.map(|offset| (bounds.value_at_unit(centre + offset * half), threshold * offset * offset)).collect()
 }
 
 /// Draws the figure; without panels where no parameter has a profile.

@@ -75,7 +75,7 @@ fn candidate_sensitivities(
     let seen = ModelFeatures::new(model, &features, Vec::new(), 1);
     let read = |unit: &Vec<f64>| -> Vec<Option<f64>> {
         let units = job.parameters.iter().zip(unit);
-        let values: Vec<f64> = units.map(|(parameter, u)| parameter.bounds.from_unit(*u)).collect();
+        let values: Vec<f64> = units.map(|(parameter, u)| parameter.bounds.value_at_unit(*u)).collect();
         let read = seen.read_features(&values, Draw::default()).unwrap_or_default();
         (0..features.len()).map(|at| read.get(at)?.as_ref().ok().map(|read| read.value)).collect()
     };

@@ -96,7 +96,7 @@ impl Bounds {
     }
 
     /// Coordinate of `value` in the unit interval; values outside the bounds are clamped.
-    pub(crate) fn to_unit(&self, value: f64) -> f64 {
+    pub(crate) fn unit_coordinate(&self, value: f64) -> f64 {
         let value = value.clamp(self.lower, self.upper);
         let along = match self.spacing {
             BoundsSpacing::Log => math::ln(value / self.lower),
@@ -106,7 +106,7 @@ impl Bounds {
     }
 
     /// Value at `unit`, which is clamped to 0 to 1; the ends give the bounds exactly.
-    pub(crate) fn from_unit(&self, unit: f64) -> f64 {
+    pub(crate) fn value_at_unit(&self, unit: f64) -> f64 {
         let unit = clamp_unit(unit);
         if unit == 0.0 {
             return self.lower;
@@ -124,7 +124,7 @@ impl Bounds {
     /// `d p / d u` at `unit`, in the parameter's unit.
     pub(crate) fn slope(&self, unit: f64) -> f64 {
         match self.spacing {
-            BoundsSpacing::Log => self.scaled_length() * self.from_unit(unit),
+            BoundsSpacing::Log => self.scaled_length() * self.value_at_unit(unit),
             BoundsSpacing::Linear => self.scaled_length(),
         }
     }
@@ -134,7 +134,7 @@ impl Bounds {
         match self.spacing {
             BoundsSpacing::Log => Some(self.scaled_length()),
             BoundsSpacing::Linear => {
-                let value = self.from_unit(unit);
+                let value = self.value_at_unit(unit);
                 (value != 0.0).then(|| self.scaled_length() / value)
             }
         }
@@ -221,7 +221,7 @@ mod tests {
         for step in 0..=1000 {
             let unit = f64::from(step) / 1000.0;
             for bounds in [log, linear] {
-                assert!((bounds.to_unit(bounds.from_unit(unit)) - unit).abs() < 1e-14, "{unit}");
+                assert!((bounds.unit_coordinate(bounds.value_at_unit(unit)) - unit).abs() < 1e-14, "{unit}");
             }
             // near the ends u = (1 + sin z)/2 is quadratic in z: half the digits of z, all the digits of u
             assert!((line_to_unit(unit_to_line(unit)) - unit).abs() < 1e-15, "{unit}");
@@ -231,12 +231,12 @@ mod tests {
     #[test]
     fn the_ends_and_the_middle_are_exact() {
         let log = Bounds::new(0.01, 100.0, BoundsSpacing::Log).unwrap();
-        assert_eq!((log.from_unit(0.0), log.from_unit(1.0)), (0.01, 100.0));
-        assert!((log.from_unit(0.5) - 1.0).abs() < 1e-15);
-        assert_eq!((log.to_unit(0.001), log.to_unit(1e9)), (0.0, 1.0));
+        assert_eq!((log.value_at_unit(0.0), log.value_at_unit(1.0)), (0.01, 100.0));
+        assert!((log.value_at_unit(0.5) - 1.0).abs() < 1e-15);
+        assert_eq!((log.unit_coordinate(0.001), log.unit_coordinate(1e9)), (0.0, 1.0));
         assert_eq!((line_to_unit(unit_to_line(0.0)), line_to_unit(unit_to_line(1.0))), (0.0, 1.0));
         let linear = Bounds::new(-1.0, 3.0, BoundsSpacing::Linear).unwrap();
-        assert_eq!(linear.from_unit(0.5), 1.0);
+        assert_eq!(linear.value_at_unit(0.5), 1.0);
     }
 
     #[test]

@@ -109,7 +109,7 @@ impl Row {
     fn into_outcome(self, body: &FeatureHeaderBody) -> EvaluationOutcome {
         let unit: Vec<f64> = self.unit.into_iter().map(|n| n.0).collect();
         let values = body.parameters.iter().zip(&unit);
-        let values = values.map(|(parameter, u)| parameter.axis.bounds.from_unit(*u)).collect();
+        let values = values.map(|(parameter, u)| parameter.axis.bounds.value_at_unit(*u)).collect();
         let features = self.features.into_iter().map(FeatureValueRow::into_observed).collect();
         EvaluationOutcome { unit, values, features, failure: self.failure }
     }

@@ -26,11 +26,13 @@ use std::collections::HashSet;
 pub use targets::{FitTarget, TargetSource, TargetStage};
 pub(crate) use traces::{CameraPriorSds, TraceChannel, TraceTarget};
 
+/// Name of a condition, what it sets, and whether it is held out.
+type ConditionIdentity<'a> = (&'a str, &'a [(String, f64)], bool);
+
 /// The part of a job that decides the cost of a point.
 #[derive(Serialize)]
 pub(super) struct JobIdentity<'a> {
-    /// Name, what it sets, and whether it is held out.
-    conditions: Vec<(&'a str, &'a [(String, f64)], bool)>,
+    conditions: Vec<ConditionIdentity<'a>>,
     camera: Option<Camera>,
     parameters: &'a [FreeParameter],
     /// Left out where constants are exact: the fingerprint of a job without them stays the same.

@@ -56,7 +56,7 @@ impl<'a> Objective<'a> {
 
     /// Parameter values at a point of the unit box.
     pub(crate) fn values(&self, unit: &[f64]) -> Vec<f64> {
-        self.axes.iter().zip(unit).map(|(axis, u)| axis.bounds.from_unit(*u)).collect()
+        self.axes.iter().zip(unit).map(|(axis, u)| axis.bounds.value_at_unit(*u)).collect()
     }
 
     /// Evaluates the model at a point of the unit box; a panic of the model is a failed run.

@@ -403,7 +403,7 @@ impl TraceFindings<'_, '_> {
 pub(super) fn trace_verdict(free: &FreeParameter, found: &ParameterResult) -> ParameterVerdict {
     /// Distance from a bound, relative to the range, up to which a value counts as at the bound.
     const NEAR: f64 = 1e-6;
-    let place = free.bounds.to_unit(found.estimate);
+    let place = free.bounds.unit_coordinate(found.estimate);
     match (found.lower_95, found.upper_95) {
         _ if !(NEAR..=1.0 - NEAR).contains(&place) => ParameterVerdict::AtBound,
         (None, None) => ParameterVerdict::NotIdentified,

@@ -312,7 +312,8 @@ impl LocalAssessment {
         let good = good.filter_map(|e| e.unit.get(axis).copied());
         let (least, most) = good.fold((unit, unit), |(least, most), u| (least.min(u), most.max(u)));
         let [below, above] = twins.unwrap_or([unit, unit]);
-        let value = |u: f64| ledger.objective().axes().get(axis).map_or(f64::NAN, |a| a.bounds.from_unit(u));
+        let value =
+            |u: f64| ledger.objective().axes().get(axis).map_or(f64::NAN, |a| a.bounds.value_at_unit(u));
         // an interval that reaches a bound is open: nothing beyond the bound was tried
         let inside = |u: f64| (AT_BOUND..=1.0 - AT_BOUND).contains(&u).then(|| value(u));
         let lower_95 = lower.and_then(|u| inside(u.min(least).min(below)));

@@ -154,7 +154,7 @@ impl SpectralAnalysis {
             (0..frames).map(at).collect()
         };
         let left = |frame: usize| {
-            self.residual_m.get(frame / stride).copied().flatten().filter(|_| frame % stride == 0)
+            self.residual_m.get(frame / stride).copied().flatten().filter(|_| frame.is_multiple_of(stride))
         };
         let left_m = (0..frames).map(left).collect();
         let (removed_m, model_m) = (between(&self.removed_m), between(&self.model_m));

@@ -36,9 +36,13 @@ pub(crate) fn fill_short_gaps(samples: &[Option<f64>]) -> Vec<Option<f64>> {
     let clusters: Vec<&[usize]> =
         short.chunk_by(near).flat_map(|cluster| cluster.chunks(MOST_UNKNOWNS)).collect();
     let solved = |clusters: &[&[usize]]| -> Vec<(usize, f64)> {
-        let solved =
-            |cluster: &&[usize]| Some(cluster.to_vec().into_iter().zip(solve_cluster(samples, cluster)?));
-        clusters.iter().filter_map(solved).flatten().collect()
+        let mut values = Vec::new();
+        for cluster in clusters {
+            if let Some(solution) = solve_cluster(samples, cluster) {
+                values.extend(cluster.iter().copied().zip(solution));
+            }
+        }
+        values
     };
     let values = if samples.len() < PARALLEL_FROM {
         vec![solved(&clusters)]

@@ -52,7 +52,7 @@ fn outcome(u: f64) -> EvaluationOutcome {
     let features = vec![Observed::from_value(1e23 * u), Observed::Missing("no peak".to_owned())];
     let unit = vec![u, 0.1 + 0.2];
     let parameters = header("f").body.parameters;
-    let values = parameters.iter().zip(&unit).map(|(p, u)| p.axis.bounds.from_unit(*u)).collect();
+    let values = parameters.iter().zip(&unit).map(|(p, u)| p.axis.bounds.value_at_unit(*u)).collect();
     EvaluationOutcome { unit, values, features, failure: None }
 }
 

@@ -64,7 +64,7 @@ fn excluded_slabs(found: &FitUncertainty, ledger: &Ledger, times: f64) -> Vec<Sl
     let sides =
         axes.enumerate().filter(|(_, (_, interval))| interval.verdict == ParameterVerdict::Identified);
     let both = sides.flat_map(|(number, ((axis, unit), interval))| {
-        let end = |value: Option<f64>| value.map_or(*unit, |value| axis.bounds.to_unit(value));
+        let end = |value: Option<f64>| value.map_or(*unit, |value| axis.bounds.unit_coordinate(value));
         let away = |end: f64| unit + times * (end - unit);
         [
             Slab { axis: number, lower: 0.0, upper: away(end(interval.lower_95)) },
@@ -129,14 +129,14 @@ fn withdraw_split_interval(found: &mut FitUncertainty, ledger: &Ledger, names: &
     let good = ledger.run_evaluations().iter().filter(|e| e.failure.is_none() && e.cost <= limit);
     let mut places: Vec<f64> = good.filter_map(|e| e.unit.get(axis).copied()).collect();
     places.sort_by(f64::total_cmp);
-    let wide = MIN_GAP_SHARE * (bounds.to_unit(upper) - bounds.to_unit(lower));
+    let wide = MIN_GAP_SHARE * (bounds.unit_coordinate(upper) - bounds.unit_coordinate(lower));
     let excluded = |from: f64, to: f64| {
         let above = interval.profile.iter().filter(|(_, cost)| *cost > limit);
-        above.map(|(value, _)| bounds.to_unit(*value)).any(|u| from < u && u < to)
+        above.map(|(value, _)| bounds.unit_coordinate(*value)).any(|u| from < u && u < to)
     };
     let gap = places.windows(2).find(|pair| pair[1] - pair[0] > wide && excluded(pair[0], pair[1]));
     let Some(gap) = gap else { return };
-    let [below, above] = [gap[0], gap[1]].map(|u| format_number(bounds.from_unit(u)));
+    let [below, above] = [gap[0], gap[1]].map(|u| format_number(bounds.value_at_unit(u)));
     interval.withdraw_verdict(format!(
         "values up to {below} and from {above} on meet the features about as well"
     ));

@@ -187,7 +187,7 @@ pub(in crate::fit) fn stored_verdicts(job: &Job, result: &FitResult) -> Vec<Para
     // a parameter that the linear model determines has a correlation with itself
     let correlation = |a: usize, b: usize| result.correlations.get(&names[a])?.get(&names[b]).copied();
     let unit: Vec<f64> = (job.parameters.iter().enumerate())
-        .map(|(axis, free)| found(axis).map_or(0.5, |p| free.bounds.to_unit(p.estimate)))
+        .map(|(axis, free)| found(axis).map_or(0.5, |p| free.bounds.unit_coordinate(p.estimate)))
         .collect();
     let of = |axis: usize| {
         let Some(p) = found(axis) else { return ParameterVerdict::NotIdentified };
