@@ -1,4 +1,5 @@
-//! Effects of a camera on a motion: its exposure averages the motion, and its frame rate folds faster frequencies.
+//! Effects of a camera on a motion: its exposure averages the motion, and its frame rate folds faster
+//! frequencies.
 
 use crate::math;
 use schemars::JsonSchema;
@@ -20,7 +21,8 @@ const HALF_POWER_CYCLES: f64 = 0.442_946_47;
 /// Most frequencies listed by [`aliased_frequencies_hz`], so that a mistyped rate does not fill the memory.
 pub(crate) const MOST_ALIASES: usize = 1000;
 
-/// Gain of an exposure of `exposure_s` at `frequency_hz`, 0 to 1: `|sin(pi f T)/(pi f T)|`, from the mean of the motion
+/// Gain of an exposure of `exposure_s` at `frequency_hz`, 0 to 1: `|sin(pi f T)/(pi f T)|`, from the mean of
+/// the motion
 /// while the shutter is open.
 #[must_use]
 pub fn exposure_gain(frequency_hz: f64, exposure_s: f64) -> f64 {
@@ -33,7 +35,8 @@ pub(crate) fn half_power_hz(exposure_s: f64) -> f64 {
     HALF_POWER_CYCLES / exposure_s
 }
 
-/// Frequency at which a frequency appears at `frame_rate_hz`, Hz: folded about the multiples of half the rate.
+/// Frequency at which a frequency appears at `frame_rate_hz`, Hz: folded about the multiples of half the
+/// rate.
 #[must_use]
 pub fn alias_hz(frequency_hz: f64, frame_rate_hz: f64) -> f64 {
     if frequency_hz <= frame_rate_hz / 2.0 {
@@ -43,7 +46,8 @@ pub fn alias_hz(frequency_hz: f64, frame_rate_hz: f64) -> f64 {
     rest.min(frame_rate_hz - rest)
 }
 
-/// Every frequency above half of `frame_rate_hz` and up to `up_to_hz` that appears at `frequency_hz`, Hz: `k rate - f`
+/// Every frequency above half of `frame_rate_hz` and up to `up_to_hz` that appears at `frequency_hz`, Hz: `k
+/// rate - f`
 /// and `k rate + f`, ascending, each once, at most 1000. Empty for a frequency outside 0 to half the rate.
 pub(crate) fn aliased_frequencies_hz(frequency_hz: f64, frame_rate_hz: f64, up_to_hz: f64) -> Vec<f64> {
     let half_hz = frame_rate_hz / 2.0;

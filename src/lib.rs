@@ -68,7 +68,8 @@
 //! let frames = Window::parse("after")?.resolve_frames(&recording, &instants)?;
 //! let samples = &Channel::HeadDrop.samples(&recording)[frames];
 //! let record = SampledRecord { samples, frame_rate_hz: 5000.0, exposure_s: Some(5e-5) };
-//! let components = SpectralAnalysis::from_record(&record, &SpectrumSettings::default())?.spectrum.components;
+//! let components = SpectralAnalysis::from_record(&record,
+//! &SpectrumSettings::default())?.spectrum.components;
 //! assert!((components[0].frequency_hz - 74.8).abs() < 1.0);
 //!
 //! // a reversal of the model, transition by transition

@@ -1,10 +1,12 @@
 //! Components of short records with missing frames.
 //!
-//! [`SpectralAnalysis::from_record`] takes a record apart: trend, steady and decaying oscillations by least squares on the
+//! [`SpectralAnalysis::from_record`] takes a record apart: trend, steady and decaying oscillations by least
+//! squares on the
 //! frames present, one that drifts by its ridge, each with deviations and a verdict (`docs/spectra.md` has
 //! the criteria). It is what `wiperlab spectrum` shows.
 //!
-//! [`analyse_spectrum`] reads the tops of one Hann-windowed spectrum, fast and without choices that depend on the
+//! [`analyse_spectrum`] reads the tops of one Hann-windowed spectrum, fast and without choices that depend on
+//! the
 //! data, so that a fit can compare thousands of records by it. Gaps of up to four frames are bridged for the
 //! transform alone (`spectrum/gaps.rs`); where more than a tenth of the frames is missing, the components
 //! found are then refined on the frames present (`spectrum/refine.rs`). The record is detrended, weighted (a

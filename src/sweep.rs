@@ -1,6 +1,8 @@
-//! A parameter study: a scene is run at every point of a grid or a sample, and readings are taken of each run.
+//! A parameter study: a scene is run at every point of a grid or a sample, and readings are taken of each
+//! run.
 //!
-//! A point whose run ends early or lacks a reading has a reason instead of a value ([`MissingReason`]); nothing
+//! A point whose run ends early or lacks a reading has a reason instead of a value ([`MissingReason`]);
+//! nothing
 //! is filled in. Points are independent of each other, so the numbers do not depend on the number of threads,
 //! and a study resumes from a [`journal`] of finished points.
 

@@ -1,4 +1,5 @@
-//! TOML files read into typed values. Every error names file, line, column, key and the nearest known key, and all
+//! TOML files read into typed values. Every error names file, line, column, key and the nearest known key,
+//! and all
 //! problems of a file are listed together.
 
 mod hint;
@@ -149,7 +150,8 @@ pub(crate) fn check_above_zero(key: impl Into<String>, found: f64) -> Result<f64
 pub(crate) fn suggest_key(key: &str, known: &[&str]) -> String {
     /// Jaro-Winkler similarity from which a known key is suggested; below it the list is shown.
     const SIMILAR: f64 = 0.75;
-    /// Similarity of a short key with one slip (a letter extra, missing, wrong, or two exchanged), which Jaro-Winkler
+    /// Similarity of a short key with one slip (a letter extra, missing, wrong, or two exchanged), which
+    /// Jaro-Winkler
     /// rates far too low.
     const ONE_SLIP: f64 = 0.9;
     let key = key.to_lowercase();
@@ -166,7 +168,8 @@ pub(crate) fn suggest_key(key: &str, known: &[&str]) -> String {
     }
 }
 
-/// Advice on a path of a TOML file that contains a control character, because `\t` or the like was read as an escape;
+/// Advice on a path of a TOML file that contains a control character, because `\t` or the like was read as an
+/// escape;
 /// empty for any other path.
 pub(crate) fn path_hint(path: &str) -> &'static str {
     if path.chars().any(char::is_control) {
@@ -197,7 +200,8 @@ fn error_from_toml(file: &str, text: &str, error: &toml::de::Error) -> TomlError
     }
 }
 
-/// Splits serde's fixed wording "unknown field `a`, expected one of `b`, `c`" into the key and the known ones.
+/// Splits serde's fixed wording "unknown field `a`, expected one of `b`, `c`" into the key and the known
+/// ones.
 fn split_unknown_field(message: &str) -> Option<(&str, Vec<&str>)> {
     let quoted = message.strip_prefix("unknown field ")?;
     let mut names = quoted.split('`').skip(1).step_by(2);

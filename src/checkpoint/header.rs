@@ -68,7 +68,8 @@ impl<B> CheckpointHeader<B> {
     /// Checks that the header has the problem, data and program of `expected`.
     ///
     /// # Errors
-    /// [`CheckpointError::OtherVersion`], [`CheckpointError::OtherProblem`], or [`CheckpointError::Header`] for an
+    /// [`CheckpointError::OtherVersion`], [`CheckpointError::OtherProblem`], or [`CheckpointError::Header`]
+    /// for an
     /// edited header.
     pub(crate) fn check_matches<R: CheckpointRecord<Body = B>>(
         &self,

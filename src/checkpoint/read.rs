@@ -179,7 +179,8 @@ pub(super) fn strip_byte_order_mark(line: &[u8]) -> &[u8] {
 /// with different arithmetic differs in nearly every record.
 pub const RECHECKED_RECORDS: usize = 8;
 
-/// Indices of at most [`RECHECKED_RECORDS`] records: one from each of as many equal parts of the journal, drawn
+/// Indices of at most [`RECHECKED_RECORDS`] records: one from each of as many equal parts of the journal,
+/// drawn
 /// with the seed.
 #[must_use]
 pub fn sample_records(records: usize, seed: u64) -> Vec<usize> {

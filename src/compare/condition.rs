@@ -17,7 +17,8 @@ use crate::spectrum::Target;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Channels by which a model is judged, in order of preference. The deflection shows stick and slip best, but it
+/// Channels by which a model is judged, in order of preference. The deflection shows stick and slip best, but
+/// it
 /// needs the head.
 const JUDGED: [Channel; 3] = [Channel::Deflection, Channel::TipX, Channel::HeadX];
 
@@ -127,8 +128,10 @@ impl<'a> ConditionComparison<'a> {
         self.measured_side().unwrap_or_else(|| self.model_side())
     }
 
-    /// Noise of a recorded channel, m, as a trace fit measures it: against the smooth head and the glass, because
-    /// stick and slip move the tip as fast as noise does. Where neither is tracked, the scatter between frames.
+    /// Noise of a recorded channel, m, as a trace fit measures it: against the smooth head and the glass,
+    /// because
+    /// stick and slip move the tip as fast as noise does. Where neither is tracked, the scatter between
+    /// frames.
     /// `None` without a recording or without noise.
     pub(crate) fn noise_m(&self, channel: Channel) -> Option<f64> {
         let noise = self.noise.as_ref()?;

@@ -16,7 +16,8 @@ pub struct ComparisonSummary {
     pub recording: Option<String>,
     /// Shift added to the model's times, s.
     pub clock_shift_s: Option<f64>,
-    /// Standard deviation of the shift, s; infinite where the path does not determine it, `None` where no path
+    /// Standard deviation of the shift, s; infinite where the path does not determine it, `None` where no
+    /// path
     /// was aligned.
     pub clock_shift_sd_s: Option<f64>,
     /// Offset added to the model's head and tip along the sweep, m.

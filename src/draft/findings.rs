@@ -81,7 +81,8 @@ const SHARE_BEFORE_REVERSAL: f64 = 0.3;
 const BAND_FACTORS: [f64; 2] = [0.6, 1.5];
 /// Fraction of the Nyquist frequency above which exposure and tracker attenuate too much.
 const HIGHEST_SHARE: f64 = 0.8;
-/// Frequency between the ring-down of the head (78 Hz in the paper) and the stick-slip cycle (about 900 Hz), Hz.
+/// Frequency between the ring-down of the head (78 Hz in the paper) and the stick-slip cycle (about 900 Hz),
+/// Hz.
 const BETWEEN_HZ: f64 = 250.0;
 /// Largest relative standard deviation of a frequency that a job asks for.
 const MOST_RELATIVE_SD: f64 = 0.05;
@@ -91,7 +92,8 @@ const LOWEST_HZ: f64 = 10.0;
 /// Most reversals in a list.
 const MOST_TURNS: usize = 6;
 
-/// Components to look for after a reversal: name, channel, ends of the window after the release, s, and whether
+/// Components to look for after a reversal: name, channel, ends of the window after the release, s, and
+/// whether
 /// the frequency is below [`BETWEEN_HZ`].
 const WANTED_COMPONENTS: [(&str, Channel, [&str; 2], bool); 3] = [
     ("low", Channel::HeadDrop, ["+0.01", "+0.2"], true),
@@ -151,7 +153,8 @@ impl DraftFindings {
         })
     }
 
-    /// Findings for a model that is driven between two times, s; `moving` is the head, or the tip that follows
+    /// Findings for a model that is driven between two times, s; `moving` is the head, or the tip that
+    /// follows
     /// it.
     fn from_driving_trace(
         recording: &Recording,

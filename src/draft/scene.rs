@@ -150,7 +150,8 @@ pub(crate) struct FittedScene<'a> {
     pub result: &'a FitResult,
 }
 
-/// The scene of a fit at its estimates, with their intervals as comments; `None` for a start in the air, which
+/// The scene of a fit at its estimates, with their intervals as comments; `None` for a start in the air,
+/// which
 /// a scene file cannot express.
 pub(crate) fn write_fitted_scene(fitted: &FittedScene<'_>) -> Option<String> {
     let FittedScene { scene, condition, synthetic, recording, result } = *fitted;

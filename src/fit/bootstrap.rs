@@ -28,7 +28,8 @@ pub(crate) const MIN_TWINS: usize = 8;
 pub(crate) struct Bootstrap {
     /// Best points of the refits in the unit box, one per twin.
     pub refits: Vec<Vec<f64>>,
-    /// Standard deviation of each feature over the twins, in its own unit; `None` where fewer than two have it.
+    /// Standard deviation of each feature over the twins, in its own unit; `None` where fewer than two have
+    /// it.
     pub feature_sd: Vec<Option<f64>>,
 }
 

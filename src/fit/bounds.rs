@@ -148,7 +148,8 @@ impl Bounds {
     }
 }
 
-/// Clamps `unit` to 0 to 1. Minus zero becomes zero, so that equal points have equal bits; NaN becomes one half.
+/// Clamps `unit` to 0 to 1. Minus zero becomes zero, so that equal points have equal bits; NaN becomes one
+/// half.
 pub(crate) fn clamp_unit(unit: f64) -> f64 {
     if unit.is_nan() { 0.5 } else { unit.clamp(0.0, 1.0) + 0.0 }
 }

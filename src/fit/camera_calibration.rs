@@ -1,6 +1,7 @@
 //! Calibration errors of cameras and their effect on features.
 //!
-//! A camera measures a deflection `d` as `(1 + scale) d + offset`: its scale is known to half a percent, and a
+//! A camera measures a deflection `d` as `(1 + scale) d + offset`: its scale is known to half a percent, and
+//! a
 //! marker is never exactly on the hinge. Both numbers are unknowns with priors, common to all features of a
 //! recording. Their effect does not need a run of the model, so they are no search parameters: at every point
 //! of the search they minimise the cost (`CameraFit::estimate`), and the Jacobian is projected onto the
@@ -238,7 +239,8 @@ fn robust_weight(residual: f64) -> f64 {
 /// A target with its calibration and the feature of the model.
 type TargetObservation<'a> = (&'a TargetValue, TargetCalibration, Observation);
 
-/// Residual of a feature with the camera numbers at `place`, and its derivatives by them, in prior deviations.
+/// Residual of a feature with the camera numbers at `place`, and its derivatives by them, in prior
+/// deviations.
 fn linearize_residual(
     (target, calibration, observation): &TargetObservation,
     place: [f64; 2],
@@ -258,7 +260,8 @@ fn linearize_residual(
     (distance / sd, [0, 1].map(|k| slopes[k] * sds[k] * per_metre / sd))
 }
 
-/// Camera numbers, in prior deviations, that minimise the cost of the features. The cost grows logarithmically
+/// Camera numbers, in prior deviations, that minimise the cost of the features. The cost grows
+/// logarithmically
 /// far from the target and may have two minima, so that the descent starts from the prior mean and from the
 /// least-squares solution.
 fn minimize_camera_cost(pairs: &[TargetObservation]) -> [f64; 2] {

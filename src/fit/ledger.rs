@@ -83,7 +83,8 @@ impl<'a> Ledger<'a> {
         }
     }
 
-    /// The evaluations at `points` of the unit box, in their order. Points of this run are not evaluated again.
+    /// The evaluations at `points` of the unit box, in their order. Points of this run are not evaluated
+    /// again.
     ///
     /// # Errors
     /// [`StopReason`] if some could not be made; the others are kept.
@@ -219,7 +220,8 @@ impl<'a> Ledger<'a> {
         counts
     }
 
-    /// The points that this run has not evaluated, without repetitions and within the budget, and whether these
+    /// The points that this run has not evaluated, without repetitions and within the budget, and whether
+    /// these
     /// are all of them.
     fn new_points(&self, points: &[Vec<f64>]) -> (Vec<Vec<f64>>, bool) {
         let mut new: Vec<Vec<f64>> = Vec::new();

@@ -16,7 +16,8 @@ pub trait FeaturePredictor: Sync {
     /// [`RunFailure`] when the run ended before anything could be observed.
     fn predict_features(&self, values: &[f64]) -> Result<Vec<Observed>, RunFailure>;
 
-    /// The features of one simulated measurement of that model, with the noise, lost points and starting state
+    /// The features of one simulated measurement of that model, with the noise, lost points and starting
+    /// state
     /// of draw number `draw`.
     ///
     /// # Errors
@@ -37,7 +38,8 @@ pub struct Draw {
 
 /// A model that is seen through cameras.
 pub trait Model: Sync {
-    /// The recording of a condition of the job, counted from 0, by its camera; `values` are the free parameters
+    /// The recording of a condition of the job, counted from 0, by its camera; `values` are the free
+    /// parameters
     /// in job order, in their SI units.
     ///
     /// # Errors

@@ -32,7 +32,8 @@ impl FreedConstant {
     }
 }
 
-/// Constants or parameters that cannot be freed as the job asks: what was found, what was expected, what to do.
+/// Constants or parameters that cannot be freed as the job asks: what was found, what was expected, what to
+/// do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{0}")]
 pub struct NuisanceError(String);
@@ -93,7 +94,8 @@ fn free_all_constants(sd_relative: f64, job: &Job, scenes: &[Scene]) -> Vec<Free
     scene.written_values().filter(is_freed).map(freed).collect()
 }
 
-/// Whether a parameter is a constant with an error of percents. Lengths and centres of mass are exact, friction
+/// Whether a parameter is a constant with an error of percents. Lengths and centres of mass are exact,
+/// friction
 /// is sought, and drive and restitution belong to the experiment.
 fn is_constant(parameter: &ModelParameter) -> bool {
     use ParameterQuantity as Q;

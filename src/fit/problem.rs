@@ -93,7 +93,8 @@ impl Problem {
     /// Combines a job with its scenes, one per condition ([`Job::conditions`]), and its recordings, one per
     /// condition that has a recording, both in the order of the job.
     ///
-    /// The values that a condition sets replace those of its scene. Both bounds of every free parameter have to
+    /// The values that a condition sets replace those of its scene. Both bounds of every free parameter have
+    /// to
     /// be valid in every scene.
     ///
     /// # Errors
@@ -331,7 +332,8 @@ struct RecordingIdentity<'a> {
 // first segment.
 
 impl Problem {
-    /// The model with the fitted constants and starting states of a result. In a fit of features it is the model
+    /// The model with the fitted constants and starting states of a result. In a fit of features it is the
+    /// model
     /// of the problem.
     ///
     /// # Errors

@@ -54,7 +54,8 @@ pub struct ParameterResult {
     pub verdict: ParameterVerdict,
     /// Interval by the linear model at the estimates, if it determines the parameter.
     pub linear_95: Option<[f64; 2]>,
-    /// Lower and upper crossing of the threshold by the profile of the cost; `None` where there is none within the
+    /// Lower and upper crossing of the threshold by the profile of the cost; `None` where there is none
+    /// within the
     /// bounds.
     pub profile_95: [Option<f64>; 2],
     /// Interval by refits to twins of the best model.
@@ -80,7 +81,8 @@ pub struct NuisanceResult {
     /// The recording whose camera it belongs to; `None` for a constant of the scene.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recording: Option<String>,
-    /// Key of the scene, or `tilt_rad`, `scale_relative`, `offset_x_m`, `offset_drop_m`, `clock_s` of a camera.
+    /// Key of the scene, or `tilt_rad`, `scale_relative`, `offset_x_m`, `offset_drop_m`, `clock_s` of a
+    /// camera.
     pub name: String,
     /// Mean of its prior.
     pub prior: f64,
@@ -153,7 +155,8 @@ pub struct ComponentResult {
     pub tolerance_relative: f64,
     /// Whether the relative error is within the tolerance.
     pub pass: bool,
-    /// Scatter of the model's frequency between neighbouring points, Hz; it is added to the target's deviation.
+    /// Scatter of the model's frequency between neighbouring points, Hz; it is added to the target's
+    /// deviation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model_scatter_hz: Option<f64>,
     /// Standard deviation of the model's frequency over its starting states, Hz.
@@ -193,7 +196,8 @@ pub struct FeatureResult {
     pub model_seen: Option<f64>,
     /// `model_seen / target - 1`, or `model / target - 1` without camera errors.
     pub relative_error: Option<f64>,
-    /// Whether that value is within the 95 % interval of the target. For a held-out feature the interval includes
+    /// Whether that value is within the 95 % interval of the target. For a held-out feature the interval
+    /// includes
     /// the calibration errors of its camera.
     pub pass: bool,
     /// Scatter of the model's value between neighbouring points; it is added to the target's deviation.
@@ -268,7 +272,8 @@ pub struct FitResult {
     pub gate: Identifiability,
     /// Ends of the local searches in ascending order of cost.
     pub waterfall: Vec<LocalOptimum>,
-    /// `d ln feature / d ln parameter` at the estimates, by feature and parameter; `None` where it is undefined.
+    /// `d ln feature / d ln parameter` at the estimates, by feature and parameter; `None` where it is
+    /// undefined.
     pub sensitivities: BTreeMap<String, BTreeMap<String, Option<f64>>>,
     /// Evaluations of the model.
     pub evaluations: EvaluationCounts,
@@ -325,7 +330,8 @@ impl FitResult {
         self.components.iter().all(|component| component.pass)
     }
 
-    /// Whether the model explains the recordings. In a fit of features, a camera far from its prior is evidence
+    /// Whether the model explains the recordings. In a fit of features, a camera far from its prior is
+    /// evidence
     /// against the model.
     #[must_use]
     pub fn explains_recordings(&self) -> bool {
@@ -344,7 +350,8 @@ const HASH_DIGITS: usize = 64;
 /// Digits of a hash in an error message.
 const SHORT_HASH_DIGITS: usize = 12;
 
-/// Appends the hash of a pretty-printed JSON object as its last key: the SHA-256 of the whole text with zeros in
+/// Appends the hash of a pretty-printed JSON object as its last key: the SHA-256 of the whole text with zeros
+/// in
 /// place of the digits of the hash.
 pub(super) fn append_hash(object: &str) -> String {
     let open = object.trim_end().trim_end_matches('}').trim_end();

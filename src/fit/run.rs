@@ -34,7 +34,8 @@ pub fn job_warnings(job: &Job) -> Vec<String> {
     uncertainty::count_warning(job.targets.len(), None, job.parameters.len()).into_iter().collect()
 }
 
-/// Fits the job's parameters. `measured` has an entry per condition, `None` where it has no recording; `model`
+/// Fits the job's parameters. `measured` has an entry per condition, `None` where it has no recording;
+/// `model`
 /// gives the recordings of the model at parameter values.
 ///
 /// Every new evaluation is written to `journal` as a line and reported to `on_progress`. A new journal starts

@@ -21,10 +21,12 @@ use std::f64::consts::TAU;
 /// Most evaluations of the right-hand side in a run: a hundred times the cost of a reversal, a few seconds.
 const MAX_EVALUATIONS: u64 = 20_000_000;
 
-/// Relative tolerance of the model's runs. Features are measured to 1e-3, and the transitions at 1e-6 are those
+/// Relative tolerance of the model's runs. Features are measured to 1e-3, and the transitions at 1e-6 are
+/// those
 /// at 1e-8.
 const TOLERANCE: f64 = 1e-6;
-/// Reference angle of a spread of starting states where the blade starts upright, rad: a blade in use leans by
+/// Reference angle of a spread of starting states where the blade starts upright, rad: a blade in use leans
+/// by
 /// 0.1 to 1 rad.
 const REFERENCE_LEAN_RAD: f64 = 0.1;
 /// Distance between the seeds of two conditions, so that they never share noise.
@@ -35,7 +37,8 @@ const CONDITION_SEEDS: u64 = 1 << 32;
 pub struct Instrument {
     /// The camera.
     pub camera: Camera,
-    /// Standard deviation of a tracked coordinate, m. It is added to the model too, because noise biases features
+    /// Standard deviation of a tracked coordinate, m. It is added to the model too, because noise biases
+    /// features
     /// such as the time of release or the power in a band.
     pub noise_m: f64,
     /// Fraction of frames in which a point is lost; only twins lose points.

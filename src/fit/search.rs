@@ -2,7 +2,8 @@
 //! then a polish of the best point until it gains nothing.
 //!
 //! Covariance matrix adaptation and damped Gauss-Newton steps are implemented here; the simplex is argmin's
-//! (`simplex.rs`). The ledger keeps budgets, the best point and every failure, so the solvers never see errors
+//! (`simplex.rs`). The ledger keeps budgets, the best point and every failure, so the solvers never see
+//! errors
 //! or costs that are not numbers.
 
 mod excluded_region_search;

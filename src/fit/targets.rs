@@ -85,7 +85,8 @@ fn measure_target(
     Ok(TargetValue { name, value, sd, scatter: 0.0, measure, last, calibration: None })
 }
 
-/// Standard deviation of each feature over noisier copies of the recordings; `None` where no more than half of
+/// Standard deviation of each feature over noisier copies of the recordings; `None` where no more than half
+/// of
 /// them have it.
 fn copy_scatter(features: &[Feature], measured: &[Option<Recording>]) -> Vec<Option<f64>> {
     let noise = |m: &Option<Recording>| measure_quality(m.as_ref()?, None).head_x.noise_m;
@@ -135,7 +136,8 @@ fn not_measurable_error(aim: &FitTarget, measured: &[Option<Recording>], problem
 /// feature spans, so that any value costs less than a missing one.
 pub(crate) const MAX_RATIO: f64 = 100.0;
 
-/// Least relative standard deviation in the first stage. Far from the targets all features are many deviations
+/// Least relative standard deviation in the first stage. Far from the targets all features are many
+/// deviations
 /// off, and the most precise ones would dominate the cost.
 pub(crate) const FIRST_STAGE_SD_RELATIVE: f64 = 0.05;
 
@@ -177,7 +179,8 @@ impl TargetValue {
         }
     }
 
-    /// Distance between two values, in the units of [`Self::distance`]; zero where the logarithm is undefined.
+    /// Distance between two values, in the units of [`Self::distance`]; zero where the logarithm is
+    /// undefined.
     pub(crate) fn distance_between(&self, value: f64, from: f64) -> f64 {
         match self.measure {
             ValueComparison::Log => {

@@ -32,7 +32,8 @@ impl Problem {
     /// The result depends neither on the number of threads nor on interruptions.
     ///
     /// # Errors
-    /// [`FitError`]. A search that stops early or does not converge is not an error but a status of the result.
+    /// [`FitError`]. A search that stops early or does not converge is not an error but a status of the
+    /// result.
     pub(crate) fn fit_traces(
         &self,
         resume: Option<(&str, &TraceCheckpoint)>,

@@ -48,7 +48,8 @@ fn combine_stages<const N: usize, const M: usize>(
 }
 
 impl<const N: usize> StepStages<N> {
-    /// Takes the step; `first` is the derivative at its start, `f(t, y)` the right-hand side (12 evaluations).
+    /// Takes the step; `first` is the derivative at its start, `f(t, y)` the right-hand side (12
+    /// evaluations).
     #[inline]
     pub(crate) fn take_step(
         f: impl Fn(f64, &[f64; N]) -> [f64; N],
@@ -76,7 +77,8 @@ impl<const N: usize> StepStages<N> {
         &self.k[12]
     }
 
-    /// Combined error estimate in units of the tolerance; a step with at most 1 is accepted. `scale` is the tolerated
+    /// Combined error estimate in units of the tolerance; a step with at most 1 is accepted. `scale` is the
+    /// tolerated
     /// error of each component.
     #[inline]
     pub(crate) fn error_norm(&self, scale: &[f64; N]) -> f64 {
@@ -147,8 +149,10 @@ impl<const N: usize> DenseOutput<N> for StepOutput<N> {
     }
 }
 
-// Coefficients of the Dormand-Prince method of order 8 with embedded orders 5 and 3 and dense output of order 7.
-// Source: E. Hairer, S. P. Nørsett, G. Wanner, "Solving Ordinary Differential Equations I", 2nd ed., Springer 1993,
+// Coefficients of the Dormand-Prince method of order 8 with embedded orders 5 and 3 and dense output of order
+// 7.
+// Source: E. Hairer, S. P. Nørsett, G. Wanner, "Solving Ordinary Differential Equations I", 2nd ed., Springer
+// 1993,
 // section II.5, and the authors' code DOP853. Stages count from 0.
 
 /// Joins the lines of a table.

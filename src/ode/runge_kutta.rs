@@ -1,4 +1,5 @@
-//! The Dormand-Prince 8(5,3) method with error control, up to the first guard that falls. Roots are isolated on nine
+//! The Dormand-Prince 8(5,3) method with error control, up to the first guard that falls. Roots are isolated
+//! on nine
 //! samples of the dense output; a step of the method's own order gives the state there.
 
 use super::dop853::{ERROR_EXPONENT, EVALUATIONS_FOR_DENSE, EVALUATIONS_PER_STEP, StepOutput, StepStages};
@@ -8,22 +9,26 @@ use super::slack_variable::{MOST_HALVINGS, SlackVariable, StatePoint};
 use super::{AcceptedStep, HybridPhase, ObserverReply, PhaseEnd, PhaseEndCause, PhaseStart, WorkCounters};
 use crate::math;
 
-/// How the time at which a guard falls to zero is located. Which guard falls first, double roots included, always
+/// How the time at which a guard falls to zero is located. Which guard falls first, double roots included,
+/// always
 /// follows from the dense output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum EventLocator {
-    /// The root is bracketed on the dense output, the step repeated up to it and the remainder closed by Newton's
+    /// The root is bracketed on the dense output, the step repeated up to it and the remainder closed by
+    /// Newton's
     /// iteration.
     #[default]
     Bracket,
-    /// The step is rejected and a slack variable, as the independent variable, brought to zero. A guard that turns
+    /// The step is rejected and a slack variable, as the independent variable, brought to zero. A guard that
+    /// turns
     /// inside the step is bracketed until it falls.
     Slack,
 }
 
 /// Integrates `phase` from `start` until `stop` or a guard; `observe` sees every accepted step.
 ///
-/// `relative` is the tolerated error of a step relative to each state, or to its [`HybridPhase::scale`] where that
+/// `relative` is the tolerated error of a step relative to each state, or to its [`HybridPhase::scale`] where
+/// that
 /// is larger.
 pub fn integrate<const N: usize, const G: usize, P: HybridPhase<N, G>, A: ObserverReply>(
     phase: &P,
@@ -83,7 +88,8 @@ pub fn integrate_with_locator<const N: usize, const G: usize, P: HybridPhase<N, 
     }
 }
 
-/// Largest and least factor of the step size (Hairer's code), and the share of the predicted step that is taken.
+/// Largest and least factor of the step size (Hairer's code), and the share of the predicted step that is
+/// taken.
 const GROWTH: (f64, f64, f64) = (6.0, 1.0 / 3.0, 0.9);
 /// Influence of the last step's error on the step size (the beta of Hairer's code, section IV.2).
 const STABILISATION: f64 = 0.04;
@@ -97,10 +103,12 @@ const OUT_OF_DOMAIN: f64 = 0.1;
 const STRETCH: f64 = 1.01;
 /// Length of step, in units of the rounding of time, up to which a guard that starts at zero is ignored.
 const SLIVER_STEP: f64 = 64.0;
-/// Most remainder of a guard at its located zero, as a share of its largest sample. With more, the polynomial through
+/// Most remainder of a guard at its located zero, as a share of its largest sample. With more, the polynomial
+/// through
 /// the samples has a root that the guard does not have, and a shorter step is taken.
 const MOST_GUARD_REMAINDER: f64 = 1e-3;
-/// Length of step, in units of the rounding of time, below which a shorter one shows no more of a guard: over it, a
+/// Length of step, in units of the rounding of time, below which a shorter one shows no more of a guard: over
+/// it, a
 /// double zero at the start opens by less than the rounding of the state.
 const SHORTEST_TELLING_STEP: f64 = 1e8;
 
@@ -169,7 +177,8 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> AdaptiveRun<'a, N
             (v.iter().zip(&tolerated).map(|(v, s)| math::powi(v / s, 2)).sum::<f64>() / N as f64).sqrt()
         };
         let (d0, d1) = (norm(&self.y), norm(&self.derivative));
-        // a state that happens to be almost zero says nothing of its time scale, but the step must advance the time
+        // a state that happens to be almost zero says nothing of its time scale, but the step must advance
+        // the time
         let shortest = SHORTEST_START * f64::EPSILON * self.t.abs();
         let h0 = if d0 < 1e-5 || d1 < 1e-5 { 1e-6 } else { 0.01 * d0 / d1 }.max(shortest);
         let euler: [f64; N] = std::array::from_fn(|i| self.y[i] + h0 * self.derivative[i]);
@@ -274,7 +283,8 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> AdaptiveRun<'a, N
         EventLocation::At { guard, t, y }
     }
 
-    /// State at the event by the slack variable, from the start of the step, or from nearer the zero if the guard turns
+    /// State at the event by the slack variable, from the start of the step, or from nearer the zero if the
+    /// guard turns
     /// before it falls; `None` for a guard that turns too close to its zero.
     fn land_by_slack(
         &mut self,
@@ -306,14 +316,16 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> AdaptiveRun<'a, N
         None
     }
 
-    /// State at the event to the order of the method: the step is repeated up to the root of the dense output, then
+    /// State at the event to the order of the method: the step is repeated up to the root of the dense
+    /// output, then
     /// Newton's iteration on the guard closes the remainder with short steps.
     fn refine_event(&mut self, stages: &StepStages<N>, guard: usize, fraction: f64) -> (f64, [f64; N]) {
         /// Most corrections; one is usual, because the dense output's root is accurate to its order.
         const ROUNDS: usize = 4;
         /// Share of the step above which a correction is dropped: the guard only grazes zero.
         const GRAZING: f64 = 1e-3;
-        /// Share of the step over which the guard's slope is measured, which is the relative error of a correction.
+        /// Share of the step over which the guard's slope is measured, which is the relative error of a
+        /// correction.
         const PROBE: f64 = 1e-6;
         if fraction * stages.h <= 4.0 * f64::EPSILON * stages.t.abs() {
             return (stages.t, stages.y);
@@ -366,7 +378,8 @@ impl<const N: usize, const G: usize, P: HybridPhase<N, G>> GuardSamples<'_, N, G
         }
     }
 
-    /// Guards that may reach zero: those that start or end there and those that the quick test cannot exclude.
+    /// Guards that may reach zero: those that start or end there and those that the quick test cannot
+    /// exclude.
     fn find_suspects(&mut self, zero_order: &[u8; G]) -> [bool; G] {
         self.sample_at([2, 4, 6, 7]);
         std::array::from_fn(|g| {

@@ -1,7 +1,9 @@
-//! Work-precision study: error and cost of every method on a scene, against a reference with a tenfold tighter
+//! Work-precision study: error and cost of every method on a scene, against a reference with a tenfold
+//! tighter
 //! tolerance.
 //!
-//! Errors are those of transition times, of the deflection at common times, and of two spectral components. The
+//! Errors are those of transition times, of the deflection at common times, and of two spectral components.
+//! The
 //! caller measures the run times.
 
 mod reference;
@@ -46,7 +48,8 @@ impl SolverSetting {
     }
 }
 
-/// All settings for a scene: each adaptive method at each tolerance, then the fixed steps, unless the scene has
+/// All settings for a scene: each adaptive method at each tolerance, then the fixed steps, unless the scene
+/// has
 /// flight or impacts.
 pub(crate) fn list_settings(scene: &Scene) -> Vec<SolverSetting> {
     let adaptive = [IntegrationMethod::Taylor, IntegrationMethod::RungeKutta, IntegrationMethod::Slack];
@@ -76,7 +79,8 @@ fn setting_cells(row: &AccuracyRow) -> [String; 3] {
     [setting.relative_tolerance, setting.method.step_s(), lists.worst_s].map(format_optional)
 }
 
-/// `work-precision.csv`: one row per setting. `error` is the worst error of a transition time, s, and empty if the
+/// `work-precision.csv`: one row per setting. `error` is the worst error of a transition time, s, and empty
+/// if the
 /// transitions differ from the reference's.
 pub(crate) fn write_work_precision_csv(rows: &[AccuracyRow]) -> String {
     let row = |r: &AccuracyRow| {
@@ -88,7 +92,8 @@ pub(crate) fn write_work_precision_csv(rows: &[AccuracyRow]) -> String {
     std::iter::once(header.to_owned()).chain(rows.iter().map(row)).collect()
 }
 
-/// `accuracy.csv`: all errors of every setting. `above_reference_uncertainty` says whether the error of transition
+/// `accuracy.csv`: all errors of every setting. `above_reference_uncertainty` says whether the error of
+/// transition
 /// times exceeds the difference of the two references.
 pub(crate) fn write_accuracy_csv(reference: &ReferenceRun<'_>, rows: &[AccuracyRow]) -> String {
     let row = |r: &AccuracyRow| {

@@ -7,13 +7,15 @@ use nalgebra::{Matrix2, Vector2};
 /// Angles of neck and lip, rad, or moments on them, N m.
 type Pair = Vector2<f64>;
 
-/// Steps in which friction rises from zero to its value, so that each Newton iteration starts near its solution.
+/// Steps in which friction rises from zero to its value, so that each Newton iteration starts near its
+/// solution.
 const LOAD_STEPS: u32 = 64;
 const MOST_ITERATIONS: u32 = 50;
 /// Convergence limit of the residual moment relative to the stiffness of neck and lip times a radian.
 const RESIDUAL: f64 = 1e-14;
 
-/// Pose with `A qdd = 0` under the friction at the head's speed, m/s; `None` if the head rests, if no such pose
+/// Pose with `A qdd = 0` under the friction at the head's speed, m/s; `None` if the head rests, if no such
+/// pose
 /// exists with both links above level, or if the glass would have to pull the tip.
 #[must_use]
 pub fn steady_slip_pose(linkage: &Linkage, speed_m_per_s: f64) -> Option<Pose> {
@@ -73,7 +75,8 @@ pub(super) fn shoulder_contact(linkage: &Linkage, theta: f64) -> ShoulderContact
     linkage.shoulder.map_or(ShoulderContact::Off, |s| s.contact_at(theta))
 }
 
-/// The equilibrium at one load. The side of the shoulder is fixed in each iteration, because Newton's steps could
+/// The equilibrium at one load. The side of the shoulder is fixed in each iteration, because Newton's steps
+/// could
 /// cycle across the kink at its corner.
 fn solve_for_load(linkage: &Linkage, mu: f64, angles: Pair) -> Option<Pair> {
     let here = shoulder_contact(linkage, angles[0]);
@@ -102,7 +105,8 @@ fn solve_newton(linkage: &Linkage, mu: f64, mut angles: Pair, side: ShoulderCont
     None
 }
 
-/// Residual moments of springs, normal force and friction on neck and lip at rest, N m: equations (1) and (2) of
+/// Residual moments of springs, normal force and friction on neck and lip at rest, N m: equations (1) and (2)
+/// of
 /// [`crate::model`] without rates.
 pub(super) fn residual_moments(linkage: &Linkage, mu: f64, angles: &Pair, side: ShoulderContact) -> Pair {
     let pose = pose_at_rest(angles);

@@ -61,7 +61,8 @@ enum NextPhase {
     End(RunStatus),
 }
 
-/// A transition to record once the next mode is known: the mode before, and the cause unless the forces decide it.
+/// A transition to record once the next mode is known: the mode before, and the cause unless the forces
+/// decide it.
 type PendingTransition = Option<(TipMode, Option<TransitionCause>)>;
 
 impl<'a, W: RunWatcher> EventLoop<'a, W> {
@@ -175,7 +176,8 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
         }
     }
 
-    /// Removes the residual tip velocity of event location by an impulse on the tip, so that the decision sees a
+    /// Removes the residual tip velocity of event location by an impulse on the tip, so that the decision
+    /// sees a
     /// tip exactly at rest. The residual is rounding, or the tolerance if the tip only grazes rest.
     fn remove_tip_velocity(&self, mut pose: Pose) -> Pose {
         if matches!(self.effort.method, IntegrationMethod::FixedStep(scheme) if scheme.gain_per_s > 0.0) {
@@ -316,7 +318,8 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
             }
             Ended::StepTooSmall => NextPhase::End(RunStatus::Diverged),
             Ended::Guard(JAMS) if self.is_at_pole(&phase, &pose) => self.resolve_jam(&pose, mode),
-            // extrapolated past rest, steeply falling friction grows without bound, and the interpolant of the
+            // extrapolated past rest, steeply falling friction grows without bound, and the interpolant of
+            // the
             // indicator may dip below zero although the indicator does not: the phase goes on from this state
             Ended::Guard(JAMS) => {
                 self.recent.note_event(self.t);
@@ -351,7 +354,8 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
     }
 
     /// Whether the tip is about to jam. Near the paradox the indicator vanishes as the square root of the
-    /// remaining time and the normal force grows without bound. No step resolves the last instant; a step beyond
+    /// remaining time and the normal force grows without bound. No step resolves the last instant; a step
+    /// beyond
     /// it, by rounding, finds a force that pulls.
     fn is_at_pole(&self, phase: &SlipPhase<'_>, pose: &Pose) -> bool {
         /// An empirical limit: of 300 random blades with heavy heads, runs that ended at the paradox had an
@@ -377,7 +381,8 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
 /// Order of the zero of the tip's velocity as slip starts from rest: 1 if friction is less than the holding
 /// force, 2 if both are equal up to rounding, as at the end of stick.
 fn release_order(contact: &FrictionResponse, mu: f64) -> u8 {
-    /// Relative excess over the limit up to which the forces count as equal: far above rounding, far below the
+    /// Relative excess over the limit up to which the forces count as equal: far above rounding, far below
+    /// the
     /// resolution of a step.
     const EQUAL: f64 = 1e-11;
     let force = holding_force(contact);
@@ -446,7 +451,8 @@ pub(super) struct ChatterDetector {
 impl ChatterDetector {
     /// Number of recent events.
     const WINDOW: usize = 64;
-    /// Fraction of the blade's shortest period in which this many events count as chattering; real cycles take
+    /// Fraction of the blade's shortest period in which this many events count as chattering; real cycles
+    /// take
     /// about a period each.
     const SHARE: f64 = 1e-6;
 
@@ -502,7 +508,8 @@ impl<O: Observer> RunWatcher for ObserverWatcher<'_, O> {
 mod tests {
     use super::*;
 
-    /// A full window of events within a millionth of the shortest period is chattering; one event per period is
+    /// A full window of events within a millionth of the shortest period is chattering; one event per period
+    /// is
     /// not.
     #[test]
     fn events_that_accumulate_differ_from_cycles() {

@@ -1,12 +1,15 @@
-//! The paper's scheme, for comparison: classical Runge-Kutta with fixed steps on all four states. Stick is the
-//! constraint `Phi = v3 - alpha = 0` on accelerations, stabilised after Baumgarte (Comp. Meth. Appl. Mech. Eng.
+//! The paper's scheme, for comparison: classical Runge-Kutta with fixed steps on all four states. Stick is
+//! the
+//! constraint `Phi = v3 - alpha = 0` on accelerations, stabilised after Baumgarte (Comp. Meth. Appl. Mech.
+//! Eng.
 //! 1, 1972),
 //!
 //! ```text
 //! Phi'' + 2 a Phi' + b^2 Phi = 0,   a = b
 //! ```
 //!
-//! Transitions happen at the end of a step or are located by the slack variable method. The paper gives neither
+//! Transitions happen at the end of a step or are located by the slack variable method. The paper gives
+//! neither
 //! step nor gain.
 
 use super::phases::{ContactInstant, DrivenBlade, GUARDS, TipForces, apply_friction, pose_from_states};
@@ -16,7 +19,8 @@ use crate::ode::HybridPhase;
 pub(crate) use crate::ode::fixed_step::FixedStepLocator;
 use crate::ode::fixed_step::FixedStepOptions;
 
-/// Default gain of the stabilisation, 1/s: drift of the tip decays within 0.1 ms, a tenth of a stick-slip cycle.
+/// Default gain of the stabilisation, 1/s: drift of the tip decays within 0.1 ms, a tenth of a stick-slip
+/// cycle.
 pub(crate) const DEFAULT_GAIN_PER_S: f64 = 1e4;
 /// Largest stable product of gain and step for the double pole at `-a` (Hairer and Wanner, "Solving Ordinary
 /// Differential Equations II", section IV.2).
@@ -29,7 +33,8 @@ pub struct FixedStepScheme {
     pub step_s: f64,
     /// Method of locating transitions.
     pub locate: FixedStepLocator,
-    /// Gains `a = b` of the stabilisation, 1/s. With zero gain the tip's velocity is removed at the transition,
+    /// Gains `a = b` of the stabilisation, 1/s. With zero gain the tip's velocity is removed at the
+    /// transition,
     /// because it would not decay.
     pub gain_per_s: f64,
 }

@@ -87,7 +87,8 @@ pub fn solve_impact(
     relative: f64,
     work: &mut WorkCounters,
 ) -> Option<ImpactOutcome> {
-    /// Ratio of tangential to normal velocity above which the tangential one sets the unit of velocity, so that
+    /// Ratio of tangential to normal velocity above which the tangential one sets the unit of velocity, so
+    /// that
     /// the quotient stays finite.
     const FLATTEST: f64 = 1e12;
     let unit = before.normal.abs().max(before.tangential.abs() / FLATTEST);
@@ -219,7 +220,8 @@ impl ScaledImpact {
         Some(next)
     }
 
-    /// The slip of a jam, down to rest. No stage ends it: the normal velocity starts at a zero of unknown order,
+    /// The slip of a jam, down to rest. No stage ends it: the normal velocity starts at a zero of unknown
+    /// order,
     /// which depends on how the indicator vanished.
     fn integrate_jam(&self, state: ImpactState, work: &mut WorkCounters) -> Option<ImpactState> {
         let slide = ImpactSlip { blow: self, direction: state.tangential.signum(), from: state, open: true };
@@ -237,7 +239,8 @@ const REOPENS: usize = 2;
 
 /// Slip in one direction as a function of the normal impulse.
 ///
-/// States: change of the tangential speed in that direction, which is far smaller than the speed in a glancing
+/// States: change of the tangential speed in that direction, which is far smaller than the speed in a
+/// glancing
 /// impact, and work of the normal force.
 struct ImpactSlip<'a> {
     blow: &'a ScaledImpact,

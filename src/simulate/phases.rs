@@ -131,7 +131,8 @@ pub(crate) fn pose_from_states(y: &[f64; 4]) -> Pose {
 }
 
 impl SlipPhase<'_> {
-    /// Speed of the tip in the direction of slip, m/s, and the forces `f = -sigma mu N`, `N = n_free / (1 + sigma mu
+    /// Speed of the tip in the direction of slip, m/s, and the forces `f = -sigma mu N`, `N = n_free / (1 +
+    /// sigma mu
     /// nu)`.
     #[inline]
     pub(super) fn slip_forces(&self, pose: &Pose, at: &ContactInstant) -> (f64, TipForces) {
@@ -205,7 +206,8 @@ impl TaylorPhase<4, GUARDS> for SlipPhase<'_> {
     }
 }
 
-/// Stick: the tip is held at `place_m`. The states are angle and rate of the free link; the other link follows
+/// Stick: the tip is held at `place_m`. The states are angle and rate of the free link; the other link
+/// follows
 /// from `l1 sin theta + l2 sin phi = place - v(t)`, so the tip cannot drift.
 #[derive(Debug, Clone, Copy)]
 pub struct StickPhase<'a> {
@@ -226,7 +228,8 @@ enum Link {
 }
 
 impl<'a> StickPhase<'a> {
-    /// Cosine of the follower at which it counts as level, 1e-3 rad early. At level the follower's rate is 0/0 and
+    /// Cosine of the follower at which it counts as level, 1e-3 rad early. At level the follower's rate is
+    /// 0/0 and
     /// its cosine does not change sign; 1e-3 rad before, the state loses about nine bits.
     const LEAST_COSINE: f64 = 1e-3;
 
@@ -250,7 +253,8 @@ impl<'a> StickPhase<'a> {
         }
     }
 
-    /// Pose and directions from the two states: the follower's angle from the tip's position, its rate from the
+    /// Pose and directions from the two states: the follower's angle from the tip's position, its rate from
+    /// the
     /// tip's rest.
     #[inline]
     pub(super) fn full_pose(&self, head: &HeadMotion, y: &[f64; 2]) -> (Pose, LinkDirections) {

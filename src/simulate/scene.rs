@@ -51,7 +51,8 @@ impl Scene {
     /// Reads and validates a scene that needs no other file; error texts call it `file`.
     ///
     /// # Errors
-    /// [`SceneError`] with file, line, key, finding and advice; also for a scene with `drive.recording`, which
+    /// [`SceneError`] with file, line, key, finding and advice; also for a scene with `drive.recording`,
+    /// which
     /// needs [`Self::parse_with_recording`].
     pub fn parse(file: &str, text: &str) -> Result<Self, SceneError> {
         Self::parse_with_recording(file, text, |path| {
@@ -139,7 +140,8 @@ impl Scene {
         Ok(scene)
     }
 
-    /// The same scene driven by the head of a recording. The run covers the tracked time without its uncertain
+    /// The same scene driven by the head of a recording. The run covers the tracked time without its
+    /// uncertain
     /// ends; a start in steady slip waits until the head moves.
     ///
     /// # Errors

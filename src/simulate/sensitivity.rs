@@ -1,9 +1,13 @@
-//! Derivatives of a run by parameters, initial state and drive, within the tolerance, along the steps of the run
+//! Derivatives of a run by parameters, initial state and drive, within the tolerance, along the steps of the
+//! run
 //! and through its transitions.
 //!
-//! Between transitions the derivatives obey the linear equations of [`crate::model::tangent`] along the series of
-//! each step. Collocation ([`crate::ode::collocation`]) solves them; all directions share one factorisation per
-//! step. At the zero of a guard `G` the transition time changes by `d tau = -dG / G'` and the derivative of the
+//! Between transitions the derivatives obey the linear equations of [`crate::model::tangent`] along the
+//! series of
+//! each step. Collocation ([`crate::ode::collocation`]) solves them; all directions share one factorisation
+//! per
+//! step. At the zero of a guard `G` the transition time changes by `d tau = -dG / G'` and the derivative of
+//! the
 //! state jumps (saltation; Leine and Nijmeijer, "Dynamics and Bifurcations of Non-Smooth Mechanical Systems",
 //! chapter 7),
 //!
@@ -11,7 +15,8 @@
 //! d y+ = R_y (d y- + f- d tau) + R_p - f+ d tau
 //! ```
 //!
-//! with the right-hand sides `f` before and after and the map `R` of an impact, elsewhere the identity. A guard
+//! with the right-hand sides `f` before and after and the map `R` of an impact, elsewhere the identity. A
+//! guard
 //! that only grazes zero makes the derivative infinite; from there on derivatives are unknown.
 
 mod propagation;
@@ -34,7 +39,8 @@ pub use tangent_segment::{Channel, ChannelWeights, TangentSegment};
 pub trait TangentObserver {
     /// Receives a piece of the solution, in order of time.
     fn observe_segment(&mut self, piece: &TangentSegment<'_>);
-    /// Receives a change of mode, between the pieces that it separates. `d_time_s` are the derivatives of its time,
+    /// Receives a change of mode, between the pieces that it separates. `d_time_s` are the derivatives of its
+    /// time,
     /// s per unit of each direction; `None` if they do not exist.
     fn observe_transition(&mut self, _transition: &Transition, _d_time_s: Option<&[f64]>) {}
     /// Is asked after every piece; `Break` ends the run as `RunStatus::Interrupted`.
@@ -52,14 +58,16 @@ pub struct TangentRunner {
 
 impl TangentRunner {
     /// A runner with derivatives to the relative accuracy `relative` within a step, for searches that need no
-    /// more; at the ends of steps they are far more accurate. The default accuracy is the tolerance of the run,
+    /// more; at the ends of steps they are far more accurate. The default accuracy is the tolerance of the
+    /// run,
     /// which this does not change.
     #[must_use]
     pub fn with_accuracy(relative: f64) -> Self {
         Self { room: TangentWorkspace::default(), accuracy: Some(relative) }
     }
 
-    /// Runs a scene with its derivatives, always by Taylor series. Solution and transitions have the same bits as
+    /// Runs a scene with its derivatives, always by Taylor series. Solution and transitions have the same
+    /// bits as
     /// with [`run_scene_with`](super::run_scene_with).
     ///
     /// `seeds` belong to a scene with the same parameters and drive; start and stop may differ.
@@ -93,7 +101,8 @@ pub fn run_with_tangents(
 
 // Central differences of cheap, smooth functions.
 
-/// Steps and weights of the six-point central difference of order 6 (Fornberg, Math. Comp. 51, 1988, table 1).
+/// Steps and weights of the six-point central difference of order 6 (Fornberg, Math. Comp. 51, 1988, table
+/// 1).
 pub(super) const SIX_POINTS: [(f64, f64); 6] = [
     (-3.0, -1.0 / 60.0),
     (-2.0, 9.0 / 60.0),
@@ -103,7 +112,8 @@ pub(super) const SIX_POINTS: [(f64, f64); 6] = [
     (3.0, 1.0 / 60.0),
 ];
 
-/// Step relative to the scale of the function: truncation, its sixth power, is below rounding, and rounding over
+/// Step relative to the scale of the function: truncation, its sixth power, is below rounding, and rounding
+/// over
 /// the step is 1e-13.
 pub(super) const DIFFERENCE_STEP: f64 = 1e-3;
 

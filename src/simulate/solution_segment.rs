@@ -97,7 +97,8 @@ impl<'a> SolutionSegment<'a> {
         Self { start_s: step.start, end_s: step.end, mode, motion, solution }
     }
 
-    /// Positions of head and tip over the piece and their integrals; from Taylor polynomials if the method has
+    /// Positions of head and tip over the piece and their integrals; from Taylor polynomials if the method
+    /// has
     /// them.
     #[must_use]
     pub fn path(&self) -> SegmentPath<'_> {
@@ -118,7 +119,8 @@ impl<'a> SolutionSegment<'a> {
         }
     }
 
-    /// Positions of head and tip at a time within the piece; the same bits as in [`Self::sample_at`], without the
+    /// Positions of head and tip at a time within the piece; the same bits as in [`Self::sample_at`], without
+    /// the
     /// cost of forces and energies.
     #[must_use]
     pub fn points_at(&self, t: f64) -> BladePoints {
@@ -257,7 +259,8 @@ fn sample_in_flight(t: f64, flight: &FlightPhase<'_>, y: &[f64; 6]) -> ModelSamp
 // v3(x) = v3(0) + sum v3'_(j-1) x^j / j        int v3 = v3(0) x + sum v3'_(j-1) x^(j+1) / (j (j+1))
 // ```
 //
-// Other methods have no such coefficients: positions follow from the angles, and an integral from five of them.
+// Other methods have no such coefficients: positions follow from the angles, and an integral from five of
+// them.
 
 /// `1 / j`, and 0 for `j = 0`.
 const RECIPROCALS: [f64; TERMS + 4] = {

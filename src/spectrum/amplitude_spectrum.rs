@@ -22,7 +22,8 @@ pub struct WindowedTransform {
 }
 
 impl WindowedTransform {
-    /// Transforms samples, m, one a frame (`None` where a frame has no value). The number of components in the
+    /// Transforms samples, m, one a frame (`None` where a frame has no value). The number of components in
+    /// the
     /// settings has no effect here.
     ///
     /// # Errors

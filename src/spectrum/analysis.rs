@@ -124,7 +124,8 @@ impl SpectralAnalysis {
         self.residual_m.iter().zip(&self.model_m).map(|(left, m)| left.map(|left| left + m)).collect()
     }
 
-    /// Analyses a record. With `settings.detrend` `None` the trend is chosen from the record. Where only every
+    /// Analyses a record. With `settings.detrend` `None` the trend is chosen from the record. Where only
+    /// every
     /// second, third ... frame has a value, the record is read at that lower rate.
     ///
     /// # Errors
@@ -185,8 +186,10 @@ impl SpectralAnalysis {
         Ok(best.with_densities(record.frame_rate_hz))
     }
 
-    /// Analyses each stretch between the flips of a piece: the first frames that leave noise only, or else the
-    /// first whose trend has no fast waves. A trend through a flip takes many times as long as the oscillation
+    /// Analyses each stretch between the flips of a piece: the first frames that leave noise only, or else
+    /// the
+    /// first whose trend has no fast waves. A trend through a flip takes many times as long as the
+    /// oscillation
     /// that the flip starts.
     fn analyse_between_steps(record: &SampledRecord, settings: &SpectrumSettings) -> Vec<Self> {
         let of_stretch = |tries: &Vec<Range<usize>>| {

@@ -1,4 +1,5 @@
-//! Alternatives to a second oscillation near a first one: a frequency that drifts evenly, or an amplitude that
+//! Alternatives to a second oscillation near a first one: a frequency that drifts evenly, or an amplitude
+//! that
 //! falls linearly. Neither is a term of the fit. Where one explains as much as a second oscillation does, the
 //! second is dropped.
 
@@ -87,7 +88,8 @@ impl ModelSelector<'_> {
         fit.model.oscillations().into_iter().filter(is_piece).collect()
     }
 
-    /// The criterion with an evenly drifting or fading oscillation in the place of term `k`, or of `k` and its
+    /// The criterion with an evenly drifting or fading oscillation in the place of term `k`, or of `k` and
+    /// its
     /// neighbours.
     pub(super) fn alternatives_criterion(&self, fit: &ModelFit, k: usize) -> f64 {
         let group = nearby_terms(fit.model.terms(), k);

@@ -17,7 +17,8 @@ pub struct Component {
     /// Least and greatest frequency of a component that drifts; `frequency_hz` is then its mean while it was
     /// followed, by counting cycles.
     pub range_hz: Option<FrequencyRange>,
-    /// Start, s from the first frame analysed; `None` for a component present from the first frame. In a piece
+    /// Start, s from the first frame analysed; `None` for a component present from the first frame. In a
+    /// piece
     /// of a long record: the start of the piece, if the component is present by then.
     pub begins_s: Option<f64>,
     /// Amplitude, m; of a decaying component where it begins or the record starts.
@@ -96,7 +97,8 @@ pub(super) struct DecayingTone {
 impl DecayingTone {
     /// Bound on the standard deviation of the frequency, Hz, with amplitude, phase and decay unknown.
     ///
-    /// Amplitude and decay are uncorrelated with phase and frequency, so with weights `p = exp(-2 d t / T)` the
+    /// Amplitude and decay are uncorrelated with phase and frequency, so with weights `p = exp(-2 d t / T)`
+    /// the
     /// information on the frequency is `(2 pi A)^2 / (2 sigma^2)` times the spread `sum p t^2 - (sum p t)^2 /
     /// sum p`. For a steady tone that is the closed form `fs / (2 pi) sqrt(12 / (eta N (N^2 - 1)))`, `eta =
     /// A^2 / (2 sigma^2)`.

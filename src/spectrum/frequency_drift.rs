@@ -1,8 +1,11 @@
-//! A cycle whose frequency changes over the record: sought in addition to steady and decaying oscillations, and
+//! A cycle whose frequency changes over the record: sought in addition to steady and decaying oscillations,
+//! and
 //! read as one component.
 //!
-//! Sinusoids can only split such a cycle into pieces. If they leave as much as they explain, or if three or more
-//! of them lie within the range of a ridge that drifts, the ridge is the component and the pieces are dropped.
+//! Sinusoids can only split such a cycle into pieces. If they leave as much as they explain, or if three or
+//! more
+//! of them lie within the range of a ridge that drifts, the ridge is the component and the pieces are
+//! dropped.
 
 use super::model_selection::{DriftRegion, LOBE, ModelFit, ModelSelector};
 use super::periodogram::upper_median;
@@ -18,7 +21,8 @@ const SLOW_COMPONENT: (f64, f64) = (4.0, 0.25);
 const BAND_MARGIN: f64 = 2.0;
 /// Share of followed segments from which the component counts as followed everywhere.
 pub(super) const FULLY_FOLLOWED: f64 = 0.9;
-/// Shorter segments tried below that share, and the gain in it that they must bring: noise hides a component in
+/// Shorter segments tried below that share, and the gain in it that they must bring: noise hides a component
+/// in
 /// short segments.
 const SHORTER_SEGMENTS: [f64; 3] = [0.8, 0.65, 0.5];
 const LEAST_GAIN: f64 = 0.1;
@@ -33,7 +37,8 @@ const LEAST_FOLLOWED: f64 = 0.08;
 const LEAST_RANGE: f64 = 2.0;
 /// Sinusoids within the range that are pieces of one cycle.
 const FRAGMENTS: usize = 3;
-/// Peak left within the range, over the largest sinusoid there, from which sinusoids do not explain the cycle.
+/// Peak left within the range, over the largest sinusoid there, from which sinusoids do not explain the
+/// cycle.
 const LARGE_RESIDUAL: f64 = 0.25;
 
 /// The course of the strongest component above the slow ones.
@@ -86,7 +91,8 @@ pub(super) fn find_drift_course(
     Some(DriftCourse { ridge, followed_share, range })
 }
 
-/// The ridge of the segment length that shows the component best. If it misses much of the record, the shorter
+/// The ridge of the segment length that shows the component best. If it misses much of the record, the
+/// shorter
 /// length that misses least: the component may be weak or fast in a part of the record.
 fn select_best_ridge(record: &[Option<f64>], frame_rate_hz: f64, band: (f64, f64)) -> Option<(f64, Ridge)> {
     let cut = |segment_s: Option<f64>| {

@@ -1,6 +1,7 @@
 //! Components refined on the true frame times, where too many frames are missing for gap filling alone.
 //!
-//! With more than [`REFINED_MISSING`] of the frames missing, trend and steady sinusoids are fitted together to
+//! With more than [`REFINED_MISSING`] of the frames missing, trend and steady sinusoids are fitted together
+//! to
 //! the frames present (`least_squares.rs`). The residual of the fit decides what follows:
 //! - It is white: the sinusoids are the whole signal. Every frame present then counts the same, which is most
 //!   accurate, and components that the filling created are found to be absent.
@@ -8,10 +9,14 @@
 //!   added back, and the fit is repeated with the Hann weights of the transform. Without gaps that is the
 //!   maximum of the windowed periodogram, so such a cycle reads the same with and without gaps.
 //!
-//! Measured on 0.15 s at 5,000 frames/s (78.4 Hz at 20 um, 900 Hz at 8 um with 20 dB of noise, a reversal, 40 %
-//! of the frames missing at random, 50 records; rms error of the frequencies, filled alone | refined): 0.10 and
-//! 0.11 Hz | 0.007 and 0.019 Hz, 1.1 times the Cramér-Rao bound; the amplitude of the fast one reads 9 % | 0.04 %
-//! low. With 0.3 um of noise and 100 um at 78.4 Hz that decay with a damping ratio of 0.05: 0.11 and 0.13 Hz |
+//! Measured on 0.15 s at 5,000 frames/s (78.4 Hz at 20 um, 900 Hz at 8 um with 20 dB of noise, a reversal, 40
+//! %
+//! of the frames missing at random, 50 records; rms error of the frequencies, filled alone | refined): 0.10
+//! and
+//! 0.11 Hz | 0.007 and 0.019 Hz, 1.1 times the Cramér-Rao bound; the amplitude of the fast one reads 9 % |
+//! 0.04 %
+//! low. With 0.3 um of noise and 100 um at 78.4 Hz that decay with a damping ratio of 0.05: 0.11 and 0.13 Hz
+//! |
 //! 0.07 and 0.06 Hz. A chirp from 870 to 930 Hz: its mean is off by 1.7 | 1.4 Hz.
 
 use super::least_squares::{FreeSet, SineProblem, SineSolution, SineTerm, Tolerance};
@@ -20,7 +25,8 @@ use super::trend::Trend;
 use super::{gap_filling, periodogram};
 use crate::math;
 
-/// Share of missing frames above which components are refined; below, filled gaps move 900 Hz by hundredths of a
+/// Share of missing frames above which components are refined; below, filled gaps move 900 Hz by hundredths
+/// of a
 /// hertz only.
 pub(crate) const REFINED_MISSING: f64 = 0.10;
 /// Most components fitted together, largest first; smaller ones keep their start.
@@ -68,7 +74,8 @@ pub(super) struct RefinedDeviations {
 pub(super) enum Refinement {
     /// The component stays as the transform shows it.
     Unchanged,
-    /// It stays as the transform shows it, though the frames present have this amplitude, m, at its frequency.
+    /// It stays as the transform shows it, though the frames present have this amplitude, m, at its
+    /// frequency.
     FixedFrequency(f64),
     Refined(RefinedComponent),
 }
@@ -131,7 +138,8 @@ fn fit_components(
     outcome
 }
 
-/// Result for each start. `white` says that all weights are one and the residual is noise, which determines the
+/// Result for each start. `white` says that all weights are one and the residual is noise, which determines
+/// the
 /// deviations.
 fn refinement_outcomes(
     problem: &SineProblem,
@@ -163,7 +171,8 @@ fn refinement_outcomes(
     Some(starts.iter().enumerate().map(outcome).collect())
 }
 
-/// Whether the values scatter from frame to frame as much as over the whole record: fourth differences of white
+/// Whether the values scatter from frame to frame as much as over the whole record: fourth differences of
+/// white
 /// noise have 70 times its variance.
 fn is_white(left: &[Option<f64>]) -> bool {
     const GAIN: f64 = 70.0;

@@ -1,9 +1,11 @@
 //! Trend and (decaying) sinusoids fitted together to the frames present: the most accurate reading where the
 //! record holds nothing else.
 //!
-//! Model: `x = sum c_p L_p + sum exp(-d_k ((u + 1) / 2 - s_k)) (a_k cos(pi n_k u) + b_k sin(pi n_k u))` with `u`
+//! Model: `x = sum c_p L_p + sum exp(-d_k ((u + 1) / 2 - s_k)) (a_k cos(pi n_k u) + b_k sin(pi n_k u))` with
+//! `u`
 //! from -1 to 1 over the record, so `n` are cycles and `d` nepers in it; a term is zero before its start `s`.
-//! Amplitudes are linear and solved for at every step. Cycles and nepers move by Gauss-Newton steps, halved until
+//! Amplitudes are linear and solved for at every step. Cycles and nepers move by Gauss-Newton steps, halved
+//! until
 //! the misfit falls. All of it works on inner products of columns, which are summed once a step.
 
 mod columns;
@@ -22,7 +24,8 @@ const MOST_FREQUENCY_SHIFT: f64 = 1.0;
 const MOST_HALVINGS: i32 = 8;
 /// A step below this many cycles or nepers is the last.
 const SMALLEST_STEP: f64 = 1e-6;
-/// Directions of the normal matrix, scaled to a unit diagonal, below this share of the largest are not determined
+/// Directions of the normal matrix, scaled to a unit diagonal, below this share of the largest are not
+/// determined
 /// by the data.
 const SINGULAR_DIRECTION: f64 = 1e-10;
 /// Pivots of that matrix from which all directions are determined: each column then keeps a thousandth of its
@@ -34,7 +37,8 @@ const MOST_GROWTH: f64 = 6.0;
 const MOST_DAMPING: f64 = 0.5;
 /// Most nepers of a relaxation over the record: it is over within a hundredth of the record.
 const MOST_RELAXED: f64 = 500.0;
-/// The same for a relaxation at the end of the record. It grows from the start, and the squares of greater growth
+/// The same for a relaxation at the end of the record. It grows from the start, and the squares of greater
+/// growth
 /// would come near the largest number.
 const MOST_RELAXED_AT_END: f64 = 330.0;
 
@@ -118,7 +122,8 @@ impl Tolerance {
     }
 }
 
-/// A record with the weights of its frames, and its trend, which is fitted together with the sinusoids because
+/// A record with the weights of its frames, and its trend, which is fitted together with the sinusoids
+/// because
 /// they are not orthogonal.
 #[derive(Debug, Clone)]
 pub(super) struct SineProblem {
@@ -146,7 +151,8 @@ impl SineProblem {
         Self { trend, weight: weights.iter().sum(), frames: data.len(), columns }
     }
 
-    /// Minimises the misfit over the free parameters; `None` where the normal matrix is not finite. A term whose
+    /// Minimises the misfit over the free parameters; `None` where the normal matrix is not finite. A term
+    /// whose
     /// step would leave its peak returns to it and keeps its frequency; one that would decay or grow beyond
     /// bounds becomes steady.
     pub(super) fn gauss_newton(&self, terms: &[SineTerm], care: Tolerance) -> Option<SineSolution> {
@@ -226,7 +232,8 @@ impl SineProblem {
         })
     }
 
-    /// The unknowns as combinations of the columns: the linear ones, then cycles and nepers of each term where
+    /// The unknowns as combinations of the columns: the linear ones, then cycles and nepers of each term
+    /// where
     /// they are free.
     fn unknowns_matrix(&self, solved: &SineSolution) -> DMatrix<f64> {
         let trend = self.trend.column_count();

@@ -1,8 +1,10 @@
 //! The parts of a record: a trend, relaxations and (decaying) sinusoids, added one after another until the
 //! residual shows no peak.
 //!
-//! Each round takes the windowed spectrum of the residual. A peak that stands out of the noise is explained by a
-//! sinusoid whose start comes from the matrix pencil. A peak so low that the flip may have made it is explained
+//! Each round takes the windowed spectrum of the residual. A peak that stands out of the noise is explained
+//! by a
+//! sinusoid whose start comes from the matrix pencil. A peak so low that the flip may have made it is
+//! explained
 //! by a sinusoid, two more degrees of the trend or a relaxation `exp(-d t)`, whichever has the least Bayesian
 //! information criterion. Then everything is fitted again together (`least_squares.rs`).
 
@@ -314,7 +316,8 @@ impl<'a> ModelSelector<'a> {
         (relaxations > 0).then(moved).flatten().filter(|moved| moved.solution.misfit < least)
     }
 
-    /// A sinusoid for each peak, largest first, except for peaks in the lobe of a larger one: a fast decay has
+    /// A sinusoid for each peak, largest first, except for peaks in the lobe of a larger one: a fast decay
+    /// has
     /// noise peaks on its flanks.
     fn start_sinusoids(&self, fit: &ModelFit, peaks: &[Peak]) -> Vec<SineTerm> {
         let mut terms: Vec<SineTerm> = Vec::new();
@@ -349,7 +352,8 @@ impl<'a> ModelSelector<'a> {
         Some(SineModel { problem, solution })
     }
 
-    /// The model with these terms moved to the least misfit, if there are enough frames; frequencies held before
+    /// The model with these terms moved to the least misfit, if there are enough frames; frequencies held
+    /// before
     /// are free again.
     pub(super) fn fit_model(
         &self,

@@ -1,8 +1,10 @@
-//! Power density of noise-like motion, with its uncertainty and a test for steady lines, from several tapers of
+//! Power density of noise-like motion, with its uncertainty and a test for steady lines, from several tapers
+//! of
 //! one record.
 //!
 //! Each sine taper gives a nearly independent estimate. Their mean is the density, and their scatter its
-//! uncertainty (jackknife over the tapers). Thomson's harmonic F measures how well one steady sine explains them
+//! uncertainty (jackknife over the tapers). Thomson's harmonic F measures how well one steady sine explains
+//! them
 //! all. A line is spread over `tapers + 1` resolutions, so other estimators read its frequency better.
 //!
 //! Sources: Riedel and Sidorenko 1995 (IEEE Trans. Signal Process. 43, 188) for the tapers; Thomson 1982
@@ -157,7 +159,8 @@ impl Multitaper {
         2 * self.tapers
     }
 
-    /// The 95 % interval of the density in a bin, m^2/Hz, from the jackknife with Student's t of one degree of
+    /// The 95 % interval of the density in a bin, m^2/Hz, from the jackknife with Student's t of one degree
+    /// of
     /// freedom less than tapers; `None` for a bin outside the spectrum.
     #[must_use]
     pub fn interval_95(&self, bin: usize) -> Option<(f64, f64)> {
@@ -167,7 +170,8 @@ impl Multitaper {
     }
 
     /// Probability that noise alone, level within a line's width, gives an F as large as in a bin: `(1 +
-    /// F/(K-1))^-(K-1)` for `K` tapers. In a record of `n` frames, less than `1/n` counts as a line (Thomson's
+    /// F/(K-1))^-(K-1)` for `K` tapers. In a record of `n` frames, less than `1/n` counts as a line
+    /// (Thomson's
     /// rule). `None` for a bin outside the spectrum.
     #[must_use]
     pub fn line_probability(&self, bin: usize) -> Option<f64> {
@@ -270,7 +274,8 @@ fn estimate_bin(tapered: &[TaperTransform], bin: usize, scale: f64) -> Multitape
     }
 }
 
-/// Standard deviation of the logarithm of the mean of `powers`, whose sum is `total`, from the means that omit
+/// Standard deviation of the logarithm of the mean of `powers`, whose sum is `total`, from the means that
+/// omit
 /// one of them.
 fn jackknife_log_sd<I: Iterator<Item = f64>>(total: f64, powers: impl Fn() -> I) -> f64 {
     if total <= 0.0 {
@@ -303,7 +308,8 @@ pub(super) fn noise_floor_curve(density: &[f64], window: usize, degrees: f64) ->
     (0..FLOOR_PASSES).fold(all, without_lines).into_iter().map(|m| m * mean_over_median).collect()
 }
 
-/// Running median over the bins that count. A window with fewer of them than half its width grows until it has
+/// Running median over the bins that count. A window with fewer of them than half its width grows until it
+/// has
 /// enough; at the ends it is cut.
 fn running_median(density: &[f64], window: usize, counts: impl Fn(usize) -> bool + Sync) -> Vec<f64> {
     let Some(last) = density.len().checked_sub(1) else { return Vec::new() };
@@ -373,7 +379,8 @@ fn student_t_probability(angle: f64, degrees: usize) -> f64 {
 // products `G` over the frames present, `G^(-1/2)` times the tapers are, and of all such sets these are the
 // nearest to the tapers themselves.
 
-/// Frames whose inner products are summed at a time, so that the sum does not depend on the number of threads.
+/// Frames whose inner products are summed at a time, so that the sum does not depend on the number of
+/// threads.
 const PRODUCT_BLOCK: usize = 1 << 15;
 /// Energy on the frames present, relative to the largest, below which a combination of tapers is dropped: it
 /// lies in the gaps, and scaled to unit energy it would leak over the whole spectrum.

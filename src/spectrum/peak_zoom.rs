@@ -14,7 +14,8 @@ const DEMODULATED_BLOCKS: usize = 1024;
 const FRAMES_PER_RESTART: usize = 256;
 /// Distance of the three amplitudes of a parabola, cycles: an eighth of a resolution.
 const PARABOLA_SPACING: f64 = 0.125;
-/// Parabolas: each starts at the vertex of the one before, at most half a spacing away, and a parabola is exact
+/// Parabolas: each starts at the vertex of the one before, at most half a spacing away, and a parabola is
+/// exact
 /// about its own middle.
 const PARABOLAS: usize = 6;
 
@@ -75,7 +76,8 @@ impl WeightedRecord<'_> {
     }
 }
 
-/// Vertex of the parabola through the logarithms of three equidistant amplitudes: its distance from the middle
+/// Vertex of the parabola through the logarithms of three equidistant amplitudes: its distance from the
+/// middle
 /// one, in spacings, and its height.
 pub(super) fn log_parabola_vertex(around: [f64; 3]) -> (f64, f64) {
     let [left, top, right] = around.map(|a| math::ln(a.max(f64::MIN_POSITIVE)));

@@ -5,7 +5,8 @@ use crate::math;
 use std::cell::RefCell;
 use std::sync::{Arc, OnceLock};
 
-/// Windows without gaps that a thread keeps: a fit reads a few, of the same lengths in every run of its model.
+/// Windows without gaps that a thread keeps: a fit reads a few, of the same lengths in every run of its
+/// model.
 const CACHED_WINDOWS: usize = 16;
 /// Longest padded length of a window that is kept: together they take a few megabytes.
 const LONGEST_CACHED: usize = 1 << 16;
@@ -110,7 +111,8 @@ impl Periodogram {
         frame_rate_hz / self.padded as f64
     }
 
-    /// Amplitude of an oscillation of `cycles` cycles in the spectrum, m: `2 |sum w x exp(-2 pi i n t)| / sum w`.
+    /// Amplitude of an oscillation of `cycles` cycles in the spectrum, m: `2 |sum w x exp(-2 pi i n t)| / sum
+    /// w`.
     pub(super) fn amplitude_at(&self, values: &[f64], cycles: f64) -> f64 {
         Self::amplitude_with_weights(&self.weights, values, cycles)
     }
@@ -172,7 +174,8 @@ pub(super) fn upper_median(mut values: Vec<f64>) -> Option<f64> {
 
 /// Bin width, resolutions, above which bins miss the top of a sidelobe, which is one resolution wide.
 const COARSE_BINS: f64 = 0.25;
-/// Bins by which the distance of two peaks is then reduced: half a bin for each peak, and one for a sidelobe's
+/// Bins by which the distance of two peaks is then reduced: half a bin for each peak, and one for a
+/// sidelobe's
 /// top between two bins.
 const ROUNDED_BINS: usize = 2;
 
@@ -189,7 +192,8 @@ pub(super) struct WindowedSpectrum<'a> {
     pub least_m: f64,
 }
 
-/// Largest value of a window's transform, relative to that at zero, at or beyond each distance, in bins. Gaps in
+/// Largest value of a window's transform, relative to that at zero, at or beyond each distance, in bins. Gaps
+/// in
 /// the record raise it.
 pub(super) fn sidelobe_maxima(lobe: Vec<f64>, frames: usize, padded: usize) -> Vec<f64> {
     let mut envelope = lobe;

@@ -1,6 +1,7 @@
 //! Relations of a component to another, as a multiple, a fraction or a sideband, or to the mains.
 //!
-//! A relation is met within four deviations. Many multiples, or wide deviations, would match every frequency, so
+//! A relation is met within four deviations. Many multiples, or wide deviations, would match every frequency,
+//! so
 //! multiples are tried only up to a chance of one in twenty of a random match.
 
 use super::classification::RecordContext;
@@ -20,7 +21,8 @@ const SUBHARMONIC_DENOMINATORS: [usize; 2] = [2, 3];
 const MOST_FRACTION: usize = 5;
 /// Sidebands on each side of a component.
 const SIDEBANDS: usize = 2;
-/// Deviations within which a relation is met: three relations in a record are all met in all but one record of
+/// Deviations within which a relation is met: three relations in a record are all met in all but one record
+/// of
 /// five thousand.
 const MATCH_DEVIATIONS: f64 = 4.0;
 /// Most distance from a relation, resolutions: a wider tolerance would match by chance.
@@ -95,7 +97,8 @@ fn tolerance_hz(sd_hz: f64, at: &RecordContext) -> f64 {
     (MATCH_DEVIATIONS * sd_hz).min(MATCH_RESOLUTIONS * at.resolution_hz)
 }
 
-/// Whether `c` is `times` the frequency of `base`, also folded; adds the probability of a random match to `chance`.
+/// Whether `c` is `times` the frequency of `base`, also folded; adds the probability of a random match to
+/// `chance`.
 fn is_multiple(base: &Component, c: &Component, times: f64, at: &RecordContext, chance: &mut f64) -> bool {
     let within_hz = tolerance_hz(math::hypot(c.frequency_sd_hz, times * base.frequency_sd_hz), at);
     *chance += 2.0 * within_hz / base.frequency_hz;
@@ -136,7 +139,8 @@ fn find_subharmonic(base: &Component, other: &Component, at: &RecordContext) -> 
     None
 }
 
-/// Component `k` as a sideband of a larger one: at the distance of another component, or with a mirror image of
+/// Component `k` as a sideband of a larger one: at the distance of another component, or with a mirror image
+/// of
 /// similar amplitude on the other side.
 fn find_sideband(components: &[Component], k: usize, at: &RecordContext) -> Option<Sideband> {
     let c = &components[k];

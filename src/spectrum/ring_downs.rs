@@ -1,7 +1,9 @@
 //! Oscillations that end soon or begin inside the record: a window that starts at zero hides them.
 //!
-//! The residual is matched with decaying oscillations that begin at any frame: `z = sum x exp(-d s - 2 pi i n s)`
-//! over the frames since. A term of this frequency, decay and beginning lowers the sum of squares by `2 |z|^2 /
+//! The residual is matched with decaying oscillations that begin at any frame: `z = sum x exp(-d s - 2 pi i n
+//! s)`
+//! over the frames since. A term of this frequency, decay and beginning lowers the sum of squares by `2 |z|^2
+//! /
 //! sum exp(-2 d s)`. In white noise of variance one, half of that exceeds `q` with the chance `exp(-q)`.
 
 use super::least_squares::{FreeSet, SineTerm, Tolerance};
@@ -78,7 +80,8 @@ struct Decays {
 }
 
 impl Decays {
-    /// Keeps a decay that lowers the sum of squares by twice `square`, which is `half` variances of noise, if it
+    /// Keeps a decay that lowers the sum of squares by twice `square`, which is `half` variances of noise, if
+    /// it
     /// is larger than those before.
     fn keep_larger(&mut self, term: SineTerm, half: f64, square: f64) {
         if self.stands_out.is_none_or(|(least, _)| half > least) {
@@ -97,7 +100,8 @@ impl Decays {
 }
 
 impl ModelSelector<'_> {
-    /// Models with one more decaying oscillation, or with one in the place of a doubtful term or of relaxations:
+    /// Models with one more decaying oscillation, or with one in the place of a doubtful term or of
+    /// relaxations:
     /// the first half-wave of a ring-down looks like a relaxation.
     pub(super) fn with_ring_downs(&self, fit: &ModelFit, doubtful: &[DoubtfulTerm]) -> Vec<SineModel> {
         let parts = &fit.model;
@@ -130,8 +134,10 @@ impl ModelSelector<'_> {
         places.iter().flat_map(placed).collect()
     }
 
-    /// Places brief terms anew and drops relaxations that explain nothing, while the criterion falls. The first
-    /// terms were placed while others were missing, and no fit moves a first frame. Where only rounding is left,
+    /// Places brief terms anew and drops relaxations that explain nothing, while the criterion falls. The
+    /// first
+    /// terms were placed while others were missing, and no fit moves a first frame. Where only rounding is
+    /// left,
     /// the criterion decides nothing.
     pub(super) fn relocate_transients(&self, mut parts: SineModel) -> SineModel {
         let power: f64 = self.data.iter().zip(&self.weights).map(|(x, weight)| weight * x * x).sum();
@@ -150,7 +156,8 @@ impl ModelSelector<'_> {
         parts
     }
 
-    /// The terms with a brief one in another place, with two in the place of those in its lobe, with all brief
+    /// The terms with a brief one in another place, with two in the place of those in its lobe, with all
+    /// brief
     /// ones from the start of the record on, or with one relaxation less.
     fn transient_variants(&self, parts: &SineModel) -> Vec<Vec<SineTerm>> {
         let terms = parts.terms();
@@ -194,7 +201,8 @@ impl ModelSelector<'_> {
         with
     }
 
-    /// Largest residual amplitude under the envelope of a term around its frequency, m; 0 where noise alone may
+    /// Largest residual amplitude under the envelope of a term around its frequency, m; 0 where noise alone
+    /// may
     /// have made it.
     pub(super) fn residual_in_envelope(&self, fit: &ModelFit, term: &SineTerm) -> f64 {
         let frames = self.samples.len();
@@ -280,7 +288,8 @@ impl ModelSelector<'_> {
         DECAYS.into_iter().filter(|nepers| FRAMES_PER_NEPER * nepers <= frames).map(of).collect()
     }
 
-    /// Moves a term to the frequency, decay and first frame that explain most; steps are halved where none helps.
+    /// Moves a term to the frequency, decay and first frame that explain most; steps are halved where none
+    /// helps.
     fn optimise_placement(&self, left: &[f64], start: SineTerm) -> SineTerm {
         let frames = self.samples.len() as f64;
         let mut best = (self.power_of_term(left, &start), start);

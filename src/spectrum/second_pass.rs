@@ -1,4 +1,5 @@
-//! A second pass over a decomposed record, for oscillations that begin late or end soon, and for two lines where
+//! A second pass over a decomposed record, for oscillations that begin late or end soon, and for two lines
+//! where
 //! one was found.
 
 use super::chirp_alternatives::nearby_terms;
@@ -7,7 +8,8 @@ use super::least_squares::{FreeSet, SineTerm, Tolerance, nepers_from_damping_rat
 use super::model_selection::{LOBE, ModelFit, ModelSelector, STEP_CYCLES, SineModel, lobe_half_width};
 use super::time_frequency::FrequencyRange;
 
-/// Most range of a drift that may be two lines that beat, resolutions. They lie at most four apart, and where they
+/// Most range of a drift that may be two lines that beat, resolutions. They lie at most four apart, and where
+/// they
 /// nearly cancel the frequency swings beyond both.
 const WIDEST_BEAT: f64 = 10.0;
 /// Steps by which a trend may grow in the place of a slow ring-down: together they have as many unknowns.
@@ -24,7 +26,8 @@ pub(super) struct DoubtfulTerm {
 
 impl ModelSelector<'_> {
     /// The candidate of the least criterion: a model improved otherwise, with one more ring-down, or with two
-    /// lines in the place of one. Near a doubtful term it must explain more than a drift or an even fall of that
+    /// lines in the place of one. Near a doubtful term it must explain more than a drift or an even fall of
+    /// that
     /// term.
     pub(super) fn refine_candidates(&self, fit: &ModelFit, improved: Option<SineModel>) -> Option<SineModel> {
         let parts = &fit.model;
@@ -64,7 +67,8 @@ impl ModelSelector<'_> {
         self.select_best(grown).filter(|grown| self.bic_of(grown) < criterion + DECISIVE_DIFFERENCE)
     }
 
-    /// Two steady lines in the place of one that drifts over a range, if only noise is left then. A range wider
+    /// Two steady lines in the place of one that drifts over a range, if only noise is left then. A range
+    /// wider
     /// than the distance of two such lines is no pair.
     pub(super) fn split_into_pair(&self, fit: &ModelFit, range: &FrequencyRange) -> Option<ModelFit> {
         if range.high_hz - range.low_hz > WIDEST_BEAT * self.resolution_hz() {
@@ -74,7 +78,8 @@ impl ModelSelector<'_> {
         Some(self.decompose(best)).filter(|paired| self.leaves_only_noise(paired))
     }
 
-    /// Whether only noise is left around doubtful terms once a candidate replaces them. More oscillations would
+    /// Whether only noise is left around doubtful terms once a candidate replaces them. More oscillations
+    /// would
     /// split into pieces what a sum of oscillations does not describe.
     fn leaves_noise_near(
         &self,
@@ -102,8 +107,10 @@ fn are_adjacent(term: &SineTerm, other: &SineTerm) -> bool {
     (term.cycles - other.cycles).abs() < LOBE + lobe_half_width(term)
 }
 
-// Two steady oscillations in the place of one, closer than the lobe of a window that starts at zero. A frequency
-// that drifts, or an amplitude that falls linearly, can be split into two as well. So a pair is accepted only if
+// Two steady oscillations in the place of one, closer than the lobe of a window that starts at zero. A
+// frequency
+// that drifts, or an amplitude that falls linearly, can be split into two as well. So a pair is accepted only
+// if
 // it leaves only noise around it, and if neither line explains more by growing or decaying.
 
 /// Starts of a pair, resolutions from the one term, which lies between the two or has settled on either.

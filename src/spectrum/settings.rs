@@ -5,7 +5,8 @@ use super::trend::Detrend;
 /// How a record is analysed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpectrumSettings {
-    /// What is removed; `None` to let the record choose (`SpectralAnalysis::from_record`), which is a cubic to begin
+    /// What is removed; `None` to let the record choose (`SpectralAnalysis::from_record`), which is a cubic
+    /// to begin
     /// with (`SpectralAnalysis::from_record`).
     pub detrend: Option<Detrend>,
     /// Padded length over the record's, before rounding up to a power of two. Where that would exceed

@@ -5,10 +5,12 @@ use std::ops::Range;
 
 /// Fractions of the step height that bound the transition.
 const TRANSITION_BOUNDS: (f64, f64) = (0.25, 0.75);
-/// Starts tried after a step, in widths of its transition: the tail of an exponential step can be described by
+/// Starts tried after a step, in widths of its transition: the tail of an exponential step can be described
+/// by
 /// relaxations.
 const STEP_WIDTHS_AFTER: [f64; 5] = [1.0, 2.0, 3.0, 5.0, 8.0];
-/// Least length of a record over the return from a dip. The drop of a head is near its level before and after a
+/// Least length of a record over the return from a dip. The drop of a head is near its level before and after
+/// a
 /// flip and returns in a jump, faster than any slow wave.
 const DIP_FRACTION: usize = 20;
 
@@ -24,7 +26,8 @@ pub(super) fn starts_after_step(samples: &[Option<f64>]) -> Vec<usize> {
     starts.filter(|start| *start < samples.len()).collect()
 }
 
-/// Starts and ends tried next to a flip, in widths of its transition; few, because a long record has many flips.
+/// Starts and ends tried next to a flip, in widths of its transition; few, because a long record has many
+/// flips.
 const STEP_WIDTHS_BESIDE: [f64; 2] = [1.0, 5.0];
 /// Most flips of a piece of a record; more changes of side are an oscillation.
 const MAX_STEPS: usize = 4;
@@ -34,7 +37,8 @@ const SLOPE_FRACTION: usize = 16;
 /// Length of a record over the shortest stretch to try.
 const LEAST_STRETCH_FRACTION: usize = 8;
 
-/// The stretches between the flips of a record, in order, each with the frames to try: first from near the flips,
+/// The stretches between the flips of a record, in order, each with the frames to try: first from near the
+/// flips,
 /// then from farther away. Without a flip, the whole record.
 pub(super) fn stretches_between_steps(samples: &[Option<f64>]) -> Vec<Vec<Range<usize>>> {
     let frames = samples.len();
@@ -67,7 +71,8 @@ fn remove_median_slope(samples: &[Option<f64>]) -> Vec<Option<f64>> {
     samples.iter().enumerate().map(|(i, x)| x.map(|x| x - slope * i as f64)).collect()
 }
 
-/// Last frame on the old side and first on the new one, if the record changes sides once or returns from a dip.
+/// Last frame on the old side and first on the new one, if the record changes sides once or returns from a
+/// dip.
 fn find_single_step(samples: &[Option<f64>]) -> Option<(usize, usize)> {
     match find_side_changes(&classify_sides(samples))[..] {
         [change] => Some(change),

@@ -123,7 +123,8 @@ pub enum SampleSequence {
 }
 
 impl SamplePlan {
-    /// Coordinates of point `index` in the unit box, each above 0 and below 1. The Gray code of the index gives
+    /// Coordinates of point `index` in the unit box, each above 0 and below 1. The Gray code of the index
+    /// gives
     /// a point without its predecessors.
     pub(crate) fn unit_coordinates(&self, index: usize) -> impl Iterator<Item = f64> {
         let SampleSequence::Sobol = self.method;
@@ -194,7 +195,8 @@ mod tests {
         }
     }
 
-    /// The integral of a product of known value by 4,096 points in six dimensions; a random sample errs by 0.01.
+    /// The integral of a product of known value by 4,096 points in six dimensions; a random sample errs by
+    /// 0.01.
     #[test]
     fn a_sample_integrates_better_than_random_numbers() {
         let sample = SamplePlan { method: SampleSequence::Sobol, points: 4096, seed: 3 };

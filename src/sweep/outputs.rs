@@ -21,7 +21,8 @@ pub(crate) fn csv_header(study: &Study) -> String {
     cells.join(",") + "\n"
 }
 
-/// Row of a point in `sweep.csv`. A missing value is an empty cell; the columns `status` and `missing` say why.
+/// Row of a point in `sweep.csv`. A missing value is an empty cell; the columns `status` and `missing` say
+/// why.
 pub(crate) fn csv_row(study: &Study, index: usize, outcome: &PointOutcome) -> String {
     let number = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
     let mut cells: Vec<String> = study.point_values(index).iter().map(|value| value.to_string()).collect();

@@ -1,6 +1,7 @@
 //! Rank correlation of the maps of a study with its parameters.
 //!
-//! A large study is reduced to an even selection of its points, so that memory does not grow with their number.
+//! A large study is reduced to an even selection of its points, so that memory does not grow with their
+//! number.
 
 use super::grid::SweepAxis;
 use super::point::PointOutcome;

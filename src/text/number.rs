@@ -42,7 +42,8 @@ pub(crate) fn format_or_dash<T>(value: Option<T>, written: impl FnOnce(T) -> Str
     value.map_or_else(|| DASH.to_owned(), written)
 }
 
-/// A number with `count` significant digits, trailing zeros included; all digits before the decimal point are shown. A
+/// A number with `count` significant digits, trailing zeros included; all digits before the decimal point are
+/// shown. A
 /// dash for a number that is not finite.
 #[must_use]
 pub fn format_digits(value: f64, count: usize) -> String {
@@ -89,7 +90,8 @@ pub(crate) fn format_scientific(value: f64, count: usize) -> String {
     }
 }
 
-/// Typesets a number in program notation such as `-1.5e-7`: a true minus sign, none before zero, and a power of ten.
+/// Typesets a number in program notation such as `-1.5e-7`: a true minus sign, none before zero, and a power
+/// of ten.
 pub(crate) fn typeset(written: &str) -> String {
     let (digits, power) = match split_exponent(written) {
         Some((digits, power)) => (digits, format!("{TIMES_TEN}{}", to_superscript(power))),
@@ -132,13 +134,16 @@ pub fn to_ascii(printed: &str) -> String {
 
 // A value with its standard deviation.
 
-/// Most decimals shown, beyond the accuracy of any measurement here; a smaller deviation is rounded up to the last one.
+/// Most decimals shown, beyond the accuracy of any measurement here; a smaller deviation is rounded up to the
+/// last one.
 const MOST_DECIMALS: i32 = 6;
 /// Powers of ten of the larger of value and deviation that are written in plain digits.
 const PLAIN_POWERS_WITH_SD: std::ops::RangeInclusive<i32> = -4..=6;
 
-/// A value with one digit of its standard deviation, in units of the last digit shown: `78.40(3)` for 78.40 with 0.03
-/// (JCGM 100:2008, 7.2.2). Four significant digits without a deviation (missing, zero or not finite); a dash for a
+/// A value with one digit of its standard deviation, in units of the last digit shown: `78.40(3)` for 78.40
+/// with 0.03
+/// (JCGM 100:2008, 7.2.2). Four significant digits without a deviation (missing, zero or not finite); a dash
+/// for a
 /// value that is not finite.
 pub(crate) fn format_with_sd(value: f64, sd: impl Into<Option<f64>>) -> String {
     if !value.is_finite() {

@@ -10,7 +10,8 @@ const UNPREFIXED_UNITS: [(&str, &str, f64); 5] =
 /// Least value, in the unit as shown, without a prefix: 0.2 N is as readable as 200 mN.
 const LEAST_UNPREFIXED: f64 = 0.1;
 
-/// A unit with the prefix that makes the largest of some values readable, and the factor to it; an empty unit for
+/// A unit with the prefix that makes the largest of some values readable, and the factor to it; an empty unit
+/// for
 /// a plain number.
 pub(crate) fn choose_prefix(unit: &str, values: impl IntoIterator<Item = f64>) -> (String, f64) {
     if let Some((_, shown, factor)) = UNPREFIXED_UNITS.iter().find(|(name, ..)| *name == unit) {

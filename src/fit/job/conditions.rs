@@ -182,7 +182,8 @@ pub(super) fn check_not_set(conditions: &[JobCondition], free: &str) -> Result<(
 pub(super) const DEFAULT_SCALE_SD: f64 = 0.005;
 /// Largest relative standard deviation of the scale: a picture with a worse scale is not calibrated.
 pub(super) const MAX_SCALE_SD: f64 = 0.1;
-/// Default standard deviation of the position of a marker, m: a marker is placed on its hinge to a millimetre.
+/// Default standard deviation of the position of a marker, m: a marker is placed on its hinge to a
+/// millimetre.
 pub(super) const DEFAULT_OFFSET_SD_M: f64 = 1e-3;
 /// Largest standard deviation of the position of a marker, m: the length of a blade.
 pub(super) const MAX_OFFSET_SD_M: f64 = 0.1;

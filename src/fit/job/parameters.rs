@@ -109,7 +109,8 @@ const MOST_PERCENT: f64 = 50.0;
 pub enum Constants {
     /// None: all constants are exact.
     Exact,
-    /// All masses, inertias, stiffnesses, dampings, preload and shoulder angle of a scene that are not zero and
+    /// All masses, inertias, stiffnesses, dampings, preload and shoulder angle of a scene that are not zero
+    /// and
     /// neither free parameters nor set by a condition.
     All {
         /// Relative standard deviation of each.

@@ -8,7 +8,8 @@ use std::collections::BTreeSet;
 const BOUND_ROUNDING: f64 = 1e-12;
 
 impl FitResult {
-    /// Checks the result against its job: the same parameters within their bounds, intervals with ordered ends,
+    /// Checks the result against its job: the same parameters within their bounds, intervals with ordered
+    /// ends,
     /// the same components and features, no negative deviations. `file` is its name in error messages.
     ///
     /// # Errors

@@ -12,10 +12,12 @@ const POPULATION_SHARE: f64 = 0.6;
 /// Number of descents.
 const DESCENTS: usize = 3;
 
-/// Searches a slab with a population, then with Gauss-Newton descents from the best distinct points, in at most
+/// Searches a slab with a population, then with Gauss-Newton descents from the best distinct points, in at
+/// most
 /// `share` evaluations. Returns why it stopped, unless its share was used up.
 ///
-/// The best point usually lies next to the known minimum and leads back to it, so the others are followed too.
+/// The best point usually lies next to the known minimum and leads back to it, so the others are followed
+/// too.
 pub(crate) fn search_excluded_region(
     ledger: &mut Ledger,
     slab: Slab,

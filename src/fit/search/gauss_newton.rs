@@ -1,4 +1,5 @@
-//! Damped Gauss-Newton descent. One precise frequency and several imprecise features make a long narrow valley,
+//! Damped Gauss-Newton descent. One precise frequency and several imprecise features make a long narrow
+//! valley,
 //! in which simplices are slow.
 //!
 //! Several Levenberg dampings are tried at once. The Jacobian comes from differences, is updated after every

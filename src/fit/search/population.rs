@@ -1,6 +1,7 @@
 //! Populations of points in the unit box: covariance matrix adaptation (CMA-ES).
 //!
-//! Hansen and Ostermeier, Evol. Comput. 9 (2001) 159; formulas and defaults of Hansen, arXiv:1604.00772, without
+//! Hansen and Ostermeier, Evol. Comput. 9 (2001) 159; formulas and defaults of Hansen, arXiv:1604.00772,
+//! without
 //! negative weights. A population learns the shape of a valley and is not caught by ripples on its floor. A
 //! point outside the unit box is evaluated at its mirror image inside. argmin has no such solver.
 
@@ -17,7 +18,8 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 /// Least relative gain in cost that counts as progress of a population.
 const STAGNANT_GAIN: f64 = 1e-3;
 
-/// Runs populations until the evaluations of the stage are used up. The first starts in the middle of the box,
+/// Runs populations until the evaluations of the stage are used up. The first starts in the middle of the
+/// box,
 /// the others at random points. Returns why the ledger stopped, if it did.
 pub(super) fn search_with_populations(
     ledger: &mut Ledger,
@@ -67,7 +69,8 @@ pub(super) struct PopulationExtent {
     last: f64,
 }
 
-/// For the whole box: three first lengths reach every corner. At the last length damped Gauss-Newton steps are
+/// For the whole box: three first lengths reach every corner. At the last length damped Gauss-Newton steps
+/// are
 /// better.
 pub(super) const WIDE_EXTENT: PopulationExtent = PopulationExtent { first: 0.3, last: 0.01 };
 /// For the neighbourhood of a point at which Gauss-Newton steps are caught by ripples.

@@ -1,7 +1,8 @@
 //! Nelder-Mead simplices by argmin.
 //!
 //! argmin's loop can neither stop with the ledger nor count steps without a gain, so its solver is stepped
-//! here. The solver has no bounds, so it works on the real line ([`line_to_unit`]). It panics on an error of its
+//! here. The solver has no bounds, so it works on the real line ([`line_to_unit`]). It panics on an error of
+//! its
 //! first costs, so costs are never errors.
 
 use super::StageCosts;
@@ -31,7 +32,8 @@ impl CostFunction for UnboundedCost<'_, '_> {
     }
 }
 
-/// Runs one simplex from `start` with edges of this length in the unit box, until it shrinks or gains nothing.
+/// Runs one simplex from `start` with edges of this length in the unit box, until it shrinks or gains
+/// nothing.
 pub(super) fn run_simplex(ledger: &mut Ledger, start: &[f64], edge: f64) -> SearchTermination {
     let vertices = initial_simplex(start, edge);
     let steps = ledger.remaining_evaluations().saturating_mul(2).saturating_add(vertices.len());

@@ -28,7 +28,8 @@ fn total_cost(model: &TraceModel, point: &[f64], segments: &[SegmentState], plai
     segments_cost(segments, plain) + model.unknowns.prior_cost(point)
 }
 
-/// The iterate with its starting states fitted in at most `most` steps; `None` where a scene refuses its point.
+/// The iterate with its starting states fitted in at most `most` steps; `None` where a scene refuses its
+/// point.
 pub(super) fn refit(
     model: &TraceModel,
     mut at: Iterate,

@@ -92,7 +92,8 @@ fn build_recording(source: &TraceSource<'_>) -> Result<TraceRecording, HeadMotio
     Ok(TraceRecording { scene, observation: film })
 }
 
-/// Noise of a channel: the job's, otherwise the measured noise without the part that is common to both points.
+/// Noise of a channel: the job's, otherwise the measured noise without the part that is common to both
+/// points.
 /// Where it cannot be measured, white noise from the differences between frames.
 fn channel_noise(
     traced: &TraceData,

@@ -101,7 +101,8 @@ fn has_enough_starts(model: &TraceModel, descents: &[TraceDescent]) -> bool {
     other_ends(descents, best).any(|other| other.plain == end.plain && is_same_end(end, other, &sd))
 }
 
-/// Frame rate and frequency of the blade's fastest mode, Hz, where the mode has fewer than two frames a period.
+/// Frame rate and frequency of the blade's fastest mode, Hz, where the mode has fewer than two frames a
+/// period.
 #[must_use]
 pub fn undersampled_mode(model: &TraceModel, at: &Iterate) -> Option<[f64; 2]> {
     let one = |point: RecordingModel<'_>| {

@@ -191,7 +191,8 @@ impl<'a> RunProgress<'a> {
     }
 }
 
-/// Follows runs to their ends, several at once. Returns the last iterate of each, in order; an entry is `None`
+/// Follows runs to their ends, several at once. Returns the last iterate of each, in order; an entry is
+/// `None`
 /// where the scene refuses its first point. Returns `None` where the checkpoint asks to stop.
 pub(super) fn follow_runs(
     end: &SearchEnd<'_>,
@@ -278,7 +279,8 @@ fn cost_rise(end: &SearchEnd<'_>, i: usize, moved: f64, at: &Iterate) -> f64 {
     at.cost - math::powi((at.point[i] - pinned_at) / sd, 2) + own - end.at.cost
 }
 
-// Parametric bootstrap (Efron and Tibshirani, An Introduction to the Bootstrap, 1993, chapter 6): the model at
+// Parametric bootstrap (Efron and Tibshirani, An Introduction to the Bootstrap, 1993, chapter 6): the model
+// at
 // the best end with new noise, refitted from there.
 
 /// Steps of a segment's starting state before the first outer step.

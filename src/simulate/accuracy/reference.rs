@@ -19,7 +19,8 @@ pub(crate) struct ReferenceRun<'a> {
     pub components: ComponentPair,
     /// Second method at the same tolerance, to check the reference.
     pub checked_by: IntegrationMethod,
-    /// Worst difference of the transition times of both methods, s; `None` if their lists differ or are empty.
+    /// Worst difference of the transition times of both methods, s; `None` if their lists differ or are
+    /// empty.
     pub apart_s: Option<f64>,
     /// Whether both methods have the same transitions.
     pub lists_agree: bool,
@@ -112,7 +113,8 @@ pub(crate) const LOW_COMPONENT: usize = 0;
 /// Index of the high component: the stick-slip cycle, read from the deflection.
 pub(crate) const HIGH_COMPONENT: usize = 1;
 
-/// Search bands of both components over the head's natural frequency. The low one was published at 1.5 and 3.9
+/// Search bands of both components over the head's natural frequency. The low one was published at 1.5 and
+/// 3.9
 /// times that frequency, the high one at 40 to 80 times.
 const BANDS_OVER_HEAD: [(f64, f64); 2] = [(1.0, 6.0), (6.0, 600.0)];
 /// Time from the release to the start of the window, s: vibration of the flip decays.

@@ -7,7 +7,8 @@ use crate::recording::FrameGrid;
 use serde::Serialize;
 use std::sync::Arc;
 
-/// Distance before a knot, in frames, at which an instant counts as the knot, so that no tiny piece remains. The
+/// Distance before a knot, in frames, at which an instant counts as the knot, so that no tiny piece remains.
+/// The
 /// jump of the third derivative moves the position in this time by 1e-18 of its effect over a frame.
 const NEAR_FRAMES: f64 = 1e-6;
 
@@ -30,7 +31,8 @@ pub struct HeadSpline {
 impl HeadSpline {
     /// A cubic spline through the values of a smooth curve at the frames `knots`.
     ///
-    /// The curve fits `points`, at least three rising frames of `grid` with positions in m, averaged in blocks of
+    /// The curve fits `points`, at least three rising frames of `grid` with positions in m, averaged in
+    /// blocks of
     /// `block` frames.
     pub(super) fn from_points(
         grid: &FrameGrid,
@@ -76,7 +78,8 @@ impl HeadSpline {
         self.curve.as_ref().map_or(0, |curve| curve.coefficients.len())
     }
 
-    /// Derivatives of the position at a frame by the coefficients: index of the first nonzero one, and the values
+    /// Derivatives of the position at a frame by the coefficients: index of the first nonzero one, and the
+    /// values
     /// from there.
     pub(crate) fn position_weights(&self, frame: usize) -> (usize, [f64; 6]) {
         self.curve.as_ref().map_or((0, [0.0; 6]), |curve| curve.position_weights(frame as f64))
@@ -204,7 +207,8 @@ mod tests {
         assert!(worst.iter().zip(bounds).all(|(worst, bound)| *worst < bound), "{worst:?}");
     }
 
-    /// A cubic B-spline with knots at frames and straight ends is the unique natural spline through its points.
+    /// A cubic B-spline with knots at frames and straight ends is the unique natural spline through its
+    /// points.
     #[test]
     fn unsmoothed_a_spline_on_the_frames_is_reproduced() {
         let bump = |t: f64| {

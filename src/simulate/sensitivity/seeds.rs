@@ -182,7 +182,8 @@ fn scale_at_zero(parameter: &ModelParameter, linkage: &Linkage) -> f64 {
 /// Direction of a derivative.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum TangentDirection {
-    /// A parameter of the scene by name. Quantities that the scene derives from it (a stiffness from a natural
+    /// A parameter of the scene by name. Quantities that the scene derives from it (a stiffness from a
+    /// natural
     /// frequency) follow.
     Parameter(String),
     /// Angle of the neck at the start, rad.
@@ -224,7 +225,8 @@ impl TangentDirection {
 
 // Derivatives of steady slip.
 
-/// Derivatives of both angles of steady slip from `J dq + dR = 0` with the moments `R(q, p)`; `None` at a fold of
+/// Derivatives of both angles of steady slip from `J dq + dR = 0` with the moments `R(q, p)`; `None` at a
+/// fold of
 /// the equilibrium.
 ///
 /// `d_speed` are the derivatives of the head's velocity, m/s.
@@ -269,7 +271,8 @@ mod tests {
     use super::*;
     use crate::model::tangent::LinkageConstant;
 
-    /// Rounding of a difference quotient must not count as a change of a constant, because each change costs time.
+    /// Rounding of a difference quotient must not count as a change of a constant, because each change costs
+    /// time.
     #[test]
     fn a_parameter_changes_only_the_constants_that_it_enters() {
         let text = include_str!("../../../data/scenes/actual-blade.toml");

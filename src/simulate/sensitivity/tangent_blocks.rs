@@ -72,7 +72,8 @@ impl<'a> TangentBlocks<'a> {
         self.all.iter_mut().zip(&self.seeds.blocks)
     }
 
-    /// Propagates the derivatives over the next stretch from `from` towards `to`, s after `start_s`. With `is_fresh`,
+    /// Propagates the derivatives over the next stretch from `from` towards `to`, s after `start_s`. With
+    /// `is_fresh`,
     /// the derivative of the tip's velocity may be nonzero at the start of stick.
     pub(crate) fn propagate_stretch<'c>(
         &mut self,
@@ -304,7 +305,8 @@ impl StickImpulse {
     }
 }
 
-/// Rates of angles, angular rates, gap and gap rate, at `x` s after the start of a motion; on the glass the gap
+/// Rates of angles, angular rates, gap and gap rate, at `x` s after the start of a motion; on the glass the
+/// gap
 /// is constant.
 pub(super) fn rates_after(motion: &TaylorMotion, mode: TipMode, x: f64) -> [f64; 6] {
     let mut rates = [0.0; 6];

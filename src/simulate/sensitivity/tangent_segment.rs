@@ -39,7 +39,8 @@ impl TangentSegment<'_> {
         ChannelWeights::at_time(t - self.span.place.start_s, self.span.course.motion.order)
     }
 
-    /// Weights for the integral of a channel between two times within the piece, s. A camera's mean is the sum of
+    /// Weights for the integral of a channel between two times within the piece, s. A camera's mean is the
+    /// sum of
     /// these over the pieces in its exposure, divided by the exposure.
     #[must_use]
     pub fn weights_over(&self, from: f64, to: f64) -> ChannelWeights {

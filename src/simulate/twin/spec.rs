@@ -111,7 +111,8 @@ enum ExportLayout {
     Tracker,
 }
 
-/// Most frames of a twin: 200 s at 10,000 frames/s, half a gigabyte. A mistyped rate must not fill the memory.
+/// Most frames of a twin: 200 s at 10,000 frames/s, half a gigabyte. A mistyped rate must not fill the
+/// memory.
 const MOST_FRAMES: f64 = 2e6;
 
 impl TwinSpec {

@@ -1,4 +1,5 @@
-//! Components with their deviations, and the evidence for and against each, from the fitted parts of a record.
+//! Components with their deviations, and the evidence for and against each, from the fitted parts of a
+//! record.
 
 use super::{Oscillation, RemovedTrend, SampledRecord, SpectralAnalysis};
 use crate::math;
@@ -316,7 +317,8 @@ impl<'a> FitReading<'a> {
         alone.cramer_rao_bound_hz(self.selector.samples.len(), self.selector.frame_rate_hz)
     }
 
-    /// Shift of a term with a richer trend: cycles, nepers, and the share of its amplitude half way through the
+    /// Shift of a term with a richer trend: cycles, nepers, and the share of its amplitude half way through
+    /// the
     /// record.
     fn shift_by_richer_trend(&self, k: usize) -> TermDeviations {
         let Some(richer) = &self.richer_trend_model else {

@@ -75,7 +75,8 @@ impl FixedColumns {
         Self { frames: data.len(), rows, blocks, columns, gram }
     }
 
-    /// Inner products of the trend's columns, the first `EACH` columns of every term and the data, in this order.
+    /// Inner products of the trend's columns, the first `EACH` columns of every term and the data, in this
+    /// order.
     pub(super) fn gram_matrix<const EACH: usize>(&self, terms: &[SineTerm]) -> DMatrix<f64> {
         let (trend, width) = (self.columns.ncols() - 1, EACH * terms.len());
         let tasks: Vec<&[Range<usize>]> = self.blocks.chunks(BLOCKS_A_TASK).collect();

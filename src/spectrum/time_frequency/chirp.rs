@@ -78,7 +78,8 @@ impl Chirp {
         -math::atan2(self.0[1], self.0[0])
     }
 
-    /// `x`, cosine and sine of the phase in each frame, each rotated from the one before: third differences of a
+    /// `x`, cosine and sine of the phase in each frame, each rotated from the one before: third differences
+    /// of a
     /// cubic are constant.
     fn phases(&self, frames: usize) -> impl Iterator<Item = (f64, f64, f64)> + use<> {
         let [.., a, b, c] = self.0;
@@ -195,7 +196,8 @@ fn apply_step<const N: usize>(shape: Chirp, step: &SVector<f64, N>) -> Chirp {
 }
 
 impl<const N: usize> ChirpFit<N> {
-    /// Variance of the frequency at `x`, square cycles in the segment, for a noise of deviation 1 in each frame.
+    /// Variance of the frequency at `x`, square cycles in the segment, for a noise of deviation 1 in each
+    /// frame.
     pub(super) fn cycles_variance(&self, x: f64) -> f64 {
         let along = [1.0, 2.0 * x, 3.0 * x * x];
         let mut gradient = SVector::<f64, N>::zeros();
@@ -214,7 +216,8 @@ const HARMONICS: usize = 3;
 const FEWEST_RESOLUTIONS: f64 = 20.0;
 /// Fewest bins of a median; with fewer left, harmonics are not left out.
 const FEWEST_BINS: usize = 8;
-/// Neighbours on either side in the median of a column: one segment's length, so that a column's own few bins do
+/// Neighbours on either side in the median of a column: one segment's length, so that a column's own few bins
+/// do
 /// not decide.
 const NEIGHBOURS: usize = 4;
 

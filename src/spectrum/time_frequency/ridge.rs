@@ -11,7 +11,8 @@ pub struct RidgePoint {
     pub time_s: f64,
     /// Frequency at that time, Hz.
     pub frequency_hz: f64,
-    /// Its standard deviation, Hz: from the noise next to the component or from the residual of the fit, whichever
+    /// Its standard deviation, Hz: from the noise next to the component or from the residual of the fit,
+    /// whichever
     /// is larger, and a five-hundredth of the resolution for leakage of other components.
     pub frequency_sd_hz: f64,
     /// Change of the frequency, Hz/s.
@@ -40,7 +41,8 @@ pub struct RidgeEnd {
 /// Course of a component over time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ridge {
-    /// The points, in order of time. A point needs a fitted amplitude that exceeds the noise next to it by more
+    /// The points, in order of time. A point needs a fitted amplitude that exceeds the noise next to it by
+    /// more
     /// than noise alone reaches once in a hundred records and does not fall to zero within the segment, three
     /// segments in a row or more. Elsewhere the ridge is interrupted.
     pub points: Vec<RidgePoint>,
@@ -83,8 +85,10 @@ impl Ridge {
     }
 
     /// Least and greatest frequency, including the two ends of the record if they are known to a quarter of a
-    /// resolution. A point counts only if the extrapolated frequency of a neighbour agrees with it within a quarter
-    /// of a resolution or four deviations, so that a single bad point sets neither limit. `None` where no point
+    /// resolution. A point counts only if the extrapolated frequency of a neighbour agrees with it within a
+    /// quarter
+    /// of a resolution or four deviations, so that a single bad point sets neither limit. `None` where no
+    /// point
     /// is confirmed.
     #[must_use]
     pub fn range_hz(&self) -> Option<FrequencyRange> {
@@ -136,7 +140,8 @@ fn frequency_range(ridge: &Ridge) -> Option<FrequencyRange> {
     })
 }
 
-/// Change of the frequency in the outer half of a segment next to an interruption, Hz: the course may continue
+/// Change of the frequency in the outer half of a segment next to an interruption, Hz: the course may
+/// continue
 /// there.
 fn change_beyond_hz(ridge: &Ridge, point: &RidgePoint) -> f64 {
     (point.rate_hz_per_s * ridge.segment_s / 2.0).abs()
@@ -149,13 +154,15 @@ fn end_mismatch_hz(end: &RidgeEnd, point: &RidgePoint) -> f64 {
     (end.frequency_hz - led_hz).abs() / 3.0
 }
 
-/// Half of the change of the frequency within a cycle, Hz: the frequency has no meaning at an instant within a
+/// Half of the change of the frequency within a cycle, Hz: the frequency has no meaning at an instant within
+/// a
 /// cycle, whose form changes with it.
 fn change_within_cycle_hz(point: &RidgePoint) -> f64 {
     (point.rate_hz_per_s / point.frequency_hz / 2.0).abs()
 }
 
-/// Bias of a bending course at its turning points, Hz: a fit of a steady rate to a segment of length `T` cuts a
+/// Bias of a bending course at its turning points, Hz: a fit of a steady rate to a segment of length `T` cuts
+/// a
 /// corner of curvature `c` by up to `c T^2 / 24`. The curvature is the median change of the rate over half a
 /// segment.
 fn curvature_bias_hz(ridge: &Ridge) -> f64 {

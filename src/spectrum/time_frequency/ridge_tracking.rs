@@ -1,4 +1,5 @@
-//! The points of a ridge: fits to the segments and to the ends of the record, started from the path through the
+//! The points of a ridge: fits to the segments and to the ends of the record, started from the path through
+//! the
 //! columns.
 
 use super::chirp::{
@@ -14,7 +15,8 @@ use crate::spectrum::settings::ROUNDING;
 
 /// Chance that noise alone puts one point on a ridge.
 const FALSE_ALARM: f64 = 0.01;
-/// Independent trials in each resolution of each segment: overlapping columns have more maxima than independent
+/// Independent trials in each resolution of each segment: overlapping columns have more maxima than
+/// independent
 /// values.
 const TRIALS: f64 = 10.0;
 /// Farthest a fit moves from the path, resolutions: half way down the lobe of a Hann window.
@@ -23,14 +25,16 @@ const FARTHEST_FROM_PATH: f64 = 1.0;
 const LEAKAGE_SD: f64 = 0.002;
 /// The same at the end of a fit whose rate may change, resolutions of that fit.
 const END_LEAKAGE_SD: f64 = 0.01;
-/// Lengths of the fits at an end of the record, segments: the change of the rate needs a longer stretch than the
+/// Lengths of the fits at an end of the record, segments: the change of the rate needs a longer stretch than
+/// the
 /// rate.
 const END_SEGMENTS: [f64; 6] = [1.75, 1.3, 1.0, 0.75, 0.55, 0.4];
 /// Fewest cycles in a fit there that is shorter than a segment: others leak into short fits.
 const END_CYCLES: f64 = 8.0;
 /// Deviations of their difference from which a shorter fit contradicts a longer one.
 const CONTRADICTS: f64 = 3.5;
-/// Bias of the fitted frequency by a changing rate with the sine weights, over the change of the rate from one
+/// Bias of the fitted frequency by a changing rate with the sine weights, over the change of the rate from
+/// one
 /// segment to the next: `<x^4>/<x^2>/24`.
 const CURVATURE_BIAS: f64 = 0.4154 / 24.0;
 /// Deviations of the frequency by this bias from which the rate of a point may change.
@@ -146,7 +150,8 @@ impl<'a> RidgeTracker<'a> {
         fits.into_iter().zip(starts).zip(median_filter(&around_m)).map(usable).collect()
     }
 
-    /// Adds a fit where the path led to none, starting from the neighbouring column's course: the spectrum of a
+    /// Adds a fit where the path led to none, starting from the neighbouring column's course: the spectrum of
+    /// a
     /// fast chirp is flat on top.
     pub(super) fn refit_from_neighbours(&self, fits: &[Option<SegmentFit>]) -> Vec<Option<SegmentFit>> {
         let (weights, noise) = (sine_weights(self.layout.frames), self.segment_noise());
@@ -166,7 +171,8 @@ impl<'a> RidgeTracker<'a> {
         (0..fits.len()).map(mend).collect()
     }
 
-    /// Repeats fits with a changing rate where the rates half a segment before and after show a significant bias
+    /// Repeats fits with a changing rate where the rates half a segment before and after show a significant
+    /// bias
     /// of the frequency.
     pub(super) fn refit_with_curvature(&self, fits: &[Option<SegmentFit>]) -> Vec<Option<SegmentFit>> {
         let (weights, noise) = (sine_weights(self.layout.frames), self.segment_noise());
@@ -220,9 +226,12 @@ impl<'a> RidgeTracker<'a> {
         })
     }
 
-    /// The frequency at the end of the record next to a column, by separate fits with a changing rate. A straight
-    /// course extrapolated by half a segment would have a smaller deviation, but a wrong frequency. A longer stretch
-    /// is more accurate while the course is smooth, so the longest is taken with which all shorter ones agree. The
+    /// The frequency at the end of the record next to a column, by separate fits with a changing rate. A
+    /// straight
+    /// course extrapolated by half a segment would have a smaller deviation, but a wrong frequency. A longer
+    /// stretch
+    /// is more accurate while the course is smooth, so the longest is taken with which all shorter ones
+    /// agree. The
     /// shortest only confirms, because others leak into it most.
     pub(super) fn ridge_end(&self, column: usize, fit: &SegmentFit) -> Option<RidgeEnd> {
         let end = |segments: f64| self.extrapolate_to_end(column, fit, segments);
@@ -277,7 +286,8 @@ fn is_near(chirp: &Chirp, cycles: f64) -> bool {
     (chirp.cycles_at(0.0) - cycles).abs() < FARTHEST_FROM_PATH
 }
 
-/// Weights of a fit: a sine, the root of a Hann window. It suppresses components five resolutions away below a
+/// Weights of a fit: a sine, the root of a Hann window. It suppresses components five resolutions away below
+/// a
 /// hundredth and loses less of the frames' information than the Hann window.
 fn sine_weights(frames: usize) -> Vec<f64> {
     periodogram::hann_weights(&vec![Some(0.0); frames]).into_iter().map(f64::sqrt).collect()
@@ -289,7 +299,8 @@ fn sine_weights(frames: usize) -> Vec<f64> {
 const FEWEST_POINTS: usize = 3;
 
 impl Spectrogram {
-    /// Course of the strongest component between two frequencies, Hz; `samples` is the record of this spectrogram.
+    /// Course of the strongest component between two frequencies, Hz; `samples` is the record of this
+    /// spectrogram.
     /// Without a component that stands out of the noise, the ridge has no points.
     ///
     /// # Errors
@@ -333,7 +344,8 @@ fn remove_short_runs(mut points: Vec<Option<RidgePoint>>) -> Vec<Option<RidgePoi
 // The path of greatest sum through the columns (Viterbi): levels less the costs of jumps.
 
 /// Standard deviation of the change of frequency over a quarter of a segment, resolutions. A drift of half a
-/// resolution in a quarter of a segment moves the frequency by two resolutions within the segment, about the most
+/// resolution in a quarter of a segment moves the frequency by two resolutions within the segment, about the
+/// most
 /// for a segment of the chosen length.
 const JUMP_SD: f64 = 0.5;
 /// Farthest jump, in standard deviations: six resolutions within a segment.
@@ -352,7 +364,8 @@ pub(super) struct PathLevels<'a> {
 }
 
 impl PathLevels<'_> {
-    /// The bin of each column on the best path. A level counts by the logarithm of its power, so that the path
+    /// The bin of each column on the best path. A level counts by the logarithm of its power, so that the
+    /// path
     /// keeps to a component that fades; a jump costs half the square of its size in standard deviations.
     pub(super) fn best_path(&self) -> Vec<usize> {
         let sd = (JUMP_SD * self.quarters * self.bins_per_resolution).max(1.0);

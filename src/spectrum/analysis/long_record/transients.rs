@@ -162,12 +162,14 @@ fn decay_nepers(c: &Component, lasts_s: f64) -> f64 {
 }
 
 // Pieces whose spectrum exceeds what is normal for the record. The pieces overlap by half. In each bin a
-// quarter of them lies below `-ln(3/4)` times the mean power of noise, whatever the rest holds. So steady lines
+// quarter of them lies below `-ln(3/4)` times the mean power of noise, whatever the rest holds. So steady
+// lines
 // and noise of any colour are normal, even where most of the pieces hold a flip.
 
 /// Chance that noise alone exceeds the normal power anywhere in a record.
 const FALSE_ALARM: f64 = 0.01;
-/// The normal power is this quantile of the pieces' powers, divided by the same quantile of noise over its mean.
+/// The normal power is this quantile of the pieces' powers, divided by the same quantile of noise over its
+/// mean.
 const NORMAL_POWER_QUANTILE: usize = 4;
 const QUARTER_OF_NOISE: f64 = 0.287_682_072_451_780_9;
 /// Half width of the neighbourhood whose median is the least noise of a bin, bins: a quarter of a few pieces
