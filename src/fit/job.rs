@@ -2,7 +2,9 @@
 
 /// Returns from a check because of a key; the problem is formatted as by [`format!`].
 macro_rules! refuse {
-    ($key:expr, $($problem:tt)+) => { return $crate::toml_file::refuse_key($key, std::fmt::format(format_args!($($problem)+))) };
+    ($key:expr, $($problem:tt)+) => {
+        return $crate::toml_file::refuse_key($key, std::fmt::format(format_args!($($problem)+)))
+    };
 }
 
 mod as_written;

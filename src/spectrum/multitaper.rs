@@ -464,7 +464,8 @@ mod tests {
         let slope = |bin: usize| (-(bin as f64) / 300.0).exp();
         let mut density: Vec<f64> = (0..1000).map(slope).collect();
         density[480..520].iter_mut().for_each(|d| *d *= 1e6);
-        let curve = noise_floor_curve(&density, 200, 1e9); // of endless degrees of freedom mean and median are one
+        // with many degrees of freedom the mean and the median agree
+        let curve = noise_floor_curve(&density, 200, 1e9);
         assert_eq!(curve.len(), 1000);
         // next to the line the median is that of the bins that are left, at most 20 bins aside: 7 %
         assert!((100..900).all(|bin| (curve[bin] / slope(bin) - 1.0).abs() < 0.07), "{:?}", &curve[380..620]);

@@ -136,7 +136,8 @@ pub(crate) fn cut_numbers_finding(
             table.cell_location(line, cell),
             cell + 1
         );
-        new_finding(Check::SpreadsheetRounding, Severity::Caution, (count as f64, ""), found, CUT_NUMBER_ADVICE)
+        let number = (count as f64, "");
+        new_finding(Check::SpreadsheetRounding, Severity::Caution, number, found, CUT_NUMBER_ADVICE)
     }))
 }
 
