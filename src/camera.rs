@@ -22,8 +22,7 @@ const HALF_POWER_CYCLES: f64 = 0.442_946_47;
 pub(crate) const MOST_ALIASES: usize = 1000;
 
 /// Gain of an exposure of `exposure_s` at `frequency_hz`, 0 to 1: `|sin(pi f T)/(pi f T)|`, from the mean of
-/// the motion
-/// while the shutter is open.
+/// the motion while the shutter is open.
 #[must_use]
 pub fn exposure_gain(frequency_hz: f64, exposure_s: f64) -> f64 {
     let half_turns = PI * frequency_hz * exposure_s;
@@ -47,8 +46,8 @@ pub fn alias_hz(frequency_hz: f64, frame_rate_hz: f64) -> f64 {
 }
 
 /// Every frequency above half of `frame_rate_hz` and up to `up_to_hz` that appears at `frequency_hz`, Hz: `k
-/// rate - f`
-/// and `k rate + f`, ascending, each once, at most 1000. Empty for a frequency outside 0 to half the rate.
+/// rate - f` and `k rate + f`, ascending, each once, at most 1000. Empty for a frequency outside 0 to half
+/// the rate.
 pub(crate) fn aliased_frequencies_hz(frequency_hz: f64, frame_rate_hz: f64, up_to_hz: f64) -> Vec<f64> {
     let half_hz = frame_rate_hz / 2.0;
     if !(half_hz.is_finite() && half_hz > 0.0 && (0.0..=half_hz).contains(&frequency_hz)) {

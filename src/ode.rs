@@ -1,15 +1,11 @@
 //! Integration of a smooth phase up to the first zero of its guards, by three methods: Taylor series
-//! ([`taylor`]),
-//! Runge-Kutta of order 8 with dense output ([`integrate`]) and steps of fixed length ([`fixed_step`]). This
-//! layer
-//! is independent of friction.
+//! ([`taylor`]), Runge-Kutta of order 8 with dense output ([`integrate`]) and steps of fixed length
+//! ([`fixed_step`]). This layer is independent of friction.
 //!
 //! A *phase* is a smooth right-hand side with inequalities, its *guards*, that hold while it lasts.
-//! Integration
-//! ends at the stop time or where the first guard falls to zero. A guard that starts at zero (a tip that has
-//! just
-//! been released) is armed by the order of its first nonzero derivative, so that its trivial root is neither
-//! reported nor hides the next one.
+//! Integration ends at the stop time or where the first guard falls to zero. A guard that starts at zero (a
+//! tip that has just been released) is armed by the order of its first nonzero derivative, so that its
+//! trivial root is neither reported nor hides the next one.
 
 pub mod collocation;
 mod dop853;
@@ -42,8 +38,7 @@ pub struct PhaseStart<const N: usize, const G: usize> {
     /// State.
     pub y: [f64; N],
     /// Order of each guard's zero at the start: 0 where the guard is positive, 1 for a simple zero, 2 for a
-    /// double
-    /// one.
+    /// double one.
     pub zero_order: [u8; G],
     /// First step to try, s; `None` estimates one.
     pub step: Option<f64>,

@@ -1,18 +1,16 @@
 //! Components of short records with missing frames.
 //!
-//! [`SpectralAnalysis::from_record`] takes a record apart: trend, steady and decaying oscillations by least
-//! squares on the
-//! frames present, one that drifts by its ridge, each with deviations and a verdict (`docs/spectra.md` has
-//! the criteria). It is what `wiperlab spectrum` shows.
+//! [`SpectralAnalysis::from_record`] fits a record: trend, steady and decaying oscillations by least squares
+//! on the frames present, and a drifting component by its ridge, each with deviations and a verdict
+//! (`docs/spectra.md` has the criteria). `wiperlab spectrum` shows the result.
 //!
-//! [`analyse_spectrum`] reads the tops of one Hann-windowed spectrum, fast and without choices that depend on
-//! the
-//! data, so that a fit can compare thousands of records by it. Gaps of up to four frames are bridged for the
-//! transform alone (`spectrum/gaps.rs`); where more than a tenth of the frames is missing, the components
-//! found are then refined on the frames present (`spectrum/refine.rs`). The record is detrended, weighted (a
-//! frame that is still missing has weight zero on the true frame grid; no frame is closed up), padded with
-//! zeros and transformed. Amplitudes are scaled by the weights present, `2 |sum w x exp(-i w t)| / sum w`: a
-//! sine of amplitude A reads A at its peak.
+//! [`analyse_spectrum`] reads the peaks of one Hann-windowed spectrum, fast and without choices that depend
+//! on the data, so that a fit can compare thousands of records. Gaps of up to four frames are filled for the
+//! transform alone (`spectrum/gap_filling.rs`). Where more than a tenth of the frames is missing, the
+//! components are then refined on the frames present (`spectrum/gap_refinement.rs`). The record is detrended,
+//! weighted, padded with zeros and transformed. A frame that is still missing has weight zero on the true
+//! frame grid. Amplitudes are scaled by the weights present, `2 |sum w x exp(-i w t)| / sum w`: a sine of
+//! amplitude A reads A at its peak.
 
 mod amplitude_spectrum;
 mod analysis;

@@ -1,6 +1,5 @@
 //! TOML files read into typed values. Every error names file, line, column, key and the nearest known key,
-//! and all
-//! problems of a file are listed together.
+//! and all problems of a file are listed together.
 
 mod hint;
 mod key_reference;
@@ -151,8 +150,7 @@ pub(crate) fn suggest_key(key: &str, known: &[&str]) -> String {
     /// Jaro-Winkler similarity from which a known key is suggested; below it the list is shown.
     const SIMILAR: f64 = 0.75;
     /// Similarity of a short key with one slip (a letter extra, missing, wrong, or two exchanged), which
-    /// Jaro-Winkler
-    /// rates far too low.
+    /// Jaro-Winkler rates far too low.
     const ONE_SLIP: f64 = 0.9;
     let key = key.to_lowercase();
     let one_slip = |known: &str| key.chars().count() > 2 && strsim::osa_distance(&key, known) == 1;
@@ -169,8 +167,7 @@ pub(crate) fn suggest_key(key: &str, known: &[&str]) -> String {
 }
 
 /// Advice on a path of a TOML file that contains a control character, because `\t` or the like was read as an
-/// escape;
-/// empty for any other path.
+/// escape; empty for any other path.
 pub(crate) fn path_hint(path: &str) -> &'static str {
     if path.chars().any(char::is_control) {
         "; a backslash between double quotes starts an escape: write the path with `/`, or between single quotes"

@@ -49,7 +49,7 @@ fn relative_density(x: f64) -> f64 {
     exp(-x * x / 2.0)
 }
 
-/// The exponent of the numbers from 2 to 4, to which 52 bits of a place are put.
+/// Exponent bits of the numbers from 2 to 4; 52 random bits are the mantissa.
 const FROM_TWO: u64 = 0x4000_0000_0000_0000;
 
 /// Edges of 256 layers of one area. The lowest has the tail from its edge on, `EDGES[1]`; `EDGES[0]` is that

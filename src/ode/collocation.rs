@@ -2,18 +2,15 @@
 //! Gauss and Legendre (Hairer, Lubich and Wanner, *Geometric Numerical Integration*, section II.1.3).
 //!
 //! On a step of length `h` the accelerations `a_j` at the nodes `c_j` are the unknowns. With the polynomials
-//! `l_j`
-//! that are 1 at one node and 0 at the others
+//! `l_j` that are 1 at one node and 0 at the others
 //!
 //! ```text
 //! y'(x) = y'_0 + h sum a_j int_0^x l_j          y(x) = y_0 + h x y'_0 + h^2 sum a_j int_0^x int l_j
 //! ```
 //!
 //! `s` nodes give the end of the step to the order `2 s` and its inside to the order `s + 2`. The equations
-//! of the
-//! nodes are eliminated in blocks in the order of time, without exchange of rows: a later node hardly acts on
-//! an
-//! earlier one.
+//! of the nodes are eliminated in blocks in the order of time, without exchange of rows: a later node hardly
+//! acts on an earlier one.
 
 #![allow(clippy::needless_range_loop)] // indices are those of the equations
 
@@ -102,8 +99,7 @@ impl CollocationRule {
     }
 
     /// Integrals from 0 to `x` of Legendre's polynomials of `2 x - 1`, once and twice, one for each degree
-    /// below
-    /// the number of nodes. `int P_m = (P_(m+1) - P_(m-1)) / (2 (2 m + 1))`, and likewise again.
+    /// below the number of nodes. `int P_m = (P_(m+1) - P_(m-1)) / (2 (2 m + 1))`, and likewise again.
     #[inline(always)]
     pub(crate) fn integrals_by_degree<R: LaneNumber>(
         &self,

@@ -78,8 +78,7 @@ impl<const N: usize> StepStages<N> {
     }
 
     /// Combined error estimate in units of the tolerance; a step with at most 1 is accepted. `scale` is the
-    /// tolerated
-    /// error of each component.
+    /// tolerated error of each component.
     #[inline]
     pub(crate) fn error_norm(&self, scale: &[f64; N]) -> f64 {
         let zero = [0.0; N];
@@ -150,10 +149,8 @@ impl<const N: usize> DenseOutput<N> for StepOutput<N> {
 }
 
 // Coefficients of the Dormand-Prince method of order 8 with embedded orders 5 and 3 and dense output of order
-// 7.
-// Source: E. Hairer, S. P. Nørsett, G. Wanner, "Solving Ordinary Differential Equations I", 2nd ed., Springer
-// 1993,
-// section II.5, and the authors' code DOP853. Stages count from 0.
+// 7. Source: E. Hairer, S. P. Nørsett, G. Wanner, "Solving Ordinary Differential Equations I", 2nd ed.,
+// Springer 1993, section II.5, and the authors' code DOP853. Stages count from 0.
 
 /// Joins the lines of a table.
 const fn join_lines<T: Copy, const M: usize>(lines: &[&[T]]) -> [T; M] {

@@ -1,6 +1,5 @@
 //! The classical Runge-Kutta method of order 4 in steps of fixed length, for comparisons: no error control,
-//! guards
-//! evaluated at the end of each step. Two roots within one step are missed.
+//! guards evaluated at the end of each step. Two roots within one step are missed.
 
 use super::slack_variable::{SlackVariable, StatePoint};
 use super::{
@@ -27,9 +26,8 @@ pub struct FixedStepOptions {
 }
 
 /// Integrates `phase` from `start` until `stop` or a guard in steps of fixed length (the last one is cut).
-/// `observe`
-/// sees every step. The zero orders of the start are ignored: only a guard that falls over a step ends the
-/// phase.
+/// `observe` sees every step. The zero orders of the start are ignored: only a guard that falls over a step
+/// ends the phase.
 pub fn integrate_fixed<const N: usize, const G: usize, P: HybridPhase<N, G>, A: ObserverReply>(
     phase: &P,
     start: PhaseStart<N, G>,
@@ -78,8 +76,7 @@ pub fn integrate_fixed<const N: usize, const G: usize, P: HybridPhase<N, G>, A: 
 /// A last step shorter than this share of a step is joined to the one before.
 const SHORTEST_LAST_STEP: f64 = 1e-6;
 /// Halvings of a step in search of a point from which a guard falls steadily; 2^-50 of a step is below the
-/// rounding
-/// of time.
+/// rounding of time.
 const MOST_HALVINGS: usize = 50;
 
 /// Right-hand sides of [`runge_kutta_4_step`] beyond the first.

@@ -1,12 +1,9 @@
 //! Truncated power series about the start of a step, and the first zero of one of them.
 //!
 //! On a step of length `h` a series with coefficients `g_k` is the polynomial `sum g_k h^k s^k`, `s` in [0,
-//! 1]. It
-//! lies in the convex hull of its Bernstein coefficients. So it has no root if all are positive, and exactly
-//! one if
-//! they change sign once; otherwise the interval is halved by de Casteljau's algorithm. No root inside a step
-//! is
-//! missed, double ones included.
+//! 1]. It lies in the convex hull of its Bernstein coefficients. So it has no root if all are positive, and
+//! exactly one if they change sign once; otherwise the interval is halved by de Casteljau's algorithm. No
+//! root inside a step is missed, double ones included.
 
 /// Highest order of an expansion; beyond it rounding, not truncation, limits double precision.
 pub(crate) const MOST_ORDER: usize = 20;
@@ -18,14 +15,12 @@ pub(crate) const TERMS: usize = MOST_ORDER + 1;
 pub(crate) type TaylorSeries = [f64; TERMS];
 
 /// Halvings after which a root that cannot be distinguished from a touch counts as a touch: 2^-30 of a step
-/// is below
-/// every tolerance.
+/// is below every tolerance.
 const MOST_HALVINGS: u32 = 30;
 /// Terms below this share of the sum are rounding: they do not decide whether a guard starts at a zero.
 const NOISE: f64 = 1e-14;
 /// A part of the step on which no Bernstein coefficient exceeds this share of the sum of all terms is flat at
-/// zero:
-/// its signs are rounding, and further halving would take a billion steps.
+/// zero: its signs are rounding, and further halving would take a billion steps.
 const FLAT: f64 = 4.0 * f64::EPSILON;
 
 /// First fall of a guard on a step.
@@ -41,10 +36,8 @@ pub(crate) enum GuardFall {
 /// First fall of a guard to zero on `[0, h]`.
 ///
 /// `zero_order` is the multiplicity of the guard's zero at the start, 0 where it is positive. A zero at the
-/// start is
-/// armed by the first coefficient above rounding: if it is positive that zero is divided out, if it is
-/// negative the
-/// guard falls at once.
+/// start is armed by the first coefficient above rounding: if it is positive that zero is divided out, if it
+/// is negative the guard falls at once.
 pub(crate) fn first_fall(guard: &TaylorSeries, order: usize, zero_order: usize, h: f64) -> GuardFall {
     if guard[0] == f64::INFINITY {
         return GuardFall::Nowhere;
@@ -146,8 +139,7 @@ fn first_crossing(search: &RootSearch, b: &mut [f64; TERMS], low: f64, high: f64
 }
 
 /// The single root between `low`, where the polynomial is positive, and `high`, where it is not, by Newton's
-/// method.
-/// Steps outside the bracket are replaced by false position, slow ones by bisection.
+/// method. Steps outside the bracket are replaced by false position, slow ones by bisection.
 fn single_root(c: &[f64], mut low: f64, mut high: f64, at_low: f64, at_high: f64) -> f64 {
     /// More than Newton's method and bisection together need in double precision.
     const ROUNDS: usize = 80;

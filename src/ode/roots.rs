@@ -1,10 +1,8 @@
 //! First zero of a guard inside a step, certain for the interpolating polynomial, double roots included.
 //!
 //! A guard is sampled on the dense output at equispaced fractions of the step and written in the Bernstein
-//! basis. If
-//! all coefficients are positive there is no root, because the polynomial lies in their convex hull.
-//! Otherwise the
-//! interval is halved by de Casteljau's algorithm.
+//! basis. If all coefficients are positive there is no root, because the polynomial lies in their convex
+//! hull. Otherwise the interval is halved by de Casteljau's algorithm.
 
 use crate::math;
 
@@ -14,12 +12,10 @@ pub(crate) const COARSE_SAMPLES: usize = 5;
 pub(crate) const FINE_SAMPLES: usize = 9;
 
 /// Halvings after which a root that cannot be distinguished from a touch counts as a touch: 2^-30 of a step
-/// is below
-/// every tolerance.
+/// is below every tolerance.
 const MOST_HALVINGS: u32 = 30;
 /// A part of the step on which no Bernstein coefficient exceeds this share of the largest is flat at zero:
-/// its signs
-/// are rounding, and further halving would take a billion steps.
+/// its signs are rounding, and further halving would take a billion steps.
 const FLAT: f64 = 8.0 * f64::EPSILON;
 
 const COARSE_TO_BERNSTEIN: [[f64; COARSE_SAMPLES]; COARSE_SAMPLES] = bernstein_from_samples(0);
@@ -27,8 +23,7 @@ const FINE_TO_BERNSTEIN: [[f64; FINE_SAMPLES]; FINE_SAMPLES] = bernstein_from_sa
 const INNER_TO_BERNSTEIN: [[f64; FINE_SAMPLES - 1]; FINE_SAMPLES - 1] = bernstein_from_samples(1);
 
 /// Whether a guard with these coarse samples and one check sample (at fraction 7/8) stays clear of zero. The
-/// least
-/// Bernstein coefficient must exceed the interpolation error at the check sample, with a margin.
+/// least Bernstein coefficient must exceed the interpolation error at the check sample, with a margin.
 #[inline]
 pub(crate) fn is_root_free(samples: &[f64; COARSE_SAMPLES], check: f64) -> bool {
     /// The check sample shows the interpolation error at one place; elsewhere it may be larger.
@@ -47,8 +42,7 @@ pub(crate) fn first_root(samples: &[f64; FINE_SAMPLES]) -> Option<f64> {
 }
 
 /// The same for a guard that starts at a zero of multiplicity `order` and grows. The samples, except the
-/// first, are
-/// divided by `fraction^order`, which removes that zero, and the quotient is searched.
+/// first, are divided by `fraction^order`, which removes that zero, and the quotient is searched.
 pub(crate) fn first_root_after_zero(samples: &[f64; FINE_SAMPLES], order: i32) -> Option<f64> {
     let mut quotient = [0.0; FINE_SAMPLES - 1];
     for (i, q) in quotient.iter_mut().enumerate() {
@@ -68,8 +62,7 @@ fn multiply_matrix<const M: usize>(matrix: &[[f64; M]; M], x: &[f64; M]) -> [f64
 }
 
 /// First root, given Bernstein coefficients. A guard that does not apply (infinity or a difference from it)
-/// has no
-/// root, nor has one that is zero throughout.
+/// has no root, nor has one that is zero throughout.
 fn find_first_root<const M: usize>(b: [f64; M]) -> Option<f64> {
     let largest = b.iter().fold(0.0, |a: f64, c| a.max(c.abs()));
     if largest == 0.0 || !b.iter().all(|c| c.is_finite()) {
@@ -100,8 +93,7 @@ fn first_crossing<const M: usize>(b: [f64; M], flat: f64, low: f64, high: f64, d
 }
 
 /// The single root in [0, 1] of a polynomial that is positive at 0 and not at 1, by the Illinois variant of
-/// false
-/// position, with bisection every third round.
+/// false position, with bisection every third round.
 fn single_root<const M: usize>(b: &[f64; M]) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     let (mut at_low, mut at_high) = (b[0], b[M - 1]);
@@ -147,8 +139,7 @@ fn subdivide<const M: usize>(b: [f64; M]) -> ([f64; M], [f64; M]) {
 }
 
 /// Inverse of the collocation matrix of the Bernstein basis of degree `M - 1` at the nodes `i / (M - 1 +
-/// first)`, `i`
-/// from `first` on. With `first` 1 the quotient of a guard is not sampled at 0.
+/// first)`, `i` from `first` on. With `first` 1 the quotient of a guard is not sampled at 0.
 const fn bernstein_from_samples<const M: usize>(first: usize) -> [[f64; M]; M] {
     let mut nodes = [0.0; M];
     let mut i = 0;

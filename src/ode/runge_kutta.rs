@@ -1,6 +1,5 @@
 //! The Dormand-Prince 8(5,3) method with error control, up to the first guard that falls. Roots are isolated
-//! on nine
-//! samples of the dense output; a step of the method's own order gives the state there.
+//! on nine samples of the dense output; a step of the method's own order gives the state there.
 
 use super::dop853::{ERROR_EXPONENT, EVALUATIONS_FOR_DENSE, EVALUATIONS_PER_STEP, StepOutput, StepStages};
 use super::fixed_step::{RUNGE_KUTTA_4_EVALUATIONS, runge_kutta_4_step};
@@ -10,26 +9,22 @@ use super::{AcceptedStep, HybridPhase, ObserverReply, PhaseEnd, PhaseEndCause, P
 use crate::math;
 
 /// How the time at which a guard falls to zero is located. Which guard falls first, double roots included,
-/// always
-/// follows from the dense output.
+/// always follows from the dense output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum EventLocator {
     /// The root is bracketed on the dense output, the step repeated up to it and the remainder closed by
-    /// Newton's
-    /// iteration.
+    /// Newton's iteration.
     #[default]
     Bracket,
     /// The step is rejected and a slack variable, as the independent variable, brought to zero. A guard that
-    /// turns
-    /// inside the step is bracketed until it falls.
+    /// turns inside the step is bracketed until it falls.
     Slack,
 }
 
 /// Integrates `phase` from `start` until `stop` or a guard; `observe` sees every accepted step.
 ///
 /// `relative` is the tolerated error of a step relative to each state, or to its [`HybridPhase::scale`] where
-/// that
-/// is larger.
+/// that is larger.
 pub fn integrate<const N: usize, const G: usize, P: HybridPhase<N, G>, A: ObserverReply>(
     phase: &P,
     start: PhaseStart<N, G>,
@@ -104,12 +99,10 @@ const STRETCH: f64 = 1.01;
 /// Length of step, in units of the rounding of time, up to which a guard that starts at zero is ignored.
 const SLIVER_STEP: f64 = 64.0;
 /// Most remainder of a guard at its located zero, as a share of its largest sample. With more, the polynomial
-/// through
-/// the samples has a root that the guard does not have, and a shorter step is taken.
+/// through the samples has a root that the guard does not have, and a shorter step is taken.
 const MOST_GUARD_REMAINDER: f64 = 1e-3;
 /// Length of step, in units of the rounding of time, below which a shorter one shows no more of a guard: over
-/// it, a
-/// double zero at the start opens by less than the rounding of the state.
+/// it, a double zero at the start opens by less than the rounding of the state.
 const SHORTEST_TELLING_STEP: f64 = 1e8;
 
 /// First event of a step.
@@ -284,8 +277,7 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> AdaptiveRun<'a, N
     }
 
     /// State at the event by the slack variable, from the start of the step, or from nearer the zero if the
-    /// guard turns
-    /// before it falls; `None` for a guard that turns too close to its zero.
+    /// guard turns before it falls; `None` for a guard that turns too close to its zero.
     fn land_by_slack(
         &mut self,
         stages: &StepStages<N>,
@@ -317,8 +309,7 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> AdaptiveRun<'a, N
     }
 
     /// State at the event to the order of the method: the step is repeated up to the root of the dense
-    /// output, then
-    /// Newton's iteration on the guard closes the remainder with short steps.
+    /// output, then Newton's iteration on the guard closes the remainder with short steps.
     fn refine_event(&mut self, stages: &StepStages<N>, guard: usize, fraction: f64) -> (f64, [f64; N]) {
         /// Most corrections; one is usual, because the dense output's root is accurate to its order.
         const ROUNDS: usize = 4;

@@ -1,16 +1,13 @@
 //! Location of a guard's zero by a slack variable. The inequality `G >= 0` is written as the equality `G =
-//! s^2/2`, so
-//! that the guard falls to zero where `s` does, and `s` becomes the independent variable,
+//! s^2/2`, so that the guard falls to zero where `s` does, and `s` becomes the independent variable,
 //!
 //! ```text
 //! dt/ds = s/G'      dy/ds = F s/G'      from s = sqrt(2 G) to s = 0
 //! ```
 //!
 //! with `F` the right-hand side and `G'` the guard's rate along the flow (Hénon's method, Physica D 5, 1982,
-//! applied
-//! to `sqrt(2 G)`). Both slopes stay finite where the guard falls to a double zero. A state past the zero has
-//! no real
-//! `s`; there `G = -s^2/2` leads back.
+//! applied to `sqrt(2 G)`). Both slopes stay finite where the guard falls to a double zero. A state past the
+//! zero has no real `s`; there `G = -s^2/2` leads back.
 
 use super::{HybridPhase, WorkCounters};
 
@@ -22,8 +19,7 @@ pub(super) struct StatePoint<const N: usize> {
 }
 
 /// Steps in `s` of the first descent. A descent only determines the time: the method's own step then gives
-/// the state,
-/// and further descents close the remainder of the guard.
+/// the state, and further descents close the remainder of the guard.
 const FIRST_STEPS: u32 = 4;
 /// Most further descents; two or three are usual. Close to a double zero a descent leaves up to a sixth of
 /// the way.
@@ -34,12 +30,10 @@ const SHORT: f64 = 1e-3;
 /// reached.
 const MOST_REMAINDER: f64 = 1e-4;
 /// Span of the central difference for the guard's rate, as a share of the step. Its error, about 1e-10 of the
-/// rate,
-/// shifts the end of one descent and is removed by the next.
+/// rate, shifts the end of one descent and is removed by the next.
 const PROBE: f64 = 1e-5;
 /// Least rate of fall at the start of a descent, relative to the mean rate down to the zero: near a maximum
-/// of the
-/// guard the slopes in `s` have a pole. A straight fall has 1, the fall to a double zero 2.
+/// of the guard the slopes in `s` have a pole. A straight fall has 1, the fall to a double zero 2.
 const LEAST_FALL: f64 = 0.5;
 /// Halvings of the way to the zero after which the guard counts as one that only grazes it.
 pub(super) const MOST_HALVINGS: usize = 30;
@@ -80,8 +74,7 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> SlackVariable<'a,
     }
 
     /// Whether a descent may start here, a time `ahead_s` before the zero: the guard falls, and not much
-    /// slower than on
-    /// average.
+    /// slower than on average.
     pub(super) fn can_descend(&mut self, at: &StatePoint<N>, ahead_s: f64) -> bool {
         let value = self.guard_value(at);
         let flow = self.derivative(at);
@@ -89,10 +82,8 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> SlackVariable<'a,
     }
 
     /// The point where the guard is zero, from a point where it falls. `advance` takes the state from there
-    /// to a given
-    /// time by the method's own step, which costs `cost` right-hand sides. `None` when the guard turns before
-    /// it is
-    /// zero.
+    /// to a given time by the method's own step, which costs `cost` right-hand sides. `None` when the guard
+    /// turns before it is zero.
     pub(super) fn land_on_zero(
         &mut self,
         from: &StatePoint<N>,

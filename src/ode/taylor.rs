@@ -2,10 +2,8 @@
 //!
 //! A step needs no trial: its length follows from the last coefficients (Jorba and Zou 2005, *Experimental
 //! Mathematics* 14, section 3.2). Nothing is rejected, and no step size is carried over a transition. The
-//! polynomials
-//! of the guards are as accurate as those of the states, so an event on them is found with certainty, and its
-//! state
-//! needs no further step.
+//! polynomials of the guards are as accurate as those of the states, so an event on them is found with
+//! certainty, and its state needs no further step.
 
 use super::polynomial::{GuardFall, MOST_ORDER, TERMS, TaylorSeries, first_fall};
 use super::{
@@ -37,8 +35,7 @@ pub struct TaylorExpansion<const N: usize, const G: usize> {
     /// apply.
     pub guards: [[f64; G]; TERMS],
     /// Last coefficient but one and last of quantities that follow from the states and must converge too, as
-    /// a
-    /// multiple of their scale.
+    /// a multiple of their scale.
     pub followers: [f64; 2],
     /// `x` of a term in `exp(-x)`, `x >= 0`, that the equations contain and that may vary much over a step.
     pub exponent: Option<TaylorSeries>,
@@ -65,8 +62,7 @@ impl<const N: usize, const G: usize> TaylorExpansion<N, G> {
     }
 
     /// Length of step at which the last two coefficients of every state reach the tolerance. The error, of
-    /// the next
-    /// order, is smaller.
+    /// the next order, is smaller.
     #[inline]
     fn step_length(&self, scale: &[f64; N], relative: f64) -> f64 {
         let largest = |k: usize, follower: f64| {
@@ -80,15 +76,12 @@ impl<const N: usize, const G: usize> TaylorExpansion<N, G> {
     }
 
     /// A length up to `h` over which the terms of the exponential fall. An exponential too small to show in
-    /// the last
-    /// coefficients, but growing by many powers of ten within the step, would otherwise be missed: the
-    /// coefficients of
-    /// `exp(x)` rise up to the order `x`.
+    /// the last coefficients, but growing by many powers of ten within the step, would otherwise be missed:
+    /// the coefficients of `exp(x)` rise up to the order `x`.
     #[inline]
     fn limit_by_exponential(&self, h: f64) -> f64 {
         /// Most change of the exponent, as a share of the order: at the end of the series each term is then
-        /// at most
-        /// this share of the one before.
+        /// at most this share of the one before.
         const SHARE: f64 = 0.25;
         /// Exponent from which the exponential is below rounding.
         const NEGLIGIBLE: f64 = 40.0;
@@ -100,8 +93,7 @@ impl<const N: usize, const G: usize> TaylorExpansion<N, G> {
     }
 
     /// The first guard that falls within `h`, with its distance from the start; of two that fall at once the
-    /// first in
-    /// the list.
+    /// first in the list.
     #[inline]
     fn find_event(&self, zero_order: &[u8; G], h: f64) -> Result<Option<(usize, f64)>, UndefinedGuard> {
         let mut rest = [0.0; G];
@@ -148,8 +140,7 @@ impl<const N: usize, const G: usize> DenseOutput<N> for TaylorExpansion<N, G> {
 
 /// Order of the series at a tolerance: the order of least work for a series that falls geometrically, `1 -
 /// ln(relative)/2` (Jorba and Zou 2005, section 3.1), and a little more, because the coefficients of
-/// oscillations fall
-/// faster. The optimum is flat: on the light test blade 2 to 6 more cost the same time.
+/// oscillations fall faster. The optimum is flat: on the light test blade 2 to 6 more cost the same time.
 pub(crate) fn order_for_tolerance(relative: f64) -> usize {
     const MORE: f64 = 3.0;
     /// A lower order would derive the step length from too few coefficients.
@@ -158,20 +149,16 @@ pub(crate) fn order_for_tolerance(relative: f64) -> usize {
 }
 
 /// Share of the tolerance that a step may use. The errors of thousands of steps add up, and slip under
-/// friction that
-/// falls with speed amplifies them: over the strokes of the light test blade the worst transition is off by
-/// 10 to 50
-/// times the error of a step. With this share it is off by about the tolerance.
+/// friction that falls with speed amplifies them: over the strokes of the light test blade the worst
+/// transition is off by 10 to 50 times the error of a step. With this share it is off by about the tolerance.
 const STEP_SHARE: f64 = 0.02;
 
 /// A step this close to the stop time, relative to its length, ends there, so that no tiny step remains.
 const STRETCH: f64 = 1.01;
 
 /// Integrates `phase` from `start` until `stop` or a guard; `observe` sees every step and the tape of its
-/// recurrences.
-/// The contract is that of [`integrate`](super::integrate). The coefficients of all states at one order count
-/// as one
-/// right-hand side.
+/// recurrences. The contract is that of [`integrate`](super::integrate). The coefficients of all states at
+/// one order count as one right-hand side.
 pub fn integrate_taylor<const N: usize, const G: usize, P: TaylorPhase<N, G>, A: ObserverReply>(
     phase: &P,
     start: PhaseStart<N, G>,
@@ -222,8 +209,7 @@ pub fn integrate_taylor<const N: usize, const G: usize, P: TaylorPhase<N, G>, A:
 }
 
 /// Moves the root of a guard's series to that of the guard itself on the states' polynomials. Forces follow
-/// from
-/// second derivatives, so their series end one order before those of the states.
+/// from second derivatives, so their series end one order before those of the states.
 fn correct_root<const N: usize, const G: usize, P: TaylorPhase<N, G>>(
     phase: &P,
     expansion: &TaylorExpansion<N, G>,

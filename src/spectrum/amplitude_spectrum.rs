@@ -23,8 +23,7 @@ pub struct WindowedTransform {
 
 impl WindowedTransform {
     /// Transforms samples, m, one a frame (`None` where a frame has no value). The number of components in
-    /// the
-    /// settings has no effect here.
+    /// the settings has no effect here.
     ///
     /// # Errors
     /// [`SpectrumError`] when the record, the rate or the settings' band cannot give one.

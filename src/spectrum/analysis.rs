@@ -125,8 +125,7 @@ impl SpectralAnalysis {
     }
 
     /// Analyses a record. With `settings.detrend` `None` the trend is chosen from the record. Where only
-    /// every
-    /// second, third ... frame has a value, the record is read at that lower rate.
+    /// every second, third ... frame has a value, the record is read at that lower rate.
     ///
     /// # Errors
     /// [`SpectrumError`] when the record, the rate or the band cannot give one.
@@ -187,10 +186,8 @@ impl SpectralAnalysis {
     }
 
     /// Analyses each stretch between the flips of a piece: the first frames that leave noise only, or else
-    /// the
-    /// first whose trend has no fast waves. A trend through a flip takes many times as long as the
-    /// oscillation
-    /// that the flip starts.
+    /// the first whose trend has no fast waves. A trend through a flip takes many times as long as the
+    /// oscillation that the flip starts.
     fn analyse_between_steps(record: &SampledRecord, settings: &SpectrumSettings) -> Vec<Self> {
         let of_stretch = |tries: &Vec<Range<usize>>| {
             let mut parts =

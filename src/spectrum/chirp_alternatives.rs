@@ -1,7 +1,6 @@
 //! Alternatives to a second oscillation near a first one: a frequency that drifts evenly, or an amplitude
-//! that
-//! falls linearly. Neither is a term of the fit. Where one explains as much as a second oscillation does, the
-//! second is dropped.
+//! that falls linearly. Neither is a term of the fit. Where one explains as much as a second oscillation
+//! does, the second is dropped.
 
 use super::least_squares::SineTerm;
 use super::model_selection::{ModelFit, ModelSelector};
@@ -89,8 +88,7 @@ impl ModelSelector<'_> {
     }
 
     /// The criterion with an evenly drifting or fading oscillation in the place of term `k`, or of `k` and
-    /// its
-    /// neighbours.
+    /// its neighbours.
     pub(super) fn alternatives_criterion(&self, fit: &ModelFit, k: usize) -> f64 {
         let group = nearby_terms(fit.model.terms(), k);
         let alone = self.replacement_criterion(fit, k, &[k]);

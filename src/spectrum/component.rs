@@ -18,8 +18,7 @@ pub struct Component {
     /// followed, by counting cycles.
     pub range_hz: Option<FrequencyRange>,
     /// Start, s from the first frame analysed; `None` for a component present from the first frame. In a
-    /// piece
-    /// of a long record: the start of the piece, if the component is present by then.
+    /// piece of a long record: the start of the piece, if the component is present by then.
     pub begins_s: Option<f64>,
     /// Amplitude, m; of a decaying component where it begins or the record starts.
     pub amplitude_m: f64,
@@ -98,10 +97,9 @@ impl DecayingTone {
     /// Bound on the standard deviation of the frequency, Hz, with amplitude, phase and decay unknown.
     ///
     /// Amplitude and decay are uncorrelated with phase and frequency, so with weights `p = exp(-2 d t / T)`
-    /// the
-    /// information on the frequency is `(2 pi A)^2 / (2 sigma^2)` times the spread `sum p t^2 - (sum p t)^2 /
-    /// sum p`. For a steady tone that is the closed form `fs / (2 pi) sqrt(12 / (eta N (N^2 - 1)))`, `eta =
-    /// A^2 / (2 sigma^2)`.
+    /// the information on the frequency is `(2 pi A)^2 / (2 sigma^2)` times the spread `sum p t^2 - (sum p
+    /// t)^2 / sum p`. For a steady tone that is the closed form `fs / (2 pi) sqrt(12 / (eta N (N^2 - 1)))`,
+    /// `eta = A^2 / (2 sigma^2)`.
     pub(super) fn cramer_rao_bound_hz(&self, frames: usize, frame_rate_hz: f64) -> f64 {
         let shrink = math::exp(-2.0 * self.nepers / frames as f64);
         let (mut power, mut sums) = (1.0, [0.0; 3]);

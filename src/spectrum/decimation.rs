@@ -1,8 +1,6 @@
-//! Records of which only every second, third ... frame was kept: they hold what a camera of that rate sees,
-//! and nothing above half of it.
+//! Records of which only every second, third ... frame was kept, as from a camera of that lower rate.
 
-/// First frame with a value, and the distance of which all later ones are multiples, where that is two
-/// frames or more.
+/// First frame with a value and distance of the kept frames, if that is two frames or more.
 pub(super) fn find_stride(samples: &[Option<f64>]) -> Option<(usize, usize)> {
     let mut present = samples.iter().enumerate().filter(|(_, x)| x.is_some()).map(|(i, _)| i);
     let first = present.next()?;

@@ -1,10 +1,8 @@
 //! A cycle whose frequency changes over the record: sought in addition to steady and decaying oscillations,
-//! and
-//! read as one component.
+//! and read as one component.
 //!
 //! Sinusoids can only split such a cycle into pieces. If they leave as much as they explain, or if three or
-//! more
-//! of them lie within the range of a ridge that drifts, the ridge is the component and the pieces are
+//! more of them lie within the range of a ridge that drifts, the ridge is the component and the pieces are
 //! dropped.
 
 use super::model_selection::{DriftRegion, LOBE, ModelFit, ModelSelector};
@@ -22,8 +20,7 @@ const BAND_MARGIN: f64 = 2.0;
 /// Share of followed segments from which the component counts as followed everywhere.
 pub(super) const FULLY_FOLLOWED: f64 = 0.9;
 /// Shorter segments tried below that share, and the gain in it that they must bring: noise hides a component
-/// in
-/// short segments.
+/// in short segments.
 const SHORTER_SEGMENTS: [f64; 3] = [0.8, 0.65, 0.5];
 const LEAST_GAIN: f64 = 0.1;
 /// Deviation of the instant of a cycle, cycles: its form changes with its frequency, and the fundamental
@@ -92,8 +89,7 @@ pub(super) fn find_drift_course(
 }
 
 /// The ridge of the segment length that shows the component best. If it misses much of the record, the
-/// shorter
-/// length that misses least: the component may be weak or fast in a part of the record.
+/// shorter length that misses least: the component may be weak or fast in a part of the record.
 fn select_best_ridge(record: &[Option<f64>], frame_rate_hz: f64, band: (f64, f64)) -> Option<(f64, Ridge)> {
     let cut = |segment_s: Option<f64>| {
         let settings = time_frequency::SpectrogramSettings { segment_s, band_hz: Some(band) };

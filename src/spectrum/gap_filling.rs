@@ -2,21 +2,15 @@
 //!
 //! A frame of weight zero leaks a little of every component over the whole spectrum: with one frame in forty
 //! missing, a ring-down of 180 um buries a cycle of 6 um. Short gaps are therefore filled with the values
-//! that
-//! minimise the sum of squared fourth differences. That reproduces cubics exactly, and a component of
-//! frequency
-//! f to `(2 sin(pi f/fs))^8/70` for a single frame: 2.5 % at 900 Hz and 5,000 frames/s, 1e-12 at 78 Hz.
-//! Longer
-//! gaps stay gaps of weight zero. The recording itself is never filled.
+//! that minimise the sum of squared fourth differences. That reproduces cubics exactly, and a component of
+//! frequency f to `(2 sin(pi f/fs))^8/70` for a single frame: 2.5 % at 900 Hz and 5,000 frames/s, 1e-12 at 78
+//! Hz. Longer gaps stay gaps of weight zero. The recording itself is never filled.
 //!
 //! Measured on 0.15 s at 5,000 frames/s (78.4 Hz at 20 um, 900 Hz at 8 um, a reversal, frames lost at random;
 //! rms error of the frequencies, with filling | without): 20 % lost 0.014 and 0.022 Hz | 0.077 and 0.31 Hz;
-//! 40 %
-//! lost 0.083 and 0.093 Hz | 0.11 and 0.42 Hz. At 3 um and 40 % the fast component is always found with
-//! filling
-//! and missed in two of three records without. The cost is its amplitude, which reads 2 % low with 20 % lost
-//! and
-//! 9 % low with 40 %. The components of such records are therefore refined without filling
+//! 40 % lost 0.083 and 0.093 Hz | 0.11 and 0.42 Hz. At 3 um and 40 % the fast component is always found with
+//! filling and missed in two of three records without. The cost is its amplitude, which reads 2 % low with 20
+//! % lost and 9 % low with 40 %. The components of such records are therefore refined without filling
 //! (`gap_refinement.rs`); the curve is not.
 
 use rayon::prelude::*;
@@ -94,8 +88,7 @@ struct BandedEquations {
 
 impl BandedEquations {
     /// Adds the difference over the frames from `start` on and returns true, unless one of them is missing
-    /// that
-    /// is not in `gaps`. The first of `gaps` has the index `at` among the unknowns.
+    /// that is not in `gaps`. The first of `gaps` has the index `at` among the unknowns.
     fn add_difference(&mut self, samples: &[Option<f64>], start: usize, at: usize, gaps: &[usize]) -> bool {
         let (mut known, mut weights, mut unknowns) = (0.0, [0.0; ORDER + 1], 0);
         for ((frame, sample), weight) in samples.iter().enumerate().zip(DIFFERENCE) {

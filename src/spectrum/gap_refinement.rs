@@ -1,8 +1,7 @@
 //! Components refined on the true frame times, where too many frames are missing for gap filling alone.
 //!
 //! With more than [`REFINED_MISSING`] of the frames missing, trend and steady sinusoids are fitted together
-//! to
-//! the frames present (`least_squares.rs`). The residual of the fit decides what follows:
+//! to the frames present (`least_squares.rs`). The residual of the fit decides what follows:
 //! - It is white: the sinusoids are the whole signal. Every frame present then counts the same, which is most
 //!   accurate, and components that the filling created are found to be absent.
 //! - It is not (the cycle decays or drifts, the flip is no cubic): only the residual is filled, the model is
@@ -10,12 +9,10 @@
 //!   maximum of the windowed periodogram, so such a cycle reads the same with and without gaps.
 //!
 //! Measured on 0.15 s at 5,000 frames/s (78.4 Hz at 20 um, 900 Hz at 8 um with 20 dB of noise, a reversal, 40
-//! %
-//! of the frames missing at random, 50 records; rms error of the frequencies, filled alone | refined): 0.10
-//! and
-//! 0.11 Hz | 0.007 and 0.019 Hz, 1.1 times the Cramér-Rao bound; the amplitude of the fast one reads 9 % |
-//! 0.04 %
-//! low. With 0.3 um of noise and 100 um at 78.4 Hz that decay with a damping ratio of 0.05: 0.11 and 0.13 Hz
+//! % of the frames missing at random, 50 records; rms error of the frequencies, filled alone | refined): 0.10
+//! and 0.11 Hz | 0.007 and 0.019 Hz, 1.1 times the Cramér-Rao bound; the amplitude of the fast one reads 9 %
+//! | 0.04 % low. With 0.3 um of noise and 100 um at 78.4 Hz that decay with a damping ratio of 0.05: 0.11 and
+//! 0.13 Hz
 //! |
 //! 0.07 and 0.06 Hz. A chirp from 870 to 930 Hz: its mean is off by 1.7 | 1.4 Hz.
 
@@ -26,8 +23,7 @@ use super::{gap_filling, periodogram};
 use crate::math;
 
 /// Share of missing frames above which components are refined; below, filled gaps move 900 Hz by hundredths
-/// of a
-/// hertz only.
+/// of a hertz only.
 pub(crate) const REFINED_MISSING: f64 = 0.10;
 /// Most components fitted together, largest first; smaller ones keep their start.
 pub(super) const MOST_REFINED: usize = MAX_COMPONENTS;
@@ -139,8 +135,7 @@ fn fit_components(
 }
 
 /// Result for each start. `white` says that all weights are one and the residual is noise, which determines
-/// the
-/// deviations.
+/// the deviations.
 fn refinement_outcomes(
     problem: &SineProblem,
     solved: &SineSolution,
@@ -172,8 +167,7 @@ fn refinement_outcomes(
 }
 
 /// Whether the values scatter from frame to frame as much as over the whole record: fourth differences of
-/// white
-/// noise have 70 times its variance.
+/// white noise have 70 times its variance.
 fn is_white(left: &[Option<f64>]) -> bool {
     const GAIN: f64 = 70.0;
     let difference = |w: &[Option<f64>]| Some(w[0]? - 4.0 * w[1]? + 6.0 * w[2]? - 4.0 * w[3]? + w[4]?);

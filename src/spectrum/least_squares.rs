@@ -2,11 +2,9 @@
 //! record holds nothing else.
 //!
 //! Model: `x = sum c_p L_p + sum exp(-d_k ((u + 1) / 2 - s_k)) (a_k cos(pi n_k u) + b_k sin(pi n_k u))` with
-//! `u`
-//! from -1 to 1 over the record, so `n` are cycles and `d` nepers in it; a term is zero before its start `s`.
-//! Amplitudes are linear and solved for at every step. Cycles and nepers move by Gauss-Newton steps, halved
-//! until
-//! the misfit falls. All of it works on inner products of columns, which are summed once a step.
+//! `u` from -1 to 1 over the record, so `n` are cycles and `d` nepers in it; a term is zero before its start
+//! `s`. Amplitudes are linear and solved for at every step. Cycles and nepers move by Gauss-Newton steps,
+//! halved until the misfit falls. All of it works on inner products of columns, which are summed once a step.
 
 mod columns;
 
@@ -25,8 +23,7 @@ const MOST_HALVINGS: i32 = 8;
 /// A step below this many cycles or nepers is the last.
 const SMALLEST_STEP: f64 = 1e-6;
 /// Directions of the normal matrix, scaled to a unit diagonal, below this share of the largest are not
-/// determined
-/// by the data.
+/// determined by the data.
 const SINGULAR_DIRECTION: f64 = 1e-10;
 /// Pivots of that matrix from which all directions are determined: each column then keeps a thousandth of its
 /// length next to those before it.
@@ -38,8 +35,7 @@ const MOST_DAMPING: f64 = 0.5;
 /// Most nepers of a relaxation over the record: it is over within a hundredth of the record.
 const MOST_RELAXED: f64 = 500.0;
 /// The same for a relaxation at the end of the record. It grows from the start, and the squares of greater
-/// growth
-/// would come near the largest number.
+/// growth would come near the largest number.
 const MOST_RELAXED_AT_END: f64 = 330.0;
 
 /// Parameters of a term that a fit moves.
@@ -123,8 +119,7 @@ impl Tolerance {
 }
 
 /// A record with the weights of its frames, and its trend, which is fitted together with the sinusoids
-/// because
-/// they are not orthogonal.
+/// because they are not orthogonal.
 #[derive(Debug, Clone)]
 pub(super) struct SineProblem {
     pub trend: Trend,
@@ -152,9 +147,8 @@ impl SineProblem {
     }
 
     /// Minimises the misfit over the free parameters; `None` where the normal matrix is not finite. A term
-    /// whose
-    /// step would leave its peak returns to it and keeps its frequency; one that would decay or grow beyond
-    /// bounds becomes steady.
+    /// whose step would leave its peak returns to it and keeps its frequency; one that would decay or grow
+    /// beyond bounds becomes steady.
     pub(super) fn gauss_newton(&self, terms: &[SineTerm], care: Tolerance) -> Option<SineSolution> {
         let (least_decrease, most_steps) = care.least_decrease_and_most_steps();
         let mut solved = self.solve_amplitudes(terms.to_vec())?;
@@ -233,8 +227,7 @@ impl SineProblem {
     }
 
     /// The unknowns as combinations of the columns: the linear ones, then cycles and nepers of each term
-    /// where
-    /// they are free.
+    /// where they are free.
     fn unknowns_matrix(&self, solved: &SineSolution) -> DMatrix<f64> {
         let trend = self.trend.column_count();
         let pair = |k| [TermColumn::Cosine, TermColumn::Sine].map(|column| column.column_index(trend, k));

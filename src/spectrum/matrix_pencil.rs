@@ -2,19 +2,16 @@
 //!
 //! The record is demodulated by the peak's frequency and summed in blocks. A block sum of `z^n` is again an
 //! exponential, `z^(mD)` times a constant. So sixty blocks represent the record, and a decay from the first
-//! frame
-//! on stays exact where a filter would blur it. The number of exponentials is the number of singular values
-//! of
-//! the sums' Hankel matrix above the noise, by the minimum description length; the shift from its rows to the
-//! next gives the poles (Hua and Sarkar 1990; Roy and Kailath 1989).
+//! frame on stays exact where a filter would blur it. The number of exponentials is the number of singular
+//! values of the sums' Hankel matrix above the noise, by the minimum description length; the shift from its
+//! rows to the next gives the poles (Hua and Sarkar 1990; Roy and Kailath 1989).
 
 use crate::math;
 use nalgebra::{Complex, DMatrix, DVector};
 use std::f64::consts::TAU;
 
 /// Blocks that represent the record: a decay within a twentieth of it is still three blocks long, and the
-/// matrix
-/// is solved in a millisecond.
+/// matrix is solved in a millisecond.
 const BLOCKS: usize = 60;
 /// Most exponentials: the peak, its mirror image, a residue of the trend and their neighbours.
 const MOST_POLES: usize = 8;
@@ -26,8 +23,7 @@ const PRECISION: f64 = 5.0 * f64::EPSILON;
 /// converge.
 const MOST_ITERATIONS: usize = 2000;
 /// Nepers gained over the record above which powers come near the largest number; a record that is mostly
-/// gaps
-/// gives such poles.
+/// gaps gives such poles.
 const MOST_NEPERS: f64 = 200.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pole {

@@ -2,11 +2,9 @@
 //! residual shows no peak.
 //!
 //! Each round takes the windowed spectrum of the residual. A peak that stands out of the noise is explained
-//! by a
-//! sinusoid whose start comes from the matrix pencil. A peak so low that the flip may have made it is
-//! explained
-//! by a sinusoid, two more degrees of the trend or a relaxation `exp(-d t)`, whichever has the least Bayesian
-//! information criterion. Then everything is fitted again together (`least_squares.rs`).
+//! by a sinusoid whose start comes from the matrix pencil. A peak so low that the flip may have made it is
+//! explained by a sinusoid, two more degrees of the trend or a relaxation `exp(-d t)`, whichever has the
+//! least Bayesian information criterion. Then everything is fitted again together (`least_squares.rs`).
 
 use super::least_squares::{FreeSet, SineProblem, SineSolution, SineTerm, Tolerance};
 use super::peaks::{self, Peak, PeakList};
@@ -317,8 +315,7 @@ impl<'a> ModelSelector<'a> {
     }
 
     /// A sinusoid for each peak, largest first, except for peaks in the lobe of a larger one: a fast decay
-    /// has
-    /// noise peaks on its flanks.
+    /// has noise peaks on its flanks.
     fn start_sinusoids(&self, fit: &ModelFit, peaks: &[Peak]) -> Vec<SineTerm> {
         let mut terms: Vec<SineTerm> = Vec::new();
         for peak in peaks {
@@ -353,8 +350,7 @@ impl<'a> ModelSelector<'a> {
     }
 
     /// The model with these terms moved to the least misfit, if there are enough frames; frequencies held
-    /// before
-    /// are free again.
+    /// before are free again.
     pub(super) fn fit_model(
         &self,
         problem: SineProblem,

@@ -1,11 +1,9 @@
 //! Power density of noise-like motion, with its uncertainty and a test for steady lines, from several tapers
-//! of
-//! one record.
+//! of one record.
 //!
 //! Each sine taper gives a nearly independent estimate. Their mean is the density, and their scatter its
 //! uncertainty (jackknife over the tapers). Thomson's harmonic F measures how well one steady sine explains
-//! them
-//! all. A line is spread over `tapers + 1` resolutions, so other estimators read its frequency better.
+//! them all. A line is spread over `tapers + 1` resolutions, so other estimators read its frequency better.
 //!
 //! Sources: Riedel and Sidorenko 1995 (IEEE Trans. Signal Process. 43, 188) for the tapers; Thomson 1982
 //! (Proc. IEEE 70, 1055) for F; Thomson and Chave 1991 (in Haykin, Advances in Spectrum Analysis and Array
@@ -160,8 +158,7 @@ impl Multitaper {
     }
 
     /// The 95 % interval of the density in a bin, m^2/Hz, from the jackknife with Student's t of one degree
-    /// of
-    /// freedom less than tapers; `None` for a bin outside the spectrum.
+    /// of freedom less than tapers; `None` for a bin outside the spectrum.
     #[must_use]
     pub fn interval_95(&self, bin: usize) -> Option<(f64, f64)> {
         let (density, sd) = (self.density_m2_per_hz.get(bin)?, self.log_density_sd.get(bin)?);
@@ -171,8 +168,7 @@ impl Multitaper {
 
     /// Probability that noise alone, level within a line's width, gives an F as large as in a bin: `(1 +
     /// F/(K-1))^-(K-1)` for `K` tapers. In a record of `n` frames, less than `1/n` counts as a line
-    /// (Thomson's
-    /// rule). `None` for a bin outside the spectrum.
+    /// (Thomson's rule). `None` for a bin outside the spectrum.
     #[must_use]
     pub fn line_probability(&self, bin: usize) -> Option<f64> {
         let others = (self.tapers - 1) as f64;
@@ -275,8 +271,7 @@ fn estimate_bin(tapered: &[TaperTransform], bin: usize, scale: f64) -> Multitape
 }
 
 /// Standard deviation of the logarithm of the mean of `powers`, whose sum is `total`, from the means that
-/// omit
-/// one of them.
+/// omit one of them.
 fn jackknife_log_sd<I: Iterator<Item = f64>>(total: f64, powers: impl Fn() -> I) -> f64 {
     if total <= 0.0 {
         return 0.0;
@@ -309,8 +304,7 @@ pub(super) fn noise_floor_curve(density: &[f64], window: usize, degrees: f64) ->
 }
 
 /// Running median over the bins that count. A window with fewer of them than half its width grows until it
-/// has
-/// enough; at the ends it is cut.
+/// has enough; at the ends it is cut.
 fn running_median(density: &[f64], window: usize, counts: impl Fn(usize) -> bool + Sync) -> Vec<f64> {
     let Some(last) = density.len().checked_sub(1) else { return Vec::new() };
     let (half, step) = ((window / 2).max(1), (window / KNOTS_PER_WINDOW).max(1));

@@ -15,8 +15,7 @@ const FRAMES_PER_RESTART: usize = 256;
 /// Distance of the three amplitudes of a parabola, cycles: an eighth of a resolution.
 const PARABOLA_SPACING: f64 = 0.125;
 /// Parabolas: each starts at the vertex of the one before, at most half a spacing away, and a parabola is
-/// exact
-/// about its own middle.
+/// exact about its own middle.
 const PARABOLAS: usize = 6;
 
 /// A weighted record.
@@ -77,8 +76,7 @@ impl WeightedRecord<'_> {
 }
 
 /// Vertex of the parabola through the logarithms of three equidistant amplitudes: its distance from the
-/// middle
-/// one, in spacings, and its height.
+/// middle one, in spacings, and its height.
 pub(super) fn log_parabola_vertex(around: [f64; 3]) -> (f64, f64) {
     let [left, top, right] = around.map(|a| math::ln(a.max(f64::MIN_POSITIVE)));
     let curvature = left - 2.0 * top + right;

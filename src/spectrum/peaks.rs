@@ -20,8 +20,7 @@ const SIDELOBE_MARGIN: f64 = 1.5;
 /// The same below [`MIN_CYCLES`]: a residue of the trend is no sine, and its sidelobes fall more slowly.
 const TREND_MARGIN: f64 = 4.0;
 /// Least amplitude listed, over the largest resolvable component: 50 dB. A cubic absorbs a little of a tone,
-/// and
-/// of twelve cycles that comes back 56 dB below.
+/// and of twelve cycles that comes back 56 dB below.
 const DYNAMIC_RANGE: f64 = 3.2e-3;
 /// A second maximum counts if the spectrum falls this far below it towards every larger one: 3 dB, half its
 /// power.

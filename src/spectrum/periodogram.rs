@@ -175,8 +175,7 @@ pub(super) fn upper_median(mut values: Vec<f64>) -> Option<f64> {
 /// Bin width, resolutions, above which bins miss the top of a sidelobe, which is one resolution wide.
 const COARSE_BINS: f64 = 0.25;
 /// Bins by which the distance of two peaks is then reduced: half a bin for each peak, and one for a
-/// sidelobe's
-/// top between two bins.
+/// sidelobe's top between two bins.
 const ROUNDED_BINS: usize = 2;
 
 /// An amplitude spectrum with the sidelobes of its window.
@@ -193,8 +192,7 @@ pub(super) struct WindowedSpectrum<'a> {
 }
 
 /// Largest value of a window's transform, relative to that at zero, at or beyond each distance, in bins. Gaps
-/// in
-/// the record raise it.
+/// in the record raise it.
 pub(super) fn sidelobe_maxima(lobe: Vec<f64>, frames: usize, padded: usize) -> Vec<f64> {
     let mut envelope = lobe;
     for k in (0..envelope.len().saturating_sub(1)).rev() {

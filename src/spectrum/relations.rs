@@ -1,8 +1,7 @@
 //! Relations of a component to another, as a multiple, a fraction or a sideband, or to the mains.
 //!
 //! A relation is met within four deviations. Many multiples, or wide deviations, would match every frequency,
-//! so
-//! multiples are tried only up to a chance of one in twenty of a random match.
+//! so multiples are tried only up to a chance of one in twenty of a random match.
 
 use super::classification::RecordContext;
 use super::component::{Component, ComponentVerdict, Harmonic, MainsMultiple, Sideband, Subharmonic};
@@ -22,8 +21,7 @@ const MOST_FRACTION: usize = 5;
 /// Sidebands on each side of a component.
 const SIDEBANDS: usize = 2;
 /// Deviations within which a relation is met: three relations in a record are all met in all but one record
-/// of
-/// five thousand.
+/// of five thousand.
 const MATCH_DEVIATIONS: f64 = 4.0;
 /// Most distance from a relation, resolutions: a wider tolerance would match by chance.
 const MATCH_RESOLUTIONS: f64 = 0.5;
@@ -140,8 +138,7 @@ fn find_subharmonic(base: &Component, other: &Component, at: &RecordContext) -> 
 }
 
 /// Component `k` as a sideband of a larger one: at the distance of another component, or with a mirror image
-/// of
-/// similar amplitude on the other side.
+/// of similar amplitude on the other side.
 fn find_sideband(components: &[Component], k: usize, at: &RecordContext) -> Option<Sideband> {
     let c = &components[k];
     let carriers = components.iter().filter(|carrier| carrier.amplitude_m > c.amplitude_m);

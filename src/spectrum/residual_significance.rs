@@ -7,19 +7,15 @@ use super::periodogram::upper_median;
 use super::settings::MIN_CYCLES;
 
 /// Half width of the neighbourhood whose residual is the noise of a component, resolutions: 48 independent
-/// values
-/// of the spectrum determine the noise to a tenth.
+/// values of the spectrum determine the noise to a tenth.
 pub(super) const NEIGHBOURHOOD: f64 = 12.0;
 /// Least half width of the neighbourhood of a slow component, resolutions, and the factor by which the
-/// detection
-/// level rises there. Six values determine the noise poorly: noise exceeds 5.8 times their rms with the
-/// chance of
-/// one in 100,000; the rms of many values it exceeds 3.4 times.
+/// detection level rises there. Six values determine the noise poorly: noise exceeds 5.8 times their rms with
+/// the chance of one in 100,000; the rms of many values it exceeds 3.4 times.
 const FEWEST_RESOLUTIONS: f64 = 3.0;
 const FEW_VALUES_FACTOR: f64 = 1.7;
 /// Mean square of the residual over that of the noise floor, up to which the residual is noise. The floor is
-/// a
-/// median, known to a few hundredths; a drift or a step leaves many times as much.
+/// a median, known to a few hundredths; a drift or a step leaves many times as much.
 const NOISE_RATIO_LIMIT: f64 = 1.5;
 
 impl ModelSelector<'_> {
@@ -44,9 +40,8 @@ impl ModelSelector<'_> {
     }
 
     /// Largest residual amplitude near a component, m, at a peak or not; 0 where noise alone may have made
-    /// it.
-    /// A companion too close to be resolved leaves most at the end of the lobe, where it has no peak of its
-    /// own.
+    /// it. A companion too close to be resolved leaves most at the end of the lobe, where it has no peak of
+    /// its own.
     pub(super) fn significant_residual(&self, fit: &ModelFit, term: &SineTerm) -> f64 {
         let most = self.residual_near(fit, term);
         let noise_m = self.noise_floor_near(fit, term.cycles);
@@ -61,8 +56,7 @@ impl ModelSelector<'_> {
     }
 
     /// Whether a slow term exceeds the residual near it by the detection level. Few values determine the
-    /// noise
-    /// there, and they include the residuals of other slow terms.
+    /// noise there, and they include the residuals of other slow terms.
     pub(super) fn exceeds_residual(&self, fit: &ModelFit, k: usize) -> bool {
         let (parts, term) = (&fit.model, &fit.model.terms()[k]);
         let least_m = fit.peaks.detection * self.residual_near(fit, term);
@@ -108,8 +102,7 @@ impl ModelSelector<'_> {
     }
 
     /// Whether a peak stands out of the octaves around it. An oscillation that begins inside the record
-    /// raises
-    /// its own neighbourhood.
+    /// raises its own neighbourhood.
     pub(super) fn stands_out_widely(&self, fit: &ModelFit, peak: &Peak) -> bool {
         let noise_m = self.octave_noise_sd(fit, self.cycles_of_peak(peak));
         self.periodogram.noise_sd_m(peak.amplitude_m) > fit.peaks.detection * noise_m

@@ -1,10 +1,9 @@
 //! Oscillations that end soon or begin inside the record: a window that starts at zero hides them.
 //!
 //! The residual is matched with decaying oscillations that begin at any frame: `z = sum x exp(-d s - 2 pi i n
-//! s)`
-//! over the frames since. A term of this frequency, decay and beginning lowers the sum of squares by `2 |z|^2
-//! /
-//! sum exp(-2 d s)`. In white noise of variance one, half of that exceeds `q` with the chance `exp(-q)`.
+//! s)` over the frames since. A term of this frequency, decay and beginning lowers the sum of squares by `2
+//! |z|^2 / sum exp(-2 d s)`. In white noise of variance one, half of that exceeds `q` with the chance
+//! `exp(-q)`.
 
 use super::least_squares::{FreeSet, SineTerm, Tolerance};
 use super::model_selection::{ModelFit, ModelSelector, STEP_CYCLES, SineModel, is_in_lobe, lobe_half_width};
@@ -81,8 +80,7 @@ struct Decays {
 
 impl Decays {
     /// Keeps a decay that lowers the sum of squares by twice `square`, which is `half` variances of noise, if
-    /// it
-    /// is larger than those before.
+    /// it is larger than those before.
     fn keep_larger(&mut self, term: SineTerm, half: f64, square: f64) {
         if self.stands_out.is_none_or(|(least, _)| half > least) {
             self.stands_out = Some((half, term));
@@ -101,8 +99,7 @@ impl Decays {
 
 impl ModelSelector<'_> {
     /// Models with one more decaying oscillation, or with one in the place of a doubtful term or of
-    /// relaxations:
-    /// the first half-wave of a ring-down looks like a relaxation.
+    /// relaxations: the first half-wave of a ring-down looks like a relaxation.
     pub(super) fn with_ring_downs(&self, fit: &ModelFit, doubtful: &[DoubtfulTerm]) -> Vec<SineModel> {
         let parts = &fit.model;
         let terms = parts.terms();
@@ -135,10 +132,8 @@ impl ModelSelector<'_> {
     }
 
     /// Places brief terms anew and drops relaxations that explain nothing, while the criterion falls. The
-    /// first
-    /// terms were placed while others were missing, and no fit moves a first frame. Where only rounding is
-    /// left,
-    /// the criterion decides nothing.
+    /// first terms were placed while others were missing, and no fit moves a first frame. Where only rounding
+    /// is left, the criterion decides nothing.
     pub(super) fn relocate_transients(&self, mut parts: SineModel) -> SineModel {
         let power: f64 = self.data.iter().zip(&self.weights).map(|(x, weight)| weight * x * x).sum();
         for _ in 0..MOST_ROUNDS {
@@ -157,8 +152,7 @@ impl ModelSelector<'_> {
     }
 
     /// The terms with a brief one in another place, with two in the place of those in its lobe, with all
-    /// brief
-    /// ones from the start of the record on, or with one relaxation less.
+    /// brief ones from the start of the record on, or with one relaxation less.
     fn transient_variants(&self, parts: &SineModel) -> Vec<Vec<SineTerm>> {
         let terms = parts.terms();
         let brief: Vec<usize> = (0..terms.len()).filter(|k| terms[*k].is_transient()).collect();
@@ -202,8 +196,7 @@ impl ModelSelector<'_> {
     }
 
     /// Largest residual amplitude under the envelope of a term around its frequency, m; 0 where noise alone
-    /// may
-    /// have made it.
+    /// may have made it.
     pub(super) fn residual_in_envelope(&self, fit: &ModelFit, term: &SineTerm) -> f64 {
         let frames = self.samples.len();
         let values = term.envelope_values(frames).map(|(i, e)| e * fit.residual_m[i].unwrap_or(0.0));

@@ -1,6 +1,5 @@
 //! A second pass over a decomposed record, for oscillations that begin late or end soon, and for two lines
-//! where
-//! one was found.
+//! where one was found.
 
 use super::chirp_alternatives::nearby_terms;
 use super::classification::SINGLE_CYCLE_DAMPING;
@@ -9,8 +8,7 @@ use super::model_selection::{LOBE, ModelFit, ModelSelector, STEP_CYCLES, SineMod
 use super::time_frequency::FrequencyRange;
 
 /// Most range of a drift that may be two lines that beat, resolutions. They lie at most four apart, and where
-/// they
-/// nearly cancel the frequency swings beyond both.
+/// they nearly cancel the frequency swings beyond both.
 const WIDEST_BEAT: f64 = 10.0;
 /// Steps by which a trend may grow in the place of a slow ring-down: together they have as many unknowns.
 const MOST_TREND_GROWTH: usize = 3;
@@ -27,8 +25,7 @@ pub(super) struct DoubtfulTerm {
 impl ModelSelector<'_> {
     /// The candidate of the least criterion: a model improved otherwise, with one more ring-down, or with two
     /// lines in the place of one. Near a doubtful term it must explain more than a drift or an even fall of
-    /// that
-    /// term.
+    /// that term.
     pub(super) fn refine_candidates(&self, fit: &ModelFit, improved: Option<SineModel>) -> Option<SineModel> {
         let parts = &fit.model;
         let terms = parts.terms();
@@ -68,8 +65,7 @@ impl ModelSelector<'_> {
     }
 
     /// Two steady lines in the place of one that drifts over a range, if only noise is left then. A range
-    /// wider
-    /// than the distance of two such lines is no pair.
+    /// wider than the distance of two such lines is no pair.
     pub(super) fn split_into_pair(&self, fit: &ModelFit, range: &FrequencyRange) -> Option<ModelFit> {
         if range.high_hz - range.low_hz > WIDEST_BEAT * self.resolution_hz() {
             return None;
@@ -79,8 +75,7 @@ impl ModelSelector<'_> {
     }
 
     /// Whether only noise is left around doubtful terms once a candidate replaces them. More oscillations
-    /// would
-    /// split into pieces what a sum of oscillations does not describe.
+    /// would split into pieces what a sum of oscillations does not describe.
     fn leaves_noise_near(
         &self,
         candidate: &SineModel,
@@ -108,10 +103,8 @@ fn are_adjacent(term: &SineTerm, other: &SineTerm) -> bool {
 }
 
 // Two steady oscillations in the place of one, closer than the lobe of a window that starts at zero. A
-// frequency
-// that drifts, or an amplitude that falls linearly, can be split into two as well. So a pair is accepted only
-// if
-// it leaves only noise around it, and if neither line explains more by growing or decaying.
+// frequency that drifts, or an amplitude that falls linearly, can be split into two as well. So a pair is
+// accepted only if it leaves only noise around it, and if neither line explains more by growing or decaying.
 
 /// Starts of a pair, resolutions from the one term, which lies between the two or has settled on either.
 const PAIR_STARTS: [[f64; 2]; 5] = [[-0.35, 0.35], [-0.6, 0.6], [-0.9, 0.9], [0.0, 1.6], [-1.6, 0.0]];

@@ -6,12 +6,10 @@ use std::ops::Range;
 /// Fractions of the step height that bound the transition.
 const TRANSITION_BOUNDS: (f64, f64) = (0.25, 0.75);
 /// Starts tried after a step, in widths of its transition: the tail of an exponential step can be described
-/// by
-/// relaxations.
+/// by relaxations.
 const STEP_WIDTHS_AFTER: [f64; 5] = [1.0, 2.0, 3.0, 5.0, 8.0];
 /// Least length of a record over the return from a dip. The drop of a head is near its level before and after
-/// a
-/// flip and returns in a jump, faster than any slow wave.
+/// a flip and returns in a jump, faster than any slow wave.
 const DIP_FRACTION: usize = 20;
 
 /// First frames to try after a step, earliest first. None where the record changes sides repeatedly, as an
@@ -38,8 +36,7 @@ const SLOPE_FRACTION: usize = 16;
 const LEAST_STRETCH_FRACTION: usize = 8;
 
 /// The stretches between the flips of a record, in order, each with the frames to try: first from near the
-/// flips,
-/// then from farther away. Without a flip, the whole record.
+/// flips, then from farther away. Without a flip, the whole record.
 pub(super) fn stretches_between_steps(samples: &[Option<f64>]) -> Vec<Vec<Range<usize>>> {
     let frames = samples.len();
     let sided = classify_sides(&remove_median_slope(samples));

@@ -1,11 +1,11 @@
-//! A frequency that is sought.
+//! A target frequency.
 
 use serde::Serialize;
 
 /// A frequency that a spectrum is compared with.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Target {
-    /// What it is.
+    /// Name of the target in tables.
     pub name: String,
     /// Frequency, Hz.
     pub frequency_hz: f64,

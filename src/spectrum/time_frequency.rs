@@ -5,18 +5,15 @@
 //! frequencies that it passes. [`Spectrogram`] cuts the record into overlapping Hann-weighted segments.
 //! [`Spectrogram::find_ridge`] follows the strongest component from column to column
 //! (`time_frequency/ridge_tracking.rs`) and then fits to each segment a sinusoid whose frequency and
-//! amplitude
-//! change linearly (`time_frequency/chirp.rs`). Unlike a maximum between bins, that frequency holds at the
-//! centre
-//! of the segment, and the fitted rate extrapolates it to the ends of the record, half a segment farther out.
+//! amplitude change linearly (`time_frequency/chirp.rs`). Unlike a maximum between bins, that frequency holds
+//! at the centre of the segment, and the fitted rate extrapolates it to the ends of the record, half a
+//! segment farther out.
 //!
 //! `tests/verify/ridge.rs` checks the accuracy: a chirp of 359 to 692 Hz in 0.1 to 0.6 s at 20 dB is read
-//! with
-//! that range within 2 %, also with harmonics, a residue of a ring-down, or a fifth of the frames missing.
-//! Limits: a frequency that swings within a segment (a cycle that follows a faster ring-down of the tip)
-//! reads as
-//! its mean, with larger deviations; a frequency that turns round at the very end of a record of a tenth of a
-//! second is extrapolated 2 to 3 % too far.
+//! with that range within 2 %, also with harmonics, a residue of a ring-down, or a fifth of the frames
+//! missing. Limits: a frequency that swings within a segment (a cycle that follows a faster ring-down of the
+//! tip) reads as its mean, with larger deviations; a frequency that turns round at the very end of a record
+//! of a tenth of a second is extrapolated 2 to 3 % too far.
 
 mod chirp;
 pub mod course;
@@ -39,8 +36,7 @@ const FEWEST_SEGMENTS: usize = 3;
 /// Ratio of the lengths tried.
 const LENGTH_RATIO: f64 = std::f64::consts::SQRT_2;
 /// Share of the best concentration, 1.5 dB, from which a shorter segment is preferred: it follows the drift
-/// more
-/// closely.
+/// more closely.
 const NEARLY_BEST_CONCENTRATION: f64 = 0.7;
 /// Columns that judge a length; more would only cost time.
 const TRIED_COLUMNS: usize = 48;
@@ -69,8 +65,7 @@ pub(super) fn choose_segment_layout(
 }
 
 /// Geometric mean of the squares of the columns' maxima, over that of noise in a bin, which falls as one over
-/// the
-/// length. The mean weighs columns with a large and a small component alike.
+/// the length. The mean weighs columns with a large and a small component alike.
 fn peak_concentration(
     samples: &[Option<f64>],
     layout: &SegmentLayout,
@@ -144,8 +139,7 @@ impl SegmentBins {
 /// Most columns of a spectrogram: a figure shows no more, and memory must not grow with the record.
 pub const MOST_COLUMNS: usize = 400;
 /// Fewest cycles of the band's lower end in a segment. The lobe of a Hann window is two resolutions wide on
-/// either
-/// side, so with four cycles the component is clear of zero and of its own mirror image.
+/// either side, so with four cycles the component is clear of zero and of its own mirror image.
 pub(crate) const SEGMENT_CYCLES: f64 = 4.0;
 /// Fewest frames of a segment: three for each of the five unknowns of the fit, and one.
 pub(super) const FEWEST_FRAMES: usize = 16;
@@ -199,8 +193,7 @@ impl SegmentLayout {
 /// alias.
 const DEFAULT_BAND_TOP: f64 = 0.9;
 /// Lower end of the default band over the largest slow component: there a ring-down has decayed in a Hann
-/// spectrum
-/// of four of its cycles.
+/// spectrum of four of its cycles.
 const SLOW_COMPONENT_MARGIN: f64 = 4.0;
 /// Segments of `SEGMENT_CYCLES` that a record should hold at the lower end of the default band.
 const SEGMENTS_AT_LOWEST: f64 = 4.0;
@@ -209,12 +202,9 @@ const SEGMENTS_AT_LOWEST: f64 = 4.0;
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SpectrogramSettings {
     /// Length of a segment, s; `None` chooses it from the data. Lengths a factor of the square root of two
-    /// apart are
-    /// tried, from `SEGMENT_CYCLES` of the band's lower end to a third of the record (and 2048 frames). The
-    /// shortest
-    /// is taken whose maxima stand out of noise within 1.5 dB of the best: in longer ones a drifting
-    /// component
-    /// smears, in shorter ones noise hides it.
+    /// apart are tried, from `SEGMENT_CYCLES` of the band's lower end to a third of the record (and 2048
+    /// frames). The shortest is taken whose maxima stand out of noise within 1.5 dB of the best: in longer
+    /// ones a drifting component smears, in shorter ones noise hides it.
     pub segment_s: Option<f64>,
     /// Band for which the length is chosen, Hz; `None` takes [`default_band_hz`] with no slow component.
     pub band_hz: Option<(f64, f64)>,
@@ -242,8 +232,7 @@ pub struct Spectrogram {
 
 impl Spectrogram {
     /// Short-time spectra of a record of displacement, m, one sample a frame (`None` where a frame has no
-    /// value).
-    /// Flip and ring-down should be removed as far as possible.
+    /// value). Flip and ring-down should be removed as far as possible.
     ///
     /// # Errors
     /// [`SpectrumError`] when the record, the rate, the band or the segment cannot give one.
@@ -275,10 +264,8 @@ impl Spectrogram {
 }
 
 /// Default band of the drifting component, Hz: from four times the largest slow component, if there is one,
-/// and at
-/// least the frequency of which the record holds four segments of `SEGMENT_CYCLES` cycles, up to nine tenths
-/// of
-/// half the frame rate.
+/// and at least the frequency of which the record holds four segments of `SEGMENT_CYCLES` cycles, up to nine
+/// tenths of half the frame rate.
 #[must_use]
 pub fn default_band_hz(frames: usize, frame_rate_hz: f64, slow_hz: Option<f64>) -> (f64, f64) {
     let top = DEFAULT_BAND_TOP * frame_rate_hz / 2.0;

@@ -59,11 +59,9 @@ impl RealTransform {
 // Numbers of the transform library that equal `f64` except for sines and cosines.
 //
 // The library takes the twiddle factors of a plan from the system's sine and cosine, whose last bits depend
-// on the
-// processor from lengths of 4,096 on, and orders additions differently for the types it knows. A type of our
-// own
-// avoids both: from each number that it is given it finds the part of a turn, and takes the cosine from
-// [`math`].
+// on the processor from lengths of 4,096 on, and orders additions differently for the types it knows. A type
+// of our own avoids both: from each number that it is given it finds the part of a turn, and takes the cosine
+// from [`math`].
 
 thread_local! {
     /// Parts of a turn in the plan that is being made; zero outside of planning.
@@ -71,8 +69,7 @@ thread_local! {
 }
 
 /// Most difference of the system's cosine from ours: many last digits, and much less than two cosines of a
-/// plan
-/// differ.
+/// plan differ.
 const COSINE_TOLERANCE: f64 = 1e-14;
 
 /// A number of a transform.

@@ -5,9 +5,8 @@ use sha2::{Digest, Sha256};
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// SHA-256 of a text in pieces. A byte-order mark at its start is ignored and CRLF counts as LF, so a
-/// checkout that
-/// changes line endings does not change the hash. For a text with neither it is the plain SHA-256 of its
-/// bytes.
+/// checkout that changes line endings does not change the hash. For a text with neither it is the plain
+/// SHA-256 of its bytes.
 #[derive(Debug, Clone, Default)]
 pub struct TextHash {
     digest: Sha256,

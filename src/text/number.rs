@@ -43,8 +43,7 @@ pub(crate) fn format_or_dash<T>(value: Option<T>, written: impl FnOnce(T) -> Str
 }
 
 /// A number with `count` significant digits, trailing zeros included; all digits before the decimal point are
-/// shown. A
-/// dash for a number that is not finite.
+/// shown. A dash for a number that is not finite.
 #[must_use]
 pub fn format_digits(value: f64, count: usize) -> String {
     format_significant(value, count, |plain| plain)
@@ -141,10 +140,8 @@ const MOST_DECIMALS: i32 = 6;
 const PLAIN_POWERS_WITH_SD: std::ops::RangeInclusive<i32> = -4..=6;
 
 /// A value with one digit of its standard deviation, in units of the last digit shown: `78.40(3)` for 78.40
-/// with 0.03
-/// (JCGM 100:2008, 7.2.2). Four significant digits without a deviation (missing, zero or not finite); a dash
-/// for a
-/// value that is not finite.
+/// with 0.03 (JCGM 100:2008, 7.2.2). Four significant digits without a deviation (missing, zero or not
+/// finite); a dash for a value that is not finite.
 pub(crate) fn format_with_sd(value: f64, sd: impl Into<Option<f64>>) -> String {
     if !value.is_finite() {
         return DASH.to_owned();

@@ -78,16 +78,14 @@ pub(crate) fn wrap_words(words: &str, width: usize) -> Vec<String> {
 // Filters for names and texts from files before they are shown.
 
 /// Text without control characters. Control characters, line separators and characters invalid in XML become
-/// spaces;
-/// characters that change the direction of text are removed.
+/// spaces; characters that change the direction of text are removed.
 #[must_use]
 pub fn make_printable(text: &str) -> String {
     text.chars().filter(|c| !is_bidi_control(*c)).map(|c| if is_control(c) { ' ' } else { c }).collect()
 }
 
 /// Text for a terminal: every control character, line ends included, is written as its escape, such as
-/// `\u001b`, which
-/// means the same in JSON.
+/// `\u001b`, which means the same in JSON.
 #[must_use]
 pub fn escape_controls(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());

@@ -11,8 +11,7 @@ const UNPREFIXED_UNITS: [(&str, &str, f64); 5] =
 const LEAST_UNPREFIXED: f64 = 0.1;
 
 /// A unit with the prefix that makes the largest of some values readable, and the factor to it; an empty unit
-/// for
-/// a plain number.
+/// for a plain number.
 pub(crate) fn choose_prefix(unit: &str, values: impl IntoIterator<Item = f64>) -> (String, f64) {
     if let Some((_, shown, factor)) = UNPREFIXED_UNITS.iter().find(|(name, ..)| *name == unit) {
         return ((*shown).to_owned(), *factor);

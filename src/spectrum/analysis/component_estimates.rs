@@ -318,8 +318,7 @@ impl<'a> FitReading<'a> {
     }
 
     /// Shift of a term with a richer trend: cycles, nepers, and the share of its amplitude half way through
-    /// the
-    /// record.
+    /// the record.
     fn shift_by_richer_trend(&self, k: usize) -> TermDeviations {
         let Some(richer) = &self.richer_trend_model else {
             return TermDeviations { cycles: 0.0, nepers: 0.0, amplitude: 0.0 };

@@ -79,8 +79,7 @@ impl Chirp {
     }
 
     /// `x`, cosine and sine of the phase in each frame, each rotated from the one before: third differences
-    /// of a
-    /// cubic are constant.
+    /// of a cubic are constant.
     fn phases(&self, frames: usize) -> impl Iterator<Item = (f64, f64, f64)> + use<> {
         let [.., a, b, c] = self.0;
         let h = 2.0 / frames as f64;
@@ -217,8 +216,7 @@ const FEWEST_RESOLUTIONS: f64 = 20.0;
 /// Fewest bins of a median; with fewer left, harmonics are not left out.
 const FEWEST_BINS: usize = 8;
 /// Neighbours on either side in the median of a column: one segment's length, so that a column's own few bins
-/// do
-/// not decide.
+/// do not decide.
 const NEIGHBOURS: usize = 4;
 
 /// Measures the noise of segments of one length.

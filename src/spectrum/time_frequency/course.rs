@@ -1,11 +1,10 @@
 //! The parts of a ridge that follow one component whose frequency the segments agree on.
 //!
 //! A ridge has points wherever the amplitude exceeds the noise by more than noise alone reaches once in a
-//! hundred
-//! records. Two kinds of points are no part of a course. In a model, which has no noise, residues at rest far
-//! below every colour of the map exceed rounding. And where the frequency of a cycle swings several times
-//! within
-//! a segment, its sidebands are as high as the carrier, and the strongest changes from segment to segment.
+//! hundred records. Two kinds of points are no part of a course. In a model, which has no noise, residues at
+//! rest far below every colour of the map exceed rounding. And where the frequency of a cycle swings several
+//! times within a segment, its sidebands are as high as the carrier, and the strongest changes from segment
+//! to segment.
 
 use super::{Ridge, RidgePoint, Spectrogram};
 use crate::math;
@@ -13,10 +12,8 @@ use crate::math;
 /// Range of amplitudes of a course, and of the colours of a spectrogram, dB.
 pub(crate) const DYNAMIC_RANGE_DB: f64 = 60.0;
 /// Largest step between segments that share three quarters of their frames, beyond the step of the fitted
-/// rates,
-/// resolutions; the neighbours of a range agree to within the same quarter. For the weakest component of a
-/// ridge
-/// noise makes less than a tenth of it, and a single component has no other reason to jump.
+/// rates, resolutions; the neighbours of a range agree to within the same quarter. For the weakest component
+/// of a ridge noise makes less than a tenth of it, and a single component has no other reason to jump.
 const MAX_FREQUENCY_STEP: f64 = 0.25;
 /// Distance of such segments, segments.
 const USUAL_HOP: f64 = 0.25;
@@ -40,8 +37,7 @@ pub(crate) fn coherent_parts(ridge: &Ridge, of: &Spectrogram) -> Vec<Vec<RidgePo
     let least_m = math::powf(10.0, -DYNAMIC_RANGE_DB / 20.0) * largest_m;
     let strong: Vec<RidgePoint> = ridge.points.iter().filter(|p| p.amplitude_m >= least_m).copied().collect();
     // up to the next segment that shares no frame: fewer points are hardly more than one segment and may
-    // agree
-    // by chance
+    // agree by chance
     let fewest = MIN_PART_SEGMENTS.max((ridge.segment_s / ridge.hop_s).round() as usize + 1);
     let parts = strong.chunk_by(|a, b| is_continuous(ridge, a, b)).filter(|part| part.len() >= fewest);
     parts.map(<[RidgePoint]>::to_vec).collect()

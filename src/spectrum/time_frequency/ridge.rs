@@ -12,8 +12,7 @@ pub struct RidgePoint {
     /// Frequency at that time, Hz.
     pub frequency_hz: f64,
     /// Its standard deviation, Hz: from the noise next to the component or from the residual of the fit,
-    /// whichever
-    /// is larger, and a five-hundredth of the resolution for leakage of other components.
+    /// whichever is larger, and a five-hundredth of the resolution for leakage of other components.
     pub frequency_sd_hz: f64,
     /// Change of the frequency, Hz/s.
     pub rate_hz_per_s: f64,
@@ -42,9 +41,8 @@ pub struct RidgeEnd {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ridge {
     /// The points, in order of time. A point needs a fitted amplitude that exceeds the noise next to it by
-    /// more
-    /// than noise alone reaches once in a hundred records and does not fall to zero within the segment, three
-    /// segments in a row or more. Elsewhere the ridge is interrupted.
+    /// more than noise alone reaches once in a hundred records and does not fall to zero within the segment,
+    /// three segments in a row or more. Elsewhere the ridge is interrupted.
     pub points: Vec<RidgePoint>,
     /// The frequency at the first frame, if the ridge reaches the first segment and the fit extends that far.
     pub start: Option<RidgeEnd>,
@@ -86,10 +84,8 @@ impl Ridge {
 
     /// Least and greatest frequency, including the two ends of the record if they are known to a quarter of a
     /// resolution. A point counts only if the extrapolated frequency of a neighbour agrees with it within a
-    /// quarter
-    /// of a resolution or four deviations, so that a single bad point sets neither limit. `None` where no
-    /// point
-    /// is confirmed.
+    /// quarter of a resolution or four deviations, so that a single bad point sets neither limit. `None`
+    /// where no point is confirmed.
     #[must_use]
     pub fn range_hz(&self) -> Option<FrequencyRange> {
         frequency_range(self)
@@ -141,8 +137,7 @@ fn frequency_range(ridge: &Ridge) -> Option<FrequencyRange> {
 }
 
 /// Change of the frequency in the outer half of a segment next to an interruption, Hz: the course may
-/// continue
-/// there.
+/// continue there.
 fn change_beyond_hz(ridge: &Ridge, point: &RidgePoint) -> f64 {
     (point.rate_hz_per_s * ridge.segment_s / 2.0).abs()
 }
@@ -155,16 +150,14 @@ fn end_mismatch_hz(end: &RidgeEnd, point: &RidgePoint) -> f64 {
 }
 
 /// Half of the change of the frequency within a cycle, Hz: the frequency has no meaning at an instant within
-/// a
-/// cycle, whose form changes with it.
+/// a cycle, whose form changes with it.
 fn change_within_cycle_hz(point: &RidgePoint) -> f64 {
     (point.rate_hz_per_s / point.frequency_hz / 2.0).abs()
 }
 
 /// Bias of a bending course at its turning points, Hz: a fit of a steady rate to a segment of length `T` cuts
-/// a
-/// corner of curvature `c` by up to `c T^2 / 24`. The curvature is the median change of the rate over half a
-/// segment.
+/// a corner of curvature `c` by up to `c T^2 / 24`. The curvature is the median change of the rate over half
+/// a segment.
 fn curvature_bias_hz(ridge: &Ridge) -> f64 {
     let apart = (INDEPENDENT_SEGMENTS * ridge.segment_s / ridge.hop_s).round().max(1.0) as usize;
     let bend = |w: &[RidgePoint]| {

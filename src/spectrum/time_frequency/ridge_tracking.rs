@@ -1,6 +1,5 @@
 //! The points of a ridge: fits to the segments and to the ends of the record, started from the path through
-//! the
-//! columns.
+//! the columns.
 
 use super::chirp::{
     CURVED_UNKNOWNS, Chirp, ChirpFit, ChirpSegment, LINEAR_UNKNOWNS, ResidualNoise, SegmentNoise,
@@ -16,8 +15,7 @@ use crate::spectrum::settings::ROUNDING;
 /// Chance that noise alone puts one point on a ridge.
 const FALSE_ALARM: f64 = 0.01;
 /// Independent trials in each resolution of each segment: overlapping columns have more maxima than
-/// independent
-/// values.
+/// independent values.
 const TRIALS: f64 = 10.0;
 /// Farthest a fit moves from the path, resolutions: half way down the lobe of a Hann window.
 const FARTHEST_FROM_PATH: f64 = 1.0;
@@ -26,16 +24,14 @@ const LEAKAGE_SD: f64 = 0.002;
 /// The same at the end of a fit whose rate may change, resolutions of that fit.
 const END_LEAKAGE_SD: f64 = 0.01;
 /// Lengths of the fits at an end of the record, segments: the change of the rate needs a longer stretch than
-/// the
-/// rate.
+/// the rate.
 const END_SEGMENTS: [f64; 6] = [1.75, 1.3, 1.0, 0.75, 0.55, 0.4];
 /// Fewest cycles in a fit there that is shorter than a segment: others leak into short fits.
 const END_CYCLES: f64 = 8.0;
 /// Deviations of their difference from which a shorter fit contradicts a longer one.
 const CONTRADICTS: f64 = 3.5;
 /// Bias of the fitted frequency by a changing rate with the sine weights, over the change of the rate from
-/// one
-/// segment to the next: `<x^4>/<x^2>/24`.
+/// one segment to the next: `<x^4>/<x^2>/24`.
 const CURVATURE_BIAS: f64 = 0.4154 / 24.0;
 /// Deviations of the frequency by this bias from which the rate of a point may change.
 const SIGNIFICANT_CURVATURE: f64 = 0.5;
@@ -151,8 +147,7 @@ impl<'a> RidgeTracker<'a> {
     }
 
     /// Adds a fit where the path led to none, starting from the neighbouring column's course: the spectrum of
-    /// a
-    /// fast chirp is flat on top.
+    /// a fast chirp is flat on top.
     pub(super) fn refit_from_neighbours(&self, fits: &[Option<SegmentFit>]) -> Vec<Option<SegmentFit>> {
         let (weights, noise) = (sine_weights(self.layout.frames), self.segment_noise());
         let from = |c: usize, near: usize, segments: f64| {
@@ -172,8 +167,7 @@ impl<'a> RidgeTracker<'a> {
     }
 
     /// Repeats fits with a changing rate where the rates half a segment before and after show a significant
-    /// bias
-    /// of the frequency.
+    /// bias of the frequency.
     pub(super) fn refit_with_curvature(&self, fits: &[Option<SegmentFit>]) -> Vec<Option<SegmentFit>> {
         let (weights, noise) = (sine_weights(self.layout.frames), self.segment_noise());
         let bent = |c: usize| {
@@ -227,12 +221,9 @@ impl<'a> RidgeTracker<'a> {
     }
 
     /// The frequency at the end of the record next to a column, by separate fits with a changing rate. A
-    /// straight
-    /// course extrapolated by half a segment would have a smaller deviation, but a wrong frequency. A longer
-    /// stretch
-    /// is more accurate while the course is smooth, so the longest is taken with which all shorter ones
-    /// agree. The
-    /// shortest only confirms, because others leak into it most.
+    /// straight course extrapolated by half a segment would have a smaller deviation, but a wrong frequency.
+    /// A longer stretch is more accurate while the course is smooth, so the longest is taken with which all
+    /// shorter ones agree. The shortest only confirms, because others leak into it most.
     pub(super) fn ridge_end(&self, column: usize, fit: &SegmentFit) -> Option<RidgeEnd> {
         let end = |segments: f64| self.extrapolate_to_end(column, fit, segments);
         let ends: Vec<RidgeEnd> = END_SEGMENTS.into_iter().filter_map(end).collect();
@@ -287,8 +278,7 @@ fn is_near(chirp: &Chirp, cycles: f64) -> bool {
 }
 
 /// Weights of a fit: a sine, the root of a Hann window. It suppresses components five resolutions away below
-/// a
-/// hundredth and loses less of the frames' information than the Hann window.
+/// a hundredth and loses less of the frames' information than the Hann window.
 fn sine_weights(frames: usize) -> Vec<f64> {
     periodogram::hann_weights(&vec![Some(0.0); frames]).into_iter().map(f64::sqrt).collect()
 }
@@ -300,8 +290,7 @@ const FEWEST_POINTS: usize = 3;
 
 impl Spectrogram {
     /// Course of the strongest component between two frequencies, Hz; `samples` is the record of this
-    /// spectrogram.
-    /// Without a component that stands out of the noise, the ridge has no points.
+    /// spectrogram. Without a component that stands out of the noise, the ridge has no points.
     ///
     /// # Errors
     /// [`SpectrumError::Band`] when the band holds no frequency of the spectrogram.
@@ -345,8 +334,7 @@ fn remove_short_runs(mut points: Vec<Option<RidgePoint>>) -> Vec<Option<RidgePoi
 
 /// Standard deviation of the change of frequency over a quarter of a segment, resolutions. A drift of half a
 /// resolution in a quarter of a segment moves the frequency by two resolutions within the segment, about the
-/// most
-/// for a segment of the chosen length.
+/// most for a segment of the chosen length.
 const JUMP_SD: f64 = 0.5;
 /// Farthest jump, in standard deviations: six resolutions within a segment.
 const LONGEST_JUMP: f64 = 3.0;
@@ -365,8 +353,7 @@ pub(super) struct PathLevels<'a> {
 
 impl PathLevels<'_> {
     /// The bin of each column on the best path. A level counts by the logarithm of its power, so that the
-    /// path
-    /// keeps to a component that fades; a jump costs half the square of its size in standard deviations.
+    /// path keeps to a component that fades; a jump costs half the square of its size in standard deviations.
     pub(super) fn best_path(&self) -> Vec<usize> {
         let sd = (JUMP_SD * self.quarters * self.bins_per_resolution).max(1.0);
         let reach = ((LONGEST_JUMP * sd) as usize).clamp(1, self.bins);

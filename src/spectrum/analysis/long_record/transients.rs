@@ -163,8 +163,7 @@ fn decay_nepers(c: &Component, lasts_s: f64) -> f64 {
 
 // Pieces whose spectrum exceeds what is normal for the record. The pieces overlap by half. In each bin a
 // quarter of them lies below `-ln(3/4)` times the mean power of noise, whatever the rest holds. So steady
-// lines
-// and noise of any colour are normal, even where most of the pieces hold a flip.
+// lines and noise of any colour are normal, even where most of the pieces hold a flip.
 
 /// Chance that noise alone exceeds the normal power anywhere in a record.
 const FALSE_ALARM: f64 = 0.01;
