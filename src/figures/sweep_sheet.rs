@@ -13,6 +13,8 @@ use crate::text::{capitalise, format_decimals, join_with_and, make_printable};
 /// Heights of a panel and of a row of the table of correlations, mm.
 const PANEL_MM: f64 = 42.0;
 const ROW_MM: f64 = 7.0;
+/// Least height of the table of correlations, in rows: the label of the colour bar fits beside it.
+const FEWEST_ROWS: usize = 5;
 /// Letters that fit above a panel.
 const CLAIM_LETTERS: usize = 34;
 /// Most panels; further maps are left out.
@@ -90,7 +92,7 @@ pub(crate) fn draw_correlations(study: &Study, found: &RankCorrelations) -> Figu
     let panel = Panel {
         x: ChartAxis::categorical("", study.maps.iter().map(|map| capitalise(&map.name))),
         y: ChartAxis::categorical("", axes.iter().map(|axis| axis_label(axis))),
-        height_mm: ROW_MM * study.axes.len().max(1) as f64,
+        height_mm: ROW_MM * study.axes.len().max(FEWEST_ROWS) as f64,
         annotations: cells().map(text).collect(),
         heat_map: Some(HeatMap {
             label: "rank correlation".to_owned(),
