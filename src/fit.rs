@@ -4,12 +4,9 @@
 //! components (frequencies) and other features. Targets are measured on the recordings or given in the job.
 //!
 //! A fit has three steps. It assesses which parameters the features can determine ([`identifiability`]),
-//! searches
-//! the unit box for the lowest cost with clouds of points and local searches ([`search`]), and computes
-//! intervals
-//! at the best point by profiles and twins ([`uncertainty`]). All evaluations are written to a journal from
-//! which
-//! the fit can be resumed.
+//! searches the unit box for the lowest cost with clouds of points and local searches ([`search`]), and
+//! computes intervals at the best point by profiles and twins ([`uncertainty`]). All evaluations are
+//! written to a journal from which the fit can be resumed.
 
 pub mod advice;
 pub mod bootstrap;

@@ -2,9 +2,8 @@
 //! run.
 //!
 //! A point whose run ends early or lacks a reading has a reason instead of a value ([`MissingReason`]);
-//! nothing
-//! is filled in. Points are independent of each other, so the numbers do not depend on the number of threads,
-//! and a study resumes from a [`journal`] of finished points.
+//! nothing is filled in. Points are independent of each other, so the numbers do not depend on the number
+//! of threads, and a study resumes from a [`journal`] of finished points.
 
 pub mod collect;
 pub mod grid;

@@ -1,8 +1,7 @@
 //! The checksum at the end of a line, and the fingerprint of a problem.
 //!
 //! A line is a JSON object with the last key `sha256`: the first digits of the SHA-256 of the bytes before
-//! the
-//! comma of that key. `sha256sum` verifies it.
+//! the comma of that key. `sha256sum` verifies it.
 
 use serde::Serialize;
 use serde_json::Value;
@@ -53,9 +52,9 @@ fn hex_checksum(content: &[u8]) -> String {
     Sha256::digest(content).iter().take(CHECKSUM_DIGITS / 2).map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// SHA-256 of the canonical JSON of a problem, in hexadecimal: sorted keys, numbers as the shortest decimals
-/// that
-/// keep every bit. Equal values have equal fingerprints, independent of the layout of their files.
+/// SHA-256 of the canonical JSON of a problem, in hexadecimal: sorted keys, numbers as the shortest
+/// decimals that keep every bit. Equal values have equal fingerprints, independent of the layout of their
+/// files.
 pub(crate) fn fingerprint(problem: &impl Serialize) -> String {
     // finite numbers and string keys cannot fail to serialize
     let value = serde_json::to_value(problem).unwrap_or_default();

@@ -180,8 +180,7 @@ pub(super) fn strip_byte_order_mark(line: &[u8]) -> &[u8] {
 pub const RECHECKED_RECORDS: usize = 8;
 
 /// Indices of at most [`RECHECKED_RECORDS`] records: one from each of as many equal parts of the journal,
-/// drawn
-/// with the seed.
+/// drawn with the seed.
 #[must_use]
 pub fn sample_records(records: usize, seed: u64) -> Vec<usize> {
     let parts = RECHECKED_RECORDS.min(records);

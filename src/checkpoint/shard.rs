@@ -7,8 +7,7 @@ use std::str::FromStr;
 const MAX_SHARDS: usize = 1_000_000;
 
 /// The points of a study, or jobs of a list, whose index is `number` modulo `total`. This spreads slow
-/// regions
-/// over all shards.
+/// regions over all shards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
     number: usize,

@@ -17,9 +17,8 @@ use crate::spectrum::Target;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Channels by which a model is judged, in order of preference. The deflection shows stick and slip best, but
-/// it
-/// needs the head.
+/// Channels by which a model is judged, in order of preference. The deflection shows stick and slip best,
+/// but it needs the head.
 const JUDGED: [Channel; 3] = [Channel::Deflection, Channel::TipX, Channel::HeadX];
 
 /// A fitted recording with its description and its video.
@@ -129,10 +128,8 @@ impl<'a> ConditionComparison<'a> {
     }
 
     /// Noise of a recorded channel, m, as a trace fit measures it: against the smooth head and the glass,
-    /// because
-    /// stick and slip move the tip as fast as noise does. Where neither is tracked, the scatter between
-    /// frames.
-    /// `None` without a recording or without noise.
+    /// because stick and slip move the tip as fast as noise does. Where neither is tracked, the scatter
+    /// between frames. `None` without a recording or without noise.
     pub(crate) fn noise_m(&self, channel: Channel) -> Option<f64> {
         let noise = self.noise.as_ref()?;
         let along_m = noise.along_sweep.as_ref().map(|found| found.noise.sd());

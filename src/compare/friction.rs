@@ -2,10 +2,8 @@
 //!
 //! A blade whose links turn slowly is in equilibrium, and the deflection `tip_x - head_x` determines both
 //! angles, the normal force and the coefficient of friction. In stick-slip, inertia cancels over whole
-//! cycles,
-//! so the mean deflection gives a mean coefficient. That is not a value of the friction law, so it is
-//! compared
-//! with the same mean of the model.
+//! cycles, so the mean deflection gives a mean coefficient. That is not a value of the friction law, so it
+//! is compared with the same mean of the model.
 
 use super::condition::{ConditionComparison, TimedRecording};
 use crate::fit::job::Job;
@@ -194,11 +192,9 @@ pub(crate) const COEFFICIENTS: [LawCoefficient; 3] = [
 /// Half width of an interval, as a function of the tip's speed, m/s.
 pub(crate) type HalfInterval = Box<dyn Fn(f64) -> f64>;
 
-/// Half width of the 95 % interval of the coefficient of friction, propagated linearly from the intervals of
-/// the
-/// fitted coefficients with their correlations. `None` where no coefficient is fitted, an interval is open,
-/// or
-/// the linear model does not determine a fitted coefficient.
+/// Half width of the 95 % interval of the coefficient of friction, propagated linearly from the intervals
+/// of the fitted coefficients with their correlations. `None` where no coefficient is fitted, an interval
+/// is open, or the linear model does not determine a fitted coefficient.
 pub(crate) fn friction_half_95(job: &Job, result: &FitResult, law: &FrictionLaw) -> Option<HalfInterval> {
     let half = |coefficient: &LawCoefficient| {
         if !is_fitted(job, coefficient) {

@@ -131,9 +131,8 @@ fn track_ridge(
     Some(TrackedRidge { start_s, spectrogram, ridge, courses, band_hz, over_speed })
 }
 
-/// The ridge in segments of a given length. Without a length, the shortest segments whose courses are nearly
-/// as
-/// long as the longest: short segments resolve changes, but too short ones break the courses.
+/// The ridge in segments of a given length. Without a length, the shortest segments whose courses are
+/// nearly as long as the longest: short segments resolve changes, but too short ones break the courses.
 fn choose_ridge(
     fast: &[Option<f64>],
     rate_hz: f64,

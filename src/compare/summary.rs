@@ -17,8 +17,7 @@ pub struct ComparisonSummary {
     /// Shift added to the model's times, s.
     pub clock_shift_s: Option<f64>,
     /// Standard deviation of the shift, s; infinite where the path does not determine it, `None` where no
-    /// path
-    /// was aligned.
+    /// path was aligned.
     pub clock_shift_sd_s: Option<f64>,
     /// Offset added to the model's head and tip along the sweep, m.
     pub along_m: Option<f64>,

@@ -24,8 +24,7 @@ pub struct ComparisonTable {
 }
 
 /// Residuals, ridges and transitions of every condition, in the order of the job. The first two columns are
-/// the
-/// condition and the kind of its recording.
+/// the condition and the kind of its recording.
 pub(crate) fn comparison_tables(cases: &[ConditionComparison]) -> Vec<ComparisonTable> {
     let table = |file, header: &str, rows: fn(&ConditionComparison) -> Vec<Vec<String>>| {
         let rows = cases.iter().flat_map(|case| {

@@ -93,8 +93,7 @@ const LOWEST_HZ: f64 = 10.0;
 const MOST_TURNS: usize = 6;
 
 /// Components to look for after a reversal: name, channel, ends of the window after the release, s, and
-/// whether
-/// the frequency is below [`BETWEEN_HZ`].
+/// whether the frequency is below [`BETWEEN_HZ`].
 const WANTED_COMPONENTS: [(&str, Channel, [&str; 2], bool); 3] = [
     ("low", Channel::HeadDrop, ["+0.01", "+0.2"], true),
     ("high", Channel::Deflection, ["+0.01", "+0.1"], false),
@@ -154,8 +153,7 @@ impl DraftFindings {
     }
 
     /// Findings for a model that is driven between two times, s; `moving` is the head, or the tip that
-    /// follows
-    /// it.
+    /// follows it.
     fn from_driving_trace(
         recording: &Recording,
         exposure_s: Option<f64>,

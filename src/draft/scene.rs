@@ -151,8 +151,7 @@ pub(crate) struct FittedScene<'a> {
 }
 
 /// The scene of a fit at its estimates, with their intervals as comments; `None` for a start in the air,
-/// which
-/// a scene file cannot express.
+/// which a scene file cannot express.
 pub(crate) fn write_fitted_scene(fitted: &FittedScene<'_>) -> Option<String> {
     let FittedScene { scene, condition, synthetic, recording, result } = *fitted;
     let of = match synthetic {

@@ -1,8 +1,7 @@
 //! Estimates the stroke of a head that was not tracked from the motion of the tip.
 //!
-//! A sliding tip trails the head by a nearly constant length `d`, so that `x = c + d s + P cos(w t) + Q sin(w
-//! t)`
-//! with the sign `s` of its speed. The model is linear in all parameters except the frequency.
+//! A sliding tip trails the head by a nearly constant length `d`, so that `x = c + d s + P cos(w t) + Q
+//! sin(w t)` with the sign `s` of its speed. The model is linear in all parameters except the frequency.
 
 use crate::math;
 use crate::recording::Recording;
@@ -88,8 +87,7 @@ fn select_sliding(recording: &Recording) -> Vec<[f64; 3]> {
 }
 
 /// Mean squared residual, m2, and `c`, `d`, `P`, `Q`, m, at a frequency. The tip does not trail while the
-/// blade
-/// flips: points far from a first solution are left out of the second one.
+/// blade flips: points far from a first solution are left out of the second one.
 fn fit_terms(sliding: &[[f64; 3]], frequency_hz: f64) -> Option<(f64, [f64; 4])> {
     /// Residuals beyond this many times their median are left out.
     const FAR: f64 = 4.0;

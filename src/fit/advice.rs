@@ -1,8 +1,7 @@
 //! Advice on additional measurements: features that change along the combinations that a job leaves open.
 //!
 //! The candidates are read from runs of the model around one probe. A feature is worth measuring if it
-//! changes
-//! by more than its own 95 % interval when a parameter combination crosses the box.
+//! changes by more than its own 95 % interval when a parameter combination crosses the box.
 
 use super::identifiability::ProbeEvaluation;
 use super::job::{FitTarget, Job};

@@ -1,12 +1,11 @@
 //! Calibration errors of cameras and their effect on features.
 //!
-//! A camera measures a deflection `d` as `(1 + scale) d + offset`: its scale is known to half a percent, and
-//! a
-//! marker is never exactly on the hinge. Both numbers are unknowns with priors, common to all features of a
-//! recording. Their effect does not need a run of the model, so they are no search parameters: at every point
-//! of the search they minimise the cost (`CameraFit::estimate`), and the Jacobian is projected onto the
-//! complement of their derivatives (variable projection, Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973)
-//! 413, in the form of Kaufman, BIT 15 (1975) 49).
+//! A camera measures a deflection `d` as `(1 + scale) d + offset`: its scale is known to half a percent,
+//! and a marker is never exactly on the hinge. Both numbers are unknowns with priors, common to all
+//! features of a recording. Their effect does not need a run of the model, so they are no search
+//! parameters: at every point of the search they minimise the cost (`CameraFit::estimate`), and the
+//! Jacobian is projected onto the complement of their derivatives (variable projection, Golub and Pereyra,
+//! SIAM J. Numer. Anal. 10 (1973) 413, in the form of Kaufman, BIT 15 (1975) 49).
 
 use super::evaluation::{Observation, Observed};
 use super::objective::{LOSS_KNEE, residual, robust_loss, total_sd};
@@ -261,9 +260,8 @@ fn linearize_residual(
 }
 
 /// Camera numbers, in prior deviations, that minimise the cost of the features. The cost grows
-/// logarithmically
-/// far from the target and may have two minima, so that the descent starts from the prior mean and from the
-/// least-squares solution.
+/// logarithmically far from the target and may have two minima, so that the descent starts from the prior
+/// mean and from the least-squares solution.
 fn minimize_camera_cost(pairs: &[TargetObservation]) -> [f64; 2] {
     let cost = |place: &[f64; 2]| camera_cost(pairs, *place, robust_loss);
     let squares = gauss_newton_descent(pairs, [0.0; 2], |r| r * r, |_| 1.0);

@@ -16,9 +16,8 @@ pub struct Observation {
     /// Standard deviation over the starting states, in the same unit; 0 for a single state.
     #[serde(with = "exact")]
     pub spread: f64,
-    /// Level of the strongest peak of the band above the assigned one, dB; 0 where that is the strongest, and
-    /// for
-    /// features without peaks.
+    /// Level of the strongest peak of the band above the assigned one, dB; 0 where that is the strongest,
+    /// and for features without peaks.
     #[serde(with = "exact")]
     pub below_db: f64,
 }

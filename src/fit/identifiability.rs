@@ -2,8 +2,8 @@
 //! few points of the box.
 //!
 //! At each probe the model is differentiated by finite differences along every parameter. A fit is refused
-//! only
-//! if the model has no features anywhere, or if no parameter changes any feature. Everything else is a note.
+//! only if the model has no features anywhere, or if no parameter changes any feature. Everything else is a
+//! note.
 
 use super::FitError;
 use super::evaluation::{Evaluation, EvaluationStage, Observed};
@@ -46,9 +46,8 @@ pub struct Identifiability {
     pub probes: Vec<Probe>,
     /// Combinations of parameters that are determined or left open at the probe nearest to the targets.
     pub combinations: Vec<ParameterCombination>,
-    /// Scatter of each modelled feature between neighbouring points, in its unit: the median over the probes.
-    /// It
-    /// is added to the deviation of the target, because a search cannot resolve less.
+    /// Scatter of each modelled feature between neighbouring points, in its unit: the median over the
+    /// probes. It is added to the deviation of the target, because a search cannot resolve less.
     pub scatter: Vec<f64>,
     /// Sentences for the reader.
     pub notes: Vec<String>,

@@ -221,8 +221,7 @@ impl<'a> Ledger<'a> {
     }
 
     /// The points that this run has not evaluated, without repetitions and within the budget, and whether
-    /// these
-    /// are all of them.
+    /// these are all of them.
     fn new_points(&self, points: &[Vec<f64>]) -> (Vec<Vec<f64>>, bool) {
         let mut new: Vec<Vec<f64>> = Vec::new();
         for point in points.iter().filter(|point| self.find_evaluation(point).is_none()) {

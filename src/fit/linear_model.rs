@@ -1,9 +1,9 @@
 //! Linear model of the residuals around a point of the unit box.
 //!
 //! Rows of the Jacobian are the features in the order of the targets, then the priors, then the camera
-//! unknowns
-//! (`CameraFit`), each in standard deviations; columns are the parameters. Slopes are central differences
-//! with `DIFFERENCE_STEP`, which is wide enough to average over the scatter of features of sampled traces.
+//! unknowns (`CameraFit`), each in standard deviations; columns are the parameters. Slopes are central
+//! differences with `DIFFERENCE_STEP`, which is wide enough to average over the scatter of features of
+//! sampled traces.
 
 use super::bounds::{Prior, SearchAxis, clamp_unit};
 use super::camera_calibration::{CameraEstimate, CameraFit};
@@ -30,9 +30,8 @@ pub(crate) fn difference_points(unit: &[f64]) -> Vec<Vec<f64>> {
     (0..unit.len()).flat_map(|axis| [moved(axis, -DIFFERENCE_STEP), moved(axis, DIFFERENCE_STEP)]).collect()
 }
 
-/// `d distance / d u` of every feature with its camera errors, one row per feature. `None` where the feature
-/// is
-/// missing on both sides, or at the point and on one side.
+/// `d distance / d u` of every feature with its camera errors, one row per feature. `None` where the
+/// feature is missing on both sides, or at the point and on one side.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FeatureSlopes(pub Vec<Vec<Option<f64>>>);
 
@@ -67,10 +66,9 @@ fn feature_slope(target: &TargetValue, below: (f64, f64), above: (f64, f64)) -> 
     (width > 0.0 && change.is_finite()).then(|| change / width)
 }
 
-/// Scatter of each feature about a straight line through the points next to a centre, as a standard deviation
-/// in
-/// its own unit: `f(+) + f(-) - 2 f(0)` of independent values has six times their variance. `None` where the
-/// feature is missing at one of the points.
+/// Scatter of each feature about a straight line through the points next to a centre, as a standard
+/// deviation in its own unit: `f(+) + f(-) - 2 f(0)` of independent values has six times their variance.
+/// `None` where the feature is missing at one of the points.
 pub(crate) fn feature_scatter(
     targets: &[TargetValue],
     centre: &Evaluation,
@@ -159,8 +157,7 @@ fn jacobian_with_cameras_held(
 }
 
 /// Broyden's update of the Jacobian after a step: the model then reproduces the change of the residuals
-/// (Math.
-/// Comput. 19 (1965) 577).
+/// (Math. Comput. 19 (1965) 577).
 pub(crate) fn broyden_update(
     jacobian: &mut DMatrix<f64>,
     before: &[Option<f64>],
@@ -181,11 +178,9 @@ pub(crate) fn broyden_update(
     }
 }
 
-/// Damped Gauss-Newton step: `(J^T W J + damping) d = -J^T W r` with the weights `min(1, LOSS_KNEE / |r|)^2`
-/// of
-/// the cost (Levenberg, Quart. Appl. Math. 2 (1944) 164), shortened to [`MAX_STEP`]. The coordinate `held`
-/// does
-/// not change.
+/// Damped Gauss-Newton step: `(J^T W J + damping) d = -J^T W r` with the weights `min(1, LOSS_KNEE /
+/// |r|)^2` of the cost (Levenberg, Quart. Appl. Math. 2 (1944) 164), shortened to [`MAX_STEP`]. The
+/// coordinate `held` does not change.
 pub(crate) fn damped_step(
     jacobian: &DMatrix<f64>,
     residuals: &[Option<f64>],

@@ -2,9 +2,8 @@
 //! fit.
 //!
 //! The parameters of a wrong model have narrow intervals too. Evidence against a model is a residual above
-//! the
-//! noise, a residual that grows with the length of the segments, or a segment that fits worse than noise
-//! allows; in a fit of features also a camera or a constant that is far from its prior.
+//! the noise, a residual that grows with the length of the segments, or a segment that fits worse than
+//! noise allows; in a fit of features also a camera or a constant that is far from its prior.
 
 use super::result::NuisanceResult;
 use crate::math;
@@ -16,14 +15,12 @@ use std::collections::BTreeMap;
 /// degree of freedom has twice this scatter about 1.
 const NOISE_SD_RELATIVE: f64 = 0.04;
 /// Largest relative growth of chi2 per degree of freedom from the shortest to the longest segments, beyond
-/// its
-/// scatter. A wrong damping gives 0.05 to 0.13, a right model less than 0.02.
+/// its scatter. A wrong damping gives 0.05 to 0.13, a right model less than 0.02.
 const MAX_GROWTH: f64 = 0.03;
 /// Standard deviations of a two-sided 95 % interval.
 const Z_95: f64 = 1.96;
 /// Largest distance of a nuisance from its prior, in standard deviations. With twenty nuisances, one of a
-/// hundred
-/// fits of a right model exceeds it.
+/// hundred fits of a right model exceeds it.
 const MAX_PRIOR_DISTANCE_SD: f64 = 3.5;
 /// Digits of a ratio in a sentence.
 const DIGITS: usize = 3;
@@ -87,8 +84,7 @@ pub struct StageMisfit {
     /// Degrees of freedom: number of data minus number of unknowns.
     pub dof: usize,
     /// Sum of squared residuals in units of the noise over the degrees of freedom; infinite (`null` in a
-    /// file)
-    /// if a run of the model fails.
+    /// file) if a run of the model fails.
     #[serde(deserialize_with = "or_infinite")]
     pub chi2_per_dof: f64,
     /// Parameters at the end of the stage, in SI units.

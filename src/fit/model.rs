@@ -17,8 +17,7 @@ pub trait FeaturePredictor: Sync {
     fn predict_features(&self, values: &[f64]) -> Result<Vec<Observed>, RunFailure>;
 
     /// The features of one simulated measurement of that model, with the noise, lost points and starting
-    /// state
-    /// of draw number `draw`.
+    /// state of draw number `draw`.
     ///
     /// # Errors
     /// As [`Self::predict_features`].
@@ -39,8 +38,7 @@ pub struct Draw {
 /// A model that is seen through cameras.
 pub trait Model: Sync {
     /// The recording of a condition of the job, counted from 0, by its camera; `values` are the free
-    /// parameters
-    /// in job order, in their SI units.
+    /// parameters in job order, in their SI units.
     ///
     /// # Errors
     /// [`RunFailure`] when the run ended before anything could be observed.

@@ -95,8 +95,7 @@ fn free_all_constants(sd_relative: f64, job: &Job, scenes: &[Scene]) -> Vec<Free
 }
 
 /// Whether a parameter is a constant with an error of percents. Lengths and centres of mass are exact,
-/// friction
-/// is sought, and drive and restitution belong to the experiment.
+/// friction is sought, and drive and restitution belong to the experiment.
 fn is_constant(parameter: &ModelParameter) -> bool {
     use ParameterQuantity as Q;
     let exact = [Q::NeckLength, Q::LipLength, Q::NeckCentre, Q::LipCentre, Q::Restitution];

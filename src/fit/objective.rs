@@ -1,20 +1,17 @@
 //! The cost of a point of the unit box. Every failure of the model becomes a reason and a finite cost.
 //!
 //! The cost is twice the negative log-likelihood, up to a constant that makes it zero where all targets are
-//! met:
-//! `sum [ rho(r) + 2 ln(s / sd) + (d / 6 dB)^2 ] + sum of the priors`.
+//! met: `sum [ rho(r) + 2 ln(s / sd) + (d / 6 dB)^2 ] + sum of the priors`.
 //!
 //! - The residual of a feature is `r = ln(model / target) / s`, or `(model - target) / s` where the sign may
 //!   change.
 //! - `s^2 = sd^2 + scatter^2 + spread^2` combines the deviation of the target, the scatter of a rough model
-//! value
-//!   between neighbouring parameters, and the spread over the starting states. The term `2 ln(s / sd)`
+//!   value between neighbouring parameters, and the spread over the starting states. The term `2 ln(s / sd)`
 //!   penalises the spread; without it a fit would prefer points with uncertain features.
 //! - `rho` (`robust_loss`) is `r^2` up to `LOSS_KNEE` and logarithmic beyond it, so that a missing peak does
 //!   not dominate the cost. A missing feature costs as much as one that is wrong by a factor of `MAX_RATIO`.
 //! - `d` is the level of the strongest peak above the assigned one. With it the cost is continuous when
-//! another
-//!   peak is assigned.
+//!   another peak is assigned.
 //!
 //! A failing run costs at least as much as a run without any feature, and less the longer it lasts.
 
@@ -29,8 +26,7 @@ use crate::text::panic_message;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Residual, in standard deviations, above which the cost grows logarithmically. Measurement errors stay
-/// below 3,
-/// so that only a wrong model is affected.
+/// below 3, so that only a wrong model is affected.
 pub(crate) const LOSS_KNEE: f64 = 3.0;
 
 /// The cost function of a fit: bounds, targets and model.
@@ -41,9 +37,8 @@ pub struct Objective<'a> {
 }
 
 impl<'a> Objective<'a> {
-    /// One axis per free parameter and one target per feature. Targets are finite, not zero where logarithms
-    /// are
-    /// compared, and have a standard deviation above zero.
+    /// One axis per free parameter and one target per feature. Targets are finite, not zero where
+    /// logarithms are compared, and have a standard deviation above zero.
     #[must_use]
     pub fn new(axes: Vec<SearchAxis>, targets: Vec<TargetValue>, model: &'a dyn FeaturePredictor) -> Self {
         Self { axes, targets, model }

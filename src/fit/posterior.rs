@@ -1,11 +1,9 @@
 //! The posterior density of a job's unknowns, for external samplers and optimisers.
 //!
 //! `ln p(x) = ln p(data | x) + ln p(x)`, up to a constant of the data. Every unknown has a range. Its prior
-//! is
-//! flat along its coordinate (its logarithm, or itself), or normal and truncated to the range. The likelihood
-//! of a job on features is `-cost / 2` without the terms of the priors ([`super::objective`]). That of a job
-//! on
-//! traces is `-chi^2 / 2`, minimised over the starting states of the segments
+//! is flat along its coordinate (its logarithm, or itself), or normal and truncated to the range. The
+//! likelihood of a job on features is `-cost / 2` without the terms of the priors ([`super::objective`]).
+//! That of a job on traces is `-chi^2 / 2`, minimised over the starting states of the segments
 //! (`fit_states_at`).
 
 use super::FitError;
@@ -121,9 +119,8 @@ impl Posterior {
     }
 
     /// Residuals (model minus data) in standard deviations: one per feature in the order of the job, or one
-    /// per
-    /// fitted frame of the traces, recording by recording, tip before head. `None` where the model has no
-    /// value.
+    /// per fitted frame of the traces, recording by recording, tip before head. `None` where the model has
+    /// no value.
     #[must_use]
     pub fn residuals(&self, values: &[f64]) -> Vec<Option<f64>> {
         match &self.data {

@@ -93,9 +93,8 @@ impl Problem {
     /// Combines a job with its scenes, one per condition ([`Job::conditions`]), and its recordings, one per
     /// condition that has a recording, both in the order of the job.
     ///
-    /// The values that a condition sets replace those of its scene. Both bounds of every free parameter have
-    /// to
-    /// be valid in every scene.
+    /// The values that a condition sets replace those of its scene. Both bounds of every free parameter
+    /// have to be valid in every scene.
     ///
     /// # Errors
     /// [`ProblemError`] for the first mismatch.
@@ -333,8 +332,7 @@ struct RecordingIdentity<'a> {
 
 impl Problem {
     /// The model with the fitted constants and starting states of a result. In a fit of features it is the
-    /// model
-    /// of the problem.
+    /// model of the problem.
     ///
     /// # Errors
     /// [`FitError::CannotBeFitted`] when a scene refuses what was fitted.

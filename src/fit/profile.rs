@@ -1,16 +1,15 @@
 //! Profile likelihood: along each parameter, the lowest cost that the others can still reach.
 //!
 //! From the best point one walker goes up and another down each parameter. At every place it minimises the
-//! cost
-//! over the other parameters, first by the linear model and then by damped Gauss-Newton steps corrected by
-//! Broyden's rule, until the cost has risen by more than the threshold or the range ends (Venzon and
-//! Moolgavkar, Appl. Stat. 37 (1988) 87; Raue et al., Bioinformatics 25 (2009) 1923). All walkers step
-//! together: their evaluations run in parallel, in an order that does not depend on the number of threads.
+//! cost over the other parameters, first by the linear model and then by damped Gauss-Newton steps
+//! corrected by Broyden's rule, until the cost has risen by more than the threshold or the range ends
+//! (Venzon and Moolgavkar, Appl. Stat. 37 (1988) 87; Raue et al., Bioinformatics 25 (2009) 1923). All
+//! walkers step together: their evaluations run in parallel, in an order that does not depend on the number
+//! of threads.
 //!
 //! A cost of features is rough, and values behind a ridge may be as good. A walker therefore also tries the
 //! best known point near each place, probes behind the crossing that it finds, and continues from the
-//! farthest
-//! evaluated point within the threshold.
+//! farthest evaluated point within the threshold.
 
 use super::bounds::clamp_unit;
 use super::evaluation::{Evaluation, EvaluationStage};
@@ -28,12 +27,10 @@ const INNER_STEPS: usize = 3;
 /// Gain in cost below which the inner minimisation ends: a fiftieth of the threshold.
 const FOLLOWED_GAIN: f64 = 0.08;
 /// Most places of a walker: with a poor linear model it takes about eight, and each probe behind a crossing
-/// is
-/// one more.
+/// is one more.
 const MAX_PLACES: usize = 20;
 /// Probes behind a crossing, in units of its distance from the best point. The cost has to exceed the
-/// threshold
-/// there too, so that a ridge of a quarter of an interval does not end the walk.
+/// threshold there too, so that a ridge of a quarter of an interval does not end the walk.
 const PROBE_FACTORS: [f64; 2] = [1.25, 1.6];
 /// Largest distance along the coordinate, in the unit box, of a known point from which a place is started.
 const NEAR_COORDINATE: f64 = 0.01;
@@ -58,9 +55,8 @@ const MAX_STEP_GROWTH: f64 = 3.0;
 pub(crate) struct ProfileLikelihood {
     /// Coordinate in the unit interval and lowest cost there, rising, with the best point.
     pub points: Vec<(f64, f64)>,
-    /// Lower crossing of the threshold; `None` if there is none within the range, or if another parameter is
-    /// at
-    /// its bound there.
+    /// Lower crossing of the threshold; `None` if there is none within the range, or if another parameter
+    /// is at its bound there.
     pub lower: Option<f64>,
     pub upper: Option<f64>,
 }
@@ -98,8 +94,7 @@ fn walk_to_ends(ledger: &mut Ledger, walkers: &mut [ProfileWalker]) -> Result<()
 }
 
 /// Lets walkers continue from the farthest points within the threshold behind their crossings; returns
-/// whether
-/// any of them does.
+/// whether any of them does.
 fn resume_walkers(ledger: &mut Ledger, walkers: &mut [ProfileWalker]) -> Result<bool, StopReason> {
     let farther: Vec<Option<Evaluation>> =
         walkers.iter().map(|walker| walker.farthest_within_threshold(ledger)).collect();
@@ -296,8 +291,7 @@ impl ProfileWalker {
     }
 
     /// Starting points at a place: the other parameters unchanged, moved by the linear model, and from the
-    /// best
-    /// known point.
+    /// best known point.
     fn first_points(&self) -> Vec<Vec<f64>> {
         let change = self.at - self.base_coordinate();
         let kept = self.move_onto_coordinate(&self.base.evaluation.unit);
@@ -395,9 +389,8 @@ impl ProfileWalker {
         self.refine_bracket(base, self.at, root);
     }
 
-    /// Interpolates the crossing between the base (within the threshold) and `place` (beyond it), or chooses
-    /// the
-    /// next place between them.
+    /// Interpolates the crossing between the base (within the threshold) and `place` (beyond it), or
+    /// chooses the next place between them.
     fn refine_bracket(&mut self, base_root: f64, place: f64, root: f64) {
         let base = self.base_coordinate();
         let share = ((self.most_root - base_root) / (root - base_root)).clamp(0.0, 1.0);

@@ -55,8 +55,7 @@ pub struct ParameterResult {
     /// Interval by the linear model at the estimates, if it determines the parameter.
     pub linear_95: Option<[f64; 2]>,
     /// Lower and upper crossing of the threshold by the profile of the cost; `None` where there is none
-    /// within the
-    /// bounds.
+    /// within the bounds.
     pub profile_95: [Option<f64>; 2],
     /// Interval by refits to twins of the best model.
     pub bootstrap_95: Option<[f64; 2]>,
@@ -197,8 +196,7 @@ pub struct FeatureResult {
     /// `model_seen / target - 1`, or `model / target - 1` without camera errors.
     pub relative_error: Option<f64>,
     /// Whether that value is within the 95 % interval of the target. For a held-out feature the interval
-    /// includes
-    /// the calibration errors of its camera.
+    /// includes the calibration errors of its camera.
     pub pass: bool,
     /// Scatter of the model's value between neighbouring points; it is added to the target's deviation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -331,8 +329,7 @@ impl FitResult {
     }
 
     /// Whether the model explains the recordings. In a fit of features, a camera far from its prior is
-    /// evidence
-    /// against the model.
+    /// evidence against the model.
     #[must_use]
     pub fn explains_recordings(&self) -> bool {
         match &self.misfit {
@@ -350,9 +347,8 @@ const HASH_DIGITS: usize = 64;
 /// Digits of a hash in an error message.
 const SHORT_HASH_DIGITS: usize = 12;
 
-/// Appends the hash of a pretty-printed JSON object as its last key: the SHA-256 of the whole text with zeros
-/// in
-/// place of the digits of the hash.
+/// Appends the hash of a pretty-printed JSON object as its last key: the SHA-256 of the whole text with
+/// zeros in place of the digits of the hash.
 pub(super) fn append_hash(object: &str) -> String {
     let open = object.trim_end().trim_end_matches('}').trim_end();
     let with = |digits: &str| format!("{open},{HASH_KEY}{digits}\"\n}}\n");

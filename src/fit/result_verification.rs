@@ -1,10 +1,9 @@
 //! Checks a stored result against its job, recordings and model with one evaluation of the model.
 //!
 //! The values of the model are computed again from the stored estimates. Targets, relative errors, passes,
-//! the
-//! cost and the verdicts are computed from the stored numbers. Intervals, sensitivities and the record of the
-//! search would need the whole fit: they are only checked for consistency, and the hash of the file reveals a
-//! changed digit.
+//! the cost and the verdicts are computed from the stored numbers. Intervals, sensitivities and the record
+//! of the search would need the whole fit: they are only checked for consistency, and the hash of the file
+//! reveals a changed digit.
 
 use super::FitError;
 use super::evaluation::{Evaluation, Observation, Observed};

@@ -35,8 +35,7 @@ pub fn job_warnings(job: &Job) -> Vec<String> {
 }
 
 /// Fits the job's parameters. `measured` has an entry per condition, `None` where it has no recording;
-/// `model`
-/// gives the recordings of the model at parameter values.
+/// `model` gives the recordings of the model at parameter values.
 ///
 /// Every new evaluation is written to `journal` as a line and reported to `on_progress`. A new journal starts
 /// with a header, and nothing is written before the identifiability is assessed. The result depends only on

@@ -22,8 +22,7 @@ use std::f64::consts::TAU;
 const MAX_EVALUATIONS: u64 = 20_000_000;
 
 /// Relative tolerance of the model's runs. Features are measured to 1e-3, and the transitions at 1e-6 are
-/// those
-/// at 1e-8.
+/// those at 1e-8.
 const TOLERANCE: f64 = 1e-6;
 /// Reference angle of a spread of starting states where the blade starts upright, rad: a blade in use leans
 /// by
@@ -38,8 +37,7 @@ pub struct Instrument {
     /// The camera.
     pub camera: Camera,
     /// Standard deviation of a tracked coordinate, m. It is added to the model too, because noise biases
-    /// features
-    /// such as the time of release or the power in a band.
+    /// features such as the time of release or the power in a band.
     pub noise_m: f64,
     /// Fraction of frames in which a point is lost; only twins lose points.
     pub dropout_fraction: f64,

@@ -3,8 +3,7 @@
 //!
 //! Covariance matrix adaptation and damped Gauss-Newton steps are implemented here; the simplex is argmin's
 //! (`simplex.rs`). The ledger keeps budgets, the best point and every failure, so the solvers never see
-//! errors
-//! or costs that are not numbers.
+//! errors or costs that are not numbers.
 
 mod excluded_region_search;
 mod gauss_newton;

@@ -1,9 +1,8 @@
 //! Checks whether the transient of the start affects the features.
 //!
 //! A scene starts from a guess, such as the equilibrium of steady slip. The error of the guess rings down
-//! with
-//! the slowest mode of blade and head, and biases a feature whose window begins too early. The best model is
-//! therefore run again from another start, and its features are compared with those of the fit.
+//! with the slowest mode of blade and head, and biases a feature whose window begins too early. The best
+//! model is therefore run again from another start, and its features are compared with those of the fit.
 
 use super::evaluation::{Observed, RunFailure};
 use super::job::FitTarget;
@@ -69,8 +68,7 @@ impl ConditionFeatures<'_> {
 }
 
 /// A sentence for each condition whose features depend on the start of its scene. `targets` have the
-/// deviations
-/// of the end of the fit; `names` are those of the conditions.
+/// deviations of the end of the fit; `names` are those of the conditions.
 pub(super) fn start_notes(
     model: &dyn Model,
     names: &[String],

@@ -86,8 +86,7 @@ fn measure_target(
 }
 
 /// Standard deviation of each feature over noisier copies of the recordings; `None` where no more than half
-/// of
-/// them have it.
+/// of them have it.
 fn copy_scatter(features: &[Feature], measured: &[Option<Recording>]) -> Vec<Option<f64>> {
     let noise = |m: &Option<Recording>| measure_quality(m.as_ref()?, None).head_x.noise_m;
     let noise_m: Vec<f64> = measured.iter().map(|m| noise(m).unwrap_or(0.0)).collect();
@@ -137,8 +136,7 @@ fn not_measurable_error(aim: &FitTarget, measured: &[Option<Recording>], problem
 pub(crate) const MAX_RATIO: f64 = 100.0;
 
 /// Least relative standard deviation in the first stage. Far from the targets all features are many
-/// deviations
-/// off, and the most precise ones would dominate the cost.
+/// deviations off, and the most precise ones would dominate the cost.
 pub(crate) const FIRST_STAGE_SD_RELATIVE: f64 = 0.05;
 
 /// The target value of a feature, with its standard deviation.

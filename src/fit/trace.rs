@@ -2,10 +2,9 @@
 //!
 //! A long run of a stick-slip model is so sensitive that the misfit of its trace has tens of minima. With a
 //! restart from the recorded state every few milliseconds it has one. The starting state of each segment is
-//! eliminated (variable projection, Golub and Pereyra 1973), so an outer Levenberg-Marquardt step moves only
-//! the parameters and the unknowns of the camera. Segments grow from stage to stage; a new stage starts on
-//! the
-//! motion that the previous one fitted.
+//! eliminated (variable projection, Golub and Pereyra 1973), so an outer Levenberg-Marquardt step moves
+//! only the parameters and the unknowns of the camera. Segments grow from stage to stage; a new stage
+//! starts on the motion that the previous one fitted.
 
 mod assessment;
 mod camera_observation;

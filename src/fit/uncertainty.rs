@@ -1,9 +1,8 @@
 //! Uncertainty of the parameters at the best point: intervals, verdicts, correlations, combinations.
 //!
 //! An interval is the widest of three: the profile likelihood ([`super::profile`]), refits to twins of the
-//! best
-//! model ([`super::bootstrap`]), and the range of all evaluated points whose cost is within the threshold.
-//! Without a profile the linear model at the best point takes its place.
+//! best model ([`super::bootstrap`]), and the range of all evaluated points whose cost is within the
+//! threshold. Without a profile the linear model at the best point takes its place.
 
 mod rivals;
 mod verdicts;

@@ -1,10 +1,8 @@
 //! Work-precision study: error and cost of every method on a scene, against a reference with a tenfold
-//! tighter
-//! tolerance.
+//! tighter tolerance.
 //!
 //! Errors are those of transition times, of the deflection at common times, and of two spectral components.
-//! The
-//! caller measures the run times.
+//! The caller measures the run times.
 
 mod reference;
 mod sampled_run;
@@ -49,8 +47,7 @@ impl SolverSetting {
 }
 
 /// All settings for a scene: each adaptive method at each tolerance, then the fixed steps, unless the scene
-/// has
-/// flight or impacts.
+/// has flight or impacts.
 pub(crate) fn list_settings(scene: &Scene) -> Vec<SolverSetting> {
     let adaptive = [IntegrationMethod::Taylor, IntegrationMethod::RungeKutta, IntegrationMethod::Slack];
     let tolerances =
@@ -80,8 +77,7 @@ fn setting_cells(row: &AccuracyRow) -> [String; 3] {
 }
 
 /// `work-precision.csv`: one row per setting. `error` is the worst error of a transition time, s, and empty
-/// if the
-/// transitions differ from the reference's.
+/// if the transitions differ from the reference's.
 pub(crate) fn write_work_precision_csv(rows: &[AccuracyRow]) -> String {
     let row = |r: &AccuracyRow| {
         let [tolerance, step, error] = setting_cells(r);
@@ -93,8 +89,7 @@ pub(crate) fn write_work_precision_csv(rows: &[AccuracyRow]) -> String {
 }
 
 /// `accuracy.csv`: all errors of every setting. `above_reference_uncertainty` says whether the error of
-/// transition
-/// times exceeds the difference of the two references.
+/// transition times exceeds the difference of the two references.
 pub(crate) fn write_accuracy_csv(reference: &ReferenceRun<'_>, rows: &[AccuracyRow]) -> String {
     let row = |r: &AccuracyRow| {
         let [tolerance, step, error] = setting_cells(r);

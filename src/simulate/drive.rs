@@ -126,16 +126,14 @@ fn is_zero(value: &f64) -> bool {
 // Motion of a recorded head.
 
 /// Time over which frames are averaged before smoothing, and between knots of the spline, s. Tracking noise
-/// is
-/// correlated over a few frames (vibration, sub-pixel bias), and cross-validation would take it for motion. A
-/// head moves smoothly within this time.
+/// is correlated over a few frames (vibration, sub-pixel bias), and cross-validation would take it for
+/// motion. A head moves smoothly within this time.
 const BLOCK_S: f64 = 4e-3;
 /// Fewest frames with the head: cross-validation needs several points per degree of freedom.
 const FEWEST_FRAMES: usize = 10;
 
 /// Time at either end of a recording in which the acceleration of the head is ten times less certain, s. A
-/// run
-/// avoids it.
+/// run avoids it.
 pub(crate) const UNCERTAIN_END_S: f64 = 0.01;
 /// Fraction of the head's top speed above which a run may start in steady slip.
 pub(crate) const EVEN_SPEED_SHARE: f64 = 0.2;

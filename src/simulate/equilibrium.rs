@@ -15,8 +15,7 @@ const MOST_ITERATIONS: u32 = 50;
 const RESIDUAL: f64 = 1e-14;
 
 /// Pose with `A qdd = 0` under the friction at the head's speed, m/s; `None` if the head rests, if no such
-/// pose
-/// exists with both links above level, or if the glass would have to pull the tip.
+/// pose exists with both links above level, or if the glass would have to pull the tip.
 #[must_use]
 pub fn steady_slip_pose(linkage: &Linkage, speed_m_per_s: f64) -> Option<Pose> {
     if speed_m_per_s == 0.0 {
@@ -76,8 +75,7 @@ pub(super) fn shoulder_contact(linkage: &Linkage, theta: f64) -> ShoulderContact
 }
 
 /// The equilibrium at one load. The side of the shoulder is fixed in each iteration, because Newton's steps
-/// could
-/// cycle across the kink at its corner.
+/// could cycle across the kink at its corner.
 fn solve_for_load(linkage: &Linkage, mu: f64, angles: Pair) -> Option<Pair> {
     let here = shoulder_contact(linkage, angles[0]);
     let sides = [here, ShoulderContact::Off, ShoulderContact::Forward, ShoulderContact::Backward];
@@ -105,9 +103,8 @@ fn solve_newton(linkage: &Linkage, mu: f64, mut angles: Pair, side: ShoulderCont
     None
 }
 
-/// Residual moments of springs, normal force and friction on neck and lip at rest, N m: equations (1) and (2)
-/// of
-/// [`crate::model`] without rates.
+/// Residual moments of springs, normal force and friction on neck and lip at rest, N m: equations (1) and
+/// (2) of [`crate::model`] without rates.
 pub(super) fn residual_moments(linkage: &Linkage, mu: f64, angles: &Pair, side: ShoulderContact) -> Pair {
     let pose = pose_at_rest(angles);
     let d = LinkDirections::from_pose(&pose);

@@ -177,8 +177,7 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
     }
 
     /// Removes the residual tip velocity of event location by an impulse on the tip, so that the decision
-    /// sees a
-    /// tip exactly at rest. The residual is rounding, or the tolerance if the tip only grazes rest.
+    /// sees a tip exactly at rest. The residual is rounding, or the tolerance if the tip only grazes rest.
     fn remove_tip_velocity(&self, mut pose: Pose) -> Pose {
         if matches!(self.effort.method, IntegrationMethod::FixedStep(scheme) if scheme.gain_per_s > 0.0) {
             return pose; // the stabilisation removes it
@@ -319,8 +318,8 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
             Ended::StepTooSmall => NextPhase::End(RunStatus::Diverged),
             Ended::Guard(JAMS) if self.is_at_pole(&phase, &pose) => self.resolve_jam(&pose, mode),
             // extrapolated past rest, steeply falling friction grows without bound, and the interpolant of
-            // the
-            // indicator may dip below zero although the indicator does not: the phase goes on from this state
+            // the indicator may dip below zero although the indicator does not: the phase goes on from this
+            // state
             Ended::Guard(JAMS) => {
                 self.recent.note_event(self.t);
                 self.shorten_slip_step();
@@ -355,8 +354,7 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
 
     /// Whether the tip is about to jam. Near the paradox the indicator vanishes as the square root of the
     /// remaining time and the normal force grows without bound. No step resolves the last instant; a step
-    /// beyond
-    /// it, by rounding, finds a force that pulls.
+    /// beyond it, by rounding, finds a force that pulls.
     fn is_at_pole(&self, phase: &SlipPhase<'_>, pose: &Pose) -> bool {
         /// An empirical limit: of 300 random blades with heavy heads, runs that ended at the paradox had an
         /// indicator of at most 5e-6 in size, all others 0.5 or more.
@@ -382,8 +380,7 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
 /// force, 2 if both are equal up to rounding, as at the end of stick.
 fn release_order(contact: &FrictionResponse, mu: f64) -> u8 {
     /// Relative excess over the limit up to which the forces count as equal: far above rounding, far below
-    /// the
-    /// resolution of a step.
+    /// the resolution of a step.
     const EQUAL: f64 = 1e-11;
     let force = holding_force(contact);
     let limit = mu * (contact.n_free + contact.nu * force);
@@ -452,8 +449,7 @@ impl ChatterDetector {
     /// Number of recent events.
     const WINDOW: usize = 64;
     /// Fraction of the blade's shortest period in which this many events count as chattering; real cycles
-    /// take
-    /// about a period each.
+    /// take about a period each.
     const SHARE: f64 = 1e-6;
 
     pub(super) fn new(period_s: f64) -> Self {
@@ -508,9 +504,8 @@ impl<O: Observer> RunWatcher for ObserverWatcher<'_, O> {
 mod tests {
     use super::*;
 
-    /// A full window of events within a millionth of the shortest period is chattering; one event per period
-    /// is
-    /// not.
+    /// A full window of events within a millionth of the shortest period is chattering; one event per
+    /// period is not.
     #[test]
     fn events_that_accumulate_differ_from_cycles() {
         let period_s = 2e-3;

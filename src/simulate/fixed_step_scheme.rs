@@ -1,16 +1,13 @@
 //! The paper's scheme, for comparison: classical Runge-Kutta with fixed steps on all four states. Stick is
-//! the
-//! constraint `Phi = v3 - alpha = 0` on accelerations, stabilised after Baumgarte (Comp. Meth. Appl. Mech.
-//! Eng.
-//! 1, 1972),
+//! the constraint `Phi = v3 - alpha = 0` on accelerations, stabilised after Baumgarte (Comp. Meth. Appl.
+//! Mech. Eng. 1, 1972),
 //!
 //! ```text
 //! Phi'' + 2 a Phi' + b^2 Phi = 0,   a = b
 //! ```
 //!
 //! Transitions happen at the end of a step or are located by the slack variable method. The paper gives
-//! neither
-//! step nor gain.
+//! neither step nor gain.
 
 use super::phases::{ContactInstant, DrivenBlade, GUARDS, TipForces, apply_friction, pose_from_states};
 use crate::model::shoulder::ShoulderContact;
@@ -34,8 +31,7 @@ pub struct FixedStepScheme {
     /// Method of locating transitions.
     pub locate: FixedStepLocator,
     /// Gains `a = b` of the stabilisation, 1/s. With zero gain the tip's velocity is removed at the
-    /// transition,
-    /// because it would not decay.
+    /// transition, because it would not decay.
     pub gain_per_s: f64,
 }
 

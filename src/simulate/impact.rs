@@ -88,8 +88,7 @@ pub fn solve_impact(
     work: &mut WorkCounters,
 ) -> Option<ImpactOutcome> {
     /// Ratio of tangential to normal velocity above which the tangential one sets the unit of velocity, so
-    /// that
-    /// the quotient stays finite.
+    /// that the quotient stays finite.
     const FLATTEST: f64 = 1e12;
     let unit = before.normal.abs().max(before.tangential.abs() / FLATTEST);
     let unit = if origin == ImpactOrigin::Jam { before.tangential.abs() } else { unit };
@@ -221,8 +220,7 @@ impl ScaledImpact {
     }
 
     /// The slip of a jam, down to rest. No stage ends it: the normal velocity starts at a zero of unknown
-    /// order,
-    /// which depends on how the indicator vanished.
+    /// order, which depends on how the indicator vanished.
     fn integrate_jam(&self, state: ImpactState, work: &mut WorkCounters) -> Option<ImpactState> {
         let slide = ImpactSlip { blow: self, direction: state.tangential.signum(), from: state, open: true };
         let (next, cause) = slide.integrate([0; 3], work);
@@ -240,8 +238,7 @@ const REOPENS: usize = 2;
 /// Slip in one direction as a function of the normal impulse.
 ///
 /// States: change of the tangential speed in that direction, which is far smaller than the speed in a
-/// glancing
-/// impact, and work of the normal force.
+/// glancing impact, and work of the normal force.
 struct ImpactSlip<'a> {
     blow: &'a ScaledImpact,
     direction: f64,

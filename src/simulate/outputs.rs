@@ -325,8 +325,7 @@ pub(crate) struct ShutterObserver<I: Iterator<Item = [f64; 2]>, F: FnMut(&BladeP
 
 impl<I: Iterator<Item = [f64; 2]>, F: FnMut(&BladePoints)> ShutterObserver<I, F> {
     /// `intervals` are rising times of opening and closing, s, without overlap. An interval that is still
-    /// open at
-    /// the end of the run gives no mean.
+    /// open at the end of the run gives no mean.
     pub(crate) fn new(intervals: I, sink: F) -> Self {
         Self { intervals: intervals.peekable(), sink, sum: [0.0; 4], open_s: 0.0 }
     }

@@ -132,8 +132,7 @@ pub(crate) fn pose_from_states(y: &[f64; 4]) -> Pose {
 
 impl SlipPhase<'_> {
     /// Speed of the tip in the direction of slip, m/s, and the forces `f = -sigma mu N`, `N = n_free / (1 +
-    /// sigma mu
-    /// nu)`.
+    /// sigma mu nu)`.
     #[inline]
     pub(super) fn slip_forces(&self, pose: &Pose, at: &ContactInstant) -> (f64, TipForces) {
         let speed = self.direction * self.system.linkage.tip_velocity_m_per_s(pose, &at.directions, &at.head);
@@ -207,8 +206,7 @@ impl TaylorPhase<4, GUARDS> for SlipPhase<'_> {
 }
 
 /// Stick: the tip is held at `place_m`. The states are angle and rate of the free link; the other link
-/// follows
-/// from `l1 sin theta + l2 sin phi = place - v(t)`, so the tip cannot drift.
+/// follows from `l1 sin theta + l2 sin phi = place - v(t)`, so the tip cannot drift.
 #[derive(Debug, Clone, Copy)]
 pub struct StickPhase<'a> {
     /// The blade on its drive.
@@ -229,8 +227,7 @@ enum Link {
 
 impl<'a> StickPhase<'a> {
     /// Cosine of the follower at which it counts as level, 1e-3 rad early. At level the follower's rate is
-    /// 0/0 and
-    /// its cosine does not change sign; 1e-3 rad before, the state loses about nine bits.
+    /// 0/0 and its cosine does not change sign; 1e-3 rad before, the state loses about nine bits.
     const LEAST_COSINE: f64 = 1e-3;
 
     /// Holds the tip at its position in a pose with both links above level.
@@ -254,8 +251,7 @@ impl<'a> StickPhase<'a> {
     }
 
     /// Pose and directions from the two states: the follower's angle from the tip's position, its rate from
-    /// the
-    /// tip's rest.
+    /// the tip's rest.
     #[inline]
     pub(super) fn full_pose(&self, head: &HeadMotion, y: &[f64; 2]) -> (Pose, LinkDirections) {
         let (l1, l2) = (self.system.linkage.l1_m, self.system.linkage.l2_m);

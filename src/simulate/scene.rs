@@ -141,8 +141,7 @@ impl Scene {
     }
 
     /// The same scene driven by the head of a recording. The run covers the tracked time without its
-    /// uncertain
-    /// ends; a start in steady slip waits until the head moves.
+    /// uncertain ends; a start in steady slip waits until the head moves.
     ///
     /// # Errors
     /// [`SceneError`] if the head is tracked too briefly or steady slip is impossible.

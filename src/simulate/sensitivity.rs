@@ -1,23 +1,18 @@
-//! Derivatives of a run by parameters, initial state and drive, within the tolerance, along the steps of the
-//! run
-//! and through its transitions.
+//! Derivatives of a run by parameters, initial state and drive, within the tolerance, along the steps of
+//! the run and through its transitions.
 //!
 //! Between transitions the derivatives obey the linear equations of [`crate::model::tangent`] along the
-//! series of
-//! each step. Collocation ([`crate::ode::collocation`]) solves them; all directions share one factorisation
-//! per
-//! step. At the zero of a guard `G` the transition time changes by `d tau = -dG / G'` and the derivative of
-//! the
-//! state jumps (saltation; Leine and Nijmeijer, "Dynamics and Bifurcations of Non-Smooth Mechanical Systems",
-//! chapter 7),
+//! series of each step. Collocation ([`crate::ode::collocation`]) solves them; all directions share one
+//! factorisation per step. At the zero of a guard `G` the transition time changes by `d tau = -dG / G'` and
+//! the derivative of the state jumps (saltation; Leine and Nijmeijer, "Dynamics and Bifurcations of
+//! Non-Smooth Mechanical Systems", chapter 7),
 //!
 //! ```text
 //! d y+ = R_y (d y- + f- d tau) + R_p - f+ d tau
 //! ```
 //!
 //! with the right-hand sides `f` before and after and the map `R` of an impact, elsewhere the identity. A
-//! guard
-//! that only grazes zero makes the derivative infinite; from there on derivatives are unknown.
+//! guard that only grazes zero makes the derivative infinite; from there on derivatives are unknown.
 
 mod propagation;
 mod saltation;
@@ -39,9 +34,8 @@ pub use tangent_segment::{Channel, ChannelWeights, TangentSegment};
 pub trait TangentObserver {
     /// Receives a piece of the solution, in order of time.
     fn observe_segment(&mut self, piece: &TangentSegment<'_>);
-    /// Receives a change of mode, between the pieces that it separates. `d_time_s` are the derivatives of its
-    /// time,
-    /// s per unit of each direction; `None` if they do not exist.
+    /// Receives a change of mode, between the pieces that it separates. `d_time_s` are the derivatives of
+    /// its time, s per unit of each direction; `None` if they do not exist.
     fn observe_transition(&mut self, _transition: &Transition, _d_time_s: Option<&[f64]>) {}
     /// Is asked after every piece; `Break` ends the run as `RunStatus::Interrupted`.
     fn control_flow(&self) -> ControlFlow<()> {
@@ -57,18 +51,16 @@ pub struct TangentRunner {
 }
 
 impl TangentRunner {
-    /// A runner with derivatives to the relative accuracy `relative` within a step, for searches that need no
-    /// more; at the ends of steps they are far more accurate. The default accuracy is the tolerance of the
-    /// run,
-    /// which this does not change.
+    /// A runner with derivatives to the relative accuracy `relative` within a step, for searches that need
+    /// no more; at the ends of steps they are far more accurate. The default accuracy is the tolerance of
+    /// the run, which this does not change.
     #[must_use]
     pub fn with_accuracy(relative: f64) -> Self {
         Self { room: TangentWorkspace::default(), accuracy: Some(relative) }
     }
 
     /// Runs a scene with its derivatives, always by Taylor series. Solution and transitions have the same
-    /// bits as
-    /// with [`run_scene_with`](super::run_scene_with).
+    /// bits as with [`run_scene_with`](super::run_scene_with).
     ///
     /// `seeds` belong to a scene with the same parameters and drive; start and stop may differ.
     pub fn run_scene(
@@ -113,8 +105,7 @@ pub(super) const SIX_POINTS: [(f64, f64); 6] = [
 ];
 
 /// Step relative to the scale of the function: truncation, its sixth power, is below rounding, and rounding
-/// over
-/// the step is 1e-13.
+/// over the step is 1e-13.
 pub(super) const DIFFERENCE_STEP: f64 = 1e-3;
 
 /// Derivative of `f` at 0; `None` if `f` has no value at a step.

@@ -98,8 +98,7 @@ impl<'a> SolutionSegment<'a> {
     }
 
     /// Positions of head and tip over the piece and their integrals; from Taylor polynomials if the method
-    /// has
-    /// them.
+    /// has them.
     #[must_use]
     pub fn path(&self) -> SegmentPath<'_> {
         let polynomials = self.motion.and_then(|motion| PathPolynomials::from_segment(self, motion));
@@ -119,9 +118,8 @@ impl<'a> SolutionSegment<'a> {
         }
     }
 
-    /// Positions of head and tip at a time within the piece; the same bits as in [`Self::sample_at`], without
-    /// the
-    /// cost of forces and energies.
+    /// Positions of head and tip at a time within the piece; the same bits as in [`Self::sample_at`],
+    /// without the cost of forces and energies.
     #[must_use]
     pub fn points_at(&self, t: f64) -> BladePoints {
         let on_glass = |system: &DrivenBlade, d: &LinkDirections, head: &HeadMotion| BladePoints {

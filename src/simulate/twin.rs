@@ -1,6 +1,5 @@
 //! Twins: synthetic recordings of a scene by a camera with frame rate, exposure, pixel size, tracking noise
-//! and
-//! dropouts. They are marked as synthetic.
+//! and dropouts. They are marked as synthetic.
 
 pub mod film;
 pub mod spec;
@@ -151,8 +150,7 @@ pub(crate) fn true_parameters(scene: &Scene) -> toml::Table {
 pub(crate) const SYNTHETIC_TRACK_NAMES: [&str; 2] = ["synthetic tip", "synthetic head"];
 
 /// The recording as Tracker exports it: two tracks in pixels, y upwards, time from the first frame, empty
-/// cells
-/// for lost points, seven digits in Java's notation (`1.234567E-1`).
+/// cells for lost points, seven digits in Java's notation (`1.234567E-1`).
 pub(crate) fn write_tracker_table(recording: &Recording, metres_per_pixel: f64) -> String {
     let [tip, head] = SYNTHETIC_TRACK_NAMES;
     let mut text = format!("#multi:\n\t{tip}\t\t{head}\t\t\nt\tx\ty\tx\ty\t\n");

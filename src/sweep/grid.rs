@@ -124,8 +124,7 @@ pub enum SampleSequence {
 
 impl SamplePlan {
     /// Coordinates of point `index` in the unit box, each above 0 and below 1. The Gray code of the index
-    /// gives
-    /// a point without its predecessors.
+    /// gives a point without its predecessors.
     pub(crate) fn unit_coordinates(&self, index: usize) -> impl Iterator<Item = f64> {
         let SampleSequence::Sobol = self.method;
         let mut shifts = Xoshiro256PlusPlus::seed_from_u64(self.seed);

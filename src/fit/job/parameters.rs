@@ -110,8 +110,7 @@ pub enum Constants {
     /// None: all constants are exact.
     Exact,
     /// All masses, inertias, stiffnesses, dampings, preload and shoulder angle of a scene that are not zero
-    /// and
-    /// neither free parameters nor set by a condition.
+    /// and neither free parameters nor set by a condition.
     All {
         /// Relative standard deviation of each.
         sd_relative: f64,

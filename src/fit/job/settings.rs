@@ -23,8 +23,7 @@ const SPREAD: f64 = 0.1;
 /// Most particles of a cloud: a thousand fill a box of many parameters.
 const MOST_PARTICLES: usize = 10_000;
 /// Most entries of a kind: a page and its figures show tens, and a larger job is a mistake of the program
-/// that
-/// wrote it.
+/// that wrote it.
 const MOST_ENTRIES: usize = 1000;
 /// Default number of fits to twins of the best model: forty give a standard deviation to a tenth.
 const REPLICATES: usize = 40;

@@ -235,9 +235,8 @@ pub enum TargetSource {
         /// Its standard deviation.
         sd: f64,
     },
-    /// Measured on the recording. The standard deviation is at least `least_sd` and `least_sd_relative` times
-    /// the
-    /// target; where both are 0 it is that of the recording's noise.
+    /// Measured on the recording. The standard deviation is at least `least_sd` and `least_sd_relative`
+    /// times the target; where both are 0 it is that of the recording's noise.
     Measured {
         /// Least standard deviation in the feature's unit.
         least_sd: f64,

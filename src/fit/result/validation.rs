@@ -9,8 +9,8 @@ const BOUND_ROUNDING: f64 = 1e-12;
 
 impl FitResult {
     /// Checks the result against its job: the same parameters within their bounds, intervals with ordered
-    /// ends,
-    /// the same components and features, no negative deviations. `file` is its name in error messages.
+    /// ends, the same components and features, no negative deviations. `file` is its name in error
+    /// messages.
     ///
     /// # Errors
     /// [`ResultError`] with the first key that does not match.

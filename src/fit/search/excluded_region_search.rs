@@ -13,8 +13,7 @@ const POPULATION_SHARE: f64 = 0.6;
 const DESCENTS: usize = 3;
 
 /// Searches a slab with a population, then with Gauss-Newton descents from the best distinct points, in at
-/// most
-/// `share` evaluations. Returns why it stopped, unless its share was used up.
+/// most `share` evaluations. Returns why it stopped, unless its share was used up.
 ///
 /// The best point usually lies next to the known minimum and leads back to it, so the others are followed
 /// too.

@@ -1,6 +1,5 @@
 //! Damped Gauss-Newton descent. One precise frequency and several imprecise features make a long narrow
-//! valley,
-//! in which simplices are slow.
+//! valley, in which simplices are slow.
 //!
 //! Several Levenberg dampings are tried at once. The Jacobian comes from differences, is updated after every
 //! step by Broyden's rule and measured again when a step gains nothing. argmin's Gauss-Newton has neither

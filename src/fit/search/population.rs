@@ -1,9 +1,8 @@
 //! Populations of points in the unit box: covariance matrix adaptation (CMA-ES).
 //!
 //! Hansen and Ostermeier, Evol. Comput. 9 (2001) 159; formulas and defaults of Hansen, arXiv:1604.00772,
-//! without
-//! negative weights. A population learns the shape of a valley and is not caught by ripples on its floor. A
-//! point outside the unit box is evaluated at its mirror image inside. argmin has no such solver.
+//! without negative weights. A population learns the shape of a valley and is not caught by ripples on its
+//! floor. A point outside the unit box is evaluated at its mirror image inside. argmin has no such solver.
 
 use super::stagnation::StagnationCounter;
 use super::{SearchSettings, StageCosts};
@@ -19,8 +18,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 const STAGNANT_GAIN: f64 = 1e-3;
 
 /// Runs populations until the evaluations of the stage are used up. The first starts in the middle of the
-/// box,
-/// the others at random points. Returns why the ledger stopped, if it did.
+/// box, the others at random points. Returns why the ledger stopped, if it did.
 pub(super) fn search_with_populations(
     ledger: &mut Ledger,
     dimensions: usize,
@@ -70,8 +68,7 @@ pub(super) struct PopulationExtent {
 }
 
 /// For the whole box: three first lengths reach every corner. At the last length damped Gauss-Newton steps
-/// are
-/// better.
+/// are better.
 pub(super) const WIDE_EXTENT: PopulationExtent = PopulationExtent { first: 0.3, last: 0.01 };
 /// For the neighbourhood of a point at which Gauss-Newton steps are caught by ripples.
 pub(super) const NEAR_EXTENT: PopulationExtent = PopulationExtent { first: 0.06, last: 0.003 };

@@ -1,9 +1,8 @@
 //! Nelder-Mead simplices by argmin.
 //!
 //! argmin's loop can neither stop with the ledger nor count steps without a gain, so its solver is stepped
-//! here. The solver has no bounds, so it works on the real line ([`line_to_unit`]). It panics on an error of
-//! its
-//! first costs, so costs are never errors.
+//! here. The solver has no bounds, so it works on the real line ([`line_to_unit`]). It panics on an error
+//! of its first costs, so costs are never errors.
 
 use super::StageCosts;
 use super::stagnation::StagnationCounter;

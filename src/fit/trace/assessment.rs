@@ -62,8 +62,7 @@ pub struct TraceAssessment {
 
 impl TraceAssessment {
     /// Adds the intervals from the scatter of refitted twins about the end. All twins share the recorded
-    /// head,
-    /// so the variance due to its errors is added.
+    /// head, so the variance due to its errors is added.
     fn add_twins(&mut self, model: &TraceModel, end: &Iterate, refits: &[&[f64]]) {
         self.twins = refits.len();
         if refits.len() < MIN_TWINS {
@@ -190,10 +189,9 @@ const LENGTHS_AGREE_SD: f64 = 3.0;
 /// Compares the best end with the end of the shorter segments; `sd` are the standard deviations at `end`.
 ///
 /// Returns the bias of every unknown, in its coordinate: the difference beyond twice its scatter. The bias
-/// falls
-/// with segment length, so the difference between two lengths bounds what is left of it. Also returns the
-/// doubt
-/// about the parameter that differs most, where it differs too much: one wrong parameter makes all doubtful.
+/// falls with segment length, so the difference between two lengths bounds what is left of it. Also returns
+/// the doubt about the parameter that differs most, where it differs too much: one wrong parameter makes
+/// all doubtful.
 fn compare_segment_lengths(
     model: &TraceModel,
     end: &Iterate,

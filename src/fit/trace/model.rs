@@ -93,8 +93,7 @@ fn build_recording(source: &TraceSource<'_>) -> Result<TraceRecording, HeadMotio
 }
 
 /// Noise of a channel: the job's, otherwise the measured noise without the part that is common to both
-/// points.
-/// Where it cannot be measured, white noise from the differences between frames.
+/// points. Where it cannot be measured, white noise from the differences between frames.
 fn channel_noise(
     traced: &TraceData,
     recording: &Recording,

@@ -25,8 +25,7 @@ pub(super) struct SegmentBoundary {
 }
 
 /// Boundaries about `length_s` apart. Each is the nearest frame to its nominal position at which the tip
-/// slides
-/// and the blade is bent. (To choose the fastest frame nearby would select for large noise.)
+/// slides and the blade is bent. (To choose the fastest frame nearby would select for large noise.)
 pub(super) fn segment_boundaries(
     scene: &Scene,
     film: &CameraObservation,

@@ -192,8 +192,7 @@ impl<'a> RunProgress<'a> {
 }
 
 /// Follows runs to their ends, several at once. Returns the last iterate of each, in order; an entry is
-/// `None`
-/// where the scene refuses its first point. Returns `None` where the checkpoint asks to stop.
+/// `None` where the scene refuses its first point. Returns `None` where the checkpoint asks to stop.
 pub(super) fn follow_runs(
     end: &SearchEnd<'_>,
     runs: &[UncertaintyRun],
@@ -280,8 +279,7 @@ fn cost_rise(end: &SearchEnd<'_>, i: usize, moved: f64, at: &Iterate) -> f64 {
 }
 
 // Parametric bootstrap (Efron and Tibshirani, An Introduction to the Bootstrap, 1993, chapter 6): the model
-// at
-// the best end with new noise, refitted from there.
+// at the best end with new noise, refitted from there.
 
 /// Steps of a segment's starting state before the first outer step.
 const TWIN_STATE_STEPS: usize = 3;

@@ -1,10 +1,9 @@
 //! Searches the whole range of every identified parameter for other values that are as good.
 //!
 //! Slopes and profiles describe the cost near the best point. The cost of a dozen features of one run has
-//! many
-//! minima: a neck of twice the stiffness may give the same two frequencies. Each identified parameter
-//! therefore
-//! has a search below its interval and another one above it, with other seeds than the first search.
+//! many minima: a neck of twice the stiffness may give the same two frequencies. Each identified parameter
+//! therefore has a search below its interval and another one above it, with other seeds than the first
+//! search.
 
 use super::{FitUncertainty, MAX_RESTARTS, ParameterVerdict, assess_best, polish_within};
 use crate::fit::job::IntervalSettings;
@@ -120,9 +119,8 @@ fn withdraw_rivalled(
     found
 }
 
-/// Withdraws the verdict of a parameter whose interval is split: good values lie on both sides of a wide gap
-/// in
-/// which the profile exceeds the threshold.
+/// Withdraws the verdict of a parameter whose interval is split: good values lie on both sides of a wide
+/// gap in which the profile exceeds the threshold.
 fn withdraw_split_interval(found: &mut FitUncertainty, ledger: &Ledger, names: &[String], axis: usize) {
     let (interval, bounds) = (&mut found.intervals[axis], ledger.objective().axes()[axis].bounds);
     let ends = interval.lower_95.zip(interval.upper_95);

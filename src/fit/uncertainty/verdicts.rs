@@ -38,8 +38,7 @@ pub(super) fn strongest_bound_correlation(
 }
 
 /// The parameter at its bound whose optimum beyond the bound lowers the cost most, and that gain by the
-/// linear
-/// model; `None` if no gain is worth a step.
+/// linear model; `None` if no gain is worth a step.
 pub(super) fn best_excluded_gain(
     unit: &[f64],
     jacobian: &DMatrix<f64>,
@@ -112,9 +111,8 @@ pub(crate) struct FeatureWeights {
     pub roughness: Vec<f64>,
 }
 
-/// Weighs the features at the ledger's best point; `None` if the model failed there or its neighbours cannot
-/// be
-/// evaluated.
+/// Weighs the features at the ledger's best point; `None` if the model failed there or its neighbours
+/// cannot be evaluated.
 pub(crate) fn weigh_features(ledger: &mut Ledger) -> Option<FeatureWeights> {
     let best = ledger.best_evaluation().filter(|best| best.failure.is_none())?.clone();
     let targets = ledger.objective().targets();
@@ -165,8 +163,7 @@ pub(super) fn check_best_point(
 }
 
 /// The 99.9 % point of the standard normal distribution, for the cube root of chi-squared (Wilson and
-/// Hilferty,
-/// Proc. Natl. Acad. Sci. 17 (1931) 684).
+/// Hilferty, Proc. Natl. Acad. Sci. 17 (1931) 684).
 const CHI2_TAIL_SD: f64 = 3.09;
 
 /// Sum of the squares of the residuals and its degrees of freedom.
@@ -182,9 +179,8 @@ fn birge_factor(objective: &Objective, best: &Evaluation) -> f64 {
     if freedom > 0.0 { (misfit / freedom).sqrt().max(1.0) } else { 1.0 }
 }
 
-/// The verdicts that follow from the numbers of a stored result of features, one per parameter in job order.
-/// A
-/// parameter that the result does not have is not identified.
+/// The verdicts that follow from the numbers of a stored result of features, one per parameter in job
+/// order. A parameter that the result does not have is not identified.
 pub(in crate::fit) fn stored_verdicts(job: &Job, result: &FitResult) -> Vec<ParameterVerdict> {
     let names = job.parameter_names();
     let found = |axis: usize| result.parameters.get(&names[axis]);

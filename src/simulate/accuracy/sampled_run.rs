@@ -38,9 +38,8 @@ impl SampledRun {
         Self { run, transitions: transitions.0, deflection_m, head_drop_m }
     }
 
-    /// Root mean square and worst difference of the deflection over the common samples of two runs, relative
-    /// to
-    /// the range of the reference.
+    /// Root mean square and worst difference of the deflection over the common samples of two runs,
+    /// relative to the range of the reference.
     pub(crate) fn deflection_differences(reference: &Self, other: &Self) -> (f64, f64) {
         let deflections = reference.deflection_m.iter();
         let low = deflections.clone().copied().fold(f64::INFINITY, f64::min);

@@ -16,8 +16,7 @@ pub(crate) struct TransitionDifference {
 impl TransitionDifference {
     /// Compares two lists. They agree if they have the same changes of mode in the same order. Otherwise
     /// transitions between the same modes pair if they are closer than half of the reference's median gap;
-    /// the
-    /// others are missed or invented.
+    /// the others are missed or invented.
     pub(crate) fn from_lists(reference: &[Transition], found: &[Transition]) -> Self {
         let same =
             reference.len() == found.len() && reference.iter().zip(found).all(|(a, b)| is_of_one_kind(a, b));

@@ -7,9 +7,9 @@ use crate::recording::FrameGrid;
 use serde::Serialize;
 use std::sync::Arc;
 
-/// Distance before a knot, in frames, at which an instant counts as the knot, so that no tiny piece remains.
-/// The
-/// jump of the third derivative moves the position in this time by 1e-18 of its effect over a frame.
+/// Distance before a knot, in frames, at which an instant counts as the knot, so that no tiny piece
+/// remains. The jump of the third derivative moves the position in this time by 1e-18 of its effect over a
+/// frame.
 const NEAR_FRAMES: f64 = 1e-6;
 
 /// Position of the head as cubics between knots, where only the third derivative jumps. The outermost cubics
@@ -32,8 +32,7 @@ impl HeadSpline {
     /// A cubic spline through the values of a smooth curve at the frames `knots`.
     ///
     /// The curve fits `points`, at least three rising frames of `grid` with positions in m, averaged in
-    /// blocks of
-    /// `block` frames.
+    /// blocks of `block` frames.
     pub(super) fn from_points(
         grid: &FrameGrid,
         points: &[(usize, f64)],
@@ -79,8 +78,7 @@ impl HeadSpline {
     }
 
     /// Derivatives of the position at a frame by the coefficients: index of the first nonzero one, and the
-    /// values
-    /// from there.
+    /// values from there.
     pub(crate) fn position_weights(&self, frame: usize) -> (usize, [f64; 6]) {
         self.curve.as_ref().map_or((0, [0.0; 6]), |curve| curve.position_weights(frame as f64))
     }

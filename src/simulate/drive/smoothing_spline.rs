@@ -1,19 +1,14 @@
 //! A smooth curve through noisy points on a frame grid: a least-squares spline of degree 5.
 //!
-//! Generalised cross-validation chooses the number of pieces (Craven and Wahba 1979, *Numerische Mathematik*
-//! 31, 377). Degrees of freedom count 1.4-fold, so that noise does not add pieces (Kim and Gu 2004, *Journal
-//! of
-//! the Royal Statistical Society* B 66, 337). A crank moves the head smoothly over tenths of a second, so a
-//! few
-//! pieces average the noise of thousands of frames; a hand needs more pieces. A cubic smoothing spline left
-//! two
-//! to three times the position error on noisy cosines.
+//! Generalised cross-validation chooses the number of pieces (Craven and Wahba 1979, *Numerische
+//! Mathematik* 31, 377). Degrees of freedom count 1.4-fold, so that noise does not add pieces (Kim and Gu
+//! 2004, *Journal of the Royal Statistical Society* B 66, 337). A crank moves the head smoothly over tenths
+//! of a second, so a few pieces average the noise of thousands of frames; a hand needs more pieces. A cubic
+//! smoothing spline left two to three times the position error on noisy cosines.
 //!
 //! Tracking noise is correlated over a few frames (vibration, sub-pixel bias), and cross-validation would
-//! take it
-//! for motion. Points are therefore averaged in blocks, and each block is compared with the same average of
-//! the
-//! curve. Times are in frames.
+//! take it for motion. Points are therefore averaged in blocks, and each block is compared with the same
+//! average of the curve. Times are in frames.
 
 use crate::math;
 use nalgebra::{DMatrix, DVector};
@@ -25,8 +20,7 @@ const SUPPORT: usize = DEGREE + 1;
 /// Number of B-splines that are nonzero in two pieces: a block may contain a knot.
 const BLOCK_WIDTH: usize = SUPPORT + 1;
 /// Weight of the third differences of the coefficients relative to a block. It matters only in gaps that
-/// leave a
-/// piece without points.
+/// leave a piece without points.
 const BRIDGE: f64 = 1e-7;
 /// Factor on the degrees of freedom in cross-validation.
 const CAUTION: f64 = 1.4;
@@ -190,8 +184,7 @@ impl SmoothingSpline {
     }
 
     /// Derivatives of the position at a frame by the coefficients: index of the first nonzero one, and the
-    /// values
-    /// from there.
+    /// values from there.
     pub(crate) fn position_weights(&self, frame: f64) -> (usize, [f64; SUPPORT]) {
         let (piece, x) = self.piece_at(frame);
         (piece, b_splines(x))
@@ -222,8 +215,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// The `N` nonzero B-splines of degree `N - 1` with integer knots at `x` from 0 to 1 (de Boor 1978, *A
-/// Practical
-/// Guide to Splines*, chapter X).
+/// Practical Guide to Splines*, chapter X).
 fn b_splines<const N: usize>(x: f64) -> [f64; N] {
     let mut values = [0.0; N];
     values[0] = 1.0;

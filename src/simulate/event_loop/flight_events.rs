@@ -38,13 +38,10 @@ impl<W: RunWatcher> EventLoop<'_, W> {
         self.system.linkage.flight_accelerations(state, &d, &head, self.lean).gap_m_per_s2
     }
 
-    /// Order of the zero of the gap at lift-off: that of the largest term of its series over a short time. It
-    /// is
-    /// 1 after a rebound, 2 after a jump of the forces, and 3 after the normal force passes zero, where the
-    /// gap's
-    /// acceleration is zero except for errors. A rebound that falls back needs order 1 whatever the other
-    /// terms;
-    /// else a smaller positive term of lower order only widens the gap.
+    /// Order of the zero of the gap at lift-off: that of the largest term of its series over a short time.
+    /// It is 1 after a rebound, 2 after a jump of the forces, and 3 after the normal force passes zero,
+    /// where the gap's acceleration is zero except for errors. A rebound that falls back needs order 1
+    /// whatever the other terms; else a smaller positive term of lower order only widens the gap.
     pub(super) fn gap_order(&self, state: &FlightState) -> u8 {
         /// The short time as a fraction of the shortest period.
         const SHARE: f64 = 1e-3;
@@ -125,8 +122,7 @@ impl<W: RunWatcher> EventLoop<'_, W> {
     }
 
     /// Handles slip, or release into slip, without an admissible finite force: lift-off if the tip rises
-    /// without
-    /// contact, otherwise an impact without collision.
+    /// without contact, otherwise an impact without collision.
     pub(super) fn resolve_jam(&mut self, pose: &Pose, from: TipMode) -> NextPhase {
         if self.scene.jam == JamRule::Stop {
             return NextPhase::End(RunStatus::Jammed);
@@ -178,18 +174,15 @@ impl<W: RunWatcher> EventLoop<'_, W> {
     }
 
     /// The impact with the scene's restitution, or with none once its train of rebounds counts as over. The
-    /// rest
-    /// of a train, of duration `T (1 + e + e^2 + ...)`, transmits the same impulse as contact in that time,
-    /// so
-    /// closing it early moves the tip by at most the height of a rebound.
+    /// rest of a train, of duration `T (1 + e + e^2 + ...)`, transmits the same impulse as contact in that
+    /// time, so closing it early moves the tip by at most the height of a rebound.
     fn rebound_or_close(&mut self, strike: TipStrike) -> Option<(FlightState, ImpactOutcome)> {
         /// Fraction of the shortest period below which a rebound closes its train: ten times the limit of
         /// chattering, so that the train closes first.
         const RESOLUTION: f64 = 1e-5;
-        /// Fraction below which a rebound counts as short, and the number of consecutive short rebounds that
-        /// closes a train: near restitution 1 it might last for ever. A restitution of 0.99 needs 690
-        /// rebounds
-        /// from `SHORT` to `RESOLUTION`.
+        /// Fraction below which a rebound counts as short, and the number of consecutive short rebounds
+        /// that closes a train: near restitution 1 it might last for ever. A restitution of 0.99 needs 690
+        /// rebounds from `SHORT` to `RESOLUTION`.
         const SHORT: f64 = 1e-2;
         const MOST_SHORT: u32 = 1000;
         let rebound = self.solve_strike(&strike)?;

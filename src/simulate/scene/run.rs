@@ -26,8 +26,7 @@ pub struct RunSettings {
 }
 
 /// Most samples of a run: no longer trace can be read ([`crate::recording::clock::MAX_FRAMES`]), and a
-/// mistyped
-/// rate or stop time must not fill the disk.
+/// mistyped rate or stop time must not fill the disk.
 const MOST_SAMPLES: f64 = crate::recording::clock::MAX_FRAMES;
 /// Default limit of right-hand sides: minutes of computing, more than any ordinary scene needs.
 pub const MOST_EVALUATIONS: u64 = 10_000_000_000;

@@ -72,8 +72,7 @@ impl<'a, O> TangentPropagator<'a, O> {
         [tolerance, accuracy]: [f64; 2],
     ) -> Self {
         /// The rate of a guard has the error of the solution. Above this fraction of its terms, and this
-        /// multiple
-        /// of the tolerance, derivatives of the transition time err by about a thousandth.
+        /// multiple of the tolerance, derivatives of the transition time err by about a thousandth.
         const GRAZING: f64 = 1e-6;
         const TOLERANCES: f64 = 1e3;
         let TangentWorkspace { blocks, works } = room;

@@ -183,8 +183,7 @@ fn scale_at_zero(parameter: &ModelParameter, linkage: &Linkage) -> f64 {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum TangentDirection {
     /// A parameter of the scene by name. Quantities that the scene derives from it (a stiffness from a
-    /// natural
-    /// frequency) follow.
+    /// natural frequency) follow.
     Parameter(String),
     /// Angle of the neck at the start, rad.
     NeckAngle,
@@ -226,8 +225,7 @@ impl TangentDirection {
 // Derivatives of steady slip.
 
 /// Derivatives of both angles of steady slip from `J dq + dR = 0` with the moments `R(q, p)`; `None` at a
-/// fold of
-/// the equilibrium.
+/// fold of the equilibrium.
 ///
 /// `d_speed` are the derivatives of the head's velocity, m/s.
 pub(super) fn steady_slip_tangent(

@@ -156,8 +156,7 @@ fn rate_index(course: &SeriesReference<'_>) -> usize {
 }
 
 /// Bound of the rates of `m y'' + d y' + k y = 0`, 1/s: the root of `x^2 = x |m^-1 d| + |m^-1 k|`, with the
-/// largest
-/// eigenvalues in size as norms.
+/// largest eigenvalues in size as norms.
 pub(super) fn bound_rate<const D: usize>(
     mass: &SquareMatrix<D>,
     damping: &SquareMatrix<D>,

@@ -73,8 +73,7 @@ impl<'a> TangentBlocks<'a> {
     }
 
     /// Propagates the derivatives over the next stretch from `from` towards `to`, s after `start_s`. With
-    /// `is_fresh`,
-    /// the derivative of the tip's velocity may be nonzero at the start of stick.
+    /// `is_fresh`, the derivative of the tip's velocity may be nonzero at the start of stick.
     pub(crate) fn propagate_stretch<'c>(
         &mut self,
         course: &SeriesReference<'c>,
@@ -306,8 +305,7 @@ impl StickImpulse {
 }
 
 /// Rates of angles, angular rates, gap and gap rate, at `x` s after the start of a motion; on the glass the
-/// gap
-/// is constant.
+/// gap is constant.
 pub(super) fn rates_after(motion: &TaylorMotion, mode: TipMode, x: f64) -> [f64; 6] {
     let mut rates = [0.0; 6];
     for k in (1..=motion.order).rev() {

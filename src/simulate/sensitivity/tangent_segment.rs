@@ -40,8 +40,7 @@ impl TangentSegment<'_> {
     }
 
     /// Weights for the integral of a channel between two times within the piece, s. A camera's mean is the
-    /// sum of
-    /// these over the pieces in its exposure, divided by the exposure.
+    /// sum of these over the pieces in its exposure, divided by the exposure.
     #[must_use]
     pub fn weights_over(&self, from: f64, to: f64) -> ChannelWeights {
         let TangentStretch { place, course, .. } = &self.span;

@@ -1,11 +1,10 @@
 //! Films a finely sampled trace with a camera, for a fair comparison of simulated and measured traces.
 //!
-//! Between samples the trace is a quintic through the six nearest samples; its mean over the open shutter is
-//! exact. With [`LEAST_OVERSAMPLING`] samples per frame, a sine of half the frame rate errs by 0.12 % of its
-//! amplitude relative to the exact exposure sinc, one of a quarter of the frame rate by 0.002 %. Faster,
-//! aliased
-//! sines need 8 samples per cycle for 0.12 %. At the jumps of acceleration of stick-slip the error falls with
-//! the square of the sampling interval: 2 nm on the bundled blade at 20,000 samples/s.
+//! Between samples the trace is a quintic through the six nearest samples; its mean over the open shutter
+//! is exact. With [`LEAST_OVERSAMPLING`] samples per frame, a sine of half the frame rate errs by 0.12 % of
+//! its amplitude relative to the exact exposure sinc, one of a quarter of the frame rate by 0.002 %.
+//! Faster, aliased sines need 8 samples per cycle for 0.12 %. At the jumps of acceleration of stick-slip
+//! the error falls with the square of the sampling interval: 2 nm on the bundled blade at 20,000 samples/s.
 
 use super::Camera;
 use crate::math::StandardNormal;
@@ -20,8 +19,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 /// Fewest samples of the fine trace per frame for the errors above.
 pub const LEAST_OVERSAMPLING: f64 = 4.0;
 /// Nodes and weights of the three-point Gauss-Legendre rule on [0, 1], exact to degree 5 (Abramowitz and
-/// Stegun,
-/// table 25.4).
+/// Stegun, table 25.4).
 const GAUSS: [(f64, f64); 3] =
     [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
 
@@ -89,9 +87,8 @@ pub enum FilmError {
 /// Films the trace `fine` without noise from `start_s`, s on its clock, to its end.
 ///
 /// The result is synthetic and keeps clock and name of the trace. A frame averages over the exposure around
-/// its
-/// instant; beyond the ends of the trace the shutter sees the outermost sample. A frame that needs a missing
-/// sample is missing. Without exposure, frames that fall on samples take them at any frame rate.
+/// its instant; beyond the ends of the trace the shutter sees the outermost sample. A frame that needs a
+/// missing sample is missing. Without exposure, frames that fall on samples take them at any frame rate.
 ///
 /// # Errors
 /// [`FilmError`].
@@ -237,8 +234,7 @@ pub struct MatchedFilm {
     /// The film on the clock of the fine trace; marked synthetic.
     pub recording: Recording,
     /// Standard deviations of the white noise added to tip x, tip y, head x, head y, m; 0 for a column that
-    /// the
-    /// recording lacks.
+    /// the recording lacks.
     pub noise_m: [f64; COORDINATES],
     /// Choice of the dropped frames.
     pub dropouts: DropoutPattern,
@@ -266,9 +262,8 @@ pub enum MatchedFilmError {
 ///
 /// [`noise_floor`] measures the white noise of each column of `like`; it overestimates noise if the column
 /// oscillates within a few frames. If both traces show a turn of the head, their clocks are aligned there,
-/// the
-/// film covers the frames of `like`, and it drops the same frames; otherwise it drops the same fraction at
-/// random. `seed` sets noise and random dropouts; dropouts do not change the noise.
+/// the film covers the frames of `like`, and it drops the same frames; otherwise it drops the same fraction
+/// at random. `seed` sets noise and random dropouts; dropouts do not change the noise.
 ///
 /// # Errors
 /// [`MatchedFilmError`].
@@ -333,8 +328,7 @@ fn align_recordings(fine: &Recording, like: &Recording) -> Option<SharedFrames> 
 }
 
 /// The first `frames` frames of a film with noise and lost points. `first` is the index of the film's first
-/// frame
-/// in the columns `like`; `None` for random dropouts.
+/// frame in the columns `like`; `None` for random dropouts.
 fn track_frames(
     seen: &Recording,
     frames: usize,
