@@ -150,7 +150,7 @@ impl<const N: usize> DenseOutput<N> for StepOutput<N> {
 
 // Coefficients of the Dormand-Prince method of order 8 with embedded orders 5 and 3 and dense output of order
 // 7. Source: E. Hairer, S. P. Nørsett, G. Wanner, "Solving Ordinary Differential Equations I", 2nd ed.,
-//   Springer 1993, section II.5, and the authors' code DOP853. Stages count from 0.
+// Springer 1993, section II.5, and the authors' code DOP853. Stages count from 0.
 
 /// Joins the lines of a table.
 const fn join_lines<T: Copy, const M: usize>(lines: &[&[T]]) -> [T; M] {
