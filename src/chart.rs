@@ -22,6 +22,7 @@ mod panel;
 mod path;
 mod series;
 mod style;
+pub(crate) mod svg;
 mod text;
 
 pub(crate) use axis::{AxisScale, ChartAxis, value_span};
@@ -29,13 +30,11 @@ pub use elements::{
     ErrorBar, Hatch, HatchPattern, Panel, Raster, Ribbon, SampledSeries, Series, ShadedSpan, TextAnnotation,
     TopLabel, VerticalLine,
 };
-pub(crate) use figure::PanelPlacement;
 pub use figure::{Figure, Medium};
 pub use heat_map::{HeatMap, cell_edges};
-pub(crate) use style::ColourMap;
-pub use style::MAX_HEIGHT_MM;
-pub use style::{COLUMN_WIDTH_MM, FULL_WIDTH_MM};
-pub(crate) use style::{Colour, Mark, MarkerShape};
+pub use style::{COLUMN_WIDTH_MM, FULL_WIDTH_MM, MAX_HEIGHT_MM};
+pub(crate) use style::{Colour, ColourMap, Mark, MarkerShape};
+pub(crate) use svg::PanelPlacement;
 
 #[cfg(test)]
 mod tests;

@@ -17,8 +17,12 @@ pub use checksum::append_checksum;
 pub(crate) use checksum::fingerprint;
 pub use error::CheckpointError;
 pub use header::{CheckpointHeader, CheckpointKind, detect_kind, has_whole_line};
-pub use read::{CheckpointEnd, CheckpointFile, CheckpointReader, RECHECKED_RECORDS, StoredRecord};
-pub use read::{check_recomputed, duplicate_record_error, read_checkpoint, sample_records};
-pub use record::{CheckpointRecord, CheckpointSink, ExactNumber, NullSink};
-pub use record::{format_header_line, format_record_line};
+pub use read::{
+    CheckpointEnd, CheckpointFile, CheckpointReader, RECHECKED_RECORDS, StoredRecord, check_recomputed,
+    duplicate_record_error, read_checkpoint, sample_records,
+};
+pub(crate) use record::exact;
+pub use record::{
+    CheckpointRecord, CheckpointSink, ExactNumber, NullSink, format_header_line, format_record_line,
+};
 pub use shard::Shard;

@@ -14,6 +14,6 @@ pub(crate) use friction::{FrictionPoint, MeasuredFriction};
 pub(crate) use model_run::RunSummary;
 pub use model_run::{ModelRun, run_conditions};
 pub use ridge::{RidgePair, TrackedRidge};
-pub(crate) use rows::{Comparison, NextPeak, ParameterLine, Truth};
+pub(crate) use rows::{NextPeak, ParameterLine, TargetComparison, TrueValue};
 pub(crate) use summary::ComparisonSummary;
 pub(crate) use tables::{COMPARISON_FILE, ComparisonTable, comparison_table};

@@ -49,7 +49,7 @@ pub struct FigureBlock {
 
 /// The text of a figure.
 #[derive(Default)]
-pub(crate) struct Words {
+pub(crate) struct FigureText {
     /// One sentence with the result.
     pub caption: String,
     pub details: String,

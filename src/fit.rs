@@ -12,6 +12,7 @@ pub mod advice;
 pub mod bootstrap;
 pub mod bounds;
 pub mod camera_calibration;
+pub(crate) mod context;
 pub mod evaluation;
 pub mod feature_checkpoint;
 pub mod identifiability;
@@ -31,6 +32,7 @@ mod run;
 pub mod scene_model;
 pub mod search;
 mod start_transient;
+pub mod target_value;
 pub mod targets;
 pub mod trace;
 pub mod trace_checkpoint;
@@ -40,8 +42,9 @@ mod trace_run;
 pub mod uncertainty;
 
 use crate::checkpoint::CheckpointError;
+pub use context::FitContext;
 pub use problem::{MeasuredRecording, Problem, ProblemError};
-pub use run::{FitContext, fit_features, job_warnings};
+pub use run::{fit_features, job_warnings};
 pub use targets::measure_targets;
 
 /// A fit that cannot run or continue.

@@ -4,7 +4,8 @@
 pub use crate::fit::job::Job;
 pub use crate::fit::result::FitResult;
 pub use crate::fit::{FitContext, FitError, MeasuredRecording, Problem, ProblemError};
-pub use crate::import::{CoordinateScale, ImportError, ImportOptions, ImportSource, import};
+pub use crate::import::source::ImportSource;
+pub use crate::import::{CoordinateScale, ImportError, ImportOptions, import};
 pub use crate::recording::Recording;
 pub use crate::recording::channel::{Channel, ReversalInstants, Window};
 pub use crate::recording::files::YAxis;

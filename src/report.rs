@@ -9,7 +9,7 @@ pub mod summary;
 pub mod verdict;
 mod view_model;
 
-use crate::compare::{Comparison, ComparisonSummary, ComparisonTable, ParameterLine, RunSummary};
+use crate::compare::{ComparisonSummary, ComparisonTable, ParameterLine, RunSummary, TargetComparison};
 use crate::figures::FigureBlock;
 use crate::figures::friction::FrictionLine;
 use crate::fit::misfit::TraceMisfit;
@@ -34,11 +34,11 @@ pub struct Report {
     /// The recordings; empty if only published numbers were fitted.
     pub recordings: Vec<RecordingLine>,
     /// Frequencies of components, measured against model.
-    pub components: Vec<Comparison>,
+    pub components: Vec<TargetComparison>,
     /// Other features, measured against model.
-    pub features: Vec<Comparison>,
+    pub features: Vec<TargetComparison>,
     /// Components and features that were predicted, not fitted.
-    pub held_out: Vec<Comparison>,
+    pub held_out: Vec<TargetComparison>,
     /// The fitted parameters.
     pub parameters: Vec<ParameterLine>,
     /// Friction of the best model at rest and at the tip's greatest speed.

@@ -29,6 +29,7 @@ mod multitaper;
 mod peak_zoom;
 mod peaks;
 mod periodogram;
+pub(crate) mod record;
 mod relations;
 mod residual_significance;
 mod ring_downs;
@@ -40,22 +41,22 @@ pub mod time_frequency;
 mod transform;
 mod trend;
 
-pub use amplitude_spectrum::Spectrum;
-pub use analysis::{LONGEST_DECOMPOSED, Oscillation, RemovedTrend, SampledRecord, SpectralAnalysis};
-pub use component::{Component, Estimator};
+pub use amplitude_spectrum::{Spectrum, WindowedTransform};
+pub use analysis::{LONGEST_DECOMPOSED, Oscillation, RemovedTrend, SpectralAnalysis};
+pub use component::{
+    AliasSource, Component, ComponentReason, ComponentVerdict, Estimator, Harmonic, MainsMultiple, Sideband,
+    Subharmonic,
+};
 pub use error::SpectrumError;
+pub use record::SampledRecord;
 
 pub(crate) use settings::{FASTEST_HZ, MAX_COMPONENTS, MIN_SAMPLES};
 
 pub use multitaper::{Multitaper, MultitaperError, TAPERS};
 
-pub use amplitude_spectrum::WindowedTransform;
 pub use settings::SpectrumSettings;
 pub use target::Target;
 
-pub use component::{
-    AliasSource, ComponentReason, ComponentVerdict, Harmonic, MainsMultiple, Sideband, Subharmonic,
-};
 pub use trend::{Detrend, UnknownDetrend};
 
 /// Spectrum of a record of displacement, m, one sample a frame (`None` where there is none).

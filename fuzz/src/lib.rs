@@ -4,7 +4,8 @@
 
 pub mod readers;
 
-use wiperlab::import::{Columns, Import, Options, Scale, Source, TimeColumn, import};
+use wiperlab::import::{Columns, Options, Scale, Source, TimeColumn, import};
+use wiperlab::import::source::Import;
 use wiperlab::recording::files::{YAxis, read_recording, trace_csv};
 
 /// Names that the seeds give to the tip, and to the head where the format has names of its own.

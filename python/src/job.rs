@@ -11,14 +11,14 @@ use wiperlab::fit::posterior::Posterior;
 
 /// A job with its scenes and recordings.
 #[pyclass(module = "wiperlab", frozen, subclass, name = "Job")]
-pub struct Job {
+pub struct PyJob {
     posterior: Arc<Posterior>,
     path: PathBuf,
 }
 
 type PointArray<'py> = PyReadonlyArray1<'py, f64>;
 
-impl Job {
+impl PyJob {
     fn read_point(&self, py: Python<'_>, of: &PointArray<'_>) -> PyResult<Vec<f64>> {
         let (found, expected) = (of.as_array().len(), self.posterior.unknowns().len());
         if found != expected {
@@ -40,7 +40,7 @@ impl Job {
 }
 
 #[pymethods]
-impl Job {
+impl PyJob {
     #[new]
     fn new(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let read = workers::run_interruptible(py, None, {

@@ -25,9 +25,9 @@ fn run_program(py: Python<'_>, arguments: Vec<OsString>, path: Option<PathBuf>) 
 #[pymodule]
 fn _wiperlab(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
-    module.add_class::<scene::Scene>()?;
-    module.add_class::<recording::Recording>()?;
-    module.add_class::<job::Job>()?;
+    module.add_class::<scene::PyScene>()?;
+    module.add_class::<recording::PyRecording>()?;
+    module.add_class::<job::PyJob>()?;
     module.add_function(wrap_pyfunction!(scene::simulate_scene, module)?)?;
     module.add_function(wrap_pyfunction!(many::simulate_points, module)?)?;
     module.add_function(wrap_pyfunction!(recording::analyse, module)?)?;

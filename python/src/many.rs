@@ -1,13 +1,14 @@
 //! Many runs of a scene with other values of its parameters.
 
 use crate::errors;
-use crate::scene::{Scene, StopFlag};
+use crate::scene::{PyScene, StopFlag};
 use crate::workers;
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use std::sync::Arc;
-use wiperlab::simulate::scene::{Scene as Model, SceneError};
+use wiperlab::simulate::scene::Scene;
+use wiperlab::simulate::scene::error::SceneError;
 use wiperlab::sweep::{PointOutcome, Study};
 
 /// Runs the scene with every row of `points` for the named parameters and reads what the maps of a study say:
@@ -16,7 +17,7 @@ use wiperlab::sweep::{PointOutcome, Study};
 #[pyo3(signature = (scene, names, points, maps, workers = None))]
 pub fn simulate_points<'py>(
     py: Python<'py>,
-    scene: &Scene,
+    scene: &PyScene,
     names: Vec<String>,
     points: PyReadonlyArray2<'py, f64>,
     maps: &str,
@@ -38,8 +39,8 @@ pub fn simulate_points<'py>(
     let rows: Vec<Vec<f64>> = points.rows().into_iter().map(|row| row.to_vec()).collect();
     let maps = study.maps.len();
     let outcomes: Option<Vec<PointOutcome>> = workers::run_interruptible(py, workers, move |stop| {
-        let at = |row: &Vec<f64>| -> Result<Model, SceneError> {
-            let set = |scene: Model, (name, value): (&String, &f64)| scene.with_parameter(name, *value);
+        let at = |row: &Vec<f64>| -> Result<Scene, SceneError> {
+            let set = |scene: Scene, (name, value): (&String, &f64)| scene.with_parameter(name, *value);
             names.iter().zip(row).try_fold((*scene).clone(), set)
         };
         let run = |row| PointOutcome::run_point_scene(&study, || at(row), || StopFlag(stop).flow());

@@ -11,9 +11,9 @@ use wiperlab::cli::read::{self, SpectrumOptions};
 use wiperlab::recording::{self, FrameGrid, Traces};
 
 /// Tracked positions of tip and head on the frame grid.
-#[pyclass(module = "wiperlab", frozen, from_py_object)]
+#[pyclass(module = "wiperlab", frozen, from_py_object, name = "Recording")]
 #[derive(Clone)]
-pub struct Recording {
+pub struct PyRecording {
     pub inner: Arc<recording::Recording>,
     /// Exposure of a frame, s, where known.
     #[pyo3(get)]
@@ -21,7 +21,7 @@ pub struct Recording {
 }
 
 #[pymethods]
-impl Recording {
+impl PyRecording {
     /// Reads the folder of a recording, or a trace.csv alone.
     #[staticmethod]
     fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
@@ -116,7 +116,7 @@ impl Recording {
 #[expect(clippy::too_many_arguments, reason = "a Python function has named arguments")]
 pub fn analyse<'py>(
     py: Python<'py>,
-    recording: &Recording,
+    recording: &PyRecording,
     channel: String,
     window: String,
     detrend: String,

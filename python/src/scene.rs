@@ -13,43 +13,43 @@ use wiperlab::cli::read;
 use wiperlab::simulate::outputs::{
     EnergyAudit, SampleObserver, SimulationSummary, Transitions, recorded_points_m, sample_times,
 };
-use wiperlab::simulate::scene::Scene as Model;
+use wiperlab::simulate::scene::Scene;
 use wiperlab::simulate::{ModelSample, Observer, SolutionSegment, SolverOptions, run_scene_with};
 
 /// What a scene is restored from: name and text of its file, the recording that drives it, replaced values.
 type SceneParts = (String, String, Option<PathBuf>, Vec<(String, f64)>);
 
 /// A blade, its friction, its drive and what is to be computed.
-#[pyclass(module = "wiperlab", frozen, from_py_object)]
+#[pyclass(module = "wiperlab", frozen, from_py_object, name = "Scene")]
 #[derive(Clone)]
-pub struct Scene {
-    pub inner: Arc<Model>,
+pub struct PyScene {
+    pub inner: Arc<Scene>,
     file: String,
     text: String,
     driver: Option<PathBuf>,
     set: Vec<(String, f64)>,
 }
 
-impl Scene {
+impl PyScene {
     fn from_source(py: Python<'_>, (file, text, driver, set): SceneParts) -> PyResult<Self> {
         let recording = |named: &str| {
             let path =
                 driver.clone().map_or_else(|| read::resolve_existing_path(Path::new(&file), named), Ok)?;
             read::read_recording(&path).map(|(recording, _)| recording).map_err(|error| error.to_string())
         };
-        let scene = Model::parse_with_recording(&file, &text, recording);
+        let scene = Scene::parse_with_recording(&file, &text, recording);
         let scene = scene.map_err(|error| errors::input_error(py, error))?;
         Ok(Self { inner: replace_values(py, scene, &set)?, file, text, driver, set })
     }
 }
 
-fn replace_values(py: Python<'_>, scene: Model, values: &[(String, f64)]) -> PyResult<Arc<Model>> {
-    let with = |scene: Model, (name, value): &(String, f64)| scene.with_parameter(name, *value);
+fn replace_values(py: Python<'_>, scene: Scene, values: &[(String, f64)]) -> PyResult<Arc<Scene>> {
+    let with = |scene: Scene, (name, value): &(String, f64)| scene.with_parameter(name, *value);
     values.iter().try_fold(scene, with).map(Arc::new).map_err(|error| errors::input_error(py, error))
 }
 
 #[pymethods]
-impl Scene {
+impl PyScene {
     /// Reads a scene file.
     #[staticmethod]
     fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
@@ -89,7 +89,7 @@ impl Scene {
     }
 
     /// The parameters as they are written.
-    fn written(&self) -> Vec<(&'static str, f64)> {
+    fn written_values(&self) -> Vec<(&'static str, f64)> {
         self.inner.written_values().collect()
     }
 
@@ -157,7 +157,7 @@ type RunArrays<'py> = (Bound<'py, PyDict>, Vec<&'static str>, Bound<'py, PyDict>
 #[pyo3(signature = (scene, times_s = None))]
 pub fn simulate_scene<'py>(
     py: Python<'py>,
-    scene: &Scene,
+    scene: &PyScene,
     times_s: Option<PyReadonlyArray1<'py, f64>>,
 ) -> PyResult<RunArrays<'py>> {
     let given = times_s.map(|times| times.as_array().iter().copied().collect());

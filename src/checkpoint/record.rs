@@ -14,7 +14,7 @@ pub trait CheckpointRecord: Clone + Debug + PartialEq {
     /// Part of the header that is specific to the kind.
     type Body: Serialize + DeserializeOwned + Clone + Debug + PartialEq;
     /// Serialized form of the record.
-    type IterateRow: Serialize + DeserializeOwned;
+    type Row: Serialize + DeserializeOwned;
     /// Identifies the computation: records with equal identity must have equal outcomes.
     type Identity: Eq + Hash;
 
@@ -22,16 +22,16 @@ pub trait CheckpointRecord: Clone + Debug + PartialEq {
     fn identity(&self) -> Self::Identity;
 
     /// The serialized form in line `at`, counted from 0 after the header.
-    fn to_row(&self, at: usize) -> Self::IterateRow;
+    fn to_row(&self, at: usize) -> Self::Row;
 
     /// The line number that a row contains, if any, counted from 0 after the header.
-    fn line_index(row: &Self::IterateRow) -> Option<usize>;
+    fn line_index(row: &Self::Row) -> Option<usize>;
 
     /// The record of a row.
     ///
     /// # Errors
     /// What was found and what was expected.
-    fn from_row(row: Self::IterateRow, body: &Self::Body) -> Result<Self, String>;
+    fn from_row(row: Self::Row, body: &Self::Body) -> Result<Self, String>;
 
     /// The first difference between two outcomes of one computation, as words for each; `None` if equal.
     fn difference(&self, other: &Self) -> Option<[String; 2]>;
@@ -82,6 +82,20 @@ impl<'de> Deserialize<'de> for ExactNumber {
             Ok(number) if number.is_finite() => Ok(Self(number)),
             _ => Err(D::Error::custom(format!("found \"{text}\", expected a finite number in quotes"))),
         }
+    }
+}
+
+/// A number as [`ExactNumber`], for `#[serde(with)]`.
+pub(crate) mod exact {
+    use super::ExactNumber;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub(crate) fn serialize<S: Serializer>(number: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+        ExactNumber(*number).serialize(serializer)
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+        ExactNumber::deserialize(deserializer).map(|number| number.0)
     }
 }
 

@@ -9,7 +9,8 @@ use super::progress::print_progress;
 use super::report;
 use super::spectrum::SpectrumArgs;
 use crate::fit::result::{FitResult, FitStatus};
-use crate::import::{CoordinateScale, ImportOptions, ImportSource};
+use crate::import::source::ImportSource;
+use crate::import::{CoordinateScale, ImportOptions};
 use crate::recording::files::{DESCRIPTION_FILE, TRACE_FILE, YAxis};
 use crate::simulate::twin::SYNTHETIC_TRACK_NAMES;
 

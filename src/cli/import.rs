@@ -4,9 +4,9 @@ use super::args::parse_count;
 use super::files::OutputStaging;
 use super::inspect::Inspection;
 use super::prelude::*;
-use crate::import::{
-    self, ColumnMap, CompanionFile, CoordinateScale, Import, ImportOptions, ImportSource, TimeColumn,
-};
+use crate::import;
+use crate::import::source::{CompanionFile, Import, ImportSource};
+use crate::import::{ColumnMap, CoordinateScale, ImportOptions, TimeColumn};
 use crate::recording::files::{DESCRIPTION_FILE, RecordingFile, TRACE_FILE, YAxis, trace_blocks};
 use clap::ValueEnum;
 use serde::Serialize;
@@ -184,7 +184,7 @@ impl ImportOptionArgs {
 
     /// What the import may overwrite: a measured recording only if it comes from the same exports.
     fn write_policy(&self, sources: &[ImportSource]) -> WritePolicy {
-        let exports = import::preserved_files(sources).into_iter();
+        let exports = import::source::preserved_files(sources).into_iter();
         let exports = exports.map(|(_, bytes)| crate::text::sha256(bytes)).collect();
         WritePolicy { exports, ..WritePolicy::new(OutputCommand::Import, self.overwrite) }
     }
@@ -234,7 +234,10 @@ struct ImportSummary {
 
 /// Names of the files that an import writes.
 fn output_names(sources: &[ImportSource]) -> impl Iterator<Item = &str> {
-    import::preserved_files(sources).into_iter().map(|(name, _)| name).chain([TRACE_FILE, DESCRIPTION_FILE])
+    import::source::preserved_files(sources)
+        .into_iter()
+        .map(|(name, _)| name)
+        .chain([TRACE_FILE, DESCRIPTION_FILE])
 }
 
 /// Rows of the trace that a dry run shows.
@@ -319,7 +322,7 @@ fn write_recording(
 ) -> Outcome<()> {
     let names: Vec<&str> = output_names(sources).collect();
     let mut staging = OutputStaging::new(folder, writer, &names)?;
-    for (name, bytes) in import::preserved_files(sources) {
+    for (name, bytes) in import::source::preserved_files(sources) {
         staging.stage_file(name, bytes)?;
     }
     let trace = staging.stage_file(TRACE_FILE, files::ChunkReader::new(trace_blocks(&imported.recording)))?;

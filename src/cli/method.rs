@@ -4,7 +4,8 @@ use super::prelude::*;
 use crate::simulate::fixed_step_scheme::{
     DEFAULT_GAIN_PER_S, FixedStepLocator, FixedStepScheme, LARGEST_GAIN_TIMES_STEP,
 };
-use crate::simulate::scene::{ContactLossRule, JamRule, Scene, check_tolerance};
+use crate::simulate::scene::contact::{ContactLossRule, JamRule};
+use crate::simulate::scene::{Scene, check_tolerance};
 use crate::simulate::{IntegrationMethod, SolverOptions};
 use clap::ValueEnum;
 

@@ -12,7 +12,8 @@ use crate::simulate::outputs::{
     EVENTS_HEADER, EnergyAudit, STATE_HEADER, SampleObserver, SimulationSummary, push_event_row,
     push_state_row, recorded_points_m, sample_times,
 };
-use crate::simulate::scene::{OutputTable, Scene};
+use crate::simulate::scene::Scene;
+use crate::simulate::scene::contact::OutputTable;
 use crate::simulate::{
     ModelSample, Observer, RunMotion, RunStatus, SolutionSegment, SolverOptions, Transition, run_scene_with,
 };

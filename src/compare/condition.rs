@@ -68,6 +68,12 @@ pub struct TimedRecording<'a> {
 }
 
 impl<'a> ConditionComparison<'a> {
+    /// Intervals in which the model's tip sticks, s, on the clock of the recording.
+    pub(crate) fn sticks_on_clock(&self) -> Vec<(f64, f64)> {
+        let shift_s = self.alignment.shift_s;
+        self.model.view.stick_s.iter().map(|[from, to]| (from + shift_s, to + shift_s)).collect()
+    }
+
     /// Compares the conditions of a job, in order. `measured` has the recordings of the first conditions.
     #[must_use]
     pub fn compare_conditions(

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 /// A number of the experiment against the model's.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct Comparison {
+pub struct TargetComparison {
     /// Name.
     pub name: String,
     /// Name of the condition, where the job has several.
@@ -82,12 +82,12 @@ pub struct ParameterLine {
     /// Interval of refitted twins of the best model, where there are any.
     pub bootstrap_95: Option<[f64; 2]>,
     /// The true value, where the data are synthetic.
-    pub truth: Option<Truth>,
+    pub truth: Option<TrueValue>,
 }
 
 /// The true value of synthetic data.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Truth {
+pub struct TrueValue {
     /// The value, in the parameter's unit.
     pub value: f64,
     /// Whether the 95 % interval holds it; an open end holds everything beyond.

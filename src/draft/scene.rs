@@ -7,7 +7,8 @@ use crate::fit::result::{FitResult, NuisanceResult};
 use crate::model::parameters;
 use crate::model::parameters::SAME_LENGTH_ADVICE;
 use crate::simulate::drive::Drive;
-use crate::simulate::scene::{Scene, SceneError, StartKind};
+use crate::simulate::scene::error::SceneError;
+use crate::simulate::scene::{Scene, StartKind};
 use crate::text::{capitalise, format_digits, format_interval, format_percent, make_printable};
 
 /// The blade of every draft.

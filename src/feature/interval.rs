@@ -43,7 +43,7 @@ impl ReversalInterval {
             Self::FlipAfterReversal => at(InstantKind::Flip)? - at(InstantKind::Reversal)?,
             Self::FlipDuration => {
                 let start_s = at(InstantKind::Flip)?;
-                let flip = reader.instants.numbered(reversal).and_then(|found| found.flip);
+                let flip = reader.instants.find_reversal(reversal).and_then(|found| found.flip);
                 flip.map_or(start_s, |flip| flip.end_s) - start_s
             }
         };

@@ -8,7 +8,7 @@
 mod drawing;
 mod smil;
 
-use super::{Drawing, FigureBlock, Words};
+use super::{Drawing, FigureBlock, FigureText};
 use crate::chart::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, ShadedSpan};
 use crate::compare::ConditionComparison;
 use crate::figures::{NO_TRACES, about, subtitle};
@@ -211,7 +211,7 @@ fn describe_crosses(recording: &Recording, case: &ConditionComparison) -> String
 }
 
 /// Caption and details, with the numbers of the hold.
-fn figure_text(shown: &Animation, case: &ConditionComparison) -> Words {
+fn figure_text(shown: &Animation, case: &ConditionComparison) -> FigureText {
     let [from_s, to_s] = shown.hold_s;
     let at = |time_s: f64| shown.samples.iter().rfind(|s| s.time_s <= time_s).or(shown.samples.first());
     let mm = |x: f64| format_decimals(1e3 * x, 2);
@@ -233,7 +233,7 @@ fn figure_text(shown: &Animation, case: &ConditionComparison) -> Words {
         shown.part_name(),
         describe_pace(&shown.pace),
     );
-    Words { caption, details }
+    FigureText { caption, details }
 }
 
 // Playback pace: the parts of the motion and their slow-down factors.

@@ -2,7 +2,7 @@
 //! targets as lines.
 
 use super::spectrogram::speed_series;
-use super::{FigureBlock, Words};
+use super::{FigureBlock, FigureText};
 use crate::chart::{ChartAxis, Colour, Figure, Mark, MarkerShape, Panel, Ribbon, Series, TextAnnotation};
 use crate::compare::{ConditionComparison, TrackedRidge};
 use crate::figures::full_figure;
@@ -207,7 +207,7 @@ fn frequency_rise_hz(points: &[SpeedPoint]) -> f64 {
     if slow.is_empty() { 0.0 } else { mean(fast) - mean(slow) }
 }
 
-fn figure_text(case: &ConditionComparison, shown: &CycleOverSpeed, claim: &str) -> Words {
+fn figure_text(case: &ConditionComparison, shown: &CycleOverSpeed, claim: &str) -> FigureText {
     let points = cycle_points(shown);
     let speeds = || points.iter().map(|p| p.tip_speed_m_per_s);
     let span = speeds().reduce(f64::min).zip(speeds().reduce(f64::max));
@@ -228,14 +228,14 @@ fn figure_text(case: &ConditionComparison, shown: &CycleOverSpeed, claim: &str) 
          fitted blade off its shoulder, each link by itself: {}; those above the axis are left out.",
         join_with_and(&natural)
     );
-    Words { caption, details }
+    FigureText { caption, details }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn shown() -> CycleOverSpeed {
+    fn example_cycles() -> CycleOverSpeed {
         let point =
             |v: f64, f: f64| SpeedPoint { tip_speed_m_per_s: v, frequency_hz: f, frequency_sd_hz: Some(2.0) };
         CycleOverSpeed {
@@ -253,7 +253,7 @@ mod tests {
 
     #[test]
     fn lines_within_the_axes_are_named_and_close_ones_next_to_each_other() {
-        let panel = &draw_figure(&shown()).panels[0];
+        let panel = &draw_figure(&example_cycles()).panels[0];
         let names: Vec<&str> = panel.annotations.iter().map(|t| t.text.as_str()).collect();
         assert_eq!(names, ["neck 195 Hz", "lip 608 Hz", "high 640 Hz"]);
         assert!(panel.annotations[1].at.0 < panel.annotations[2].at.0);

@@ -2,7 +2,7 @@
 //! enlarged at the release and at the worst part.
 
 use super::history::{length_unit, symmetric_axis, thin_points};
-use super::{FigureBlock, Words, history};
+use super::{FigureBlock, FigureText, history};
 use crate::chart::{ChartAxis, Colour, Figure, Mark, Panel, Ribbon, SampledSeries, Series, ShadedSpan};
 use crate::compare::ConditionComparison;
 use crate::figures::full_figure;
@@ -164,7 +164,7 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
             model: fine.unwrap_or_else(|| channel_between(&model, channel, span_s)),
             residual: left.map(|p| p.map(|(t, x)| (t, x / noise_m))).collect(),
             rms,
-            sticks: history::stick_spans(&history::sticks_on_clock(case), span_s),
+            sticks: history::stick_spans(&case.sticks_on_clock(), span_s),
         })
     };
     let release_s = case.measured_or_model().instant_s(InstantKind::Release);
@@ -250,7 +250,12 @@ fn figure_title(channel: Channel, rms: f64, noise_m: f64) -> String {
     format!("One run of the model misses the {label} by {left}, {} times the noise", format_digits(rms, 2))
 }
 
-fn figure_text(case: &ConditionComparison, shown: &EvidencePlot, channel: Channel, noise_m: f64) -> Words {
+fn figure_text(
+    case: &ConditionComparison,
+    shown: &EvidencePlot,
+    channel: Channel,
+    noise_m: f64,
+) -> FigureText {
     let rms = |part: &EvidencePart| {
         let at = match part.name.as_str() {
             "worst later" => "where it fits worst later",
@@ -259,7 +264,7 @@ fn figure_text(case: &ConditionComparison, shown: &EvidencePlot, channel: Channe
         };
         format!("{} {at}", format_digits(part.rms, 2))
     };
-    let [whole, parts @ ..] = shown.parts.as_slice() else { return Words::default() };
+    let [whole, parts @ ..] = shown.parts.as_slice() else { return FigureText::default() };
     let enlarged: Vec<String> = parts.iter().map(rms).collect();
     let enlarged = if enlarged.is_empty() { String::new() } else { format!(": {}", enlarged.join(", ")) };
     let caption = format!(
@@ -286,7 +291,7 @@ fn figure_text(case: &ConditionComparison, shown: &EvidencePlot, channel: Channe
     );
     let segments = describe_segments(case).map_or_else(String::new, |said| format!(" {}", capitalise(&said)));
     let details = details + &segments;
-    Words { caption, details }
+    FigureText { caption, details }
 }
 
 /// For a fit to traces: the misfit of its longest restarted segments.
@@ -308,7 +313,7 @@ fn describe_segments(case: &ConditionComparison) -> Option<String> {
 mod tests {
     use super::*;
 
-    fn shown() -> EvidencePlot {
+    fn example_evidence() -> EvidencePlot {
         let course =
             |scale: f64| (0..100).map(|i| Some((f64::from(i) * 0.01, scale * f64::from(i % 7)))).collect();
         let part = |name: &str, span_s| EvidencePart {
@@ -331,7 +336,7 @@ mod tests {
 
     #[test]
     fn every_part_has_its_number_and_what_is_enlarged_is_framed() {
-        let drawn = draw_figure(&shown());
+        let drawn = draw_figure(&example_evidence());
         assert_eq!(drawn.panels.len(), 4);
         assert_eq!(drawn.panels[2].title, "release: 3.5 times the noise");
         assert_eq!((drawn.panels[0].shaded_spans[0].from, drawn.panels[0].shaded_spans[0].to), (0.2, 0.3));
@@ -340,10 +345,10 @@ mod tests {
 
     #[test]
     fn the_axis_of_a_residual_holds_all_of_it_and_the_noise() {
-        let drawn = draw_figure(&shown());
+        let drawn = draw_figure(&example_evidence());
         let (low, high) = drawn.panels[1].y.range.unwrap();
         assert!(low < -6.0 && high > 6.0);
-        let mut quiet = shown();
+        let mut quiet = example_evidence();
         quiet.parts[0].residual = vec![Some((0.5, 0.1))];
         assert!(draw_figure(&quiet).panels[1].y.range.unwrap().1 > NOISE_95);
     }

@@ -1,6 +1,6 @@
 //! Texts and file names of the figures of a condition.
 
-use super::{Drawing, FigureBlock, NO_TRACES, Words, about};
+use super::{Drawing, FigureBlock, FigureText, NO_TRACES, about};
 use crate::chart::Figure;
 use crate::compare::ConditionComparison;
 use crate::model::parameters;
@@ -44,19 +44,24 @@ impl ConditionComparison<'_> {
     }
 
     /// A figure of recording and model.
-    pub(crate) fn figure_block(&self, name: &str, words: Words, figure: Figure) -> FigureBlock {
+    pub(crate) fn figure_block(&self, name: &str, words: FigureText, figure: Figure) -> FigureBlock {
         let figure = Figure { subtitle: about(&self.figure_title(), &figure.subtitle), ..figure };
         self.drawing_block(name, words, Drawing::Chart(figure))
     }
 
     /// A figure of the model alone. Conditions with the same run share it, so its details name the condition.
-    pub(crate) fn model_figure_block(&self, name: &str, words: Words, drawing: Drawing) -> FigureBlock {
+    pub(crate) fn model_figure_block(&self, name: &str, words: FigureText, drawing: Drawing) -> FigureBlock {
         let of = self.distinct_name().map_or_else(String::new, |name| format!("{name}: "));
         let details = format!("{of}{}{}", words.details, self.sharing_note());
-        self.drawing_block(name, Words { details, ..words }, drawing)
+        self.drawing_block(name, FigureText { details, ..words }, drawing)
     }
 
-    fn drawing_block(&self, name: &str, Words { caption, details }: Words, drawing: Drawing) -> FigureBlock {
+    fn drawing_block(
+        &self,
+        name: &str,
+        FigureText { caption, details }: FigureText,
+        drawing: Drawing,
+    ) -> FigureBlock {
         let number = self.distinct_name().map_or_else(String::new, |_| format!("-{}", self.condition + 1));
         let drawing = match drawing {
             Drawing::Chart(figure) => Drawing::Chart(Figure { watermarked: self.is_synthetic(), ..figure }),

@@ -1,7 +1,7 @@
 //! Stribeck curve: the fitted friction law over tip speed, friction measured on the recording, and the time
 //! spent at each speed.
 
-use super::{FigureBlock, Words};
+use super::{FigureBlock, FigureText};
 use crate::chart::{ChartAxis, Colour, Figure, Mark, MarkerShape, Panel, Ribbon, Series, VerticalLine};
 use crate::compare::friction::{COEFFICIENTS, LawCoefficient, friction_half_95, is_fitted};
 use crate::compare::{ConditionComparison, FrictionPoint, MeasuredFriction};
@@ -243,7 +243,7 @@ fn figure_text(
     slips: &[(f64, f64)],
     half: Option<&(dyn Fn(f64) -> f64 + '_)>,
     measured: &MeasuredFriction,
-) -> Words {
+) -> FigureText {
     let fastest = slips.last().map_or(0.0, |s| s.0);
     let (median, head) = (slips.get(slips.len() / 2).map_or(0.0, |s| s.0), mean_head_speed(case));
     let slower = slips.partition_point(|s| s.0 < head) as f64 / slips.len().max(1) as f64;
@@ -272,7 +272,7 @@ fn figure_text(
         format!("; {count} points measured where the tip slides evenly lie within {off} of it")
     });
     let caption = format!("{} in the law of the fitted model{even}.", claim_sentence(law, fastest));
-    Words { caption, details: said.join(" ") + &case.sharing_note() }
+    FigureText { caption, details: said.join(" ") + &case.sharing_note() }
 }
 
 /// Number of points and their largest deviation from the law; `None` without points.

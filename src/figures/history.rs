@@ -4,7 +4,6 @@
 pub(crate) mod caption;
 
 use crate::chart::{ChartAxis, Colour, Figure, Mark, Panel, Series, ShadedSpan, VerticalLine, value_span};
-use crate::compare::ConditionComparison;
 use crate::figures::{NO_TRACES, full_figure};
 use crate::math;
 use crate::recording::channel::Channel;
@@ -202,12 +201,6 @@ const MIN_STICK_GAP: f64 = 0.005;
 
 const STICKS_LABEL: &str = "tip sticks (model)";
 const CYCLES_LABEL: &str = "stick-slip cycles (model)";
-
-/// Intervals in which the model's tip sticks, s, on the clock of the recording.
-pub(super) fn sticks_on_clock(case: &ConditionComparison) -> Vec<(f64, f64)> {
-    let shift_s = case.alignment.shift_s;
-    case.model.view.stick_s.iter().map(|[from, to]| (from + shift_s, to + shift_s)).collect()
-}
 
 /// Shaded spans of long sticks, and of groups of short ones that are too close to be told apart.
 pub(crate) fn stick_spans(stick_s: &[(f64, f64)], (from, to): (f64, f64)) -> Vec<ShadedSpan> {

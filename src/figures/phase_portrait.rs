@@ -1,6 +1,6 @@
 //! Phase portraits: tip velocity over deflection, measured and of the model.
 
-use super::{FigureBlock, Words};
+use super::{FigureBlock, FigureText};
 use crate::chart::{ChartAxis, Colour, Figure, Mark, Panel, Series, value_span};
 use crate::compare::{ConditionComparison, TimedRecording};
 use crate::figures::full_figure;
@@ -387,7 +387,7 @@ fn figure_text(
     spans: &[PortraitSpan],
     taken: &VelocityEstimate,
     measured: bool,
-) -> Words {
+) -> FigureText {
     let said: Vec<String> = spans.iter().map(|span| span.said.clone()).collect();
     let mut source = case.source_name();
     if case.recording().is_some() && !measured {
@@ -404,7 +404,7 @@ fn figure_text(
         "Velocity of the tip over deflection, {whose}: every loop is a cycle, and loops that lie over each \
          other repeat."
     );
-    Words { caption, details }
+    FigureText { caption, details }
 }
 
 impl VelocityEstimate {

@@ -5,7 +5,7 @@ use crate::chart::{
     ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, MarkerShape, Panel, Series, TextAnnotation,
 };
 use crate::compare::ConditionComparison;
-use crate::figures::{Drawing, FigureBlock, Words, subtitle};
+use crate::figures::{Drawing, FigureBlock, FigureText, subtitle};
 use crate::model::Linkage;
 use crate::recording::channel::InstantKind;
 use crate::simulate::mode::TipMode;
@@ -149,7 +149,7 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
         released_after_s,
         ..PoseSequence::from_motion(&case.model.motion, &case.figure_title(), subtitle)?
     };
-    let words = Words { caption: figure_caption(&shown), details: figure_details(&shown) };
+    let words = FigureText { caption: figure_caption(&shown), details: figure_details(&shown) };
     Some(case.model_figure_block("poses", words, Drawing::Chart(draw_figure(&shown))))
 }
 

@@ -410,7 +410,7 @@ mod tests {
         }
     }
 
-    fn shown() -> ProfilePlot {
+    fn example_profiles() -> ProfilePlot {
         ProfilePlot {
             title: "t".to_owned(),
             least_cost: 0.5,
@@ -433,7 +433,7 @@ mod tests {
 
     #[test]
     fn an_open_interval_runs_out_and_the_bound_is_shaded() {
-        let panel = draw_panel(&shown(), &profile());
+        let panel = draw_panel(&example_profiles(), &profile());
         assert_eq!(panel.x.label, "k1, mN m/rad");
         let (_, high) = panel.x.range.unwrap();
         let bar = panel.series.iter().flat_map(|s| &s.error_bars).next().unwrap();
@@ -446,8 +446,12 @@ mod tests {
 
     #[test]
     fn caption_and_details_say_what_is_open_and_how_many_truths_are_held() {
-        assert!(figure_caption(&shown()).contains("0 of 1 profiles cross"), "{}", figure_caption(&shown()));
-        let text = figure_details(&shown());
+        assert!(
+            figure_caption(&example_profiles()).contains("0 of 1 profiles cross"),
+            "{}",
+            figure_caption(&example_profiles())
+        );
+        let text = figure_details(&example_profiles());
         assert!(
             text.contains("k1 above 1.81, open upwards mN m/rad") && text.contains("no interval for k1"),
             "{text}"
@@ -458,8 +462,8 @@ mod tests {
     #[test]
     fn the_details_explain_a_rise_on_an_open_side() {
         let open = "on a side that counts as open";
-        assert!(!figure_details(&shown()).contains(open));
-        let mut rising = shown();
+        assert!(!figure_details(&example_profiles()).contains(open));
+        let mut rising = example_profiles();
         rising.parameters[0].points.push((2.21e-3, 9.0));
         assert!(figure_details(&rising).contains(open));
     }
@@ -493,10 +497,12 @@ mod tests {
 
     #[test]
     fn parameters_without_a_profile_have_no_panel() {
-        let none =
-            ProfilePlot { parameters: vec![ParameterProfile { points: Vec::new(), ..profile() }], ..shown() };
+        let none = ProfilePlot {
+            parameters: vec![ParameterProfile { points: Vec::new(), ..profile() }],
+            ..example_profiles()
+        };
         assert!(draw_figure(&none).panels.is_empty());
-        assert!(draw_figure(&shown()).to_svg(Medium::Column).contains("95 % threshold"));
+        assert!(draw_figure(&example_profiles()).to_svg(Medium::Column).contains("95 % threshold"));
     }
 
     fn free(spacing: BoundsSpacing) -> FreeParameter {

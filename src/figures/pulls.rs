@@ -1,7 +1,7 @@
 //! Pulls: deviation of the model from each feature of a fit, in standard deviations of the target.
 
 use crate::chart::{ChartAxis, Colour, Figure, Mark, MarkerShape, Panel, Series, ShadedSpan, VerticalLine};
-use crate::compare::Comparison;
+use crate::compare::TargetComparison;
 use crate::figures::{Drawing, FigureBlock, about, full_figure, subtitle};
 use crate::text::{format_digits, pluralise, truncate_text};
 
@@ -41,14 +41,19 @@ const LEAST_END: f64 = 3.0;
 
 impl PullPlot {
     /// The pulls of the rows of a report.
-    pub(crate) fn from_comparisons(title: &str, fitted: &[&[Comparison]], held_out: &[Comparison]) -> Self {
-        let deviations = |row: &Comparison| {
+    pub(crate) fn from_comparisons(
+        title: &str,
+        fitted: &[&[TargetComparison]],
+        held_out: &[TargetComparison],
+    ) -> Self {
+        let deviations = |row: &TargetComparison| {
             let sd = row.target_sd.filter(|sd| *sd > 0.0)?;
             Some((row.model? - row.target) / sd).filter(|deviations| deviations.is_finite())
         };
         let fitted = fitted.iter().copied().flatten().map(|row| (row, false));
-        let rows: Vec<(&Comparison, bool)> = fitted.chain(held_out.iter().map(|row| (row, true))).collect();
-        let pull = |(row, held_out): &(&Comparison, bool)| {
+        let rows: Vec<(&TargetComparison, bool)> =
+            fitted.chain(held_out.iter().map(|row| (row, true))).collect();
+        let pull = |(row, held_out): &(&TargetComparison, bool)| {
             deviations(row).map(|deviations| Pull { name: row.name.clone(), deviations, held_out: *held_out })
         };
         let without = rows.iter().filter(|(row, _)| deviations(row).is_none());
@@ -144,8 +149,8 @@ pub(crate) fn figure_caption(shown: &PullPlot) -> String {
 mod tests {
     use super::*;
 
-    fn row(name: &str, target: f64, target_sd: Option<f64>, model: Option<f64>) -> Comparison {
-        Comparison { name: name.to_owned(), target, target_sd, model, ..Comparison::default() }
+    fn row(name: &str, target: f64, target_sd: Option<f64>, model: Option<f64>) -> TargetComparison {
+        TargetComparison { name: name.to_owned(), target, target_sd, model, ..TargetComparison::default() }
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Residual of a model against white noise: size, autocorrelation, spectrum, and growth with the length of a
 //! run.
 
-use super::{FigureBlock, Words};
+use super::{FigureBlock, FigureText};
 use crate::chart::{ChartAxis, Colour, Figure, Mark, MarkerShape, Panel, Ribbon, Series};
 use crate::compare::ConditionComparison;
 use crate::figures::full_figure;
@@ -177,7 +177,7 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
          that of the noise ({TAPERS} tapers).{growth}",
         channel.label()
     );
-    Some(case.figure_block("residuals", Words { caption, details }, draw_figure(&shown)))
+    Some(case.figure_block("residuals", FigureText { caption, details }, draw_figure(&shown)))
 }
 
 /// The main result in one sentence, with its numbers.

@@ -1,6 +1,6 @@
 //! A synthetic recording: the simulated motion, the frames with exposure and noise, and the lost frames.
 
-use super::Words;
+use super::FigureText;
 use crate::chart::{ChartAxis, Colour, ErrorBar, FULL_WIDTH_MM, Figure, Mark, Panel, Series, VerticalLine};
 use crate::recording::Recording;
 use crate::text::{format_length, format_milliseconds, format_percent, format_short};
@@ -51,7 +51,7 @@ pub(crate) fn draw_figure(twin: &TwinPlot) -> Figure {
 }
 
 /// Caption with the main numbers, and description.
-fn figure_text(twin: &TwinPlot) -> Words {
+fn figure_text(twin: &TwinPlot) -> FigureText {
     let grid = twin.tracked.grid();
     let lost = lost_points(twin).len();
     let blur_m = difference_points(twin, twin.seen)
@@ -59,7 +59,7 @@ fn figure_text(twin: &TwinPlot) -> Words {
         .flatten()
         .map(|(_, blur_m)| blur_m.abs())
         .fold(0.0, f64::max);
-    Words {
+    FigureText {
         caption: format!(
             "{} frames at {} frames/s: noise of {} on the deflection, {} of the frames lost",
             grid.frames,

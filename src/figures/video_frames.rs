@@ -1,6 +1,6 @@
 //! The links of the fitted model over frames of the video, at instants through the reversal.
 
-use super::Words;
+use super::FigureText;
 use super::poses::{joint_positions, reversal_poses};
 use crate::chart::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Raster, Series};
 use crate::compare::ConditionComparison;
@@ -42,7 +42,7 @@ pub enum Frame {
 impl Frame {
     /// The picture; `None` where it does not show the links.
     #[must_use]
-    pub fn shown(&self) -> Option<&Raster> {
+    pub fn raster(&self) -> Option<&Raster> {
         match self {
             Self::Shown(raster) => Some(raster),
             Self::Missing | Self::Elsewhere => None,
@@ -174,7 +174,7 @@ fn photograph(
 /// The figure of a condition; `None` without a video, or where nothing was tracked at the instants.
 pub(crate) fn block(case: &ConditionComparison) -> Option<FigureBlock> {
     let shown = VideoFrames::of(case)?;
-    let words = Words { caption: caption(&shown), details: details(&shown) };
+    let words = FigureText { caption: caption(&shown), details: details(&shown) };
     Some(case.figure_block("video-frames", words, figure(&shown)))
 }
 
@@ -210,7 +210,7 @@ fn frames_in_words(shown: &VideoFrames) -> String {
     let of = |is: fn(&Frame) -> bool| -> Vec<String> {
         shown.instants.iter().filter(|i| is(&i.frame)).map(|i| i.name.to_owned()).collect()
     };
-    let with = of(|frame| frame.shown().is_some());
+    let with = of(|frame| frame.raster().is_some());
     let (without, elsewhere) = (of(|frame| *frame == Frame::Missing), of(|frame| *frame == Frame::Elsewhere));
     let mut words = match (with.is_empty(), without.is_empty()) {
         (true, true) => String::new(),
@@ -260,7 +260,7 @@ fn drawing(shown: &VideoFrames, instant: &Instant) -> Panel {
     let size = all().map(|(_, y)| y).fold(0.0, f64::max);
     let half = all().map(|(x, _)| x.abs()).fold(0.0, f64::max) + ROOM * size;
     // white edges make lines and points visible on any picture
-    let filmed = instant.frame.shown().is_some();
+    let filmed = instant.frame.raster().is_some();
     let look = |plain: Mark| if filmed { Mark::Edged } else { plain };
     let [tracked_head, tracked_tip] = instant.tracked_m.map(place);
     let tracked = [tracked_head, None, tracked_tip].into_iter().filter(|point| filmed || point.is_some());
@@ -276,7 +276,7 @@ fn drawing(shown: &VideoFrames, instant: &Instant) -> Panel {
     Panel {
         title: format!("{}\ntip {}, head {}", instant.name, format_length(tip_m), format_length(head_m)),
         equal_aspect: true,
-        raster: instant.frame.shown().cloned(),
+        raster: instant.frame.raster().cloned(),
         ..Panel::new(x, y, DRAWING_MM, series)
     }
 }

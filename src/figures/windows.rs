@@ -98,7 +98,7 @@ mod tests {
         draw_figure(shown).to_svg(Medium::Screen)
     }
 
-    fn shown() -> WindowOverview {
+    fn example_windows() -> WindowOverview {
         let time_s: Vec<f64> = (0..1000).map(|i| f64::from(i) * 1e-3).collect();
         let window = |name: &str, from_s, to_s| WindowSpan { name: name.to_owned(), from_s, to_s };
         WindowOverview {
@@ -119,7 +119,7 @@ mod tests {
 
     #[test]
     fn every_window_is_named_over_the_panel_and_in_the_legend() {
-        let drawn = as_svg(&shown());
+        let drawn = as_svg(&example_windows());
         let named = |name: &str| drawn.matches(&format!("\n{name}\n")).count();
         assert_eq!(["before", "stick", "flip", "after", "analysed"].map(named), [2, 2, 2, 2, 1]);
         assert!(drawn.contains("deflection, mm") && drawn.contains("head x, mm"));
@@ -127,6 +127,6 @@ mod tests {
 
     #[test]
     fn without_a_head_there_is_one_panel() {
-        assert!(!as_svg(&WindowOverview { head_x_m: Vec::new(), ..shown() }).contains("head x"));
+        assert!(!as_svg(&WindowOverview { head_x_m: Vec::new(), ..example_windows() }).contains("head x"));
     }
 }

@@ -11,7 +11,7 @@ use super::evaluation::{Evaluation, EvaluationStage, Observed};
 use super::ledger::{Ledger, StopReason};
 use super::linear_model::{broyden_update, damped_step, residuals_against, step_in_box};
 use super::objective::Objective;
-use super::targets::TargetValue;
+use super::target_value::TargetValue;
 use crate::math;
 use nalgebra::DMatrix;
 use rayon::prelude::*;

@@ -9,8 +9,9 @@
 
 use super::evaluation::{Observation, Observed};
 use super::objective::{LOSS_KNEE, residual, robust_loss, total_sd};
-use super::targets::{MAX_RATIO, TargetValue};
-use crate::feature::{LengthCalibration, ValueComparison};
+use super::target_value::{MAX_RATIO, TargetValue};
+use crate::feature::ValueComparison;
+use crate::fit::target_value::TargetCalibration;
 use crate::math;
 use crate::math::StandardNormal;
 use nalgebra::{DMatrix, Matrix2, Vector2};
@@ -312,57 +313,6 @@ fn gauss_newton_descent(
         }
     }
     place
-}
-
-/// How a value depends on the calibration errors of its camera: `(1 + scale) value + offset`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TargetCalibration {
-    /// Number of the condition whose camera it is, from 0.
-    pub condition: usize,
-    /// Standard deviation of the scale, relative; 0 where it is held.
-    pub scale_sd: f64,
-    /// Standard deviation of the offset, m; 0 where it is held.
-    pub offset_sd_m: f64,
-    /// Kind of length, which decides how scale and offset act on it.
-    pub length: LengthCalibration,
-}
-
-impl TargetCalibration {
-    /// The value with the errors `[scale, offset]`, m.
-    pub(crate) fn apply(&self, value: f64, [scale, offset_m]: [f64; 2]) -> f64 {
-        match self.length {
-            LengthCalibration::Position => (1.0 + scale) * value + offset_m,
-            LengthCalibration::Size { floor_m } => {
-                let of_motion = (value * value - floor_m * floor_m).max(0.0).sqrt();
-                math::hypot((1.0 + scale) * of_motion, floor_m)
-            }
-        }
-    }
-
-    /// Its derivatives by scale and offset, m.
-    pub(crate) fn derivatives(&self, value: f64, [scale, offset_m]: [f64; 2]) -> [f64; 2] {
-        match self.length {
-            LengthCalibration::Position => [value, 1.0],
-            LengthCalibration::Size { floor_m } => {
-                let motion2 = (value * value - floor_m * floor_m).max(0.0);
-                [(1.0 + scale) * motion2 / self.apply(value, [scale, offset_m]), 0.0]
-            }
-        }
-    }
-
-    /// Standard deviation of a value by the calibration errors, m.
-    pub(crate) fn sd_m(&self, value: f64) -> f64 {
-        let [by_scale, by_offset] = self.derivatives(value, [0.0; 2]);
-        math::hypot(self.scale_sd * by_scale, self.offset_sd_m * by_offset)
-    }
-
-    /// Standard deviations of scale and offset; the latter is 0 where the value does not depend on an offset.
-    pub(crate) fn standard_deviations(&self) -> [f64; 2] {
-        match self.length {
-            LengthCalibration::Position => [self.scale_sd, self.offset_sd_m],
-            LengthCalibration::Size { .. } => [self.scale_sd, 0.0],
-        }
-    }
 }
 
 #[cfg(test)]

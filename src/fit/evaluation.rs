@@ -1,10 +1,11 @@
 //! One evaluation of the cost: a point, the features of the model there, and their cost.
 
-use super::feature_checkpoint::exact;
+use crate::checkpoint::exact;
 use crate::simulate::RunStatus;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::cmp::Ordering;
+use std::collections::BTreeMap;
 use std::fmt;
 
 /// The value of a feature of the model.
@@ -232,6 +233,11 @@ impl EvaluationStage {
             Self::Elsewhere => "elsewhere",
         }
     }
+}
+
+/// Values by parameter name.
+pub(super) fn map_names<T>(names: &[String], values: impl Iterator<Item = T>) -> BTreeMap<String, T> {
+    names.iter().cloned().zip(values).collect()
 }
 
 #[cfg(test)]

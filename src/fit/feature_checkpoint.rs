@@ -2,11 +2,10 @@
 
 use super::FitError;
 use super::bounds::{Bounds, BoundsSpacing, Prior, SearchAxis};
-use super::camera_calibration::TargetCalibration;
+use super::context::FitContext;
 use super::evaluation::{EvaluationOutcome, EvaluationStage, Observation, Observed, RunFailure};
 use super::objective::Objective;
-use super::run::FitContext;
-use super::targets::TargetValue;
+use super::target_value::{TargetCalibration, TargetValue};
 use crate::checkpoint::{
     self, CheckpointError, CheckpointKind, CheckpointRecord, ExactNumber, sample_records,
 };
@@ -35,7 +34,7 @@ pub(crate) fn point_key(unit: &[f64]) -> Vec<u64> {
 impl CheckpointRecord for EvaluationRecord {
     const KIND: CheckpointKind = CheckpointKind::Fit;
     type Body = FeatureHeaderBody;
-    type IterateRow = Row;
+    type Row = EvaluationRow;
     type Identity = Vec<u64>;
 
     fn identity(&self) -> Vec<u64> {
@@ -43,9 +42,9 @@ impl CheckpointRecord for EvaluationRecord {
     }
 
     /// The values are not stored: they follow from the point in the unit box.
-    fn to_row(&self, at: usize) -> Row {
+    fn to_row(&self, at: usize) -> EvaluationRow {
         let EvaluationOutcome { unit, features, failure, .. } = &self.outcome;
-        Row {
+        EvaluationRow {
             index: at,
             stage: self.stage,
             unit: unit.iter().copied().map(ExactNumber).collect(),
@@ -54,11 +53,11 @@ impl CheckpointRecord for EvaluationRecord {
         }
     }
 
-    fn line_index(row: &Row) -> Option<usize> {
+    fn line_index(row: &EvaluationRow) -> Option<usize> {
         Some(row.index)
     }
 
-    fn from_row(row: Row, body: &FeatureHeaderBody) -> Result<Self, String> {
+    fn from_row(row: EvaluationRow, body: &FeatureHeaderBody) -> Result<Self, String> {
         row.check_against(body)?;
         Ok(Self { stage: row.stage, outcome: row.into_outcome(body) })
     }
@@ -78,7 +77,7 @@ impl CheckpointRecord for EvaluationRecord {
 /// An evaluation as a line of the journal.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Row {
+pub struct EvaluationRow {
     index: usize,
     stage: EvaluationStage,
     unit: Vec<ExactNumber>,
@@ -87,7 +86,7 @@ pub struct Row {
     failure: Option<RunFailure>,
 }
 
-impl Row {
+impl EvaluationRow {
     fn check_against(&self, body: &FeatureHeaderBody) -> Result<(), String> {
         let (found, expected) = (self.unit.len(), body.parameters.len());
         if found != expected {
@@ -140,20 +139,6 @@ impl FeatureValueRow {
             Self::Averaged(averaged) => Observed::Value(averaged),
             Self::Missing { missing } => Observed::Missing(missing),
         }
-    }
-}
-
-/// Numbers as [`ExactNumber`] in a journal, for `#[serde(with)]`.
-pub(super) mod exact {
-    use super::{Deserialize, ExactNumber, Serialize};
-    use serde::{Deserializer, Serializer};
-
-    pub(in crate::fit) fn serialize<S: Serializer>(number: &f64, serializer: S) -> Result<S::Ok, S::Error> {
-        ExactNumber(*number).serialize(serializer)
-    }
-
-    pub(in crate::fit) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-        ExactNumber::deserialize(deserializer).map(|number| number.0)
     }
 }
 

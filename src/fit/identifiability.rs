@@ -6,12 +6,12 @@
 //! note.
 
 use super::FitError;
-use super::evaluation::{Evaluation, EvaluationStage, Observed};
+use super::evaluation::{Evaluation, EvaluationStage, Observed, map_names};
 use super::ledger::Ledger;
-use super::linear_model::{FeatureSlopes, ParameterCombination, SingularDirections};
-use super::linear_model::{difference_points, feature_scatter, jacobian};
-use super::result::map_names;
-use super::targets::TargetValue;
+use super::linear_model::{
+    FeatureSlopes, ParameterCombination, SingularDirections, difference_points, feature_scatter, jacobian,
+};
+use super::target_value::TargetValue;
 use crate::text::format_short;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -8,6 +8,7 @@ macro_rules! refuse {
 }
 
 mod as_written;
+pub mod checks;
 mod conditions;
 mod parameters;
 mod settings;
@@ -15,8 +16,8 @@ mod targets;
 mod traces;
 
 use super::bounds::SearchAxis;
-use super::camera_calibration::TargetCalibration;
 use super::search::SearchSettings;
+use super::target_value::TargetCalibration;
 use crate::feature::Feature;
 use crate::simulate::twin::Camera;
 use crate::toml_file::{self, KeyRefusal, TomlError, check_above_zero, check_format, parse_toml};
@@ -24,7 +25,6 @@ pub(crate) use conditions::{FeatureCamera, HeadSource, JobCondition, is_same_qua
 pub(crate) use parameters::{Constants, FreeParameter, NuisanceParameter};
 use serde::Serialize;
 pub(crate) use settings::{Ensemble, IntervalSettings};
-use std::collections::HashSet;
 pub use targets::{FitTarget, TargetSource, TargetStage};
 pub(crate) use traces::{CameraPriorSds, TraceChannel, TraceTarget};
 
@@ -209,18 +209,6 @@ pub enum JobError {
         /// What was found, what was expected, and what to do.
         problem: String,
     },
-}
-
-pub(super) fn check_non_empty(key: &str, found: &str, expected: &str) -> Result<String, KeyRefusal> {
-    if found.trim().is_empty() {
-        refuse!(key, "found \"{found}\", expected {expected}");
-    }
-    Ok(found.to_owned())
-}
-
-pub(super) fn find_repeated<'a>(mut names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    let mut met = HashSet::new();
-    names.find(|name| !met.insert(*name))
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use super::bounds::{Prior, SearchAxis, clamp_unit};
 use super::camera_calibration::{CameraEstimate, CameraFit};
 use super::evaluation::Evaluation;
 use super::objective::{LOSS_KNEE, Objective, prior_residuals, residual, total_sd};
-use super::targets::TargetValue;
+use super::target_value::TargetValue;
 use crate::feature::ValueComparison;
 use crate::math;
 use nalgebra::{DMatrix, DVector};

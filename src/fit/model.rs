@@ -2,7 +2,7 @@
 
 use super::evaluation::{FailureReason, Observation, Observed, RunFailure};
 use super::job::FitTarget;
-use super::targets::TargetValue;
+use super::target_value::TargetValue;
 use crate::feature::{Feature, FeatureValue, MissingValue, ValueComparison, read_assigned_features};
 use crate::math;
 use crate::recording::Recording;
@@ -243,7 +243,7 @@ mod tests {
         Feature { name: condition.to_string(), reading: Reading::MeanDeflection(Window::WHOLE), condition }
     }
 
-    fn shown(members: usize, conditions: &[usize]) -> Vec<Observation> {
+    fn observe_mean(members: usize, conditions: &[usize]) -> Vec<Observation> {
         let features: Vec<Feature> = conditions.iter().map(|condition| mean(*condition)).collect();
         let seen = ModelFeatures::new(&Still, &features, vec![0.01; conditions.len()], members);
         seen.predict_features(&[0.01])
@@ -255,9 +255,9 @@ mod tests {
 
     #[test]
     fn starting_states_are_averaged_and_their_spread_is_kept() {
-        let alone = shown(1, &[0])[0];
+        let alone = observe_mean(1, &[0])[0];
         assert!((alone.value / 0.01 - 1.0).abs() < 1e-12 && alone.spread == 0.0);
-        let found = shown(3, &[0])[0];
+        let found = observe_mean(3, &[0])[0];
         let logs = FACTORS[..3].iter().map(|f: &f64| f.ln());
         let mean = logs.clone().sum::<f64>() / 3.0;
         let sd = (logs.map(|l| (l - mean).powi(2)).sum::<f64>() / 2.0).sqrt();
@@ -266,12 +266,12 @@ mod tests {
                 && (found.spread / (found.value * sd) - 1.0).abs() < 1e-9,
             "{found:?}"
         );
-        assert_eq!(shown(4, &[0])[0], found, "a state from which the run fails is left out");
+        assert_eq!(observe_mean(4, &[0])[0], found, "a state from which the run fails is left out");
     }
 
     #[test]
     fn each_feature_is_read_from_its_own_condition() {
-        let values: Vec<f64> = shown(1, &[5, 2, 5]).iter().map(|found| found.value).collect();
+        let values: Vec<f64> = observe_mean(1, &[5, 2, 5]).iter().map(|found| found.value).collect();
         assert!(
             values.iter().zip([5.01, 2.01, 5.01]).all(|(found, expected)| (found - expected).abs() < 1e-9),
             "{values:?}"

@@ -19,7 +19,7 @@ use super::bounds::SearchAxis;
 use super::camera_calibration::CameraFit;
 use super::evaluation::{Evaluation, EvaluationOutcome, FailureReason, Observation, Observed, RunFailure};
 use super::model::FeaturePredictor;
-use super::targets::{MAX_RATIO, TargetValue};
+use super::target_value::{MAX_RATIO, TargetValue};
 use crate::feature::ASSIGN_DB;
 use crate::math;
 use crate::text::panic_message;

@@ -1,14 +1,16 @@
 //! A job with its scenes and recordings: the complete input of a fit.
 
+use super::context::FitContext;
 use super::job::{FreeParameter, HeadSource, Job};
 use super::ledger::{FitProgress, OnProgress};
 use super::model::ModelFeatures;
 use super::nuisance_parameters::{FreedConstant, NuisanceError, check_scaling, free_constants};
 use super::objective::Objective;
 use super::result::{FeatureResult, FitResult, ModelledTargets};
-use super::run::{FitContext, fit_features, predict_held_out, read_best_model};
+use super::run::{fit_features, predict_held_out, read_best_model};
 use super::scene_model::{Instrument, ModelCondition, PlausibilityLimits, SceneModel};
-use super::targets::{TargetValue, split_held_out};
+use super::target_value::TargetValue;
+use super::targets::split_held_out;
 use super::trace::{TraceModel, TraceSource};
 use super::trace_data::{TraceData, TraceError, prepare_traces};
 use super::trace_ledger::TraceProgress;
@@ -18,7 +20,8 @@ use crate::model::Pose;
 use crate::recording::quality::measure_quality;
 use crate::recording::{FrameGrid, Recording, Traces};
 use crate::simulate::drive::{Drive, HeadMotionError, smooth_head_motion};
-use crate::simulate::scene::{Scene, SceneError, StartKind};
+use crate::simulate::scene::error::SceneError;
+use crate::simulate::scene::{Scene, StartKind};
 use crate::simulate::twin::Camera;
 use serde::Serialize;
 use std::ops::ControlFlow;

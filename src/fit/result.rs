@@ -10,8 +10,7 @@ use super::linear_model::ParameterCombination;
 use super::misfit::{TraceMisfit, far_from_priors};
 use super::uncertainty::ParameterVerdict;
 use crate::text::text_sha256;
-pub(super) use assembly::{FitFindings, ModelledTargets};
-pub(super) use assembly::{camera_nuisance_results, map_names, predicted_feature_result};
+pub(super) use assembly::{FitFindings, ModelledTargets, camera_nuisance_results, predicted_feature_result};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

@@ -3,7 +3,7 @@
 use super::advice::advise_measurements;
 use super::evaluation::Evaluation;
 use super::feature_checkpoint::{
-    EvaluationRecord, FeatureCheckpoint, FeatureHeader, FeatureHeaderBody, HeaderFeature, HeaderParameter,
+    EvaluationRecord, FeatureHeader, FeatureHeaderBody, HeaderFeature, HeaderParameter,
 };
 use super::identifiability::{Identifiability, assess_identifiability};
 use super::job::{FitTarget, FreeParameter, Job};
@@ -11,15 +11,18 @@ use super::ledger::{Ledger, OnProgress, StopReason};
 use super::misfit::{far_from_priors, unexplained_headline};
 use super::model::{Draw, Model, ModelFeatures};
 use super::objective::Objective;
-use super::result::{FeatureResult, FitFindings, FitResult, FitStatus};
-use super::result::{camera_nuisance_results, predicted_feature_result};
+use super::result::{
+    FeatureResult, FitFindings, FitResult, FitStatus, camera_nuisance_results, predicted_feature_result,
+};
 use super::search::{SearchOutcome, SearchTermination};
 use super::start_transient::start_notes;
-use super::targets::{TargetValue, measure_targets, split_held_out};
+use super::target_value::TargetValue;
+use super::targets::{measure_targets, split_held_out};
 use super::uncertainty::{FeatureWeights, FitUncertainty};
 use super::{FitError, feature_checkpoint, search, uncertainty};
-use crate::checkpoint::{CheckpointSink, format_header_line};
+use crate::checkpoint::CheckpointSink;
 use crate::feature::{FeatureUnit, FeatureValue};
+use crate::fit::context::FitContext;
 use crate::model::parameters::find_parameter;
 use crate::recording::Recording;
 use std::cell::OnceCell;
@@ -210,40 +213,4 @@ fn checkpoint_header(
     let features = aims.iter().zip(targets).map(aimed).collect();
     let body = FeatureHeaderBody { seed: job.search.seed, parameters, features };
     FeatureHeader::new::<EvaluationRecord>(context.fingerprint, context.version, body)
-}
-
-/// The run of a fit: its problem, its allowance and the journal that it continues.
-#[derive(Debug, Clone, Default)]
-pub struct FitContext<'a> {
-    /// Fingerprint of the problem, from `checkpoint::fingerprint`.
-    pub fingerprint: &'a str,
-    /// Version of the program.
-    pub version: &'a str,
-    /// Most evaluations of this run, replayed ones included; `None` for what the job allows.
-    pub max_evaluations: Option<usize>,
-    /// The journal to continue, with the name of its file for error messages.
-    pub resume: Option<(&'a str, &'a FeatureCheckpoint)>,
-}
-
-impl<'a> FitContext<'a> {
-    /// Evaluations of the journal that is resumed.
-    pub(super) fn stored_records(&self) -> &'a [EvaluationRecord] {
-        self.resume.map_or(&[][..], |(_, journal)| &journal.records)
-    }
-
-    /// Text before the first new line: the header, unless a journal is resumed.
-    pub(super) fn opening_lines(&self, header: &FeatureHeader) -> String {
-        self.resume.map_or_else(|| format_header_line(header), |_| String::new())
-    }
-
-    /// Refuses a journal that a fit with this header cannot resume.
-    pub(super) fn check_resumable(&self, expected: &FeatureHeader) -> Result<(), FitError> {
-        let Some((file, journal)) = self.resume else { return Ok(()) };
-        journal.header.check_matches::<EvaluationRecord>(file, expected)?;
-        let (found, expected) = (journal.header.body.seed, expected.body.seed);
-        if found == expected {
-            return Ok(());
-        }
-        Err(FitError::OtherSeed { file: file.to_owned(), found, expected })
-    }
 }

@@ -5,6 +5,7 @@
 //! (`simplex.rs`). The ledger keeps budgets, the best point and every failure, so the solvers never see
 //! errors or costs that are not numbers.
 
+pub(crate) mod costs;
 mod excluded_region_search;
 mod gauss_newton;
 mod local;
@@ -13,14 +14,15 @@ mod simplex;
 mod stagnation;
 mod termination;
 
-use super::evaluation::{Evaluation, EvaluationStage};
 use super::ledger::{Ledger, StopReason};
-pub(super) use excluded_region_search::{Slab, best_in_slab, search_excluded_region};
+pub(super) use costs::Slab;
+pub(super) use excluded_region_search::{best_in_slab, search_excluded_region};
 pub(crate) use local::polish_best;
 use local::search_locally;
 use population::search_with_populations;
-pub use termination::{EXACT_COST, MIN_WORTHWHILE_GAIN};
-pub use termination::{LocalDescent, SIMPLEX_COST_SPREAD, SearchOutcome, SearchTermination};
+pub use termination::{
+    EXACT_COST, LocalDescent, MIN_WORTHWHILE_GAIN, SIMPLEX_COST_SPREAD, SearchOutcome, SearchTermination,
+};
 
 /// Searches within the budgets of `settings` and at most `limit` evaluations in total.
 pub fn search_minimum(
@@ -41,42 +43,6 @@ pub fn search_minimum(
         }
     };
     SearchOutcome { termination, descents }
-}
-
-/// Cost of every point after the ledger has stopped. A solver that gets it is abandoned before it uses it.
-const STOPPED_COST: f64 = 1e100;
-
-/// Costs of points of the unit box for the solvers of a stage.
-struct StageCosts<'l, 'a> {
-    ledger: &'l mut Ledger<'a>,
-    stage: EvaluationStage,
-    /// Why the ledger makes no more evaluations, once it has stopped.
-    stop: Option<StopReason>,
-    /// The part of the box onto which the points are mapped; `None` for the whole box.
-    slab: Option<Slab>,
-}
-
-impl<'l, 'a> StageCosts<'l, 'a> {
-    fn new(ledger: &'l mut Ledger<'a>, stage: EvaluationStage) -> Self {
-        Self { ledger, stage, stop: None, slab: None }
-    }
-
-    /// One cost per point, in order; the ledger evaluates them in parallel.
-    fn evaluate_points(&mut self, points: &[Vec<f64>]) -> Vec<f64> {
-        let global = self.stage == EvaluationStage::Global;
-        let cost = |e: &Evaluation| if global { e.global_cost } else { e.cost };
-        let moved: Option<Vec<Vec<f64>>> =
-            self.slab.map(|slab| points.iter().map(|point| slab.map_into(point.clone())).collect());
-        match self.ledger.evaluate_points(self.stage, moved.as_deref().unwrap_or(points)) {
-            Ok(found) if found.len() == points.len() => return found.into_iter().map(cost).collect(),
-            found => self.stop = found.err().or(self.stop.take()),
-        }
-        vec![STOPPED_COST; points.len()]
-    }
-
-    fn evaluate_point(&mut self, point: Vec<f64>) -> f64 {
-        self.evaluate_points(&[point]).first().copied().unwrap_or(STOPPED_COST)
-    }
 }
 
 /// Default number of generations without a gain after which a population ends.

@@ -7,7 +7,7 @@
 use super::evaluation::{Observed, RunFailure};
 use super::job::FitTarget;
 use super::model::{Draw, FeaturePredictor, Model, ModelFeatures, Restart};
-use super::targets::TargetValue;
+use super::target_value::TargetValue;
 use crate::feature::Feature;
 use crate::recording::Recording;
 

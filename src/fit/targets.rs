@@ -2,9 +2,9 @@
 //! leaves.
 
 use super::FitError;
-use super::camera_calibration::TargetCalibration;
 use super::job::{FitTarget, Job, TargetSource, TargetStage};
 use crate::feature::{Feature, FeatureValue, MissingValue, ValueComparison, read_assigned_features};
+use crate::fit::target_value::TargetValue;
 use crate::math;
 use crate::recording::Recording;
 use crate::recording::quality::measure_quality;
@@ -130,76 +130,3 @@ fn not_measurable_error(aim: &FitTarget, measured: &[Option<Recording>], problem
 }
 
 // Target values and distances from them.
-
-/// Ratio of model and target beyond which a residual no longer grows. Two decades are more than a physical
-/// feature spans, so that any value costs less than a missing one.
-pub(crate) const MAX_RATIO: f64 = 100.0;
-
-/// Least relative standard deviation in the first stage. Far from the targets all features are many
-/// deviations off, and the most precise ones would dominate the cost.
-pub(crate) const FIRST_STAGE_SD_RELATIVE: f64 = 0.05;
-
-/// The target value of a feature, with its standard deviation.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TargetValue {
-    /// Name of the component or feature.
-    pub name: String,
-    /// Target, in the feature's own SI unit; not zero where it is measured by logarithms.
-    pub value: f64,
-    /// Its standard deviation, in the same unit; above zero.
-    pub sd: f64,
-    /// Scatter of the model's value between neighbouring parameters, in the same unit; 0 where it is smooth.
-    pub scatter: f64,
-    /// How a residual is taken.
-    pub measure: ValueComparison,
-    /// Whether it counts in the last stage alone.
-    pub last: bool,
-    /// Calibration errors of the camera that measured it, where the value depends on them.
-    pub calibration: Option<TargetCalibration>,
-}
-
-impl TargetValue {
-    /// Standard deviation of a distance, including the model's scatter, in units of [`Self::reference_size`].
-    pub(crate) fn relative_sd(&self) -> f64 {
-        math::hypot(self.sd, self.scatter) / self.reference_size()
-    }
-
-    /// Distance of a value from the target in units of [`Self::reference_size`], clamped to the logarithm of
-    /// [`MAX_RATIO`].
-    pub(crate) fn distance(&self, value: f64) -> f64 {
-        let most = math::ln(MAX_RATIO);
-        match self.measure {
-            ValueComparison::Log => {
-                let ratio = value / self.value;
-                if ratio > 0.0 { math::ln(ratio).clamp(-most, most) } else { -most }
-            }
-            ValueComparison::Linear { scale } => ((value - self.value) / scale).clamp(-most, most),
-        }
-    }
-
-    /// Distance between two values, in the units of [`Self::distance`]; zero where the logarithm is
-    /// undefined.
-    pub(crate) fn distance_between(&self, value: f64, from: f64) -> f64 {
-        match self.measure {
-            ValueComparison::Log => {
-                Some(value / from).filter(|ratio| *ratio > 0.0 && ratio.is_finite()).map_or(0.0, math::ln)
-            }
-            ValueComparison::Linear { scale } => (value - from) / scale,
-        }
-    }
-
-    /// The target of the first stage, with a deviation of at least [`FIRST_STAGE_SD_RELATIVE`]; `None` if it
-    /// counts in the last stage only.
-    pub(super) fn first_stage_target(&self) -> Option<Self> {
-        let sd = self.sd.max(FIRST_STAGE_SD_RELATIVE * self.reference_size());
-        (!self.last).then(|| Self { sd, ..self.clone() })
-    }
-
-    /// Unit of distances, in the feature's own unit: the size of the target, or the scale of its differences.
-    pub(crate) fn reference_size(&self) -> f64 {
-        match self.measure {
-            ValueComparison::Log => self.value.abs(),
-            ValueComparison::Linear { scale } => scale,
-        }
-    }
-}

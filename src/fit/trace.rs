@@ -7,6 +7,7 @@
 //! starts on the motion that the previous one fitted.
 
 mod assessment;
+pub(crate) mod build;
 mod camera_observation;
 mod checkpoint;
 mod initial_states;
@@ -21,13 +22,13 @@ mod unknowns;
 mod variable_projection;
 
 pub use assessment::{TraceAssessment, UnknownEstimate};
+pub(crate) use build::{TraceSource, fit_states_at, frame_residuals};
 pub(crate) use checkpoint::Checkpoint;
 pub use checkpoint::{Iterate, SegmentState, TraceSearchSettings, chi2_per_dof};
 pub use levenberg_marquardt::{first_iterate, next_iterate};
-pub(crate) use model::{TraceModel, TraceRecording, TraceSource};
+pub(crate) use model::{TraceModel, TraceRecording};
 pub(crate) use search::TraceDescent;
 pub use search::{TraceSearchOutcome, search_trace, start_point, undersampled_mode};
 pub use segment_simulation::{SegmentResiduals, segment_residuals};
-pub(crate) use segment_simulation::{fit_states_at, frame_residuals};
 pub(crate) use uncertainty_run::{MAX_TWINS, SearchEnd, UncertaintyRun};
 pub(crate) use unknowns::{CameraUnknown, TraceUnknown, UnknownKind};

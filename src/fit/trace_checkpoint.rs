@@ -23,21 +23,21 @@ pub(crate) struct IterateRecord {
 impl CheckpointRecord for IterateRecord {
     const KIND: CheckpointKind = CheckpointKind::Trace;
     type Body = TraceHeaderBody;
-    type IterateRow = Row;
+    type Row = IterateRow;
     type Identity = (usize, usize);
 
     fn identity(&self) -> (usize, usize) {
         (self.start, self.step)
     }
 
-    fn to_row(&self, at: usize) -> Row {
+    fn to_row(&self, at: usize) -> IterateRow {
         let Self { start, step, ref iterate } = *self;
         let Iterate { stage, number, cuts, rescues: mended, plain, settled, .. } = *iterate;
         let [damping, cost] = [iterate.damping, iterate.cost].map(ExactNumber);
         let point = iterate.point.iter().copied().map(ExactNumber).collect();
         let segments = iterate.segments.iter().map(SegmentRow::from_state).collect();
         let index = at;
-        Row {
+        IterateRow {
             index,
             start,
             step,
@@ -54,13 +54,13 @@ impl CheckpointRecord for IterateRecord {
         }
     }
 
-    fn line_index(row: &Row) -> Option<usize> {
+    fn line_index(row: &IterateRow) -> Option<usize> {
         Some(row.index)
     }
 
-    fn from_row(row: Row, body: &TraceHeaderBody) -> Result<Self, String> {
+    fn from_row(row: IterateRow, body: &TraceHeaderBody) -> Result<Self, String> {
         row.check_against(body)?;
-        let Row { start, step, stage, number, cuts, mended: rescues, plain, settled, .. } = row;
+        let IterateRow { start, step, stage, number, cuts, mended: rescues, plain, settled, .. } = row;
         let (damping, cost) = (row.damping.0, row.cost.0);
         let point = row.point.into_iter().map(|z| z.0).collect();
         let segments = row.segments.into_iter().map(SegmentRow::into_state).collect();
@@ -103,7 +103,7 @@ impl CheckpointRecord for IterateRecord {
 /// The line of an iterate.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Row {
+pub(crate) struct IterateRow {
     index: usize,
     start: usize,
     step: usize,
@@ -119,7 +119,7 @@ pub(crate) struct Row {
     segments: Vec<SegmentRow>,
 }
 
-impl Row {
+impl IterateRow {
     fn check_against(&self, body: &TraceHeaderBody) -> Result<(), String> {
         let (found, expected) = (self.point.len(), body.unknowns.len());
         if found != expected {

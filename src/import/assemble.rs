@@ -2,7 +2,7 @@
 
 use super::error::{ImportError, ImportResult};
 use super::options::ImportOptions;
-use super::{Import, ImportReport, ImportSource, base_name, preserved_files};
+use super::source::{Import, ImportReport, ImportSource, base_name, preserved_files};
 use crate::import::options::CoordinateScale;
 use crate::import::reader::calibration::calibrate;
 use crate::import::reader::encoding::DecodedText;

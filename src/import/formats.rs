@@ -20,8 +20,8 @@ mod wiperlab;
 
 use super::error::{ImportError, ImportResult};
 use super::options::ImportOptions;
-use super::reader::track_file::TrackFile;
 use super::reader::{Document, new_finding};
+use crate::import::format::FileFormat;
 use crate::recording::quality::{Check, QualityFinding, Severity};
 use crate::toml_file;
 
@@ -160,15 +160,4 @@ fn unknown_format_error(name: &str) -> ImportError {
     };
     let expected = format!("one of {}", names.join(", "));
     ImportError::format("--format", format!("the format {name}"), expected, advice)
-}
-
-/// A file format; every file in `formats/` has one.
-pub(crate) trait FileFormat: Sync {
-    /// Name on the command line.
-    fn name(&self) -> &'static str;
-    /// What in the content shows the format, if anything does. Tables of the same program without positions
-    /// are recognised too, and refused by [`FileFormat::read`].
-    fn recognises(&self, document: &Document) -> Option<String>;
-    /// Reads the clocks and tracks, in the file's own units.
-    fn read<'a>(&self, document: &'a Document<'a>, options: &ImportOptions) -> ImportResult<TrackFile<'a>>;
 }

@@ -3,6 +3,7 @@
 
 pub(crate) mod calibration;
 pub(crate) mod companion;
+pub(crate) mod cut_numbers;
 pub(crate) mod dialect;
 pub(crate) mod encoding;
 pub(crate) mod file_type;
@@ -19,7 +20,7 @@ pub(crate) mod track_choice;
 pub(crate) mod track_file;
 
 use super::error::ImportResult;
-use super::{ImportSource, base_name};
+use super::source::{ImportSource, base_name};
 use encoding::DecodedText;
 pub(crate) use findings::new_finding;
 pub(crate) use instances::{InstanceFields, PointFields, RowOrder, RowPosition, RowStamp, TrackCollector};

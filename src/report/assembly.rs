@@ -135,8 +135,8 @@ fn measured_figures(cases: &[ConditionComparison], telling: usize) -> Vec<Figure
         let first = if i == telling { Vec::new() } else { condition_figures(case, own) };
         let parts = [
             history::caption::figure_blocks(case),
-            spectrum::figure_blocks(case),
-            spectrogram::figure_blocks(case),
+            spectrum::caption::figure_blocks(case),
+            spectrogram::caption::figure_blocks(case),
             phase_portrait::figure_blocks(case),
         ];
         first.into_iter().chain(parts.into_iter().flatten()).collect::<Vec<_>>()

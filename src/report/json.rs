@@ -74,7 +74,7 @@ pub(crate) fn report_json(report: &Report) -> Result<String, serde_json::Error> 
 mod tests {
     use super::super::FigureGroup;
     use super::*;
-    use crate::compare::Comparison;
+    use crate::compare::TargetComparison;
     use crate::figures::{Drawing, FigureBlock};
 
     #[test]
@@ -87,7 +87,7 @@ mod tests {
             drawing: Drawing::Moving("<svg/>".to_owned()),
         };
         let figures = vec![FigureGroup { subject: FigureSubject::Blade, figures: vec![block] }];
-        let components = vec![Comparison { model: Some(f64::NAN), ..Comparison::default() }];
+        let components = vec![TargetComparison { model: Some(f64::NAN), ..TargetComparison::default() }];
         let text = report_json(&Report { figures, components, ..Report::default() }).unwrap();
         let json: serde_json::Value = serde_json::from_str(&text).unwrap();
         assert_eq!(

@@ -5,7 +5,7 @@ use super::Report;
 use super::rich_text::{Sentence, Statement};
 use super::verdict::comparison_sentence;
 use crate::compare::summary::ResidualSummary;
-use crate::compare::{Comparison, ComparisonSummary, ParameterLine};
+use crate::compare::{ComparisonSummary, ParameterLine, TargetComparison};
 use crate::figures::evidence::NOTHING_LEFT;
 use crate::figures::friction::FrictionLine;
 use crate::fit::misfit::{ChannelMisfit, TraceMisfit, WorstSegment, far_from_priors};
@@ -187,7 +187,7 @@ fn farthest_residual(report: &Report) -> Option<(&str, &ResidualSummary)> {
 }
 
 /// Every target that was fitted.
-fn fitted_targets(report: &Report) -> impl Iterator<Item = &Comparison> {
+fn fitted_targets(report: &Report) -> impl Iterator<Item = &TargetComparison> {
     report.components.iter().chain(&report.features)
 }
 
@@ -204,8 +204,8 @@ fn count_met_targets(report: &Report) -> (bool, String) {
 
 /// The missed targets, then met ones that are more than [`FAR_SD`] standard deviations off.
 fn missed_target_sentences(report: &Report) -> Vec<Sentence> {
-    let apart = |c: &Comparison| c.model.zip(c.target_sd).map(|(m, sd)| (m - c.target).abs() / sd);
-    let far = |c: &&Comparison| c.pass && apart(c).is_some_and(|sds| sds > FAR_SD);
+    let apart = |c: &TargetComparison| c.model.zip(c.target_sd).map(|(m, sd)| (m - c.target).abs() / sd);
+    let far = |c: &&TargetComparison| c.pass && apart(c).is_some_and(|sds| sds > FAR_SD);
     let missed = fitted_targets(report).filter(|c| !c.pass).map(comparison_sentence);
     let met = fitted_targets(report).filter(far).map(|c| {
         let sds = format_digits(apart(c).unwrap_or(0.0), 2);
@@ -377,8 +377,8 @@ mod tests {
     use crate::fit::uncertainty::ParameterVerdict as Knowledge;
     use crate::report::{RunSummary, SearchLine};
 
-    fn target(model: f64, sd: f64, pass: bool) -> Comparison {
-        Comparison {
+    fn target(model: f64, sd: f64, pass: bool) -> TargetComparison {
+        TargetComparison {
             name: "low".to_owned(),
             unit: "Hz".to_owned(),
             target: 100.0,
@@ -386,7 +386,7 @@ mod tests {
             model: Some(model),
             pass,
             tolerance_relative: Some(0.02),
-            ..Comparison::default()
+            ..TargetComparison::default()
         }
     }
 
@@ -416,7 +416,7 @@ mod tests {
         }
     }
 
-    fn filmed(ratio: f64, targets: Vec<Comparison>) -> Report {
+    fn filmed(ratio: f64, targets: Vec<TargetComparison>) -> Report {
         Report {
             recordings: vec![crate::report::page::tests::recording("film", false)],
             comparison: vec![left_of(ratio)],

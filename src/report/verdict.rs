@@ -2,7 +2,7 @@
 
 use super::rich_text::{Sentence, Statement};
 use super::{Report, summary};
-use crate::compare::{Comparison, ParameterLine, RunSummary, Truth};
+use crate::compare::{ParameterLine, RunSummary, TargetComparison, TrueValue};
 use crate::figures::OPPOSED;
 use crate::fit::misfit::{ChannelMisfit, TraceMisfit, far_from_priors, unexplained_headline};
 use crate::fit::uncertainty::ParameterVerdict as Knowledge;
@@ -43,7 +43,7 @@ pub struct ReportVerdict {
 impl ReportVerdict {
     /// The verdict on what a report holds.
     pub(crate) fn from_report(report: &Report) -> Self {
-        let met = |list: &[Comparison]| list.iter().all(|c| c.pass);
+        let met = |list: &[TargetComparison]| list.iter().all(|c| c.pass);
         Self {
             model_explains_recording: match &report.misfit {
                 Some(misfit) => misfit.explained,
@@ -148,8 +148,8 @@ const NOUNS: [[&str; 2]; 3] =
 fn met_statement(
     noun: &str,
     how: &str,
-    list: &[Comparison],
-    listed: impl Fn(&&Comparison) -> bool,
+    list: &[TargetComparison],
+    listed: impl Fn(&&TargetComparison) -> bool,
 ) -> Option<Statement> {
     let (count, total) = (list.iter().filter(|c| c.pass).count(), list.len());
     let plural = || NOUNS.iter().fold(noun.to_owned(), |noun, [one, many]| noun.replacen(one, many, 1));
@@ -161,7 +161,7 @@ fn met_statement(
 }
 
 /// Name, model, target with its deviation, error and tolerance.
-pub(super) fn comparison_sentence(c: &Comparison) -> Sentence {
+pub(super) fn comparison_sentence(c: &TargetComparison) -> Sentence {
     let (unit, factor) = text::choose_prefix(&c.unit, [c.target]);
     let unit = if unit.is_empty() { unit } else { format!(" {unit}") };
     let target = format!("{}{unit}", format_with_sd(c.target * factor, c.target_sd.map(|sd| sd * factor)));
@@ -220,7 +220,7 @@ fn truth_statement(parameters: &[ParameterLine]) -> Option<Statement> {
         "The value behind the synthetic data lies inside the 95 % interval of {inside} of {all} {noun}{without_end}"
     );
     let outside = known.iter().filter(|(_, truth)| !truth.inside_95);
-    let detail = |(p, truth): &(&ParameterLine, Truth)| {
+    let detail = |(p, truth): &(&ParameterLine, TrueValue)| {
         let interval = format_interval(p.lower_95, p.upper_95, format_number);
         let words = format!(" is {} in truth, outside {interval}", format_number(truth.value));
         Sentence::default().with_name(&p.name).with_words(words)
@@ -282,10 +282,10 @@ mod tests {
     use crate::fit::misfit::{StageMisfit, WorstSegment};
     use crate::fit::result;
 
-    fn comparison(name: &str, model: Option<f64>, pass: bool) -> Comparison {
+    fn comparison(name: &str, model: Option<f64>, pass: bool) -> TargetComparison {
         let relative_error = model.map(|m| m / 100.0 - 1.0);
         let (unit, target_sd) = ("Hz".to_owned(), Some(0.5));
-        Comparison {
+        TargetComparison {
             name: name.to_owned(),
             unit,
             target: 100.0,
@@ -294,7 +294,7 @@ mod tests {
             relative_error,
             pass,
             tolerance_relative: Some(0.02),
-            ..Comparison::default()
+            ..TargetComparison::default()
         }
     }
 
@@ -338,9 +338,9 @@ mod tests {
     fn the_verdict_says_what_is_known_what_is_not_and_whether_the_truth_is_held() {
         let mut wide = parameter("friction.c", Knowledge::OpenAbove, None);
         wide.why = Some("only a lower limit is known".to_owned());
-        wide.truth = Some(Truth { value: 0.3, inside_95: wide.holds(0.3) });
+        wide.truth = Some(TrueValue { value: 0.3, inside_95: wide.holds(0.3) });
         let mut known = parameter("friction.a", Knowledge::Identified, Some(0.6));
-        known.truth = Some(Truth { value: 0.55, inside_95: known.holds(0.55) });
+        known.truth = Some(TrueValue { value: 0.55, inside_95: known.holds(0.55) });
         let advice = vec!["measure the release".to_owned()];
         let verdict = ReportVerdict::from_report(&Report {
             parameters: vec![known, wide],
@@ -399,10 +399,10 @@ mod tests {
         let open = |value| {
             let line =
                 ParameterLine { lower_95: None, ..parameter("friction.a", Knowledge::NotIdentified, None) };
-            ParameterLine { truth: Some(Truth { value, inside_95: line.holds(value) }), ..line }
+            ParameterLine { truth: Some(TrueValue { value, inside_95: line.holds(value) }), ..line }
         };
         let known = ParameterLine {
-            truth: Some(Truth { value: 0.5, inside_95: true }),
+            truth: Some(TrueValue { value: 0.5, inside_95: true }),
             ..parameter("friction.c", Knowledge::Identified, Some(0.6))
         };
         let of = |parameters: Vec<ParameterLine>| {

@@ -9,7 +9,8 @@ mod sampled_run;
 mod transition_lists;
 
 use super::fixed_step_scheme::{DEFAULT_GAIN_PER_S, FixedStepLocator, FixedStepScheme};
-use super::scene::{ContactLossRule, JamRule, Scene};
+use super::scene::Scene;
+use super::scene::contact::{ContactLossRule, JamRule};
 use super::{IntegrationMethod, SolverOptions};
 pub(crate) use reference::{AccuracyRow, HIGH_COMPONENT, LOW_COMPONENT, ReferenceRun};
 

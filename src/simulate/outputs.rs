@@ -1,7 +1,8 @@
 //! Observers of a run: samples, transitions, impacts, extremes and the energy balance.
 
 use super::mode::TipMode;
-use super::scene::{ContactLossRule, Drive, JamRule, Scene, StartKind};
+use super::scene::contact::{ContactLossRule, JamRule};
+use super::scene::{Drive, Scene, StartKind};
 use super::{
     BladePoints, Impact, ModelSample, Observer, RunResult, SegmentPath, SolutionSegment, SolverOptions,
     Transition,

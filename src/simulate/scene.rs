@@ -1,6 +1,8 @@
 //! Scenes: a blade, its friction, its drive and the settings of a run, read from `scene.toml` and validated.
 
 mod as_written;
+pub mod contact;
+pub mod error;
 mod linkage;
 mod numbers;
 mod run;
@@ -12,13 +14,14 @@ use crate::model::modes::time_scales_rad_per_s;
 use crate::model::parameters::{self, ModelParameter, PARAMETERS};
 use crate::model::plausibility::{self, PlausibilityFinding};
 use crate::recording::Recording;
-use crate::toml_file::{self, TomlError};
+use crate::simulate::scene::contact::{ContactLossRule, JamRule};
+use crate::simulate::scene::error::{SceneError, key_error};
+use crate::toml_file;
 use as_written::SceneFile;
 use linkage::{build_linkage, linkage_constants};
 use numbers::{SceneReader, check_complete, check_range, find_known_parameter};
 pub use run::{MOST_EVALUATIONS, RunSettings, StartKind, check_tolerance};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -254,73 +257,4 @@ fn recorded_drive(
 fn read_head_motion(place: &str, recording: &Recording) -> Result<HeadSpline, SceneError> {
     smooth_head_motion(recording)
         .map_err(|problem| SceneError::Recording { place: place.to_owned(), problem: problem.to_string() })
-}
-
-/// What happens when the normal force reaches zero.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum ContactLossRule {
-    /// The run ends and says so.
-    #[default]
-    Stop,
-    /// The tip flies and lands.
-    Fly,
-}
-
-/// What happens when the Painlevé condition fails.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum JamRule {
-    /// The run ends and says so.
-    #[default]
-    Stop,
-    /// An impact without collision.
-    Impact,
-}
-
-/// Why a scene was refused.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum SceneError {
-    /// The file is not TOML of this format.
-    #[error(transparent)]
-    Toml(#[from] TomlError),
-    /// A key is unknown, missing, doubled or out of range.
-    #[error("{place}: key `{key}`: found {found}, expected {expected}; {advice}")]
-    Key {
-        /// File, with the line where there is one.
-        place: String,
-        /// Table and key.
-        key: String,
-        /// What the file says.
-        found: String,
-        /// What the key takes.
-        expected: String,
-        /// What to do.
-        advice: String,
-    },
-    /// The recording that drives the head cannot be read or used.
-    #[error("{place}: key `drive.recording`: {problem}")]
-    Recording {
-        /// File and line.
-        place: String,
-        /// The recording's own refusal.
-        problem: String,
-    },
-}
-
-fn key_error(place: &str, key: &str, found: impl ToString, expected: &str, advice: &str) -> SceneError {
-    let [place, key, expected, advice] = [place, key, expected, advice].map(str::to_owned);
-    SceneError::Key { place, key, found: found.to_string(), expected, advice }
-}
-
-/// What `simulate` writes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum OutputTable {
-    /// `trace.csv`.
-    Trace,
-    /// `state.csv`.
-    State,
-    /// `events.csv`.
-    Events,
 }

@@ -13,6 +13,7 @@ use super::settings::ROUNDING;
 use super::time_frequency::Ridge;
 use super::{Detrend, MIN_SAMPLES, Spectrum, SpectrumError, SpectrumSettings, decimation, step_detection};
 use crate::math;
+use crate::spectrum::record::SampledRecord;
 use component_estimates::FitReading;
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -20,16 +21,6 @@ use std::ops::Range;
 /// Longest record that is fitted, frames: three seconds at 5,000 frames/s, which take about one second. The
 /// time grows faster than the record; longer ones are read by their windowed periodogram.
 pub const LONGEST_DECOMPOSED: usize = 1 << 14;
-/// A record and the camera that took it.
-#[derive(Debug, Clone, Copy)]
-pub struct SampledRecord<'a> {
-    /// One sample a frame, m; `None` where there is none.
-    pub samples: &'a [Option<f64>],
-    /// Frames per second, 1/s.
-    pub frame_rate_hz: f64,
-    /// Exposure of a frame, s, where known.
-    pub exposure_s: Option<f64>,
-}
 
 /// A record taken apart.
 #[derive(Debug, Clone, PartialEq)]

@@ -79,20 +79,20 @@ pub fn study_header(study: &Study, fingerprint: &str) -> SweepHeader {
 impl CheckpointRecord for SweepPoint {
     const KIND: CheckpointKind = CheckpointKind::Sweep;
     type Body = SweepHeaderBody;
-    type IterateRow = Row;
+    type Row = PointRow;
     type Identity = usize;
 
     fn identity(&self) -> usize {
         self.index
     }
 
-    fn to_row(&self, _: usize) -> Row {
+    fn to_row(&self, _: usize) -> PointRow {
         let PointOutcome { ended, stopped_at_s, values } = &self.outcome;
         let cell = |value: &Result<f64, MissingReason>| match value {
             Ok(value) => ValueCell::Value(ExactNumber(*value)),
             Err(reason) => ValueCell::Missing { reason: *reason },
         };
-        Row {
+        PointRow {
             index: self.index,
             ended: ended.clone(),
             stopped_at_s: stopped_at_s.map(ExactNumber),
@@ -101,11 +101,11 @@ impl CheckpointRecord for SweepPoint {
     }
 
     /// Points are not ordered by index.
-    fn line_index(_: &Row) -> Option<usize> {
+    fn line_index(_: &PointRow) -> Option<usize> {
         None
     }
 
-    fn from_row(row: Row, body: &SweepHeaderBody) -> Result<Self, String> {
+    fn from_row(row: PointRow, body: &SweepHeaderBody) -> Result<Self, String> {
         if row.values.len() != body.maps.len() {
             return Err(format!("`values`: found {}, expected {}", row.values.len(), body.maps.len()));
         }
@@ -149,7 +149,7 @@ impl CheckpointRecord for SweepPoint {
 /// A point as written in a line.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Row {
+pub struct PointRow {
     index: usize,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     ended: Option<EarlyEnd>,

@@ -5,7 +5,8 @@
 #![allow(dead_code)] // each test program uses a part
 
 use std::fmt::Write;
-use wiperlab::import::{ColumnMap, CompanionFile, CoordinateScale, ImportOptions, ImportSource, TimeColumn};
+use wiperlab::import::source::{CompanionFile, ImportSource};
+use wiperlab::import::{ColumnMap, CoordinateScale, ImportOptions, TimeColumn};
 use wiperlab::recording::files::YAxis;
 
 /// Frames of two points: tip x and y, head x and y, `None` where a point was lost.

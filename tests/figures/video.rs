@@ -136,7 +136,7 @@ fn spots_in_the_pictures_lie_where_the_tracked_points_are_drawn() {
         assert_eq!(spots.asked.lock().unwrap().len(), shown.instants.len(), "no other frame is read");
         assert!(shown.instants.len() >= 3);
         for instant in &shown.instants {
-            let raster = instant.frame.shown().unwrap();
+            let raster = instant.frame.raster().unwrap();
             let step = (raster.x[1] - raster.x[0]) / 256.0;
             for (x, y) in instant.tracked_m.map(|(x, y)| (1e3 * x, 1e3 * y)) {
                 let found = middle(raster, (x, y), 0.7);
@@ -158,7 +158,7 @@ fn an_instant_without_a_frame_is_drawn_without_one_and_said() {
     let place = PixelMapping::new([0.0, 12.0], 2e-4, None);
     let spots = |frames| Spots::of(&fit.recording, place, frames);
     let none = over_spots(&fit, &spots(0..0));
-    assert!(none.instants.iter().all(|instant| instant.frame.shown().is_none()));
+    assert!(none.instants.iter().all(|instant| instant.frame.raster().is_none()));
     assert!(
         details(&none).contains("no picture before the reversal")
             && details(&none).contains("first_frame")
@@ -167,7 +167,7 @@ fn an_instant_without_a_frame_is_drawn_without_one_and_said() {
     let last = over_spots(&fit, &spots(0..fit.recording.grid().frames)).instants.pop().unwrap();
     let from = ((last.time_s - fit.recording.grid().start_s) * 5000.0).round() as usize;
     let one = over_spots(&fit, &spots(from..from + 1));
-    assert_eq!(one.instants.iter().filter(|instant| instant.frame.shown().is_some()).count(), 1);
+    assert_eq!(one.instants.iter().filter(|instant| instant.frame.raster().is_some()).count(), 1);
     assert!(details(&one).contains("of which there is none before the reversal"), "{}", details(&one));
 }
 

@@ -1,10 +1,8 @@
 //! Exports of Kinovea, DIPP-MOTION, Frame-DIAS and motion-analysis-2d: exact values, gaps and names, and the
 //! words of refusals.
 
-use wiperlab::import::{
-    ColumnMap, CompanionFile, CoordinateScale, Import, ImportError, ImportOptions, ImportSource, TimeColumn,
-    import,
-};
+use wiperlab::import::source::{CompanionFile, Import, ImportSource};
+use wiperlab::import::{ColumnMap, CoordinateScale, ImportError, ImportOptions, TimeColumn, import};
 use wiperlab::recording::Traces;
 use wiperlab::recording::files::YAxis;
 use wiperlab::recording::quality::Severity;

@@ -2,7 +2,8 @@
 
 use crate::exports::{self, Motion};
 use std::path::{Path, PathBuf};
-use wiperlab::import::{ColumnMap, CoordinateScale, Import, ImportOptions, ImportSource, import};
+use wiperlab::import::source::{Import, ImportSource};
+use wiperlab::import::{ColumnMap, CoordinateScale, ImportOptions, import};
 use wiperlab::recording::Recording;
 use wiperlab::recording::files::YAxis;
 use wiperlab::recording::quality::Severity;

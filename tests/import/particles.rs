@@ -1,7 +1,8 @@
 //! Tables of programs that track particles and cells: exact values, gaps, names, and refusals with place and
 //! remedy.
 
-use wiperlab::import::{CoordinateScale, Import, ImportError, ImportOptions, ImportSource, import};
+use wiperlab::import::source::{Import, ImportSource};
+use wiperlab::import::{CoordinateScale, ImportError, ImportOptions, import};
 use wiperlab::recording::quality::Severity;
 
 macro_rules! fixture {

@@ -1,8 +1,7 @@
 //! DeepLabCut, Lightning Pose, SLEAP, DLTdv and Argus: exact values, gaps and names, and what is refused.
 
-use wiperlab::import::{
-    CompanionFile, CoordinateScale, Import, ImportError, ImportOptions, ImportSource, import,
-};
+use wiperlab::import::source::{CompanionFile, Import, ImportSource};
+use wiperlab::import::{CoordinateScale, ImportError, ImportOptions, import};
 use wiperlab::recording::channel::ReversalInstants;
 use wiperlab::recording::files::YAxis;
 use wiperlab::recording::quality::Severity;

@@ -1,8 +1,8 @@
 //! Exports in, recordings out: exact values for what is read, place and remedy for what is refused.
 
+use wiperlab::import::source::{Import, ImportSource};
 use wiperlab::import::{
-    CellProblem, ColumnMap, CoordinateScale, Import, ImportError, ImportOptions, ImportSource, TimeColumn,
-    import,
+    CellProblem, ColumnMap, CoordinateScale, ImportError, ImportOptions, TimeColumn, import,
 };
 use wiperlab::recording::files::{RecordingFile, YAxis, read_recording, trace_csv};
 

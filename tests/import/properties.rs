@@ -3,7 +3,8 @@
 
 use crate::exports::{Exporter, Motion, exporters};
 use proptest::prelude::*;
-use wiperlab::import::{Import, ImportSource, import};
+use wiperlab::import::import;
+use wiperlab::import::source::{Import, ImportSource};
 
 /// Positions with three decimals, of which some are lost; no point sits on the origin, which some programs
 /// write for a lost one.

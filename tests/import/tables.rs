@@ -1,9 +1,8 @@
 //! ImageJ's tables, DICe, TRC, plain tables with a telling header, and the camera's record of an export.
 
 use proptest::prelude::*;
-use wiperlab::import::{
-    ColumnMap, CompanionFile, CoordinateScale, Import, ImportError, ImportOptions, ImportSource, import,
-};
+use wiperlab::import::source::{CompanionFile, Import, ImportSource};
+use wiperlab::import::{ColumnMap, CoordinateScale, ImportError, ImportOptions, import};
 use wiperlab::recording::files::YAxis;
 
 macro_rules! fixture {

@@ -1,11 +1,12 @@
 //! A recording's own `trace.csv` is read back to the bit.
 
 use proptest::prelude::*;
-use wiperlab::import::{ImportOptions, ImportSource, import};
+use wiperlab::import::source::ImportSource;
+use wiperlab::import::{ImportOptions, import};
 use wiperlab::recording::files::{HEADER, trace_csv};
 use wiperlab::recording::{FrameGrid, Recording, Traces};
 
-fn read(text: &str, rate_hz: Option<f64>) -> Result<wiperlab::import::Import, String> {
+fn read(text: &str, rate_hz: Option<f64>) -> Result<wiperlab::import::source::Import, String> {
     let options =
         ImportOptions { name: "made".to_owned(), frame_rate_hz: rate_hz, ..ImportOptions::default() };
     import(&[ImportSource::without_companions("run7.csv", text.as_bytes().to_vec())], &options)

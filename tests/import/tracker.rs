@@ -1,7 +1,8 @@
 //! Tracker's tables: versions 4 to 6, exported and copied, in every spelling that its dialogue and the locale
 //! of its user give.
 
-use wiperlab::import::{ColumnMap, CoordinateScale, Import, ImportOptions, ImportSource, TimeColumn, import};
+use wiperlab::import::source::{Import, ImportSource};
+use wiperlab::import::{ColumnMap, CoordinateScale, ImportOptions, TimeColumn, import};
 use wiperlab::recording::files::YAxis;
 
 macro_rules! fixture {

@@ -18,7 +18,7 @@ use wiperlab::fit::objective::Objective;
 use wiperlab::fit::result::{FitResult, FitStatus};
 use wiperlab::fit::search::{STAGNANT_GENERATIONS, SearchSettings};
 use wiperlab::fit::search::{SearchTermination, search_minimum};
-use wiperlab::fit::targets::TargetValue;
+use wiperlab::fit::target_value::TargetValue;
 use wiperlab::fit::uncertainty::ParameterVerdict;
 use wiperlab::fit::{FitContext, FitError, fit_features, job::Job, job_warnings};
 use wiperlab::recording::Recording;

@@ -38,14 +38,9 @@ const LAYERS: [&str; 20] = [
 /// Layers that know nothing of a blade, and all that they may use.
 const GENERAL_LAYERS: [(&str, &[&str]); 3] =
     [("ode", &["math"]), ("spectrum", &["camera", "math"]), ("chart", &["math", "text"])];
-/// Commands that need no fit, the most files that each may reach, and whether it reaches nothing of a fit yet.
-const COMMANDS_WITHOUT_FIT: [(&str, usize, bool); 5] = [
-    ("modes", 99, true),
-    ("twin", 99, true),
-    ("inspect", 220, false),
-    ("simulate", 230, false),
-    ("spectrum", 240, false),
-];
+/// Commands that need no fit, and the most files that each may reach.
+const COMMANDS_WITHOUT_FIT: [(&str, usize); 5] =
+    [("modes", 99), ("twin", 120), ("inspect", 130), ("simulate", 140), ("spectrum", 150)];
 /// Layers that these commands reach nothing of.
 const FIT_LAYERS: [&str; 2] = ["fit", "compare"];
 
@@ -56,21 +51,12 @@ const MAX_FILE_LINES: usize = 700;
 /// Most columns of a line; tables and the inside of texts do not count.
 const MAX_COLUMNS: usize = 110;
 
-/// Cycles of more files or of several layers, each by its first file, with its length.
-const LONG_CYCLES: [(&str, usize); 6] = [
-    ("chart/contours.rs", 8),
-    ("fit/advice.rs", 43),
-    ("import.rs", 40),
-    ("simulate/scene.rs", 5),
-    ("simulate/sensitivity.rs", 6),
-    ("spectrum/analysis.rs", 6),
-];
 /// Files that are longer.
 const LONG_FILES: [&str; 0] = [];
 /// Types whose name another type has.
-const SHARED_TYPE_NAMES: [&str; 4] = ["Job", "Recording", "Row", "Scene"];
+const SHARED_TYPE_NAMES: [&str; 0] = [];
 /// Functions whose name is a bare participle.
-const PARTICIPLES: [&str; 3] = ["numbered", "shown", "written"];
+const PARTICIPLES: [&str; 0] = [];
 /// Nouns, adjectives and verbs that end as participles do.
 const NO_PARTICIPLES: [&str; 8] =
     ["drawing", "expecting", "len", "meaning", "open", "recording", "setting", "spacing"];
@@ -101,7 +87,7 @@ fn layers_use_only_layers_above_them() {
 fn commands_without_a_fit_reach_no_fit() {
     let files = read_source_files();
     let edges = find_edges(&files);
-    for (command, most, is_clean) in COMMANDS_WITHOUT_FIT {
+    for (command, most) in COMMANDS_WITHOUT_FIT {
         let start = files.iter().position(|f| f.path == format!("cli/{command}.rs")).expect(command);
         let reached = reach(start, &edges);
         let of_a_fit: Vec<_> = reached
@@ -110,7 +96,7 @@ fn commands_without_a_fit_reach_no_fit() {
             .filter(|f| f.layer().is_some_and(|layer| FIT_LAYERS.contains(&layer)))
             .map(|f| &f.path)
             .collect();
-        assert_eq!(of_a_fit.is_empty(), is_clean, "{command} reaches {of_a_fit:#?}");
+        assert!(of_a_fit.is_empty(), "{command} reaches {of_a_fit:#?}");
         assert!(reached.len() <= most, "{command} reaches {} files, at most {most}", reached.len());
     }
 }
@@ -141,8 +127,7 @@ fn no_cycle_leads_through_two_layers_or_many_files() {
         .filter(|cycle| cycle.len() > MAX_CYCLE_FILES || modules(cycle).len() > 1)
         .map(paths)
         .collect();
-    let lengths: Vec<_> = wrong.iter().map(|cycle| (&cycle[0][..], cycle.len())).collect();
-    assert_eq!(lengths, LONG_CYCLES, "{wrong:#?}");
+    assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
 #[test]

@@ -12,7 +12,8 @@ use wiperlab::model::shoulder::ShoulderContact;
 use wiperlab::model::{HeadMotion, LinkDirections, Linkage, Pose};
 use wiperlab::simulate::mode::TipMode;
 use wiperlab::simulate::outputs::{EnergyAudit, Transitions};
-use wiperlab::simulate::scene::{ContactLossRule, Drive, JamRule, Scene, StartKind};
+use wiperlab::simulate::scene::contact::{ContactLossRule, JamRule};
+use wiperlab::simulate::scene::{Drive, Scene, StartKind};
 use wiperlab::simulate::{
     Impact, ModelSample, Observer, RunResult, RunStatus, SolutionSegment, SolverOptions, Transition,
     TransitionCause, run_scene_with,

@@ -12,7 +12,8 @@ use wiperlab::model::modes::{TipConstraint, natural_modes};
 use wiperlab::simulate::drive::Drive;
 use wiperlab::simulate::mode::TipMode;
 use wiperlab::simulate::outputs::Transitions;
-use wiperlab::simulate::scene::{ContactLossRule, JamRule, Scene, StartKind};
+use wiperlab::simulate::scene::contact::{ContactLossRule, JamRule};
+use wiperlab::simulate::scene::{Scene, StartKind};
 use wiperlab::simulate::sensitivity::{
     Channel, TangentDirection, TangentObserver, TangentSeeds, TangentSegment, run_with_tangents,
 };

@@ -12,7 +12,8 @@ use wiperlab::model::modes::{TipConstraint, natural_modes};
 use wiperlab::recording::channel::ReversalInstants;
 use wiperlab::simulate::mode::TipMode;
 use wiperlab::simulate::outputs::Transitions;
-use wiperlab::simulate::scene::{ContactLossRule, Scene};
+use wiperlab::simulate::scene::Scene;
+use wiperlab::simulate::scene::contact::ContactLossRule;
 use wiperlab::simulate::twin::film_scene;
 use wiperlab::simulate::{RunStatus, SolverOptions, run_scene};
 use wiperlab::sweep::{

@@ -62,7 +62,7 @@ class Scene:
     @property
     def parameters(self) -> dict[str, float]:
         """The parameters as they are written."""
-        return dict(self._native.written())
+        return dict(self._native.written_values())
 
     @property
     def title(self) -> str:

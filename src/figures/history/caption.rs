@@ -1,16 +1,13 @@
 //! Time histories of a condition, whole and at the release, with their captions.
 
-use super::{TimeHistory, draw_enlarged, draw_figure};
-use super::{sticks_on_clock, thin_frames};
+use super::{TimeHistory, draw_enlarged, draw_figure, thin_frames};
 use crate::compare::condition::{FitWindow, group_fit_windows};
 use crate::compare::{ConditionComparison, TimedRecording};
 use crate::feature::{Reading, ReversalInterval};
-use crate::figures::{FigureBlock, OPPOSED, Words};
-use crate::recording::alignment::AlignmentPoint;
-use crate::recording::alignment::is_tracked;
+use crate::figures::{FigureBlock, FigureText, OPPOSED};
+use crate::recording::alignment::{AlignmentPoint, is_tracked};
 use crate::recording::channel::{Channel, InstantKind};
-use crate::recording::motion_traces::MOTION_CHANNELS;
-use crate::recording::motion_traces::MotionTraces;
+use crate::recording::motion_traces::{MOTION_CHANNELS, MotionTraces};
 use crate::simulate::RunStatus;
 use crate::simulate::mode::TipMode;
 use crate::text::{
@@ -53,7 +50,7 @@ fn build_history(case: &ConditionComparison) -> TimeHistory {
         measured,
         model: Some(model),
         residual: case.residual.clone().map(light),
-        stick_s: sticks_on_clock(case),
+        stick_s: case.sticks_on_clock(),
         instants: turn_instants(&shown),
         windows: windows.collect(),
         zoom_s,
@@ -99,7 +96,7 @@ fn fit_window_spans(case: &ConditionComparison) -> Vec<(String, f64, f64)> {
     found
 }
 
-fn whole_text(case: &ConditionComparison, history: &TimeHistory) -> Words {
+fn whole_text(case: &ConditionComparison, history: &TimeHistory) -> FigureText {
     let first =
         format!("Tip, head, deflection (tip minus head) and head drop over time: {}", describe_overlay(case));
     let said = [
@@ -118,10 +115,10 @@ fn whole_text(case: &ConditionComparison, history: &TimeHistory) -> Words {
     }
     let agreement = describe_agreement(case, None);
     let caption = format!("Motion of tip and head over time, {}{agreement}.", whose_motion(case));
-    Words { caption, details: details.join(" ") }
+    FigureText { caption, details: details.join(" ") }
 }
 
-fn enlarged_text(case: &ConditionComparison, history: &TimeHistory) -> Words {
+fn enlarged_text(case: &ConditionComparison, history: &TimeHistory) -> FigureText {
     let release_s = case.measured_or_model().instant_s(InstantKind::Release);
     let span = release_s.zip(history.zoom_s).map_or_else(String::new, |(at_s, (from_s, to_s))| {
         let [before, after] = [at_s - from_s, to_s - at_s].map(format_milliseconds);
@@ -138,7 +135,7 @@ fn enlarged_text(case: &ConditionComparison, history: &TimeHistory) -> Words {
     details.extend(describe_residuals(case, history.zoom_s));
     let agreement = describe_agreement(case, history.zoom_s);
     let caption = format!("The release of the tip enlarged, {}{agreement}.", whose_motion(case));
-    Words { caption, details: details.join(" ") }
+    FigureText { caption, details: details.join(" ") }
 }
 
 /// Sources of the drawn motions.

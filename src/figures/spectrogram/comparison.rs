@@ -151,7 +151,7 @@ mod tests {
     use crate::chart::Medium;
     use crate::figures::spectrogram::{SpectrogramRidgePoint, SpeedPoint};
 
-    fn shown(columns: usize, scale: f64) -> SpectrogramPlot {
+    fn example_spectrogram(columns: usize, scale: f64) -> SpectrogramPlot {
         let column = |i: usize| {
             (0..1000)
                 .map(|j| {
@@ -188,8 +188,8 @@ mod tests {
     fn both() -> SpectrogramComparison {
         SpectrogramComparison {
             sides: vec![
-                (SpectrogramSide::Measured, shown(200, 1.0)),
-                (SpectrogramSide::Model, shown(200, 0.1)),
+                (SpectrogramSide::Measured, example_spectrogram(200, 1.0)),
+                (SpectrogramSide::Model, example_spectrogram(200, 0.1)),
             ],
             ..SpectrogramComparison::default()
         }
@@ -227,7 +227,7 @@ mod tests {
 
     #[test]
     fn coarse_maps_keep_thin_lines_within_what_is_shown() {
-        let small = coarsen_spectrogram(&shown(200, 1.0));
+        let small = coarsen_spectrogram(&example_spectrogram(200, 1.0));
         assert!(small.time_s.len() <= MOST_COLUMNS && small.frequency_hz.len() <= MOST_ROWS);
         assert!(small.frequency_hz.iter().all(|f| *f <= 2000.0));
         assert!(
@@ -243,8 +243,8 @@ mod tests {
         for medium in [Medium::Screen, Medium::Column, Medium::Page] {
             let bytes = draw_comparison(&SpectrogramComparison {
                 sides: vec![
-                    (SpectrogramSide::Measured, shown(400, 1.0)),
-                    (SpectrogramSide::Model, shown(400, 0.1)),
+                    (SpectrogramSide::Measured, example_spectrogram(400, 1.0)),
+                    (SpectrogramSide::Model, example_spectrogram(400, 0.1)),
                 ],
                 ..both()
             })

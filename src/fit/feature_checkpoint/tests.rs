@@ -3,7 +3,7 @@ use crate::checkpoint::{CheckpointError, format_header_line, format_record_line,
 use crate::feature::ValueComparison;
 use crate::fit::bounds::{Bounds, BoundsSpacing};
 use crate::fit::evaluation::FailureReason;
-use crate::fit::targets::TargetValue;
+use crate::fit::target_value::TargetValue;
 use crate::simulate::RunStatus;
 
 fn header(fingerprint: &str) -> FeatureHeader {

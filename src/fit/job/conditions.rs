@@ -1,8 +1,9 @@
 //! Recordings and operating conditions of a job: what is simulated, and which values replace those of the
 //! scene.
 
+use super::KeyRefusal;
 use super::as_written::{self, RecordingCamera};
-use super::{KeyRefusal, check_non_empty, find_repeated};
+use super::checks::{check_non_empty, find_repeated};
 use crate::model::parameters;
 use crate::toml_file::suggest_key;
 use serde::Serialize;

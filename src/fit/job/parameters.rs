@@ -1,7 +1,8 @@
 //! Free parameters and freed constants of a job: bounds and priors.
 
 use super::as_written::{self, JobNuisanceEntry, ListedNuisance};
-use super::{KeyRefusal, check_above_zero, find_repeated, is_same_quantity};
+use super::checks::find_repeated;
+use super::{KeyRefusal, check_above_zero, is_same_quantity};
 use crate::fit::bounds::{Bounds, BoundsSpacing, Prior, SearchAxis};
 use crate::math;
 use crate::toml_file::suggest_key;

@@ -1,8 +1,9 @@
 //! Components and features of a job: readings and the sources of their targets.
 
 use super::as_written::ConditionReference;
+use super::checks::{check_non_empty, find_repeated};
 use super::conditions::JobCondition;
-use super::{KeyRefusal, as_written, check_above_zero, check_non_empty, find_repeated};
+use super::{KeyRefusal, as_written, check_above_zero};
 use crate::feature;
 use crate::feature::{FREQUENCY_SD_FLOOR, Feature, Keys, Reading, ReadingKind, ValueComparison};
 use crate::toml_file::suggest_key;

@@ -5,11 +5,10 @@ use super::super::objective::Objective;
 use super::*;
 use crate::checkpoint::NullSink;
 use crate::feature::ValueComparison;
-use crate::fit::bounds::SearchAxis;
-use crate::fit::bounds::{Bounds, BoundsSpacing};
+use crate::fit::bounds::{Bounds, BoundsSpacing, SearchAxis};
 use crate::fit::evaluation::RunFailure;
 use crate::fit::linear_model::{FeatureSlopes, difference_points, jacobian};
-use crate::fit::targets::TargetValue;
+use crate::fit::target_value::TargetValue;
 use std::ops::ControlFlow;
 
 struct CurvedPredictor;

@@ -1,21 +1,22 @@
 //! Assembles the result of a fit.
 
-use super::{ComponentResult, EvaluationCounts, FeatureResult, FitResult, FitStatus};
-use super::{LocalOptimum, NuisanceResult, RunnerUpPeak};
+use super::{
+    ComponentResult, EvaluationCounts, FeatureResult, FitResult, FitStatus, LocalOptimum, NuisanceResult,
+    RunnerUpPeak,
+};
 use crate::feature::FeatureValue;
 use crate::fit::camera_calibration::{CameraEstimate, CameraFit};
-use crate::fit::evaluation::{Evaluation, Observed};
+use crate::fit::context::FitContext;
+use crate::fit::evaluation::{Evaluation, Observed, map_names};
 use crate::fit::identifiability::Identifiability;
 use crate::fit::job::{FitTarget, Job};
 use crate::fit::ledger::Ledger;
 use crate::fit::linear_model::Z_95;
-use crate::fit::run::FitContext;
 use crate::fit::search::{LocalDescent, SearchOutcome};
-use crate::fit::targets::TargetValue;
+use crate::fit::target_value::TargetValue;
 use crate::fit::uncertainty::{CHI_SQUARED_95, FitUncertainty};
 use crate::math;
 use crate::text::format_short;
-use std::collections::BTreeMap;
 
 /// Everything that goes into a result.
 pub(in crate::fit) struct FitFindings<'a> {
@@ -163,11 +164,6 @@ fn unread_result(aim: &FitTarget, target: &TargetValue) -> FeatureResult {
 
 fn relative_error(model: Option<f64>, target: &TargetValue) -> Option<f64> {
     model.map(|model| model / target.value - 1.0).filter(|error| error.is_finite())
-}
-
-/// Values by parameter name.
-pub(in crate::fit) fn map_names<T>(names: &[String], values: impl Iterator<Item = T>) -> BTreeMap<String, T> {
-    names.iter().cloned().zip(values).collect()
 }
 
 /// Calibrations of the cameras of features.

@@ -1,11 +1,13 @@
 //! A search outside the interval of one parameter: how well the model fits at other values of it.
 
+use super::SearchSettings;
+use super::costs::StageCosts;
 use super::gauss_newton::descend_gauss_newton;
 use super::local::distinct_best_points;
 use super::population::{WIDE_EXTENT, evolve_population};
-use super::{SearchSettings, StageCosts};
 use crate::fit::evaluation::{Evaluation, EvaluationStage};
 use crate::fit::ledger::{Ledger, StopReason};
+use crate::fit::search::costs::Slab;
 
 /// Fraction of the evaluations for the population; the rest is for the descents.
 const POPULATION_SHARE: f64 = 0.6;
@@ -53,35 +55,4 @@ fn evaluations_in_slab<'l>(ledger: &'l Ledger, slab: Slab) -> impl Iterator<Item
 /// The best known point of a slab.
 pub(crate) fn best_in_slab<'l>(ledger: &'l Ledger, slab: Slab) -> Option<&'l Evaluation> {
     evaluations_in_slab(ledger, slab).min_by(|a, b| a.cost.total_cmp(&b.cost))
-}
-
-/// Part of the unit box in which one coordinate is limited to a range.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Slab {
-    /// Index of the parameter.
-    pub axis: usize,
-    pub lower: f64,
-    pub upper: f64,
-}
-
-impl Slab {
-    /// Whether a point lies in it.
-    pub(crate) fn contains(&self, unit: &[f64]) -> bool {
-        unit.get(self.axis).is_some_and(|u| (self.lower..=self.upper).contains(u))
-    }
-
-    /// The slab reduced by `margin` at each end that is not an end of the box.
-    pub(crate) fn shrink_by(self, margin: f64) -> Self {
-        let lower = if self.lower > 0.0 { self.lower + margin } else { self.lower };
-        let upper = if self.upper < 1.0 { self.upper - margin } else { self.upper };
-        Self { lower, upper, ..self }
-    }
-
-    /// Maps a point of the unit box into the slab.
-    pub(super) fn map_into(&self, mut unit: Vec<f64>) -> Vec<f64> {
-        if let Some(u) = unit.get_mut(self.axis) {
-            *u = self.lower + (self.upper - self.lower) * *u;
-        }
-        unit
-    }
 }

@@ -5,7 +5,7 @@
 //! step by Broyden's rule and measured again when a step gains nothing. argmin's Gauss-Newton has neither
 //! damping nor bounds and stops at the first failure.
 
-use super::StageCosts;
+use super::costs::StageCosts;
 use super::termination::{EXACT_COST, MIN_WORTHWHILE_GAIN};
 use crate::fit::evaluation::{Evaluation, EvaluationStage};
 use crate::fit::ledger::{Ledger, StopReason};

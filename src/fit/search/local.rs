@@ -1,11 +1,13 @@
 //! Local searches: descents from the best points, populations about the best ends, and a polish of the best.
 
+use super::SearchSettings;
+use super::costs::StageCosts;
 use super::gauss_newton::descend_gauss_newton;
 use super::population::{NEAR_EXTENT, evolve_population};
 use super::simplex::run_simplex;
-use super::termination::{EXACT_COST, MIN_START_DISTANCE, MIN_WORTHWHILE_GAIN, SIMPLEX_EDGES};
-use super::termination::{LocalDescent, SearchTermination};
-use super::{SearchSettings, StageCosts};
+use super::termination::{
+    EXACT_COST, LocalDescent, MIN_START_DISTANCE, MIN_WORTHWHILE_GAIN, SIMPLEX_EDGES, SearchTermination,
+};
 use crate::fit::evaluation::{Evaluation, EvaluationStage};
 use crate::fit::ledger::{Ledger, StopReason};
 

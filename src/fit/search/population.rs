@@ -4,8 +4,9 @@
 //! without negative weights. A population learns the shape of a valley and is not caught by ripples on its
 //! floor. A point outside the unit box is evaluated at its mirror image inside. argmin has no such solver.
 
+use super::SearchSettings;
+use super::costs::StageCosts;
 use super::stagnation::StagnationCounter;
-use super::{SearchSettings, StageCosts};
 use crate::fit::bounds::clamp_unit;
 use crate::fit::evaluation::EvaluationStage;
 use crate::fit::ledger::{Ledger, StopReason};

@@ -4,7 +4,7 @@
 //! here. The solver has no bounds, so it works on the real line ([`line_to_unit`]). It panics on an error
 //! of its first costs, so costs are never errors.
 
-use super::StageCosts;
+use super::costs::StageCosts;
 use super::stagnation::StagnationCounter;
 use super::termination::{EXACT_COST, SIMPLEX_COST_SPREAD, SearchTermination};
 use crate::fit::bounds::{line_to_unit, unit_to_line};

@@ -1,8 +1,7 @@
 //! One run of the model over a segment as the camera records it, with its derivatives.
 
 use super::camera_observation::CameraObservation;
-use super::checkpoint::{Iterate, TraceSearchSettings};
-use super::levenberg_marquardt::{first_iterate, refit_plain};
+use super::checkpoint::Iterate;
 use super::model::{TraceModel, TraceRecording};
 use super::normal_equations::recording_models;
 use super::unknowns::{CameraParameters, CameraUnknown, TraceUnknowns, UnknownKind};
@@ -14,7 +13,6 @@ use crate::simulate::sensitivity::{
 use crate::simulate::{RunStatus, SolverOptions};
 use nalgebra::{DMatrix, DVector, Vector4};
 use std::cell::RefCell;
-use std::collections::BTreeMap;
 
 /// Angles, rad, and rates, rad/s, of neck and lip.
 pub(super) type LinkState = Vector4<f64>;
@@ -376,29 +374,6 @@ impl<'a> RecordingModel<'a> {
 }
 
 // Misfit at one point, with nothing but the starting states fitted.
-
-/// The segments of the last stage at a point with their best starting states; `None` where a scene refuses
-/// the point. The result depends on nothing but the point.
-pub(crate) fn fit_states_at(model: &TraceModel, segment_s: &[f64], point: &[f64]) -> Option<Iterate> {
-    let last = TraceSearchSettings { segment_s: segment_s.last().copied().into_iter().collect(), twins: 0 };
-    refit_plain(model, first_iterate(model, &last, point)?)
-}
-
-/// Whitened residuals of every fitted frame, recording by recording, tip before head. A cell is `None` where
-/// the model has no value.
-pub(crate) fn frame_residuals(model: &TraceModel, at: Option<&Iterate>) -> Vec<Option<f64>> {
-    let mut known = BTreeMap::new();
-    for segment in at.map(|at| segment_residuals(model, at)).unwrap_or_default() {
-        let place = |frame: &usize| (segment.recording, segment.is_drop, *frame);
-        known.extend(segment.frames.iter().map(place).zip(segment.whitened.iter().copied()));
-    }
-    let films = model.recordings.iter().enumerate().flat_map(|(film, shoot)| {
-        let [tip, drop] = shoot.observation.data_frames(shoot.observation.settings.frames);
-        let of = move |is_drop: bool| move |frame: usize| (film, is_drop, frame);
-        tip.into_iter().map(of(false)).chain(drop.into_iter().map(of(true)))
-    });
-    films.map(|place| known.get(&place).copied()).collect()
-}
 
 // Residuals of a fitted trace, channel by channel.
 

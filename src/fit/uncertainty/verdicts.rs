@@ -11,7 +11,7 @@ use crate::fit::objective::Objective;
 use crate::fit::profile::AT_BOUND;
 use crate::fit::result::{FitResult, FitStatus};
 use crate::fit::search::{EXACT_COST, MIN_WORTHWHILE_GAIN};
-use crate::fit::targets::TargetValue;
+use crate::fit::target_value::TargetValue;
 use crate::math;
 use nalgebra::DMatrix;
 

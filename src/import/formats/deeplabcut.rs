@@ -1,8 +1,8 @@
 //! DeepLabCut and Lightning Pose: tables under three header rows (four with individuals), and tables of
 //! labels set by hand.
 
-use super::FileFormat;
 use crate::import::error::{CellProblem, ImportError, ImportResult};
+use crate::import::format::FileFormat;
 use crate::import::options::ImportOptions;
 use crate::import::reader::findings::picked_frames_finding;
 use crate::import::reader::{

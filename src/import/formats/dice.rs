@@ -1,7 +1,7 @@
 //! DICe (Digital Image Correlation Engine) in tracking mode: a file a subset, a row a frame.
 
-use super::FileFormat;
 use crate::import::error::{ImportError, ImportResult, TextLocation};
+use crate::import::format::FileFormat;
 use crate::import::options::ImportOptions;
 use crate::import::reader::{
     CoordinateUnit, DelimitedTable, Document, Facts, LostRule, PointCells, TableLayout, TextRow, TrackFile,

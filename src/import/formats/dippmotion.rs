@@ -1,7 +1,7 @@
 //! DIPP-MOTION (DITECT): the table behind an X-Y graph, in CP932, under a header of varying length.
 
-use super::FileFormat;
 use crate::import::error::{ImportError, ImportResult, TextLocation};
+use crate::import::format::FileFormat;
 use crate::import::options::ImportOptions;
 use crate::import::reader::{
     Column, CoordinateUnit, DelimitedTable, Document, Fact, Facts, PointCells, TableLayout, TextRow,

@@ -4,11 +4,11 @@
 mod flat;
 mod sparse;
 
-use super::FileFormat;
-use crate::import::base_name;
 use crate::import::error::{ImportError, ImportResult};
+use crate::import::format::FileFormat;
 use crate::import::options::ImportOptions;
 use crate::import::reader::{CoordinateUnit, Document, Fact, Facts, TextRow, TrackFile};
+use crate::import::source::base_name;
 use crate::recording::files::YAxis;
 
 pub(crate) struct Dltdv;

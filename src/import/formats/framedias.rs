@@ -1,15 +1,15 @@
 //! Frame-DIAS (DKH): `.rd`, rows of coordinates under a line of counts. A companion `.set` has the names of
 //! the points and the rate of the camera.
 
-use super::FileFormat;
-use crate::import::base_name;
 use crate::import::error::{ImportError, ImportResult};
+use crate::import::format::FileFormat;
 use crate::import::options::{ImportOptions, TimeColumn};
 use crate::import::reader::timing::RATE_AGREEMENT;
 use crate::import::reader::{
     CellNumber, Clock, DelimitedTable, Document, Fact, Facts, LostRule, PointCells, TableLayout, TimeUnit,
     TrackFile,
 };
+use crate::import::source::base_name;
 
 /// Number of cells in the first line: frames, points, time from frame to frame.
 const COUNTS: usize = 3;

@@ -1,7 +1,7 @@
 //! Plain tables whose columns the user names or numbers with `--columns`.
 
-use super::FileFormat;
 use crate::import::error::{ImportError, ImportResult};
+use crate::import::format::FileFormat;
 use crate::import::options::{COLUMN_KEYS, ColumnMap, ColumnName, ImportOptions, ROW_COLUMN};
 use crate::import::reader::layout::{ClockCell, find_clock_difference};
 use crate::import::reader::{

@@ -1,8 +1,8 @@
 //! ImageJ and Fiji: the Results table, the table of the plugin Manual Tracking, and MTrackJ's table of
 //! points.
 
-use super::FileFormat;
 use crate::import::error::{ImportError, ImportResult};
+use crate::import::format::FileFormat;
 use crate::import::options::ImportOptions;
 use crate::import::reader::{
     CoordinateUnit, DelimitedTable, Document, Facts, PointCells, RowOrder, TableLayout, TextRow, TimeUnit,

@@ -3,9 +3,9 @@
 
 mod text;
 
-use super::FileFormat;
 use super::generic::GenericFormat;
 use crate::import::error::{ImportError, ImportResult};
+use crate::import::format::FileFormat;
 use crate::import::options::ImportOptions;
 use crate::import::reader::{
     CellNumber, DelimitedTable, Document, Facts, TableLayout, TextRow, TimeUnit, TrackFile, layout,

@@ -1,7 +1,7 @@
 //! motion-analysis-2d (Saga University): one row a frame, times with four decimals.
 
-use super::FileFormat;
 use crate::import::error::{ImportError, ImportResult};
+use crate::import::format::FileFormat;
 use crate::import::options::ImportOptions;
 use crate::import::reader::{DelimitedTable, Document, Facts, TableLayout, TrackFile, layout};
 

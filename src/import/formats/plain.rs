@@ -2,14 +2,13 @@
 
 mod header;
 
-use super::FileFormat;
 use crate::import::error::{ImportError, ImportResult};
+use crate::import::format::FileFormat;
 use crate::import::options::ImportOptions;
-use crate::import::reader::layout;
 use crate::import::reader::layout::ClockCell;
 use crate::import::reader::{
     CoordinateUnit, DelimitedTable, Document, Facts, PointCells, RowOrder, TableLayout, TextRow, TimeUnit,
-    TrackFile,
+    TrackFile, layout,
 };
 use header::ColumnMeaning;
 

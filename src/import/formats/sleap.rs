@@ -1,7 +1,7 @@
 //! SLEAP: the analysis CSV and the tables of sleap-io with a row a point, an instance or a frame.
 
-use super::FileFormat;
 use crate::import::error::{ImportError, ImportResult, TextLocation};
+use crate::import::format::FileFormat;
 use crate::import::options::ImportOptions;
 use crate::import::reader::findings::picked_frames_finding;
 use crate::import::reader::{

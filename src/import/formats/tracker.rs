@@ -1,7 +1,7 @@
 //! Tracker (Open Source Physics): tables from File > Export > Data or copied from the data view.
 
-use super::FileFormat;
 use crate::import::error::{ImportError, ImportResult};
+use crate::import::format::FileFormat;
 use crate::import::options::ImportOptions;
 use crate::import::reader::layout::{ClockCell, find_clock_difference};
 use crate::import::reader::{

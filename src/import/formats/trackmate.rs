@@ -4,8 +4,8 @@ mod project;
 mod spots;
 mod xml;
 
-use super::FileFormat;
 use crate::import::error::{ImportError, ImportResult, TextLocation};
+use crate::import::format::FileFormat;
 use crate::import::options::ImportOptions;
 use crate::import::reader::{
     Clock, CoordinateUnit, DelimitedTable, Document, Facts, TimeUnit, Track, TrackFile, clock_lines,

@@ -1,8 +1,8 @@
 //! trackpy: its table of linked features, saved with `to_csv`. y is in front of x, and an index without a
 //! name may be in front of both.
 
-use super::FileFormat;
 use crate::import::error::{ImportError, ImportResult};
+use crate::import::format::FileFormat;
 use crate::import::options::ImportOptions;
 use crate::import::reader::{
     DelimitedTable, Document, Facts, PointCells, RowOrder, TableLayout, TextRow, TrackFile,

@@ -1,8 +1,8 @@
 //! TRC, the table of markers of motion-capture programs: lines of settings, then names of markers over three
 //! columns each.
 
-use super::FileFormat;
 use crate::import::error::{ImportError, ImportResult, TextLocation};
+use crate::import::format::FileFormat;
 use crate::import::options::ImportOptions;
 use crate::import::reader::timing::RATE_AGREEMENT;
 use crate::import::reader::{

@@ -1,7 +1,7 @@
 //! This program's own `trace.csv`: metres, seconds, y upwards. It is read back bit for bit.
 
-use super::FileFormat;
 use crate::import::error::ImportResult;
+use crate::import::format::FileFormat;
 use crate::import::options::ImportOptions;
 use crate::import::reader::{
     Clock, Column, CoordinateUnit, Document, Facts, TimeUnit, Track, TrackFile, clock_lines,

@@ -3,11 +3,11 @@
 
 use super::timing::{RATE_AGREEMENT, times_fit_rate};
 use super::track_file::{CoordinateUnit, TimeUnit};
-use crate::import::ImportReport;
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::options::{CoordinateScale, ImportOptions, TimeColumn};
 use crate::import::reader::track_file::TrackFile;
 use crate::import::reader::{findings, track_choice};
+use crate::import::source::ImportReport;
 use crate::recording::clock;
 use crate::recording::files::YAxis;
 

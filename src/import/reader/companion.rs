@@ -6,7 +6,7 @@ use crate::import::error::{ImportError, ImportResult};
 use crate::import::options::ImportOptions;
 use crate::import::reader::findings::new_finding;
 use crate::import::reader::track_file::{Clock, Fact, TrackFile};
-use crate::import::{CompanionFile, ImportSource, base_name};
+use crate::import::source::{CompanionFile, ImportSource, base_name};
 use crate::recording::quality::{Check, QualityFinding, Severity};
 
 /// Names that companions of the export `file` may have in its folder, in the order in which they are read.

@@ -1,7 +1,6 @@
 //! Puts the chosen tracks on one frame grid.
 
 use super::track_file::Column;
-use crate::import::ImportReport;
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::options::{CoordinateScale, ImportOptions, TimeColumn};
 use crate::import::reader::calibration::ImportCalibration;
@@ -9,6 +8,7 @@ use crate::import::reader::timing::{ClockRows, DeclaredTiming, RowFrames};
 use crate::import::reader::track_choice::TrackIndex;
 use crate::import::reader::track_file::TrackFile;
 use crate::import::reader::{findings, timing};
+use crate::import::source::ImportReport;
 use crate::recording::FrameGrid;
 use crate::recording::clock::MAX_FRAMES;
 use crate::recording::files::YAxis;

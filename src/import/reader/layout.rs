@@ -1,11 +1,12 @@
 //! The meaning of the cells of a table. A format fills in a [`TableLayout`]; the rows of all formats are then
 //! read by the same code.
 
+use super::Document;
+use super::cut_numbers::cut_numbers_finding;
 use super::number::CellNumber;
 use super::rows::RowView;
 use super::table::DelimitedTable;
 use super::track_file::{Facts, TrackFile};
-use super::{Document, spreadsheet};
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::reader::instances::{
     InstanceFields, PointFields, RowOrder, RowPosition, RowStamp, TrackCollector,
@@ -139,7 +140,7 @@ impl TableLayout {
             texts: table.head.iter().take(self.start).flat_map(|row| row.cells.iter().cloned()).collect(),
             ..TrackFile::for_document(document)
         };
-        export.findings.extend(spreadsheet::cut_numbers_finding(table, self.start, &self.number_cells())?);
+        export.findings.extend(cut_numbers_finding(table, self.start, &self.number_cells())?);
         if nameless > 0 {
             export.notes.push(format!("{nameless} rows belong to no track and are left out"));
         }

@@ -1,12 +1,6 @@
 //! Damage to numbers in a table that a spreadsheet opened and saved: dates, separators of thousands, marks of
 //! narrow columns, errors of formulas.
 
-use super::findings::new_finding;
-use super::number::CellNumber;
-use super::table::DelimitedTable;
-use crate::import::error::ImportResult;
-use crate::recording::quality::{Check, QualityFinding, Severity};
-
 const DATE: &str = "a spreadsheet has made a date of the number, and the number is lost: import the tracking \
     program's own export, which no spreadsheet has saved";
 const GROUPED: &str = "a spreadsheet has put separators of thousands into the number, perhaps for its decimal mark: \
@@ -89,58 +83,6 @@ fn is_grouped(text: &str) -> bool {
 
 // Numbers that a spreadsheet cut to three digits, because it saves what it shows.
 
-const CUT_NUMBER_ADVICE: &str = "a spreadsheet shows numbers so and saves what it shows: import the tracking program's own \
-    export, which no spreadsheet has saved";
-
-/// `1.23E+05`: the form of a number that does not fit its cell.
-fn is_cut_number(text: &str) -> bool {
-    let digits = text.strip_prefix('-').unwrap_or(text).as_bytes();
-    matches!(digits, [a, b'.' | b',', b, c, b'E', b'+' | b'-', d, e]
-        if [a, b, c, d, e].iter().all(|byte| byte.is_ascii_digit()))
-}
-
-/// Numbers in the columns `cells` that were cut to three digits, where others of the same column were not.
-/// `start` is the index of the first row of data in the table's head.
-///
-/// # Errors
-/// A refusal of rows that cannot be read.
-pub(crate) fn cut_numbers_finding(
-    table: &DelimitedTable,
-    start: usize,
-    cells: &[usize],
-) -> ImportResult<Option<QualityFinding>> {
-    if !table.may_have_cut_numbers() {
-        return Ok(None);
-    }
-    // for each column: number of cut numbers, the first of them, and whether others are written out
-    let mut found = vec![(0_usize, None, false); cells.len()];
-    let mut rows = table.rows(start);
-    while let Some(record) = rows.next_row()? {
-        for ((count, first, plain), &cell) in found.iter_mut().zip(cells) {
-            let text = record.cell(cell);
-            if is_cut_number(text) {
-                *count += 1;
-                first.get_or_insert_with(|| (record.line, text.to_owned()));
-            } else if !text.contains(['e', 'E']) {
-                *plain |= matches!(table.parse_cell(text), CellNumber::Value(value) if value != 0.0);
-            }
-        }
-    }
-    let cut = found.into_iter().zip(cells).find_map(|((count, first, plain), &cell)| {
-        first.filter(|_| plain).map(|(line, text)| (count, line, text, cell))
-    });
-    Ok(cut.map(|(count, line, text, cell)| {
-        let found = format!(
-            "{}: `{text}` has three digits where others of its column are written out ({count} such numbers in \
-             column {})",
-            table.cell_location(line, cell),
-            cell + 1
-        );
-        let number = (count as f64, "");
-        new_finding(Check::SpreadsheetRounding, Severity::Caution, number, found, CUT_NUMBER_ADVICE)
-    }))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -190,18 +132,5 @@ mod tests {
                 "{words}"
             );
         }
-    }
-
-    #[test]
-    fn numbers_cut_to_three_digits_among_others_are_found_at_their_place() {
-        let found = |text: &str| {
-            let table = DelimitedTable::parse("a.csv", text).unwrap();
-            cut_numbers_finding(&table, 1, &[0, 1]).unwrap()
-        };
-        let cut = found("t,x\n0,101.25\n1,1.23E+05\n2,103.5\n3,1.25E+05\n").unwrap();
-        assert!(cut.found.starts_with("a.csv:3:3: `1.23E+05` has three digits"), "{}", cut.found);
-        assert!(cut.found.contains("(2 such numbers in column 2)"), "{}", cut.found);
-        assert_eq!(found("t,x\n0,1.01E+02\n1,1.23E+05\n2,0\n"), None);
-        assert_eq!(found("t,x\n0,1.013E+02\n1,5\n2,6\n"), None);
     }
 }

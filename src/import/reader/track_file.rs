@@ -1,10 +1,10 @@
 //! The content of a file as its format reads it: clocks, tracks, and facts such as units.
 
 use super::Document;
-use crate::import::base_name;
 use crate::import::error::TextLocation;
 use crate::import::options::CoordinateScale;
 use crate::import::reader::table::DelimitedTable;
+use crate::import::source::base_name;
 use crate::recording::files::YAxis;
 use crate::recording::quality::QualityFinding;
 

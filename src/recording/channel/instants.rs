@@ -130,7 +130,7 @@ impl ReversalInstants {
     /// # Errors
     /// [`InstantNotFound`] with what was found instead.
     pub fn time_s(&self, anchor: InstantKind, reversal: usize) -> Result<f64, InstantNotFound> {
-        let found = self.numbered(reversal).ok_or(match self.reversals.len() {
+        let found = self.find_reversal(reversal).ok_or(match self.reversals.len() {
             0 => InstantNotFound::NoTurn,
             turns => InstantNotFound::FewerTurns { turns },
         })?;
@@ -151,11 +151,11 @@ impl ReversalInstants {
     /// As [`Self::time_s`] of [`InstantKind::Flip`].
     pub(crate) fn settling_time_s(&self, reversal: usize) -> Result<f64, InstantNotFound> {
         self.time_s(InstantKind::Flip, reversal)?;
-        self.numbered(reversal).and_then(Reversal::settling_time_s).ok_or(InstantNotFound::NoRelease)
+        self.find_reversal(reversal).and_then(Reversal::settling_time_s).ok_or(InstantNotFound::NoRelease)
     }
 
     /// The `reversal`-th turn, counted from 1.
-    pub(crate) fn numbered(&self, reversal: usize) -> Option<&Reversal> {
+    pub(crate) fn find_reversal(&self, reversal: usize) -> Option<&Reversal> {
         self.reversals.get(reversal.checked_sub(1)?)
     }
 }

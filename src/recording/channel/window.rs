@@ -188,14 +188,16 @@ impl fmt::Display for WindowEnd {
             Self::Time(time_s) => write!(f, "{time_s}"),
             Self::Found { anchor, reversal, offset_s } => {
                 let offset = if offset_s == 0.0 { String::new() } else { format!("{offset_s:+}") };
-                write!(f, "{}{}{offset}", anchor.name(), numbered(reversal))
+                write!(f, "{}{}{offset}", anchor.name(), format_reversal_index(reversal))
             }
-            Self::Phase { phase, reversal } => write!(f, "{}{}", phase.name(), numbered(reversal)),
+            Self::Phase { phase, reversal } => {
+                write!(f, "{}{}", phase.name(), format_reversal_index(reversal))
+            }
         }
     }
 }
 
-fn numbered(reversal: usize) -> String {
+fn format_reversal_index(reversal: usize) -> String {
     if reversal == 1 { String::new() } else { format!("[{reversal}]") }
 }
 

@@ -1,6 +1,6 @@
 //! Rows of the tables of a report, from a job, its recordings and its result.
 
-use crate::compare::{Comparison, FittedRecording, NextPeak, ParameterLine, Truth};
+use crate::compare::{FittedRecording, NextPeak, ParameterLine, TargetComparison, TrueValue};
 use crate::fit::job::{FreeParameter, Job, TargetSource};
 use crate::fit::result::{ComponentResult, FeatureResult, FitResult, FitStatus, ParameterResult};
 use crate::fit::uncertainty::ParameterVerdict;
@@ -32,20 +32,20 @@ pub(super) fn recording_line(measured: &FittedRecording) -> RecordingLine {
 }
 
 /// A row with what the job says of a target: its source, condition and tolerance.
-fn comparison_line(job: &Job, measured: &[FittedRecording], name: &str) -> Comparison {
+fn comparison_line(job: &Job, measured: &[FittedRecording], name: &str) -> TargetComparison {
     let Some(target) = job.targets.iter().find(|target| target.feature.name == name) else {
-        return Comparison { name: name.to_owned(), ..Comparison::default() };
+        return TargetComparison { name: name.to_owned(), ..TargetComparison::default() };
     };
     let at = target.feature.condition;
     let condition = job.conditions.get(at).filter(|_| job.conditions.len() > 1);
     let is_measured = matches!(target.source, TargetSource::Measured { .. });
-    Comparison {
+    TargetComparison {
         name: name.to_owned(),
         condition: condition.map(|condition| condition.name.clone()),
         given: matches!(target.source, TargetSource::Given { .. }),
         synthetic: is_measured && measured.get(at).is_some_and(|m| m.recording.is_synthetic()),
         tolerance_relative: target.tolerance_relative,
-        ..Comparison::default()
+        ..TargetComparison::default()
     }
 }
 
@@ -53,8 +53,8 @@ pub(super) fn component_lines(
     job: &Job,
     measured: &[FittedRecording],
     result: &FitResult,
-) -> Vec<Comparison> {
-    let component = |c: &ComponentResult| Comparison {
+) -> Vec<TargetComparison> {
+    let component = |c: &ComponentResult| TargetComparison {
         unit: "Hz".to_owned(),
         target: c.target_hz,
         target_sd: Some(c.target_sd_hz),
@@ -76,8 +76,8 @@ pub(super) fn feature_lines(
     job: &Job,
     measured: &[FittedRecording],
     found: &[FeatureResult],
-) -> Vec<Comparison> {
-    let feature = |f: &FeatureResult| Comparison {
+) -> Vec<TargetComparison> {
+    let feature = |f: &FeatureResult| TargetComparison {
         unit: f.unit.clone(),
         target: f.target,
         target_sd: Some(f.target_sd),
@@ -135,7 +135,7 @@ fn parameter_line(
         bootstrap_95: found.bootstrap_95,
         truth: None,
     };
-    line.truth = truth.map(|value| Truth { value, inside_95: line.holds(value) });
+    line.truth = truth.map(|value| TrueValue { value, inside_95: line.holds(value) });
     line
 }
 

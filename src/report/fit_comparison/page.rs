@@ -2,7 +2,7 @@
 
 use super::intervals::estimate_text;
 use super::{ComparedFit, FitComparison, IntervalPair, SharedParameter};
-use crate::compare::{Comparison, ParameterLine};
+use crate::compare::{ParameterLine, TargetComparison};
 use crate::report::page::html::CellStyle::{Bad, Good, Prose, Words};
 use crate::report::page::html::*;
 use crate::report::page::{agreement, data_banner, provenance_html};
@@ -11,7 +11,7 @@ use crate::text::{DASH, format_number, format_or_dash};
 /// The page; the same comparison always gives the same bytes.
 pub(crate) fn render_page(several: &FitComparison) -> String {
     let section = |id, heading, html: String| PageSection { id, heading, html, folded: false };
-    let compared = |caption: &str, of: fn(&ComparedFit) -> &Vec<Comparison>| {
+    let compared = |caption: &str, of: fn(&ComparedFit) -> &Vec<TargetComparison>| {
         agreement::fits_table(caption, &merge_comparisons(several, of))
     };
     let statements = statements_html(&several.statements);
@@ -43,7 +43,7 @@ fn data_lead(entry: &ComparedFit) -> String {
 fn fits_table(entries: &[ComparedFit]) -> String {
     let row = |e: &ComparedFit| -> Vec<HtmlCell> {
         let share = |met: usize, of: usize| (format!("{met} of {of}"), if met == of { Good } else { Bad });
-        let of = |list: &[Comparison]| share(list.iter().filter(|c| c.pass).count(), list.len());
+        let of = |list: &[TargetComparison]| share(list.iter().filter(|c| c.pass).count(), list.len());
         let known = e.report.parameters.iter().filter(|p| p.is_identified()).count();
         let source = |synthetic| if synthetic { " (synthetic)" } else { "" };
         let recordings = e.report.recordings.iter();
@@ -112,16 +112,16 @@ fn parameters_table(several: &FitComparison) -> String {
 /// Rows of all fits, sorted by name, each with the name of its fit as condition.
 fn merge_comparisons(
     several: &FitComparison,
-    of: impl Fn(&ComparedFit) -> &Vec<Comparison>,
-) -> Vec<Comparison> {
-    let mut lines: Vec<Comparison> = Vec::new();
+    of: impl Fn(&ComparedFit) -> &Vec<TargetComparison>,
+) -> Vec<TargetComparison> {
+    let mut lines: Vec<TargetComparison> = Vec::new();
     for entry in &several.fits {
         for line in of(entry) {
             let name = &entry.name;
             let condition =
                 line.condition.as_ref().map_or_else(|| name.clone(), |of| format!("{name}: {of}"));
             let at = lines.iter().rposition(|l| l.name == line.name).map_or(lines.len(), |at| at + 1);
-            lines.insert(at, Comparison { condition: Some(condition), ..line.clone() });
+            lines.insert(at, TargetComparison { condition: Some(condition), ..line.clone() });
         }
     }
     lines

@@ -3,7 +3,7 @@
 
 use super::{ComparisonInput, shorten_name};
 use crate::chart::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, VerticalLine};
-use crate::compare::Comparison;
+use crate::compare::TargetComparison;
 use crate::feature::{FeatureBand, Reading};
 use crate::figures::{Drawing, FigureBlock, NO_TRACES, subtitle};
 use crate::fit::job::FitTarget;
@@ -99,7 +99,7 @@ impl<'a> SpectrumGroupMember<'a> {
     }
 
     /// The lines of the report about the component.
-    fn comparisons(&self) -> impl Iterator<Item = &'a Comparison> {
+    fn comparisons(&self) -> impl Iterator<Item = &'a TargetComparison> {
         let (report, name) = (self.fitted.report, &self.aim.feature.name);
         report.components.iter().chain(&report.held_out).filter(move |c| c.name == *name)
     }

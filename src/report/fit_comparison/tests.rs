@@ -1,7 +1,7 @@
 use super::interval_relation;
 use super::*;
 use crate::chart::{MAX_HEIGHT_MM, Medium};
-use crate::compare::{Comparison, ParameterLine};
+use crate::compare::{ParameterLine, TargetComparison};
 use crate::fit::uncertainty::ParameterVerdict as Knowledge;
 
 fn line(verdict: Knowledge, lower_95: Option<f64>, upper_95: Option<f64>) -> ParameterLine {
@@ -18,7 +18,7 @@ fn line(verdict: Knowledge, lower_95: Option<f64>, upper_95: Option<f64>) -> Par
 
 fn report(parameters: Vec<ParameterLine>, pass: bool) -> Report {
     Report {
-        components: vec![Comparison { name: "low".to_owned(), pass, ..Comparison::default() }],
+        components: vec![TargetComparison { name: "low".to_owned(), pass, ..TargetComparison::default() }],
         parameters,
         ..Report::default()
     }

@@ -2,7 +2,7 @@
 
 use super::html::CellStyle::{Name, Number, Prose, Words};
 use super::html::*;
-use crate::compare::Comparison;
+use crate::compare::TargetComparison;
 use crate::fit::misfit::{ChannelMisfit, StageMisfit, TraceMisfit, WorstSegment};
 use crate::fit::result::NuisanceResult;
 use crate::text::{
@@ -10,33 +10,38 @@ use crate::text::{
     format_signed_percent, format_with_sd,
 };
 
-pub(super) fn components_table(list: &[Comparison]) -> String {
+pub(super) fn components_table(list: &[TargetComparison]) -> String {
     let words = "Frequencies that the model has to meet. A component is met if it lies within the tolerance; \
                  relative error is model / target \u{2212} 1. The standard deviation of a target stands in units \
                  of the last digit: 78.40(3) is 78.40 with 0.03. A target from the job is published or assumed.";
     comparison_table("Components: target against model", words, ["component", "condition"], list)
 }
 
-pub(super) fn features_table(list: &[Comparison]) -> String {
+pub(super) fn features_table(list: &[TargetComparison]) -> String {
     let words = "Everything else that was fitted. A feature is met if the model lies within the 95 % interval \
                  of the target, 1.96 standard deviations either side. A target from the job is published or \
                  assumed.";
     comparison_table("Features: target against model", words, ["feature", "condition"], list)
 }
 
-pub(super) fn held_out_table(list: &[Comparison]) -> String {
+pub(super) fn held_out_table(list: &[TargetComparison]) -> String {
     let words = "Not fitted, but predicted by the model at the estimates and then compared with the target.";
     comparison_table("Held-out values: target against prediction", words, ["value", "condition"], list)
 }
 
 /// Values of several fits, with the name of the fit as condition.
-pub(in crate::report) fn fits_table(caption: &str, list: &[Comparison]) -> String {
+pub(in crate::report) fn fits_table(caption: &str, list: &[TargetComparison]) -> String {
     let words =
         "Relative error is model / target \u{2212} 1; what counts as met is as on the page of each fit.";
     comparison_table(caption, words, ["name", "fit"], list)
 }
 
-fn comparison_table(caption: &str, words: &str, [kind, condition]: [&str; 2], list: &[Comparison]) -> String {
+fn comparison_table(
+    caption: &str,
+    words: &str,
+    [kind, condition]: [&str; 2],
+    list: &[TargetComparison],
+) -> String {
     if list.is_empty() {
         return String::new();
     }
@@ -55,7 +60,7 @@ fn comparison_table(caption: &str, words: &str, [kind, condition]: [&str; 2], li
     render_table(caption, column_heads(&head), rows) + &reading_hint(words)
 }
 
-fn comparison_row(c: &Comparison, several: bool) -> Vec<HtmlCell> {
+fn comparison_row(c: &TargetComparison, several: bool) -> Vec<HtmlCell> {
     let (unit, factor) = text::choose_prefix(&c.unit, [c.target]);
     let target = format_with_sd(c.target * factor, c.target_sd.map(|sd| sd * factor));
     let model = format_or_dash(c.model, |model| format_number(model * factor));
@@ -82,7 +87,7 @@ fn comparison_row(c: &Comparison, several: bool) -> Vec<HtmlCell> {
 }
 
 /// Remarks on a value.
-fn value_remarks(c: &Comparison) -> String {
+fn value_remarks(c: &TargetComparison) -> String {
     let size = |value: f64| {
         // no prefixes for Hz
         let (unit, factor) =

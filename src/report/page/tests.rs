@@ -1,5 +1,5 @@
 use super::*;
-use crate::compare::{Comparison, ParameterLine, Truth};
+use crate::compare::{ParameterLine, TargetComparison, TrueValue};
 use crate::figures::{Drawing, FigureBlock};
 use crate::fit::misfit::{ChannelMisfit, TraceMisfit, WorstSegment};
 use crate::fit::result::{FitStatus, NuisanceResult};
@@ -53,14 +53,14 @@ fn without_script(html: &str) -> &str {
 /// A report in which every text is this one.
 fn everywhere(t: &str) -> Report {
     let own = || t.to_owned();
-    let comparison = || Comparison {
+    let comparison = || TargetComparison {
         name: own(),
         condition: Some(own()),
         unit: own(),
         missing: Some(own()),
-        ..Comparison::default()
+        ..TargetComparison::default()
     };
-    let truth = Some(Truth { value: 1.0, inside_95: false });
+    let truth = Some(TrueValue { value: 1.0, inside_95: false });
     Report {
         title: own(),
         search: SearchLine {
@@ -147,8 +147,11 @@ fn names_from_files_stay_text_wherever_they_stand() {
 #[test]
 fn names_that_users_chose_are_isolated_from_the_words_beside_them() {
     let named = |k: usize| format!("\u{5e9}{k}");
-    let comparison =
-        |k| Comparison { name: named(k), condition: Some(named(k + 10)), ..Comparison::default() };
+    let comparison = |k| TargetComparison {
+        name: named(k),
+        condition: Some(named(k + 10)),
+        ..TargetComparison::default()
+    };
     let report = Report {
         title: named(1),
         recordings: vec![RecordingLine { exports: vec![named(2)], ..recording(&named(3), true) }],
@@ -178,7 +181,7 @@ fn names_that_users_chose_are_isolated_from_the_words_beside_them() {
 fn the_page_stands_alone_and_leads_with_the_answer() {
     let report = Report {
         title: "t".to_owned(),
-        components: vec![Comparison { name: "low".to_owned(), ..Comparison::default() }],
+        components: vec![TargetComparison { name: "low".to_owned(), ..TargetComparison::default() }],
         ..Report::default()
     };
     let html = render_page(&report);
@@ -197,7 +200,7 @@ fn the_page_stands_alone_and_leads_with_the_answer() {
 
 #[test]
 fn synthetic_data_carry_a_banner_and_the_truth() {
-    let truth = Some(Truth { value: 0.5, inside_95: true });
+    let truth = Some(TrueValue { value: 0.5, inside_95: true });
     let report = Report {
         recordings: vec![recording("twin", true)],
         parameters: vec![ParameterLine { truth, ..ParameterLine::default() }],

@@ -8,7 +8,7 @@ use crate::simulate::flight::{FlightPhase, LANDING, flight_state_from, flight_st
 use crate::simulate::impact::{ImpactOrigin, ImpactOutcome, TipVelocity};
 use crate::simulate::mode::TipMode;
 use crate::simulate::phases::{GUARDS, LEVEL_GUARDS};
-use crate::simulate::scene::{ContactLossRule, JamRule};
+use crate::simulate::scene::contact::{ContactLossRule, JamRule};
 use crate::simulate::solution_segment::{SegmentSolution, SolutionSegment};
 use crate::simulate::{Impact, RunStatus, TransitionCause};
 

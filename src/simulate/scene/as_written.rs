@@ -1,6 +1,6 @@
 //! scene.toml as written: tables and types; values are checked later.
 
-use super::{ContactLossRule, JamRule, OutputTable};
+use super::contact::{ContactLossRule, JamRule, OutputTable};
 use crate::model::parameters::{PARAMETERS, ParameterRange};
 use crate::toml_file::table_schema;
 use schemars::{JsonSchema, Schema, SchemaGenerator};

@@ -1,9 +1,10 @@
 //! Constants of the linkage from the numbers of a scene.
 
-use super::{SceneError, key_error};
+use super::error::{SceneError, key_error};
 use crate::model::friction::FrictionLaw;
-use crate::model::parameters::ParameterQuantity as Quantity;
-use crate::model::parameters::{PARAMETERS, damping_from_ratio, stiffness_from_frequency};
+use crate::model::parameters::{
+    PARAMETERS, ParameterQuantity as Quantity, damping_from_ratio, stiffness_from_frequency,
+};
 use crate::model::shoulder::Shoulder;
 use crate::model::{Linkage, Spring};
 use std::collections::BTreeMap;

@@ -1,7 +1,7 @@
 //! Numbers of a scene under the names of the parameter table.
 
 use super::as_written::{DriveFile, SceneNumbers};
-use super::{SceneError, key_error};
+use super::error::{SceneError, key_error};
 use crate::model::parameters::{self, ModelParameter, PARAMETERS};
 use crate::toml_file;
 use std::collections::BTreeMap;

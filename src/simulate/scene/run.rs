@@ -1,7 +1,8 @@
 //! Settings of a run: its end, its outputs and its start.
 
 use super::as_written::{RunFile, StartFile, StartWord};
-use super::{OutputTable, SceneError, key_error};
+use super::contact::OutputTable;
+use super::error::{SceneError, key_error};
 use crate::model::flight::FlightState;
 use crate::model::{Linkage, Pose};
 use crate::simulate::drive::Drive;

@@ -1,10 +1,9 @@
 //! Derivatives of guards, and of impacts by the state before them.
 
-use super::seeds::BlockSeed;
+use super::seeds::{BlockSeed, DIFFERENCE_STEP, central_difference};
 use super::stretch::{SeriesReference, TangentStretch};
 use super::tangent_blocks::TangentBlocks;
 use super::tangent_segment::{Channel, ChannelWeights, DerivativeSum};
-use super::{DIFFERENCE_STEP, central_difference};
 use crate::model::shoulder::ShoulderContact;
 use crate::model::tangent::{LANES, LaneVector, StateTangent};
 use crate::model::{HeadMotion, LinkDirections, Linkage, Pose};

@@ -1,14 +1,14 @@
 //! Direct changes by each direction: constants of the linkage, motion of the head, initial state.
 
 use super::source::TangentSource;
-use super::{DIFFERENCE_STEP, SIX_POINTS, central_difference};
 use crate::model::parameters::{ModelParameter, ParameterQuantity};
 use crate::model::shoulder::ShoulderContact;
 use crate::model::tangent::{LANES, LaneVector, LinkageTangent, StateTangent};
 use crate::model::{Linkage, Pose};
 use crate::simulate::equilibrium::residual_moments;
 use crate::simulate::phases::DrivenBlade;
-use crate::simulate::scene::{Scene, SceneError};
+use crate::simulate::scene::Scene;
+use crate::simulate::scene::error::SceneError;
 use nalgebra::{Matrix2, Vector2};
 
 /// Change of the head's motion `x(t)`: `dx = scale x + (stretch t - delay) x'`.
@@ -262,6 +262,34 @@ pub(super) fn steady_slip_tangent(
         }
     }
     Some(moved)
+}
+
+/// Steps and weights of the six-point central difference of order 6 (Fornberg, Math. Comp. 51, 1988, table
+/// 1).
+pub(super) const SIX_POINTS: [(f64, f64); 6] = [
+    (-3.0, -1.0 / 60.0),
+    (-2.0, 9.0 / 60.0),
+    (-1.0, -45.0 / 60.0),
+    (1.0, 45.0 / 60.0),
+    (2.0, -9.0 / 60.0),
+    (3.0, 1.0 / 60.0),
+];
+
+/// Step relative to the scale of the function: truncation, its sixth power, is below rounding, and rounding
+/// over the step is 1e-13.
+pub(super) const DIFFERENCE_STEP: f64 = 1e-3;
+
+/// Derivative of `f` at 0; `None` if `f` has no value at a step.
+pub(super) fn central_difference<const N: usize>(
+    step: f64,
+    mut f: impl FnMut(f64) -> Option<[f64; N]>,
+) -> Option<[f64; N]> {
+    let mut sum = [0.0; N];
+    for (point, weight) in SIX_POINTS {
+        let value = f(point * step)?;
+        sum.iter_mut().zip(value).for_each(|(sum, value)| *sum += weight / step * value);
+    }
+    Some(sum)
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Components with their deviations, and the evidence for and against each, from the fitted parts of a
 //! record.
 
-use super::{Oscillation, RemovedTrend, SampledRecord, SpectralAnalysis};
+use super::{Oscillation, RemovedTrend, SpectralAnalysis};
 use crate::math;
 use crate::spectrum::classification::{Evidence, RecordContext, classify_components};
 use crate::spectrum::component::DecayingTone;
@@ -10,6 +10,7 @@ use crate::spectrum::least_squares::{FreeSet, SineCovariance, SineTerm, TermDevi
 use crate::spectrum::model_selection::{ModelFit, ModelSelector, SineModel};
 use crate::spectrum::peaks::Peak;
 use crate::spectrum::periodogram::Periodogram;
+use crate::spectrum::record::SampledRecord;
 use crate::spectrum::residual_significance::NEIGHBOURHOOD;
 use crate::spectrum::trend::Trend;
 use crate::spectrum::{Component, Detrend, Estimator, Spectrum, SpectrumSettings};

@@ -6,12 +6,14 @@
 
 mod transients;
 
-use super::{RemovedTrend, SampledRecord, SpectralAnalysis};
+use super::{RemovedTrend, SpectralAnalysis};
 use crate::math;
 use crate::spectrum::classification::{Evidence, RecordContext, classify_components};
-use crate::spectrum::periodogram;
+use crate::spectrum::record::SampledRecord;
 use crate::spectrum::trend::Trend;
-use crate::spectrum::{Component, Detrend, Spectrum, SpectrumError, SpectrumSettings, analyse_spectrum};
+use crate::spectrum::{
+    Component, Detrend, Spectrum, SpectrumError, SpectrumSettings, analyse_spectrum, periodogram,
+};
 use rayon::prelude::*;
 use std::f64::consts::{LN_2, TAU};
 use transients::Transient;

@@ -5,7 +5,7 @@
 pub struct Use {
     /// Segments as written.
     pub path: Vec<String>,
-    /// The name in this file.
+    /// The name in this file; `*` for everything.
     pub name: String,
     /// Whether others may use it from here.
     pub public: bool,
@@ -123,11 +123,13 @@ fn branches(tree: &str, prefix: &[String], public: bool, found: &mut Vec<Use>) {
     }
     let (path, name) = tree.split_once(" as ").map_or((tree, None), |(path, name)| (path, Some(name.trim())));
     let mut path = [prefix, &segments(path)].concat();
-    if path.len() > 1 && path.last().is_some_and(|last| last == "self" || last == "*") {
+    let is_glob = path.last().is_some_and(|last| last == "*");
+    if path.len() > 1 && (is_glob || path.last().is_some_and(|last| last == "self")) {
         path.pop();
     }
     if let Some(last) = path.last().cloned() {
-        found.push(Use { path, name: name.map_or(last, str::to_owned), public });
+        let name = if is_glob { "*".to_owned() } else { name.map_or(last, str::to_owned) };
+        found.push(Use { path, name, public });
     }
 }
 

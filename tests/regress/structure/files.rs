@@ -4,6 +4,8 @@ use super::code::{self, Use};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+/// Name of an import of everything.
+const GLOB: &str = "*";
 /// Module of the program.
 const PROGRAM: &str = "cli";
 
@@ -101,7 +103,8 @@ pub fn find_edges(files: &[SourceFile]) -> Vec<(usize, usize)> {
     for (from, file) in files.iter().enumerate() {
         let imported = file.uses.iter().filter(|u| !u.public || code::mentions(&file.code, &u.name));
         let mentioned = code::paths(&file.code);
-        for path in imported.map(|u| &u.path).chain(&mentioned) {
+        let globs = tree.glob_imports(from);
+        for path in imported.map(|u| &u.path).chain(&mentioned).chain(&globs) {
             edges.extend(tree.file_of(from, path, 0).filter(|to| *to != from).map(|to| (from, to)));
         }
     }
@@ -114,6 +117,21 @@ struct Tree<'a> {
 }
 
 impl Tree<'_> {
+    /// Paths of the re-exported names that a file mentions and has from `use ...::*`.
+    fn glob_imports(&self, from: usize) -> Vec<Vec<String>> {
+        let file = &self.files[from];
+        let mut paths = Vec::new();
+        for glob in file.uses.iter().filter(|u| u.name == GLOB) {
+            let Some(module) = self.file_of(from, &glob.path, 0).filter(|module| *module != from) else {
+                continue;
+            };
+            let exported = self.files[module].uses.iter().filter(|u| u.public && u.name != GLOB);
+            let named = exported.filter(|u| code::mentions(&file.code, &u.name));
+            paths.extend(named.map(|u| glob.path.iter().chain([&u.name]).cloned().collect()));
+        }
+        paths
+    }
+
     /// The file that defines what a path in a file names.
     fn file_of(&self, from: usize, path: &[String], hops: usize) -> Option<usize> {
         const MOST_HOPS: usize = 8;
@@ -162,6 +180,8 @@ fn who_uses_whom_is_read_from_the_text() {
         ),
         ("b.rs", "pub mod deep;\npub struct Other;\nfn f() { deep::go(); let x = 'a'; }\n"),
         ("b/deep.rs", "pub struct Deepest(super::super::a::Thing);\n"),
+        ("b/all.rs", "pub use crate::a::Thing;\npub use super::Other;\n"),
+        ("c.rs", "use crate::b::all::*;\nstruct New(Thing);\n"),
         ("main.rs", "use wiperlab::a::Thing;\n"),
     ];
     let files: Vec<SourceFile> = made.iter().map(|(path, text)| SourceFile::new(path, text)).collect();
@@ -171,6 +191,13 @@ fn who_uses_whom_is_read_from_the_text() {
         .collect();
     assert_eq!(
         found,
-        [("a.rs", "b.rs"), ("a.rs", "b/deep.rs"), ("b.rs", "b/deep.rs"), ("b/deep.rs", "a/inner.rs")]
+        [
+            ("a.rs", "b.rs"),
+            ("a.rs", "b/deep.rs"),
+            ("b.rs", "b/deep.rs"),
+            ("b/deep.rs", "a/inner.rs"),
+            ("c.rs", "a/inner.rs"),
+            ("c.rs", "b/all.rs"),
+        ]
     );
 }

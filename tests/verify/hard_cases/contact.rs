@@ -10,7 +10,8 @@ use wiperlab::model::modes::time_scales_rad_per_s;
 use wiperlab::model::shoulder::ShoulderContact;
 use wiperlab::model::{LinkDirections, Linkage, Pose, Spring};
 use wiperlab::simulate::mode::TipMode;
-use wiperlab::simulate::scene::{ContactLossRule, Drive, JamRule, Scene, StartKind};
+use wiperlab::simulate::scene::contact::{ContactLossRule, JamRule};
+use wiperlab::simulate::scene::{Drive, Scene, StartKind};
 use wiperlab::simulate::{IntegrationMethod, RunStatus, TransitionCause};
 
 const AT_REST: Pose = Pose { theta: 0.0, phi: 0.0, theta_rate: 0.0, phi_rate: 0.0 };

@@ -5,7 +5,8 @@ use super::METHODS;
 use super::scenes::upright_light_blade;
 use wiperlab::model::Pose;
 use wiperlab::model::parameters::PARAMETERS;
-use wiperlab::simulate::scene::{ContactLossRule, JamRule, Scene, StartKind};
+use wiperlab::simulate::scene::contact::{ContactLossRule, JamRule};
+use wiperlab::simulate::scene::{Scene, StartKind};
 use wiperlab::simulate::{Observer, RunStatus, SolutionSegment, SolverOptions, run_scene_with};
 
 const LIGHT_BLADE: &str = include_str!("../../fixtures/light-blade.toml");

@@ -6,7 +6,7 @@ use super::{METHODS, MORE, Ran, cases, ran};
 use wiperlab::model::shoulder::Shoulder;
 use wiperlab::simulate::mode::TipMode;
 use wiperlab::simulate::outputs::SampleObserver;
-use wiperlab::simulate::scene::ContactLossRule;
+use wiperlab::simulate::scene::contact::ContactLossRule;
 use wiperlab::simulate::{IntegrationMethod, RunStatus, SolverOptions, run_scene_with};
 
 const RELATIVE: f64 = 1e-8;

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::feature::LengthCalibration;
-use crate::fit::camera_calibration::TargetCalibration;
+use crate::fit::target_value::TargetCalibration;
 
 /// What a job with this in its recording says.
 fn with(camera: &str) -> Job {

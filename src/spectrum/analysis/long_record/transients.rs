@@ -1,9 +1,10 @@
 //! Oscillations that last for a short time only, read from pieces of a long record.
 
 use crate::math;
-use crate::spectrum::analysis::{SampledRecord, SpectralAnalysis};
+use crate::spectrum::analysis::SpectralAnalysis;
 use crate::spectrum::classification::SINGLE_CYCLE_DAMPING;
 use crate::spectrum::periodogram::{Periodogram, upper_median};
+use crate::spectrum::record::SampledRecord;
 use crate::spectrum::settings::ROUNDING;
 use crate::spectrum::trend::Trend;
 use crate::spectrum::{Component, ComponentReason, ComponentVerdict, SpectrumSettings};

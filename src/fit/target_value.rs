@@ -1,0 +1,128 @@
+//! A measured or published value that a fit must meet.
+
+use crate::feature::{LengthCalibration, ValueComparison};
+use crate::math;
+
+/// Ratio of model and target beyond which a residual no longer grows. Two decades are more than a physical
+/// feature spans, so that any value costs less than a missing one.
+pub(crate) const MAX_RATIO: f64 = 100.0;
+
+/// Least relative standard deviation in the first stage. Far from the targets all features are many
+/// deviations off, and the most precise ones would dominate the cost.
+pub(crate) const FIRST_STAGE_SD_RELATIVE: f64 = 0.05;
+
+/// The target value of a feature, with its standard deviation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TargetValue {
+    /// Name of the component or feature.
+    pub name: String,
+    /// Target, in the feature's own SI unit; not zero where it is measured by logarithms.
+    pub value: f64,
+    /// Its standard deviation, in the same unit; above zero.
+    pub sd: f64,
+    /// Scatter of the model's value between neighbouring parameters, in the same unit; 0 where it is smooth.
+    pub scatter: f64,
+    /// How a residual is taken.
+    pub measure: ValueComparison,
+    /// Whether it counts in the last stage alone.
+    pub last: bool,
+    /// Calibration errors of the camera that measured it, where the value depends on them.
+    pub calibration: Option<TargetCalibration>,
+}
+
+impl TargetValue {
+    /// Standard deviation of a distance, including the model's scatter, in units of [`Self::reference_size`].
+    pub(crate) fn relative_sd(&self) -> f64 {
+        math::hypot(self.sd, self.scatter) / self.reference_size()
+    }
+
+    /// Distance of a value from the target in units of [`Self::reference_size`], clamped to the logarithm of
+    /// [`MAX_RATIO`].
+    pub(crate) fn distance(&self, value: f64) -> f64 {
+        let most = math::ln(MAX_RATIO);
+        match self.measure {
+            ValueComparison::Log => {
+                let ratio = value / self.value;
+                if ratio > 0.0 { math::ln(ratio).clamp(-most, most) } else { -most }
+            }
+            ValueComparison::Linear { scale } => ((value - self.value) / scale).clamp(-most, most),
+        }
+    }
+
+    /// Distance between two values, in the units of [`Self::distance`]; zero where the logarithm is
+    /// undefined.
+    pub(crate) fn distance_between(&self, value: f64, from: f64) -> f64 {
+        match self.measure {
+            ValueComparison::Log => {
+                Some(value / from).filter(|ratio| *ratio > 0.0 && ratio.is_finite()).map_or(0.0, math::ln)
+            }
+            ValueComparison::Linear { scale } => (value - from) / scale,
+        }
+    }
+
+    /// The target of the first stage, with a deviation of at least [`FIRST_STAGE_SD_RELATIVE`]; `None` if it
+    /// counts in the last stage only.
+    pub(super) fn first_stage_target(&self) -> Option<Self> {
+        let sd = self.sd.max(FIRST_STAGE_SD_RELATIVE * self.reference_size());
+        (!self.last).then(|| Self { sd, ..self.clone() })
+    }
+
+    /// Unit of distances, in the feature's own unit: the size of the target, or the scale of its differences.
+    pub(crate) fn reference_size(&self) -> f64 {
+        match self.measure {
+            ValueComparison::Log => self.value.abs(),
+            ValueComparison::Linear { scale } => scale,
+        }
+    }
+}
+
+/// How a value depends on the calibration errors of its camera: `(1 + scale) value + offset`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TargetCalibration {
+    /// Number of the condition whose camera it is, from 0.
+    pub condition: usize,
+    /// Standard deviation of the scale, relative; 0 where it is held.
+    pub scale_sd: f64,
+    /// Standard deviation of the offset, m; 0 where it is held.
+    pub offset_sd_m: f64,
+    /// Kind of length, which decides how scale and offset act on it.
+    pub length: LengthCalibration,
+}
+
+impl TargetCalibration {
+    /// The value with the errors `[scale, offset]`, m.
+    pub(crate) fn apply(&self, value: f64, [scale, offset_m]: [f64; 2]) -> f64 {
+        match self.length {
+            LengthCalibration::Position => (1.0 + scale) * value + offset_m,
+            LengthCalibration::Size { floor_m } => {
+                let of_motion = (value * value - floor_m * floor_m).max(0.0).sqrt();
+                math::hypot((1.0 + scale) * of_motion, floor_m)
+            }
+        }
+    }
+
+    /// Its derivatives by scale and offset, m.
+    pub(crate) fn derivatives(&self, value: f64, [scale, offset_m]: [f64; 2]) -> [f64; 2] {
+        match self.length {
+            LengthCalibration::Position => [value, 1.0],
+            LengthCalibration::Size { floor_m } => {
+                let motion2 = (value * value - floor_m * floor_m).max(0.0);
+                [(1.0 + scale) * motion2 / self.apply(value, [scale, offset_m]), 0.0]
+            }
+        }
+    }
+
+    /// Standard deviation of a value by the calibration errors, m.
+    pub(crate) fn sd_m(&self, value: f64) -> f64 {
+        let [by_scale, by_offset] = self.derivatives(value, [0.0; 2]);
+        math::hypot(self.scale_sd * by_scale, self.offset_sd_m * by_offset)
+    }
+
+    /// Standard deviations of scale and offset; the latter is 0 where the value does not depend on an offset.
+    pub(crate) fn standard_deviations(&self) -> [f64; 2] {
+        match self.length {
+            LengthCalibration::Position => [self.scale_sd, self.offset_sd_m],
+            LengthCalibration::Size { .. } => [self.scale_sd, 0.0],
+        }
+    }
+}

@@ -1,0 +1,12 @@
+//! A record: samples on an even grid, with gaps.
+
+/// A record and the camera that took it.
+#[derive(Debug, Clone, Copy)]
+pub struct SampledRecord<'a> {
+    /// One sample a frame, m; `None` where there is none.
+    pub samples: &'a [Option<f64>],
+    /// Frames per second, 1/s.
+    pub frame_rate_hz: f64,
+    /// Exposure of a frame, s, where known.
+    pub exposure_s: Option<f64>,
+}
