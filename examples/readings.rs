@@ -2,6 +2,7 @@
 //! each, how rough each is along a parameter, and what it takes.
 //! `cargo run --release --example readings`.
 
+use short_spectra::{Detrend, SampledRecord, SpectralAnalysis, SpectrumSettings, WindowedTransform};
 use std::time::Instant;
 use wiperlab::fit::job::Job;
 use wiperlab::fit::model::{Draw, Model};
@@ -9,7 +10,6 @@ use wiperlab::fit::scene_model::{Instrument, ModelCondition, PlausibilityLimits,
 use wiperlab::recording::channel::{Channel, ReversalInstants, Window};
 use wiperlab::simulate::scene::Scene;
 use wiperlab::simulate::twin::Camera;
-use wiperlab::spectrum::{Detrend, SampledRecord, SpectralAnalysis, SpectrumSettings, WindowedTransform};
 
 const JOB: &str = include_str!("../fits/actual-blade-twin/job.toml");
 const SCENE: &str = include_str!("../data/scenes/actual-blade.toml");

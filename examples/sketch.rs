@@ -3,8 +3,8 @@
 //! Lengths and the angle of the shoulder are those of data/scenes/actual-blade.toml. The lip leans farther
 //! than in steady slip, so that the drop is easy to see.
 
+use portable_math as math;
 use std::path::{Path, PathBuf};
-use wiperlab::math;
 use wiperlab::model::{LinkDirections, Linkage, Pose};
 use wiperlab::simulate::scene::Scene;
 

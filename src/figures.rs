@@ -27,7 +27,7 @@ pub mod video_frames;
 pub mod windows;
 pub mod work_precision;
 
-use crate::chart;
+use plain_charts as chart;
 use serde::Serialize;
 
 /// A figure of a page with its texts.

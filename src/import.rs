@@ -1,5 +1,5 @@
-//! Reads the exports of tracking programs into a [`Recording`](crate::recording::Recording) with a report. Rate, scale and direction of
-//! y have no defaults: what the file does not say the user has to.
+//! Reads the exports of tracking programs into a [`Recording`](crate::recording::Recording) with a report.
+//! Rate, scale and direction of y have no defaults: what the file does not say the user has to.
 //!
 //! Coordinates keep the file's origin. They are only scaled and, where y points down, mirrored (`y` becomes
 //! `-y`). A new format is one file with one `FileFormat` and one row in `FORMATS`.

@@ -5,8 +5,8 @@
 //! | step | module | in | out |
 //! |---|---|---|---|
 //! | import | [`import`] | text of a tracking program | [`recording::Recording`], on the frame grid, SI |
-//! | look | [`recording`], [`spectrum`] | a recording | quality, instants, components |
-//! | model | [`model`], [`ode`], [`simulate`] | a scene | motion, transitions, summary |
+//! | look | [`recording`], [`short_spectra`] | a recording | quality, instants, components |
+//! | model | [`model`], [`hybrid_ode`], [`simulate`] | a scene | motion, transitions, summary |
 //! | dimensions | [`model::section`], [`model::plausibility`] | the section of a blade, a scene | a first `[blade]` table, numbers to check, doubts |
 //! | check the model | [`simulate::accuracy`] | a scene | error against work of every method |
 //! | camera | [`simulate::twin`] | a scene | a synthetic recording |
@@ -14,7 +14,7 @@
 //! | fit | [`fit`] | a job, recordings | estimates, intervals, verdicts |
 //! | compare | [`compare`] | recordings, the fitted model | clock shift, residuals, ridges, transitions |
 //! | vary | [`sweep`] | a study, its scene | quantities over a grid of parameters |
-//! | draw | [`chart`], [`figures`] | results | SVG figures |
+//! | draw | [`plain_charts`], [`figures`] | results | SVG figures |
 //! | show | [`report`] | results | one HTML page |
 //!
 //! These modules read no files and print nothing: text and numbers in, typed values and text out. Only
@@ -92,7 +92,6 @@
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))] // tests may use them
 
 pub mod camera;
-pub mod chart;
 pub mod checkpoint;
 pub mod cli;
 pub mod compare;
@@ -101,14 +100,11 @@ pub mod feature;
 pub mod figures;
 pub mod fit;
 pub mod import;
-pub mod math;
 pub mod model;
-pub mod ode;
 pub mod prelude;
 pub mod recording;
 pub mod report;
 pub mod simulate;
-pub mod spectrum;
 pub mod sweep;
 pub mod text;
 pub mod toml_file;

@@ -26,8 +26,8 @@ pub mod series;
 pub mod shoulder;
 pub mod tangent;
 
-use crate::math;
 use friction::FrictionLaw;
+use portable_math as math;
 use serde::Serialize;
 use shoulder::{Shoulder, ShoulderContact};
 

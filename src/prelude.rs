@@ -13,4 +13,4 @@ pub use crate::report::Report;
 pub use crate::simulate::outputs::Transitions;
 pub use crate::simulate::scene::Scene;
 pub use crate::simulate::{RunResult, RunStatus, Transition, TransitionCause, run_scene};
-pub use crate::spectrum::{Component, SampledRecord, SpectralAnalysis, SpectrumSettings};
+pub use short_spectra::{Component, SampledRecord, SpectralAnalysis, SpectrumSettings};

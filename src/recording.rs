@@ -12,7 +12,7 @@ pub mod noise_model;
 pub mod quality;
 pub mod video;
 
-use crate::math;
+use portable_math as math;
 use serde::Serialize;
 
 /// Uniform instants of the frames: frame `i` was taken at `start_s + i / frame_rate_hz`.

@@ -5,24 +5,22 @@
 //! in units of the last digit shown (JCGM 100:2008, 7.2.2).
 
 mod hash;
-mod number;
 mod phrase;
 mod unit;
 
 pub use hash::{TextHash, sha256, text_sha256};
-pub(crate) use number::{
-    format_decimals, format_or_dash, format_scientific, format_trimmed, format_with_sd, to_superscript,
-};
-pub use number::{format_digits, format_number, format_plain, format_short, round_to_digits, to_ascii};
 pub(crate) use phrase::{
     capitalise, format_interval, format_times, join_with_and, panic_message, pluralise, truncate_text,
     wrap_words,
 };
-pub use phrase::{escape_controls, make_printable};
+pub(crate) use plain_charts::number::{
+    DASH, format_decimals, format_or_dash, format_trimmed, format_with_sd,
+};
+pub use plain_charts::number::{
+    format_digits, format_number, format_plain, format_short, round_to_digits, to_ascii,
+};
+pub use plain_charts::printable::{escape_controls, make_printable};
 pub(crate) use unit::{
     choose_prefix, format_degrees, format_length, format_milliseconds, format_percent, format_signed_percent,
     format_speed, label_with_unit,
 };
-
-/// Sign for a missing value.
-pub(crate) const DASH: &str = "\u{2013}";

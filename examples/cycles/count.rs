@@ -1,10 +1,10 @@
 //! What the spectrum reads of a cycle whose sticks are counted.
 
+use short_spectra::{Component, SampledRecord, SpectralAnalysis, SpectrumSettings};
 use wiperlab::recording::channel::Channel;
 use wiperlab::simulate::SolverOptions;
 use wiperlab::simulate::scene::Scene;
 use wiperlab::simulate::twin::{Camera, TrackingModel, add_tracking_noise, film_scene};
-use wiperlab::spectrum::{Component, SampledRecord, SpectralAnalysis, SpectrumSettings};
 
 /// Lengths of windows, s, and how far apart they begin, in their lengths.
 const LENGTHS_S: [f64; 4] = [0.05, 0.1, 0.15, 0.25];

@@ -1,10 +1,10 @@
 //! What a camera and a tracking program do besides white noise.
 
 use crate::truth::PIXEL_M;
+use portable_math::StandardNormal;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
-use wiperlab::math::StandardNormal;
 use wiperlab::recording::Recording;
 
 /// Correlation of the noise of frames 0.2 ms apart, and its standard deviation, m; half its variance is

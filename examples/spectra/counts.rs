@@ -2,7 +2,7 @@
 
 use crate::hard::{Kind, Made, Truth};
 use rayon::prelude::*;
-use wiperlab::spectrum::{Component, ComponentVerdict, SampledRecord, SpectralAnalysis, SpectrumSettings};
+use short_spectra::{Component, ComponentVerdict, SampledRecord, SpectralAnalysis, SpectrumSettings};
 
 /// A component that is listed.
 pub struct Listed {

@@ -2,10 +2,10 @@
 //! or is not there at all.
 
 use crate::signal::AMPLITUDE_M;
+use portable_math::StandardNormal;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::{PI, TAU};
-use wiperlab::math::StandardNormal;
 
 /// An oscillation that a record holds.
 #[derive(Clone, Copy, Debug)]
@@ -251,7 +251,10 @@ fn modulated(depth: f64, draw: &mut Draw) -> Made {
 fn multiple(times: f64, hz: f64, draw: &mut Draw) -> Made {
     let base = Truth::steady(hz, draw.phase());
     plain(
-        vec![base, part(wiperlab::camera::alias_hz(times * hz, RATE_HZ), 0.3 * AMPLITUDE_M, draw.phase())],
+        vec![
+            base,
+            part(short_spectra::sampling::alias_hz(times * hz, RATE_HZ), 0.3 * AMPLITUDE_M, draw.phase()),
+        ],
         30.0,
         draw,
     )

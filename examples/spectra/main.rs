@@ -13,10 +13,10 @@ mod signal;
 mod table;
 
 use score::{Errors, deviation, largest, mean, near, read, read_all, rms};
+use short_spectra::{Component, ComponentVerdict, SampledRecord, SpectralAnalysis, SpectrumSettings};
 use signal::{AMPLITUDE_M, FLIPS, Signal, Tone};
 use std::hint::black_box;
 use std::time::Instant;
-use wiperlab::spectrum::{Component, ComponentVerdict, SampledRecord, SpectralAnalysis, SpectrumSettings};
 
 /// Seeds of a line unless asked for otherwise.
 const SEEDS: u64 = 200;
@@ -119,7 +119,7 @@ fn cameras(seeds: u64) {
         [(1000.0, 150, None), (1000.0, 150, Some(5e-4)), (5000.0, 750, Some(1e-3))]
     {
         let signal = Signal { rate_hz, frames, exposure_s, ..Signal::of(&[Tone::steady(HIGH_HZ)]) };
-        let seen_hz = wiperlab::camera::alias_hz(HIGH_HZ, rate_hz);
+        let seen_hz = short_spectra::sampling::alias_hz(HIGH_HZ, rate_hz);
         let lists = read_all(&signal, seeds);
         let found: Vec<&Component> = lists.iter().filter_map(|list| near(list, seen_hz)).collect();
         let count = |holds: &dyn Fn(&Component) -> bool| found.iter().filter(|c| holds(c)).count();

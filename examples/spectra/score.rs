@@ -2,7 +2,7 @@
 
 use crate::signal::{Signal, Tone};
 use rayon::prelude::*;
-use wiperlab::spectrum::{Component, SampledRecord, SpectralAnalysis, SpectrumSettings};
+use short_spectra::{Component, SampledRecord, SpectralAnalysis, SpectrumSettings};
 
 /// A component is a tone's if its frequency is within this share of it.
 const NEAR: f64 = 0.15;

@@ -1,10 +1,10 @@
 //! Records whose components are known.
 
+use portable_math::StandardNormal;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use short_spectra::sampling::exposure_gain;
 use std::f64::consts::TAU;
-use wiperlab::camera::exposure_gain;
-use wiperlab::math::StandardNormal;
 
 /// Amplitude of a component, m; noise is given in relation to it.
 pub const AMPLITUDE_M: f64 = 1e-5;

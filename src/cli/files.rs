@@ -8,7 +8,6 @@ mod preserved_files;
 mod staging;
 
 use super::failure::{Failure, Outcome};
-use crate::chart::{Figure, Medium};
 use crate::toml_file;
 use clap::Args;
 use guard::OutputGuard;
@@ -17,6 +16,7 @@ pub(crate) use input::{
 };
 use marker::MARKER_FILE;
 pub(crate) use marker::{CsvDialect, FolderMarker, OutputCommand, Overwrite, WritePolicy};
+use plain_charts::{Figure, Medium};
 pub(crate) use preserved_files::{SIMULATION_SUMMARY, is_simulation_summary};
 pub(crate) use staging::{OutputStaging, check_path_free};
 use std::fs::File;

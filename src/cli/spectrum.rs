@@ -6,15 +6,13 @@ use super::args::parse_count;
 use super::files::{figure_files, write_outputs};
 use super::load::{LoadedRecording, load_recording};
 use super::prelude::*;
-use crate::chart::Figure;
 use crate::figures::analysis::{AnalysedWindow, compare_spectra};
 use crate::figures::spectrum::{self, SpectraPlot};
 use crate::recording::Recording;
 use crate::recording::channel::{Channel, ReversalInstants, Window};
 use crate::simulate::twin::film::{DropoutPattern, film_like_recording};
-use crate::spectrum::{
-    Detrend, FASTEST_HZ, MAX_COMPONENTS, SampledRecord, SpectralAnalysis, SpectrumSettings,
-};
+use plain_charts::Figure;
+use short_spectra::{Detrend, FASTEST_HZ, MAX_COMPONENTS, SampledRecord, SpectralAnalysis, SpectrumSettings};
 use std::ops::Range;
 
 /// The tables of a spectrum.

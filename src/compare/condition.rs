@@ -13,8 +13,8 @@ use crate::recording::motion_traces::MotionTraces;
 use crate::recording::noise_model::{RecordingNoise, measure_noise};
 use crate::recording::quality::noise_floor;
 use crate::recording::video::RecordingVideo;
-use crate::spectrum::Target;
 use rayon::prelude::*;
+use short_spectra::Target;
 use std::ops::Range;
 
 /// Channels by which a model is judged, in order of preference. The deflection shows stick and slip best,

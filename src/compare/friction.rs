@@ -8,10 +8,10 @@
 use super::condition::{ConditionComparison, TimedRecording};
 use crate::fit::job::Job;
 use crate::fit::result::FitResult;
-use crate::math;
 use crate::model::friction::FrictionLaw;
 use crate::recording::channel::Channel;
 use crate::simulate::equilibrium::static_deflections;
+use portable_math as math;
 use std::array;
 
 /// A coefficient at a speed.

@@ -3,10 +3,10 @@
 use super::condition::{ConditionComparison, TimedRecording, spectral_band};
 use crate::feature::{FeatureBand, Reading};
 use crate::recording::channel::{Channel, InstantKind, Window, WindowEnd, mean_speed_m_per_s};
-use crate::spectrum::time_frequency::{
+use short_spectra::time_frequency::{
     Ridge, RidgePoint, Spectrogram, SpectrogramSettings, SpeedPoint, course, default_band_hz,
 };
-use crate::spectrum::{Oscillation, SampledRecord, SpectralAnalysis, SpectrumSettings};
+use short_spectra::{Oscillation, SampledRecord, SpectralAnalysis, SpectrumSettings};
 use std::ops::Range;
 
 /// Segment lengths that are tried, relative to the default length, in rising order.
@@ -187,7 +187,7 @@ fn ridge_over_speed(
         let centre = first + (p.time_s * grid.frame_rate_hz).round() as usize;
         let segment = centre.saturating_sub(half)..(centre + half).min(grid.frames);
         Some(SpeedPoint {
-            tip_speed_m_per_s: mean_speed_m_per_s(tip, grid.frame_rate_hz, segment)?.abs(),
+            speed_m_per_s: mean_speed_m_per_s(tip, grid.frame_rate_hz, segment)?.abs(),
             frequency_hz: p.frequency_hz,
             frequency_sd_hz: Some(p.frequency_sd_hz),
         })

@@ -9,7 +9,7 @@ use crate::recording::alignment::Alignment;
 use crate::recording::channel::Channel;
 use crate::recording::motion_traces::{MOTION_CHANNELS, MotionTraces};
 use crate::simulate::Transition;
-use crate::spectrum::time_frequency::RidgePoint;
+use short_spectra::time_frequency::RidgePoint;
 
 /// File of [`comparison_table`].
 pub(crate) const COMPARISON_FILE: &str = "comparison.csv";

@@ -4,10 +4,10 @@ use super::stroke::{EstimatedStroke, KnownStroke, Stroke, estimate_stroke};
 use crate::recording::channel::{Channel, Reversal, ReversalInstants, Window, mean_speed_m_per_s};
 use crate::recording::{FrameGrid, Recording};
 use crate::simulate::drive::{EVEN_SPEED_SHARE, UNCERTAIN_END_S, smooth_head_motion};
-use crate::spectrum::{Component, ComponentVerdict, SampledRecord, SpectralAnalysis, SpectrumSettings};
 use crate::text::{
     format_digits, format_milliseconds, format_speed, format_with_sd, join_with_and, pluralise,
 };
+use short_spectra::{Component, ComponentVerdict, SampledRecord, SpectralAnalysis, SpectrumSettings};
 
 /// What moves the head of the scene.
 #[derive(Debug, Clone, Copy, PartialEq)]

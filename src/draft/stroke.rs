@@ -3,10 +3,10 @@
 //! A sliding tip trails the head by a nearly constant length `d`, so that `x = c + d s + P cos(w t) + Q
 //! sin(w t)` with the sign `s` of its speed. The model is linear in all parameters except the frequency.
 
-use crate::math;
 use crate::recording::Recording;
 use crate::recording::channel::mean_speed_m_per_s;
 use nalgebra::{DMatrix, DVector};
+use portable_math as math;
 use std::f64::consts::TAU;
 
 /// A head on a cosine, `a (1 - cos(2 pi f (t - t0)))`.

@@ -4,8 +4,8 @@
 use super::missing::{FEWEST_AT_SPEED, MissingValue};
 use super::reader::FeatureReader;
 use super::value::FeatureValue;
-use crate::math;
 use crate::recording::channel::{Channel, Window};
+use portable_math as math;
 
 pub(super) fn read_mean_deflection(
     window: &Window,

@@ -2,8 +2,8 @@
 
 use super::spectral::FeatureBand;
 use crate::recording::channel::{Channel, Window};
-use crate::spectrum::Detrend;
 use crate::toml_file::{KeyRefusal, NumberPair, check_above_zero, refuse_key};
+use short_spectra::Detrend;
 
 /// Default relative half width of the range of speeds around a given speed: several cycles of chatter pass
 /// within it, and friction hardly changes.

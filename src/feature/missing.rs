@@ -2,8 +2,8 @@
 
 use crate::recording::channel::{InstantNotFound, WindowError};
 use crate::simulate::RunStatus;
-use crate::spectrum::SpectrumError;
 use serde::{Deserialize, Serialize};
+use short_spectra::SpectrumError;
 
 /// Fewest cycles in each half of a window: with fewer, the main lobe of the Hann window overlaps its mirror
 /// image at negative frequencies.
@@ -80,7 +80,7 @@ pub enum MissingValue {
     /// A segment does not fit into the window, or is too short.
     #[error(
         "a segment of {segment_s} s has {frames} frames, expected {} to the {window} of the window",
-        crate::spectrum::MIN_SAMPLES
+        short_spectra::MIN_SAMPLES
     )]
     Segment {
         /// Length of the segment, s.

@@ -7,7 +7,7 @@ use crate::recording::Recording;
 use crate::recording::channel::{Channel, ReversalInstants, Window};
 use crate::simulate::outputs::EnergyAudit;
 use crate::simulate::{RunResult, Transition};
-use crate::spectrum::{Detrend, SpectrumSettings, WindowedTransform};
+use short_spectra::{Detrend, SpectrumSettings, WindowedTransform};
 use std::cell::{OnceCell, RefCell};
 use std::ops::Range;
 use std::rc::Rc;

@@ -8,9 +8,9 @@ use super::missing::{MissingReason, MissingValue};
 use super::reader::FeatureReader;
 use super::spectral::{self, CycleRangeEnd, FeatureBand};
 use super::value::{FeatureUnit, FeatureValue, LengthCalibration, ValueComparison};
-use crate::math;
 use crate::recording::channel::Window;
 use crate::toml_file::{KeyRefusal, suggest_key};
+use portable_math as math;
 use serde::Serialize;
 
 /// Scale of a time that may be zero or negative, s: a tenth of a stick of half a second.

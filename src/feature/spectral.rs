@@ -4,10 +4,10 @@
 use super::missing::{LEAST_CYCLES, MissingValue};
 use super::reader::FeatureReader;
 use super::value::{FeatureValue, RunnerUpComponent};
-use crate::math;
 use crate::recording::channel::{Channel, Window};
-use crate::spectrum::{Component, Detrend, SpectrumError, SpectrumSettings, WindowedTransform};
+use portable_math as math;
 use serde::Serialize;
+use short_spectra::{Component, Detrend, SpectrumError, SpectrumSettings, WindowedTransform};
 use std::f64::consts::TAU;
 
 /// Distance `ln(f / target)` with the same weight as [`ASSIGN_DB`]: near the best point of a fit, the model's
@@ -194,7 +194,7 @@ fn strongest_in_segment(
 /// First frames of the segments of a window; `None` where a segment has too few frames or more than the
 /// window.
 fn segment_starts(window: usize, frames: usize) -> Option<impl Iterator<Item = usize>> {
-    if frames < crate::spectrum::MIN_SAMPLES {
+    if frames < short_spectra::MIN_SAMPLES {
         return None;
     }
     let room = window.checked_sub(frames)?;

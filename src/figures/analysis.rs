@@ -7,12 +7,12 @@ use super::spectrum::{
 };
 use super::windows::{WindowOverview, WindowSpan};
 use super::{about, ring_down, spectrogram, spectrum, windows};
-use crate::chart::Figure;
 use crate::recording::channel::{Channel, InstantKind, ReversalInstants, mean_speed_m_per_s, phase_windows};
 use crate::recording::{Recording, channel};
-use crate::spectrum::time_frequency::{RidgePoint, Spectrogram, SpectrogramSettings, course};
-use crate::spectrum::{Component, ComponentVerdict, Estimator, Oscillation, SpectralAnalysis, Spectrum};
 use crate::text::{format_digits, format_short, format_with_sd};
+use plain_charts::Figure;
+use short_spectra::time_frequency::{RidgePoint, Spectrogram, SpectrogramSettings, course};
+use short_spectra::{Component, ComponentVerdict, Estimator, Oscillation, SpectralAnalysis, Spectrum};
 use std::ops::Range;
 
 impl AnalysedWindow<'_> {
@@ -194,7 +194,7 @@ impl AnalysedWindow<'_> {
         let drawn = course::coherent_parts(ridge, of);
         let over_speed = |p: &RidgePoint| {
             Some(SpeedPoint {
-                tip_speed_m_per_s: self.course_point(p, ridge.segment_s).tip_speed_m_per_s?.abs(),
+                speed_m_per_s: self.course_point(p, ridge.segment_s).tip_speed_m_per_s?.abs(),
                 frequency_hz: p.frequency_hz,
                 frequency_sd_hz: Some(p.frequency_sd_hz),
             })
@@ -359,7 +359,7 @@ mod tests {
     use super::*;
     use crate::recording::channel::Channel;
     use crate::recording::{FrameGrid, Recording, Traces};
-    use crate::spectrum::{Detrend, SampledRecord, SpectrumSettings};
+    use short_spectra::{Detrend, SampledRecord, SpectrumSettings};
     use std::f64::consts::TAU;
 
     const RATE_HZ: f64 = 5000.0;

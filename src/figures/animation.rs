@@ -9,10 +9,8 @@ mod drawing;
 mod smil;
 
 use super::{Drawing, FigureBlock, FigureText};
-use crate::chart::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, ShadedSpan};
 use crate::compare::ConditionComparison;
 use crate::figures::{NO_TRACES, about, subtitle};
-use crate::math;
 use crate::model::Linkage;
 use crate::recording::Recording;
 use crate::recording::alignment::{Alignment, is_tracked};
@@ -20,6 +18,8 @@ use crate::recording::channel::Channel;
 use crate::simulate::mode::TipMode;
 use crate::simulate::{ModelSample, RunMotion};
 use crate::text::format_decimals;
+use plain_charts::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, ShadedSpan};
+use portable_math as math;
 
 /// Data of an animation; all times are on one clock.
 #[derive(Debug, Clone)]

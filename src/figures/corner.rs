@@ -2,15 +2,15 @@
 //! bounds, prior, true value and stated interval.
 
 use super::figure_text::parameter_symbol;
-use crate::chart::{ChartAxis, Colour, Figure, Mark, Panel, Ribbon, Series};
 use crate::compare::ParameterLine;
 use crate::figures::{Drawing, FigureBlock, about, full_figure, subtitle};
 use crate::fit::bounds::Bounds;
 use crate::fit::bounds::Prior;
 use crate::fit::job::{FreeParameter, Job};
 use crate::fit::result::FitResult;
-use crate::math;
 use crate::text::{choose_prefix, format_digits, format_interval, join_with_and};
+use plain_charts::{ChartAxis, Colour, Figure, Mark, Panel, Ribbon, Series};
+use portable_math as math;
 
 /// One parameter; values are in the unit scale of the search, 0 and 1 at the bounds.
 #[derive(Debug, Clone, PartialEq, Default)]

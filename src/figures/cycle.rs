@@ -3,13 +3,13 @@
 
 use super::spectrogram::speed_series;
 use super::{FigureBlock, FigureText};
-use crate::chart::{ChartAxis, Colour, Figure, Mark, MarkerShape, Panel, Ribbon, Series, TextAnnotation};
 use crate::compare::{ConditionComparison, TrackedRidge};
 use crate::figures::full_figure;
 use crate::model::modes::body_frequencies;
-pub use crate::spectrum::Target;
-pub use crate::spectrum::time_frequency::SpeedPoint;
 use crate::text::{format_digits, format_speed, join_with_and, truncate_text};
+use plain_charts::{ChartAxis, Colour, Figure, Mark, MarkerShape, Panel, Ribbon, Series, TextAnnotation};
+pub use short_spectra::Target;
+pub use short_spectra::time_frequency::SpeedPoint;
 
 /// Data of the figure.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -47,7 +47,7 @@ const LABEL_OFFSET: f64 = 0.022;
 #[must_use]
 pub fn draw_figure(shown: &CycleOverSpeed) -> Figure {
     let points = || shown.measured.iter().chain(&shown.model);
-    let fastest = points().map(|p| p.tip_speed_m_per_s * 1e3).fold(0.0, f64::max);
+    let fastest = points().map(|p| p.speed_m_per_s * 1e3).fold(0.0, f64::max);
     let sought_hz = shown.targets.iter().map(|t| t.frequency_hz);
     let highest = points().map(|p| p.frequency_hz).chain(sought_hz).fold(0.0, f64::max);
     let empty = !(fastest > 0.0 && highest > 0.0);
@@ -201,7 +201,7 @@ fn cycle_points(shown: &CycleOverSpeed) -> &[SpeedPoint] {
 /// Mean frequency of the faster half less that of the slower half, Hz.
 fn frequency_rise_hz(points: &[SpeedPoint]) -> f64 {
     let mut by_speed = points.to_vec();
-    by_speed.sort_by(|a, b| a.tip_speed_m_per_s.total_cmp(&b.tip_speed_m_per_s));
+    by_speed.sort_by(|a, b| a.speed_m_per_s.total_cmp(&b.speed_m_per_s));
     let (slow, fast) = by_speed.split_at(by_speed.len() / 2);
     let mean = |of: &[SpeedPoint]| of.iter().map(|p| p.frequency_hz).sum::<f64>() / of.len().max(1) as f64;
     if slow.is_empty() { 0.0 } else { mean(fast) - mean(slow) }
@@ -209,7 +209,7 @@ fn frequency_rise_hz(points: &[SpeedPoint]) -> f64 {
 
 fn figure_text(case: &ConditionComparison, shown: &CycleOverSpeed, claim: &str) -> FigureText {
     let points = cycle_points(shown);
-    let speeds = || points.iter().map(|p| p.tip_speed_m_per_s);
+    let speeds = || points.iter().map(|p| p.speed_m_per_s);
     let span = speeds().reduce(f64::min).zip(speeds().reduce(f64::max));
     let span = span.map_or_else(String::new, |(from, to)| {
         format!(", at mean speeds of the tip from {} to {}", format_speed(from), format_speed(to))
@@ -237,7 +237,7 @@ mod tests {
 
     fn example_cycles() -> CycleOverSpeed {
         let point =
-            |v: f64, f: f64| SpeedPoint { tip_speed_m_per_s: v, frequency_hz: f, frequency_sd_hz: Some(2.0) };
+            |v: f64, f: f64| SpeedPoint { speed_m_per_s: v, frequency_hz: f, frequency_sd_hz: Some(2.0) };
         CycleOverSpeed {
             measured: vec![point(0.05, 910.0), point(0.2, 700.0)],
             model: vec![point(0.05, 905.0)],
@@ -268,11 +268,8 @@ mod tests {
     }
 
     fn shown_cycles(cycles: &[(f64, f64)]) -> CycleOverSpeed {
-        let point = |(v, f): &(f64, f64)| SpeedPoint {
-            tip_speed_m_per_s: *v,
-            frequency_hz: *f,
-            frequency_sd_hz: None,
-        };
+        let point =
+            |(v, f): &(f64, f64)| SpeedPoint { speed_m_per_s: *v, frequency_hz: *f, frequency_sd_hz: None };
         CycleOverSpeed { measured: cycles.iter().map(point).collect(), ..CycleOverSpeed::default() }
     }
 

@@ -3,7 +3,6 @@
 
 use super::history::{length_unit, symmetric_axis, thin_points};
 use super::{FigureBlock, FigureText, history};
-use crate::chart::{ChartAxis, Colour, Figure, Mark, Panel, Ribbon, SampledSeries, Series, ShadedSpan};
 use crate::compare::ConditionComparison;
 use crate::figures::full_figure;
 use crate::fit::misfit::ChannelMisfit;
@@ -11,6 +10,7 @@ use crate::recording::channel::{Channel, InstantKind};
 use crate::recording::motion_traces::MotionTraces;
 use crate::simulate::ModelSample;
 use crate::text::{capitalise, format_decimals, format_digits, format_length, format_trimmed};
+use plain_charts::{ChartAxis, Colour, Figure, Mark, Panel, Ribbon, SampledSeries, Series, ShadedSpan};
 
 /// Times, s, and values; `None` interrupts the curve.
 pub(crate) type TimeCurve = Vec<Option<(f64, f64)>>;

@@ -1,10 +1,10 @@
 //! Texts and file names of the figures of a condition.
 
 use super::{Drawing, FigureBlock, FigureText, NO_TRACES, about};
-use crate::chart::Figure;
 use crate::compare::ConditionComparison;
 use crate::model::parameters;
 use crate::text::{join_with_and, truncate_text};
+use plain_charts::Figure;
 
 /// Letters after which a title and a name are cut in a heading, so that room for the figure is left.
 const TITLE_LETTERS: usize = 120;

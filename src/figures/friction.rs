@@ -2,7 +2,6 @@
 //! spent at each speed.
 
 use super::{FigureBlock, FigureText};
-use crate::chart::{ChartAxis, Colour, Figure, Mark, MarkerShape, Panel, Ribbon, Series, VerticalLine};
 use crate::compare::friction::{COEFFICIENTS, LawCoefficient, friction_half_95, is_fitted};
 use crate::compare::{ConditionComparison, FrictionPoint, MeasuredFriction};
 use crate::figures::full_figure;
@@ -10,6 +9,7 @@ use crate::model::friction::FrictionLaw;
 use crate::simulate::ModelSample;
 use crate::simulate::mode::TipMode;
 use crate::text::{format_digits, format_percent, format_speed, join_with_and};
+use plain_charts::{ChartAxis, Colour, Figure, Mark, MarkerShape, Panel, Ribbon, Series, VerticalLine};
 use serde::Serialize;
 
 /// Friction coefficient of the fitted law at one speed.

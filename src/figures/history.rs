@@ -3,11 +3,11 @@
 
 pub(crate) mod caption;
 
-use crate::chart::{ChartAxis, Colour, Figure, Mark, Panel, Series, ShadedSpan, VerticalLine, value_span};
 use crate::figures::{NO_TRACES, full_figure};
-use crate::math;
 use crate::recording::channel::Channel;
 use crate::recording::motion_traces::{MOTION_CHANNELS, MotionTraces};
+use plain_charts::{ChartAxis, Colour, Figure, Mark, Panel, Series, ShadedSpan, VerticalLine, value_span};
+use portable_math as math;
 
 /// Data of a time history.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -300,7 +300,7 @@ pub(super) fn thin_frames(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chart::Medium;
+    use plain_charts::Medium;
 
     fn as_svg(shown: &TimeHistory) -> String {
         draw_figure(shown).to_svg(Medium::Screen)

@@ -1,12 +1,12 @@
 //! Natural modes of a blade: compliance of the tip over frequency, and mode shapes.
 
-use crate::chart::{
-    ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, MarkerShape, Panel, Series, VerticalLine,
-};
-use crate::math;
 use crate::model::Linkage;
 use crate::model::modes::{NaturalMode, TipConstraint, natural_modes, tip_compliance};
 use crate::text::{format_digits, join_with_and};
+use plain_charts::{
+    ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, MarkerShape, Panel, Series, VerticalLine,
+};
+use portable_math as math;
 
 /// Number of frequencies of the compliance.
 const POINTS: usize = 600;
@@ -115,8 +115,8 @@ fn draw_mode_shape(blade: &Linkage, on_shoulder: bool, number: usize, mode: &Nat
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chart::Medium;
     use crate::simulate::scene::Scene;
+    use plain_charts::Medium;
 
     #[test]
     fn a_blade_with_a_shoulder_has_two_answers_and_four_shapes() {

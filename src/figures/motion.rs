@@ -2,12 +2,12 @@
 
 use super::history;
 use super::history::TimeHistory;
-use crate::chart::{ChartAxis, Colour, Figure, Mark, Panel, Series, VerticalLine};
 use crate::figures::history::thin_points;
 use crate::recording::motion_traces::MotionTraces;
 use crate::simulate::ModelSample;
 use crate::simulate::RunMotion;
 use crate::text::{format_short, pluralise};
+use plain_charts::{ChartAxis, Colour, Figure, Mark, Panel, Series, VerticalLine};
 
 /// Height of the normal force's panel, mm.
 const FORCE_MM: f64 = 24.0;

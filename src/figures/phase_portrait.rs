@@ -1,14 +1,14 @@
 //! Phase portraits: tip velocity over deflection, measured and of the model.
 
 use super::{FigureBlock, FigureText};
-use crate::chart::{ChartAxis, Colour, Figure, Mark, Panel, Series, value_span};
 use crate::compare::{ConditionComparison, TimedRecording};
 use crate::figures::full_figure;
-use crate::math;
 use crate::recording::channel::{Channel, InstantKind};
 use crate::recording::quality::noise_floor;
 use crate::simulate::ModelSample;
 use crate::text::{format_digits, format_milliseconds, format_percent, format_speed, join_with_and};
+use plain_charts::{ChartAxis, Colour, Figure, Mark, Panel, Series, value_span};
+use portable_math as math;
 
 /// Deflection, m, and tip velocity, m/s; `None` interrupts the line.
 pub(crate) type PhasePoint = Option<(f64, f64)>;
@@ -456,7 +456,7 @@ impl VelocityEstimate {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chart::Medium;
+    use plain_charts::Medium;
 
     #[test]
     fn the_velocity_is_the_central_difference_and_gaps_stay_gaps() {

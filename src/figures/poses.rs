@@ -1,17 +1,18 @@
 //! The linkage drawn to scale at chosen instants through the reversal: how the blade flips over.
 
 use super::about;
-use crate::chart::{
-    ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, MarkerShape, Panel, Series, TextAnnotation,
-};
 use crate::compare::ConditionComparison;
 use crate::figures::{Drawing, FigureBlock, FigureText, subtitle};
 use crate::model::Linkage;
 use crate::recording::channel::InstantKind;
 use crate::simulate::mode::TipMode;
 use crate::simulate::{ModelSample, RunMotion};
+use crate::text;
 use crate::text::{format_decimals, format_milliseconds, format_short, join_with_and};
-use crate::{math, text};
+use plain_charts::{
+    ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, MarkerShape, Panel, Series, TextAnnotation,
+};
+use portable_math as math;
 
 /// Pose of the blade at an instant.
 #[derive(Debug, Clone, Copy)]
@@ -370,8 +371,8 @@ fn head_hatch_lines() -> Vec<Option<(f64, f64)>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chart::Medium;
     use crate::simulate::scene::Scene;
+    use plain_charts::Medium;
 
     pub(super) fn motion() -> RunMotion {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/data/scenes/actual-blade.toml");

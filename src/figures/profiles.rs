@@ -2,10 +2,6 @@
 //! that follow.
 
 use super::figure_text::parameter_symbol;
-use crate::chart::{
-    ChartAxis, Colour, ErrorBar, Figure, Mark, MarkerShape, Panel, Series, ShadedSpan, VerticalLine,
-    value_span,
-};
 use crate::compare::ParameterLine;
 use crate::figures::{Drawing, FigureBlock, about, full_figure, subtitle};
 use crate::fit::job::{FreeParameter, Job};
@@ -13,6 +9,10 @@ use crate::fit::profile::AT_BOUND;
 use crate::fit::result::{FitResult, ParameterResult};
 use crate::fit::uncertainty::ParameterVerdict;
 use crate::text::{choose_prefix, format_short, join_with_and, label_with_unit};
+use plain_charts::{
+    ChartAxis, Colour, ErrorBar, Figure, Mark, MarkerShape, Panel, Series, ShadedSpan, VerticalLine,
+    value_span,
+};
 
 /// Profile and intervals of one parameter, in its SI unit.
 #[derive(Debug, Clone, PartialEq)]
@@ -392,8 +392,8 @@ fn describe_truths(drawn: &[&ParameterProfile]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chart::Medium;
     use crate::fit::bounds::{Bounds, BoundsSpacing};
+    use plain_charts::Medium;
 
     fn profile() -> ParameterProfile {
         ParameterProfile {

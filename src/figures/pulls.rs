@@ -1,9 +1,9 @@
 //! Pulls: deviation of the model from each feature of a fit, in standard deviations of the target.
 
-use crate::chart::{ChartAxis, Colour, Figure, Mark, MarkerShape, Panel, Series, ShadedSpan, VerticalLine};
 use crate::compare::TargetComparison;
 use crate::figures::{Drawing, FigureBlock, about, full_figure, subtitle};
 use crate::text::{format_digits, pluralise, truncate_text};
+use plain_charts::{ChartAxis, Colour, Figure, Mark, MarkerShape, Panel, Series, ShadedSpan, VerticalLine};
 
 /// Deviation of the model from one feature.
 #[derive(Debug, Clone, PartialEq, Default)]

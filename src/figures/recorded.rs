@@ -2,10 +2,10 @@
 
 use super::history::{self, TimeHistory};
 use super::subtitle;
-use crate::chart::{Colour, Figure, ShadedSpan};
 use crate::recording::Recording;
 use crate::recording::motion_traces::MotionTraces;
 use crate::text::{format_percent, format_short, pluralise};
+use plain_charts::{Colour, Figure, ShadedSpan};
 
 /// Most reversals that are named in a figure.
 const MOST_NAMED: usize = 6;

@@ -2,12 +2,12 @@
 //! run.
 
 use super::{FigureBlock, FigureText};
-use crate::chart::{ChartAxis, Colour, Figure, Mark, MarkerShape, Panel, Ribbon, Series};
 use crate::compare::ConditionComparison;
 use crate::figures::full_figure;
-use crate::math;
-use crate::spectrum::Multitaper;
 use crate::text::{format_decimals, format_digits};
+use plain_charts::{ChartAxis, Colour, Figure, Mark, MarkerShape, Panel, Ribbon, Series};
+use portable_math as math;
+use short_spectra::Multitaper;
 
 /// Data of the figure.
 #[derive(Debug, Clone, PartialEq, Default)]

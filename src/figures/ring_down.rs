@@ -4,9 +4,9 @@ pub mod caption;
 
 use super::full_figure;
 use super::history::{length_unit, thin_points};
-use crate::chart::{ChartAxis, Colour, Figure, Mark, Panel, Ribbon, Series};
-use crate::spectrum::Component;
 use crate::text::format_with_sd;
+use plain_charts::{ChartAxis, Colour, Figure, Mark, Panel, Ribbon, Series};
+use short_spectra::Component;
 
 /// Displacement over time; both columns have the same length.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -165,7 +165,7 @@ fn draw_decay_panel(shown: &ComponentDecay) -> Panel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chart::Medium;
+    use plain_charts::Medium;
 
     fn as_svg(shown: &RingDown) -> String {
         draw_figure(shown).to_svg(Medium::Screen)

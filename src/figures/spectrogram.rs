@@ -3,18 +3,18 @@
 pub mod caption;
 mod comparison;
 
-use crate::chart::{
+use crate::figures::full_figure;
+use crate::text::{format_digits, truncate_text};
+pub use comparison::{SpectrogramComparison, SpectrogramSide, draw_comparison};
+use plain_charts::{
     ChartAxis, Colour, ErrorBar, Figure, HeatMap, Mark, MarkerShape, Panel, Series, TextAnnotation,
     VerticalLine,
 };
-use crate::figures::full_figure;
-use crate::math;
-use crate::spectrum::time_frequency;
-use crate::spectrum::time_frequency::RidgePoint;
-pub use crate::spectrum::time_frequency::SpeedPoint;
-use crate::spectrum::time_frequency::course::DYNAMIC_RANGE_DB;
-use crate::text::{format_digits, truncate_text};
-pub use comparison::{SpectrogramComparison, SpectrogramSide, draw_comparison};
+use portable_math as math;
+use short_spectra::time_frequency;
+use short_spectra::time_frequency::RidgePoint;
+pub use short_spectra::time_frequency::SpeedPoint;
+use short_spectra::time_frequency::course::DYNAMIC_RANGE_DB;
 
 /// A point of a ridge.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -173,7 +173,7 @@ fn ridge_points(ridge: &[SpectrogramRidgePoint]) -> impl Iterator<Item = Option<
 
 /// Frequencies over the speed of the tip, mm/s, as symbols with two standard deviations either side.
 pub(super) fn speed_series(label: &str, colour: Colour, shape: MarkerShape, points: &[SpeedPoint]) -> Series {
-    let place = |p: &SpeedPoint| (p.tip_speed_m_per_s * MILLIMETRES, p.frequency_hz);
+    let place = |p: &SpeedPoint| (p.speed_m_per_s * MILLIMETRES, p.frequency_hz);
     let bar = |p: &SpeedPoint| {
         let ((x, f), sd) = (place(p), p.frequency_sd_hz?);
         Some(ErrorBar::Vertical { x, from: f - 2.0 * sd, to: f + 2.0 * sd })
@@ -297,7 +297,7 @@ pub(super) fn target_names(shown: &SpectrogramPlot) -> Vec<TextAnnotation> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chart::Medium;
+    use plain_charts::Medium;
 
     fn as_svg(shown: &SpectrogramPlot) -> String {
         draw_figure(shown).to_svg(Medium::Screen)
@@ -318,7 +318,7 @@ mod tests {
                 .collect(),
             instants: vec![("release".to_owned(), 0.02)],
             over_speed: vec![SpeedPoint {
-                tip_speed_m_per_s: 0.08,
+                speed_m_per_s: 0.08,
                 frequency_hz: 400.0,
                 frequency_sd_hz: Some(5.0),
             }],

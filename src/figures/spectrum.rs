@@ -3,13 +3,13 @@
 pub mod caption;
 mod components;
 
-use crate::chart::{
-    ChartAxis, Colour, Figure, Mark, Panel, Ribbon, Series, ShadedSpan, TopLabel, VerticalLine,
-};
 use crate::figures::{NO_TRACES, about, full_figure};
-pub use crate::spectrum::Target;
 use crate::text::format_trimmed;
 pub use components::LabelledComponent;
+use plain_charts::{
+    ChartAxis, Colour, Figure, Mark, Panel, Ribbon, Series, ShadedSpan, TopLabel, VerticalLine,
+};
+pub use short_spectra::Target;
 
 /// An amplitude spectrum.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -246,7 +246,7 @@ pub(super) fn level_series(spectra: &SpectraPlot, highest: f64) -> Vec<Series> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chart::Medium;
+    use plain_charts::Medium;
 
     fn as_svg(shown: &SpectraPlot) -> String {
         draw_figure(shown).to_svg(Medium::Screen)

@@ -3,15 +3,15 @@
 
 mod claim;
 
-use crate::chart::{
-    AxisScale, COLUMN_WIDTH_MM, ChartAxis, Colour, Figure, Hatch, HatchPattern, HeatMap, Mark, MarkerShape,
-    Panel, Series, VerticalLine, cell_edges,
-};
 use crate::feature::FeatureUnit;
 use crate::model::parameters::ModelParameter;
 use crate::simulate::scene::Scene;
 use crate::sweep::{AxisSpacing, MissingReason, PointOutcome, Study, SweepAxis, SweepMap};
 pub(super) use claim::{MapClaim, map_values};
+use plain_charts::{
+    AxisScale, COLUMN_WIDTH_MM, ChartAxis, Colour, Figure, Hatch, HatchPattern, HeatMap, Mark, MarkerShape,
+    Panel, Series, VerticalLine, cell_edges,
+};
 use std::collections::BTreeMap;
 
 /// Heights of a map and of a curve, mm.

@@ -3,12 +3,12 @@
 
 use super::sweep_map::{MapClaim, ReasonPatterns, SweepMapValues, describe_axes};
 use super::sweep_map::{axis_label, parameter_words};
-use crate::chart::{
-    COLUMN_WIDTH_MM, ChartAxis, Colour, ColourMap, FULL_WIDTH_MM, Figure, HeatMap, Panel, TextAnnotation,
-};
 use crate::simulate::scene::Scene;
 use crate::sweep::{PointOutcome, RankCorrelations, Study, SweepMap};
 use crate::text::{capitalise, format_decimals, join_with_and, make_printable};
+use plain_charts::{
+    COLUMN_WIDTH_MM, ChartAxis, Colour, ColourMap, FULL_WIDTH_MM, Figure, HeatMap, Panel, TextAnnotation,
+};
 
 /// Heights of a panel and of a row of the table of correlations, mm.
 const PANEL_MM: f64 = 42.0;

@@ -1,9 +1,9 @@
 //! A synthetic recording: the simulated motion, the frames with exposure and noise, and the lost frames.
 
 use super::FigureText;
-use crate::chart::{ChartAxis, Colour, ErrorBar, FULL_WIDTH_MM, Figure, Mark, Panel, Series, VerticalLine};
 use crate::recording::Recording;
 use crate::text::{format_length, format_milliseconds, format_percent, format_short};
+use plain_charts::{ChartAxis, Colour, ErrorBar, FULL_WIDTH_MM, Figure, Mark, Panel, Series, VerticalLine};
 
 /// Samples of the motion per frame.
 pub(crate) const MOTION_SAMPLES: f64 = 8.0;
@@ -186,9 +186,9 @@ fn release_instants(twin: &TwinPlot) -> Vec<(&'static str, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chart::Medium;
     use crate::recording::{FrameGrid, Traces};
     use crate::simulate::twin::{TrackingModel, add_tracking_noise};
+    use plain_charts::Medium;
 
     fn recording(frame_rate_hz: f64, frames: usize, of: impl Fn(f64) -> f64) -> Recording {
         let grid = FrameGrid { start_s: 1.0, frame_rate_hz, frames };

@@ -2,12 +2,12 @@
 
 use super::FigureText;
 use super::poses::{joint_positions, reversal_poses};
-use crate::chart::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Raster, Series};
 use crate::compare::ConditionComparison;
 use crate::figures::{FigureBlock, subtitle};
-use crate::math;
 use crate::recording::video::RecordingVideo;
 use crate::text::{format_length, join_with_and};
+use plain_charts::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Raster, Series};
+use portable_math as math;
 
 /// The shown instants: name of the model's pose, and its name in the figure.
 const SHOWN: [(&str, &str); 4] = [
@@ -284,7 +284,7 @@ fn drawing(shown: &VideoFrames, instant: &Instant) -> Panel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chart::{MAX_HEIGHT_MM, Medium};
+    use plain_charts::{MAX_HEIGHT_MM, Medium};
 
     #[test]
     fn every_instant_has_its_links_and_the_farthest_point_is_named() {

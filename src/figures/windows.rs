@@ -1,8 +1,8 @@
 //! Overview of a recording: its named windows and the analysed part.
 
 use super::history::length_unit;
-use crate::chart::{ChartAxis, Colour, Figure, Mark, Panel, Series, ShadedSpan, TopLabel, VerticalLine};
 use crate::figures::full_figure;
+use plain_charts::{ChartAxis, Colour, Figure, Mark, Panel, Series, ShadedSpan, TopLabel, VerticalLine};
 
 /// A named part of a recording.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -92,7 +92,7 @@ fn window_spans(shown: &WindowOverview) -> Vec<ShadedSpan> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chart::Medium;
+    use plain_charts::Medium;
 
     fn as_svg(shown: &WindowOverview) -> String {
         draw_figure(shown).to_svg(Medium::Screen)

@@ -1,7 +1,7 @@
 //! Work-precision diagram: error over wall time, one line per method. Runs with missed or invented
 //! transitions have their own panel.
 
-use crate::chart::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, MarkerShape, Panel, Series};
+use plain_charts::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, MarkerShape, Panel, Series};
 
 /// A run in the diagram.
 #[derive(Debug, Clone, PartialEq)]
@@ -108,7 +108,7 @@ fn value_range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chart::Medium;
+    use plain_charts::Medium;
 
     fn as_svg(shown: &WorkPrecision) -> String {
         draw_figure(shown).to_svg(Medium::Screen)

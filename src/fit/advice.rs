@@ -8,9 +8,9 @@ use super::job::{FitTarget, Job};
 use super::linear_model::{MIN_INFORMATIVE, ParameterCombination, difference_points};
 use super::model::{Draw, Model, ModelFeatures};
 use crate::feature::{CycleRangeEnd, Feature, FeatureBand, Reading, ReversalInterval, WIDTH_RELATIVE};
-use crate::math;
 use crate::recording::Recording;
 use crate::recording::channel::{Channel, Window};
+use portable_math as math;
 
 /// Relative standard deviation of a careful measurement of a mean or an instant.
 const CAREFUL_SD_RELATIVE: f64 = 0.01;

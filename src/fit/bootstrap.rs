@@ -12,8 +12,8 @@ use super::ledger::{Ledger, StopReason};
 use super::linear_model::{broyden_update, damped_step, residuals_against, step_in_box};
 use super::objective::Objective;
 use super::target_value::TargetValue;
-use crate::math;
 use nalgebra::DMatrix;
+use portable_math as math;
 use rayon::prelude::*;
 
 /// Gauss-Newton steps of a refit: twins differ by a few deviations, where the linear model nearly holds.

@@ -4,7 +4,7 @@
 //! `u = (1 + sin z) / 2`, the transform of MINUIT (James and Roos, Comput. Phys. Commun. 10 (1975) 343): it
 //! reaches both bounds at finite `z` and cannot leave the box.
 
-use crate::math;
+use portable_math as math;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;

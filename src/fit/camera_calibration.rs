@@ -12,9 +12,9 @@ use super::objective::{LOSS_KNEE, residual, robust_loss, total_sd};
 use super::target_value::{MAX_RATIO, TargetValue};
 use crate::feature::ValueComparison;
 use crate::fit::target_value::TargetCalibration;
-use crate::math;
-use crate::math::StandardNormal;
 use nalgebra::{DMatrix, Matrix2, Vector2};
+use portable_math as math;
+use portable_math::StandardNormal;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 

@@ -11,8 +11,8 @@ use super::evaluation::Evaluation;
 use super::objective::{LOSS_KNEE, Objective, prior_residuals, residual, total_sd};
 use super::target_value::TargetValue;
 use crate::feature::ValueComparison;
-use crate::math;
 use nalgebra::{DMatrix, DVector};
+use portable_math as math;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

@@ -6,8 +6,8 @@
 //! noise allows; in a fit of features also a camera or a constant that is far from its prior.
 
 use super::result::NuisanceResult;
-use crate::math;
 use crate::text::format_trimmed;
+use portable_math as math;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 

@@ -4,8 +4,8 @@ use super::evaluation::{FailureReason, Observation, Observed, RunFailure};
 use super::job::FitTarget;
 use super::target_value::TargetValue;
 use crate::feature::{Feature, FeatureValue, MissingValue, ValueComparison, read_assigned_features};
-use crate::math;
 use crate::recording::Recording;
+use portable_math as math;
 use rayon::prelude::*;
 
 /// Features of a model at parameter values. The objective knows a model by this trait only.

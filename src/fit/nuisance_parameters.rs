@@ -2,9 +2,9 @@
 //! which no motion shows.
 
 use super::job::{Constants, FreeParameter, Job, NuisanceParameter, is_same_quantity};
-use crate::math;
 use crate::model::parameters::{ModelParameter, ParameterQuantity, ParameterRange, find_parameter};
 use crate::simulate::scene::Scene;
+use portable_math as math;
 
 /// Range of a freed constant on either side of its value, in standard deviations of its prior.
 const RANGE_SD: f64 = 5.0;

@@ -21,8 +21,8 @@ use super::evaluation::{Evaluation, EvaluationOutcome, FailureReason, Observatio
 use super::model::FeaturePredictor;
 use super::target_value::{MAX_RATIO, TargetValue};
 use crate::feature::ASSIGN_DB;
-use crate::math;
 use crate::text::panic_message;
+use portable_math as math;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Residual, in standard deviations, above which the cost grows logarithmically. Measurement errors stay

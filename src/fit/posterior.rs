@@ -17,7 +17,7 @@ use super::targets::{measure_targets, split_held_out};
 use super::trace::{TraceModel, fit_states_at, frame_residuals};
 use super::trace_checkpoint::HeaderCoordinate;
 use crate::feature::Feature;
-use crate::math;
+use portable_math as math;
 use std::f64::consts::{LN_2, SQRT_2, TAU};
 
 /// An unknown: its range and its prior along a coordinate, which is its logarithm or itself.

@@ -17,8 +17,8 @@ use super::ledger::{Ledger, StopReason};
 use super::linear_model::{self, FeatureSlopes, SingularDirections};
 use super::linear_model::{broyden_update, damped_step, difference_points, step_in_box};
 use super::objective::Objective;
-use crate::math;
 use nalgebra::DMatrix;
+use portable_math as math;
 
 /// Dampings of the inner steps: nearly undamped, and short.
 const DAMPINGS: [f64; 2] = [1.0, 3e2];

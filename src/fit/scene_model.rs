@@ -2,7 +2,6 @@
 
 use super::evaluation::{FailureReason, RunFailure};
 use super::model::{Draw, Model, Restart};
-use crate::math::StandardNormal;
 use crate::model::Pose;
 use crate::model::modes::{TipConstraint, natural_modes, time_scales_rad_per_s};
 use crate::recording::Recording;
@@ -14,6 +13,7 @@ use crate::simulate::twin::{
     Camera, TrackingModel, TwinView, TwinViewError, add_tracking_noise, film_scene, film_scene_with_observer,
 };
 use crate::simulate::{Observer, RunResult, RunStatus, SolverOptions};
+use portable_math::StandardNormal;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;

@@ -1,7 +1,7 @@
 //! A measured or published value that a fit must meet.
 
 use crate::feature::{LengthCalibration, ValueComparison};
-use crate::math;
+use portable_math as math;
 
 /// Ratio of model and target beyond which a residual no longer grows. Two decades are more than a physical
 /// feature spans, so that any value costs less than a missing one.

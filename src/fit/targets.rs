@@ -5,10 +5,10 @@ use super::FitError;
 use super::job::{FitTarget, Job, TargetSource, TargetStage};
 use crate::feature::{Feature, FeatureValue, MissingValue, ValueComparison, read_assigned_features};
 use crate::fit::target_value::TargetValue;
-use crate::math;
 use crate::recording::Recording;
 use crate::recording::quality::measure_quality;
 use crate::simulate::twin::{TrackingModel, add_tracking_noise};
+use portable_math as math;
 
 /// Number of copies of a recording with additional noise from which the deviation of a feature is estimated:
 /// a standard deviation of 12 values is good to a fifth.

@@ -1,9 +1,10 @@
 //! Iterates of a trace fit in a journal. A line has every bit that the next iterate depends on.
 
 use super::trace::{CameraUnknown, Iterate, SegmentState, TraceUnknown, UnknownKind};
+use crate::checkpoint;
 use crate::checkpoint::{CheckpointKind, CheckpointRecord, ExactNumber};
 use crate::model::parameters;
-use crate::{checkpoint, math};
+use portable_math as math;
 use serde::{Deserialize, Serialize};
 
 /// The journal of a trace fit.

@@ -1,7 +1,7 @@
 //! Friction between lip tip and glass, equations (4) and (5): `mu(v) = a exp(-b |v|) + c`, the static limit
 //! being `mu(0)`.
 
-use crate::math;
+use portable_math as math;
 use serde::Serialize;
 
 /// Coefficients of the friction law.

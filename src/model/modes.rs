@@ -14,8 +14,8 @@
 
 use super::Linkage;
 use super::parameters::natural_frequency_hz;
-use crate::math;
 use nalgebra::{Complex, Matrix2, Matrix4};
+use portable_math as math;
 use std::f64::consts::TAU;
 
 /// One mode of the linearised blade.

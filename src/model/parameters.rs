@@ -6,8 +6,8 @@
 
 use super::shoulder::Shoulder;
 use super::{Linkage, Spring};
-use crate::math;
 use ParameterRange::{NotNegative, Positive, Within};
+use portable_math as math;
 use std::f64::consts::TAU;
 
 /// Admissible values of a parameter.

@@ -24,10 +24,10 @@
 
 mod input;
 
-use crate::math::{gauss_legendre, powi};
 use crate::text::{escape_controls, round_to_digits};
 pub use input::{BladeSection, SectionError};
 use input::{InputDeviation, SectionKey};
+use portable_math::{gauss_legendre, powi};
 use serde::Serialize;
 use std::fmt::Write;
 

@@ -3,7 +3,7 @@
 //! The law is an assumption (the paper only says that the neck gets more rigid): for `|theta| > theta_s` the
 //! moment `k_s (|theta| - theta_s) sign(theta) + c_s dtheta/dt` is added to the neck's.
 
-use crate::math;
+use portable_math as math;
 use serde::Serialize;
 
 /// A shoulder on both sides of the neck.

@@ -1,8 +1,8 @@
 //! Alignment of the model's clock and origin with those of a recording.
 
-use crate::math;
 use crate::recording::Recording;
 use crate::recording::channel::{Channel, ReversalInstants, central_moments};
+use portable_math as math;
 use serde::Serialize;
 
 /// Offsets of the model's times and positions at which its head follows the recorded one.

@@ -7,9 +7,9 @@ mod turns;
 mod window;
 
 use super::Recording;
-use crate::math;
 pub use instants::{InstantKind, InstantNotFound, Reversal, ReversalInstants};
 pub use phase::{PhaseWindow, ReversalPhase, phase_windows};
+use portable_math as math;
 use serde::Serialize;
 use std::ops::Range;
 pub use window::{Window, WindowEnd, WindowError};

@@ -1,9 +1,9 @@
 //! Pictures of the video from which a recording was tracked, and the pixel of a tracked point in them.
 
 use super::files::{CameraEntry, FilesError, LevelEntry};
-use crate::math;
 use crate::toml_file::NumberPair;
 use png::{BitDepth, ColorType, Compression, Decoder, Encoder, Limits, Transformations};
+use portable_math as math;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::io::Cursor;

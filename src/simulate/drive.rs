@@ -3,10 +3,10 @@
 mod head_spline;
 mod smoothing_spline;
 
-use crate::math;
 use crate::model::HeadMotion;
 use crate::recording::Recording;
 pub use head_spline::HeadSpline;
+use portable_math as math;
 use serde::Serialize;
 use std::f64::consts::TAU;
 use std::sync::Arc;

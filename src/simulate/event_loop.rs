@@ -19,11 +19,11 @@ use crate::model::flight::FlightState;
 use crate::model::modes::time_scales_rad_per_s;
 use crate::model::shoulder::ShoulderContact;
 use crate::model::{FrictionResponse, Pose};
-use crate::ode::taylor::{TaylorPhase, TaylorWorkspace};
-use crate::ode::{
+use hybrid_ode::taylor::{TaylorPhase, TaylorWorkspace};
+use hybrid_ode::{
     self, AcceptedStep, EventLocator, PhaseEnd, PhaseEndCause as Ended, PhaseStart, WorkCounters,
 };
-use crate::ode::{fixed_step, taylor};
+use hybrid_ode::{fixed_step, taylor};
 use std::ops::ControlFlow;
 
 /// A run: its settings, and its state between phases.
@@ -419,11 +419,19 @@ pub(super) fn integrate_phase<const N: usize, P: TaylorPhase<N, GUARDS>>(
                 taylor::integrate_taylor(phase, start, until, relative, room, work, observe)
             }
             IntegrationMethod::RungeKutta => {
-                ode::integrate(phase, start, until, relative, work, |step| observe(step, None))
+                hybrid_ode::integrate(phase, start, until, relative, work, |step| observe(step, None))
             }
             IntegrationMethod::Slack => {
                 let observe = |step: &AcceptedStep<'_, N>| observe(step, None);
-                ode::integrate_with_locator(EventLocator::Slack, phase, start, until, relative, work, observe)
+                hybrid_ode::integrate_with_locator(
+                    EventLocator::Slack,
+                    phase,
+                    start,
+                    until,
+                    relative,
+                    work,
+                    observe,
+                )
             }
             IntegrationMethod::FixedStep(scheme) => {
                 let observe = |step: &AcceptedStep<'_, N>| observe(step, None);

@@ -12,9 +12,9 @@
 use super::phases::{ContactInstant, DrivenBlade, GUARDS, TipForces, apply_friction, pose_from_states};
 use crate::model::shoulder::ShoulderContact;
 use crate::model::{LinkDirections, Pose};
-use crate::ode::HybridPhase;
-pub(crate) use crate::ode::fixed_step::FixedStepLocator;
-use crate::ode::fixed_step::FixedStepOptions;
+use hybrid_ode::HybridPhase;
+pub(crate) use hybrid_ode::fixed_step::FixedStepLocator;
+use hybrid_ode::fixed_step::FixedStepOptions;
 
 /// Default gain of the stabilisation, 1/s: drift of the tip decays within 0.1 ms, a tenth of a stick-slip
 /// cycle.

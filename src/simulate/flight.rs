@@ -1,13 +1,13 @@
 //! Flight as a smooth phase with guards: no contact force acts until the tip lands.
 
 use super::phases::{DrivenBlade, GUARDS, GuardedExpansion, LEVEL_GUARDS, SHOULDER_GUARDS, TaylorMotion};
-use crate::math;
 use crate::model::flight::FlightState;
 use crate::model::series::ContactMode;
 use crate::model::shoulder::ShoulderContact;
 use crate::model::{LinkDirections, Pose};
-use crate::ode::HybridPhase;
-use crate::ode::taylor::TaylorPhase;
+use hybrid_ode::HybridPhase;
+use hybrid_ode::taylor::TaylorPhase;
+use portable_math as math;
 
 /// The gap falls to zero. Guards of shoulder and level are as in contact; the others do not apply.
 pub(crate) const LANDING: usize = 0;

@@ -23,8 +23,9 @@
 use crate::model::flight::FlightState;
 use crate::model::friction::FrictionLaw;
 use crate::model::{LinkDirections, Linkage, Pose};
-use crate::ode::{HybridPhase, PhaseEndCause, PhaseStart, WorkCounters};
-use crate::{math, ode};
+use hybrid_ode as ode;
+use hybrid_ode::{HybridPhase, PhaseEndCause, PhaseStart, WorkCounters};
+use portable_math as math;
 
 /// Inverse contact mass `W` of the tip, 1/kg.
 #[derive(Debug, Clone, Copy, PartialEq)]

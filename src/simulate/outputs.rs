@@ -7,10 +7,10 @@ use super::{
     BladePoints, Impact, ModelSample, Observer, RunResult, SegmentPath, SolutionSegment, SolverOptions,
     Transition,
 };
-use crate::math::gauss_legendre;
 use crate::model::Linkage;
 use crate::model::plausibility::PlausibilityFinding;
 use crate::recording::FrameGrid;
+use portable_math::gauss_legendre;
 use serde::Serialize;
 use std::fmt::Write;
 use std::iter::Peekable;

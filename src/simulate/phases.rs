@@ -2,13 +2,13 @@
 
 use super::drive::Drive;
 use super::mode::TipMode;
-use crate::math;
 use crate::model::series::{ContactMode, MotionSeries};
 use crate::model::shoulder::ShoulderContact;
 use crate::model::{FrictionResponse, HeadMotion, LinkDirections, Linkage, Pose};
-use crate::ode::HybridPhase;
-use crate::ode::polynomial::TERMS;
-use crate::ode::taylor::{TaylorExpansion, TaylorPhase};
+use hybrid_ode::HybridPhase;
+use hybrid_ode::polynomial::TERMS;
+use hybrid_ode::taylor::{TaylorExpansion, TaylorPhase};
+use portable_math as math;
 
 /// Number of guards of a phase.
 pub const GUARDS: usize = 7;

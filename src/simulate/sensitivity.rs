@@ -2,7 +2,7 @@
 //! the run and through its transitions.
 //!
 //! Between transitions the derivatives obey the linear equations of [`crate::model::tangent`] along the
-//! series of each step. Collocation ([`crate::ode::collocation`]) solves them; all directions share one
+//! series of each step. Collocation ([`hybrid_ode::collocation`]) solves them; all directions share one
 //! factorisation per step. At the zero of a guard `G` the transition time changes by `d tau = -dG / G'` and
 //! the derivative of the state jumps (saltation; Leine and Nijmeijer, "Dynamics and Bifurcations of
 //! Non-Smooth Mechanical Systems", chapter 7),

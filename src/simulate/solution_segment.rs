@@ -4,11 +4,11 @@ use super::fixed_step_scheme::StabilisedStickPhase;
 use super::flight::{FlightPhase, flight_state_from};
 use super::mode::TipMode;
 use super::phases::{self, DrivenBlade, SlipPhase, StickPhase, TaylorMotion, pose_from_states};
-use crate::math::gauss_legendre;
 use crate::model::shoulder::ShoulderContact;
 use crate::model::{HeadMotion, LinkDirections, Pose};
-use crate::ode;
-use crate::ode::polynomial::TERMS;
+use hybrid_ode as ode;
+use hybrid_ode::polynomial::TERMS;
+use portable_math::gauss_legendre;
 
 /// A piece of the solution in one mode of contact.
 pub struct SolutionSegment<'a> {

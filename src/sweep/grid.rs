@@ -1,7 +1,7 @@
 //! Points of a study: a grid of all combinations of the axes' values, or a sample of their box.
 
-use crate::math;
 use crate::model::parameters::ModelParameter;
+use portable_math as math;
 use rand::{RngCore, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use schemars::JsonSchema;

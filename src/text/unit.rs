@@ -1,6 +1,6 @@
 //! Units with metric prefixes, and shares as percentages.
 
-use super::number::{format_decimals, format_digits, format_short, format_with_sd, to_ascii, typeset};
+use plain_charts::number::{format_decimals, format_digits, format_short, format_with_sd, to_ascii, typeset};
 
 /// Prefixes with their factors, the smallest last.
 const PREFIXES: [(&str, f64); 3] = [("", 1.0), ("m", 1e3), ("\u{b5}", 1e6)];

@@ -1,5 +1,5 @@
-//! The tilt of the camera as a user meets it: `inspect` and `import` say it, `import --level` takes it out and
-//! keeps what it did.
+//! The tilt of the camera as a user meets it: `inspect` and `import` say it, `import --level` takes it out
+//! and keeps what it did.
 
 use assert_cmd::Command;
 use std::f64::consts::TAU;

@@ -1,5 +1,5 @@
-//! Mistakes of a newcomer in the files that `wiperlab init` writes: each message names the key, the value, what
-//! was expected and what to do, and several mistakes of a file are all named at once.
+//! Mistakes of a newcomer in the files that `wiperlab init` writes: each message names the key, the value,
+//! what was expected and what to do, and several mistakes of a file are all named at once.
 
 use crate::small_fit::Project;
 

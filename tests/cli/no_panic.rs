@@ -1,9 +1,9 @@
 //! No record, however broken, makes the search for instants or components panic.
 
 use proptest::prelude::*;
+use short_spectra::{SpectrumSettings, analyse_spectrum};
 use wiperlab::recording::channel::{Channel, ReversalInstants, Window};
 use wiperlab::recording::{FrameGrid, Recording, Traces};
-use wiperlab::spectrum::{SpectrumSettings, analyse_spectrum};
 
 fn column(frames: usize) -> impl Strategy<Value = Vec<Option<f64>>> {
     let wild = prop_oneof![4 => (-1.0..1.0f64).prop_map(Some), 3 => (-3i32..3).prop_map(|i| Some(f64::from(i) * 1e-3)), 2 => Just(None), 1 => Just(Some(9e5)), 1 => Just(Some(-9e5))];

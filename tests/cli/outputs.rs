@@ -1,5 +1,5 @@
-//! What a command may overwrite: its own unchanged files, the rest with `--force`, a measured recording never;
-//! and a trace that is not the one that its description was written for.
+//! What a command may overwrite: its own unchanged files, the rest with `--force`, a measured recording
+//! never; and a trace that is not the one that its description was written for.
 
 use crate::small_fit::{JOB, Project};
 use std::collections::BTreeMap;

@@ -1,5 +1,5 @@
-//! `result.json` is what the fit wrote: a changed digit is refused by the hash that the file carries, and most
-//! of them also by the model that a report runs.
+//! `result.json` is what the fit wrote: a changed digit is refused by the hash that the file carries, and
+//! most of them also by the model that a report runs.
 
 use crate::sealed::resealed_result;
 use crate::small_fit::{JOB, Project};

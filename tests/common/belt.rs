@@ -2,7 +2,7 @@
 
 #![allow(dead_code)] // each test program uses a part
 
-use wiperlab::ode::{HybridPhase, PhaseEnd, PhaseStart};
+use hybrid_ode::{HybridPhase, PhaseEnd, PhaseStart};
 
 /// The static limit is `at_rest`, the kinetic force a function of the sliding speed.
 pub struct Belt {

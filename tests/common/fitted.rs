@@ -2,7 +2,7 @@
 //! user's name may stand.
 
 use super::scene;
-use wiperlab::chart::Figure;
+use plain_charts::Figure;
 use wiperlab::figures::corner::{self, CornerParameter, CornerPlot};
 use wiperlab::figures::cycle::{self, CycleOverSpeed, SpeedPoint, Target};
 use wiperlab::figures::evidence;
@@ -129,7 +129,7 @@ pub fn evidence(name: &str) -> Figure {
 pub fn cycle(name: &str) -> Figure {
     let points = |by: f64| {
         let point = |i: u32| SpeedPoint {
-            tip_speed_m_per_s: 0.005 * f64::from(i),
+            speed_m_per_s: 0.005 * f64::from(i),
             frequency_hz: 900.0 - by * f64::from(i),
             frequency_sd_hz: Some(6.0),
         };

@@ -4,7 +4,7 @@
 #[path = "fitted.rs"]
 mod fitted;
 
-use wiperlab::chart::{Figure, Medium};
+use plain_charts::{Figure, Medium};
 use wiperlab::figures::animation::{self, Animation, TrackedMotion};
 use wiperlab::figures::animation::{PlaybackPace, PlaybackPart};
 use wiperlab::figures::history::{self, TimeHistory};
@@ -168,7 +168,7 @@ fn full_spectrogram(name: &str) -> SpectrogramPlot {
 /// A recording and a model that starts and ends a little later.
 fn both_spectrograms(name: &str) -> SpectrogramComparison {
     let speed = |i: u32| SpeedPoint {
-        tip_speed_m_per_s: 1e-3 * f64::from(i),
+        speed_m_per_s: 1e-3 * f64::from(i),
         frequency_hz: 150.0 + f64::from(i),
         frequency_sd_hz: Some(5.0),
     };

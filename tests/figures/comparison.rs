@@ -2,8 +2,8 @@
 //! medium, says what is synthetic or not measured, and its caption holds numbers that follow from the data.
 
 use crate::raster::{colliding, inked, rasterised, sound};
+use plain_charts::{Figure, MAX_HEIGHT_MM, Medium};
 use std::path::{Path, PathBuf};
-use wiperlab::chart::{Figure, MAX_HEIGHT_MM, Medium};
 use wiperlab::compare::{FittedRecording, ModelRun, run_conditions};
 use wiperlab::figures::{Drawing, FigureBlock};
 use wiperlab::fit::job::Job;

@@ -1,9 +1,9 @@
 //! Reports on input unlike the bundled fits: films, recordings cut short or full of holes, runs that end
 //! early, blades that never stick, several conditions.
 
+use plain_charts::{Figure, Medium};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use wiperlab::chart::{Figure, Medium};
 use wiperlab::compare::{FittedRecording, ModelRun, run_conditions};
 use wiperlab::figures::{Drawing, FigureBlock};
 use wiperlab::fit::job::Job;

@@ -5,7 +5,7 @@ use crate::shown;
 
 use crate::raster::{colliding, inked, near, rasterised, sound};
 use crate::shown::{EMPTY, FULL, MEDIA};
-use wiperlab::chart::{Figure, MAX_HEIGHT_MM, Medium};
+use plain_charts::{Figure, MAX_HEIGHT_MM, Medium};
 use wiperlab::figures::history::{self, TimeHistory};
 use wiperlab::recording::motion_traces::MotionTraces;
 

@@ -5,7 +5,8 @@ use crate::raster;
 
 use crate::noise::noise;
 use crate::raster::{drawn, inked, near, rasterised};
-use wiperlab::chart::Medium;
+use plain_charts::Medium;
+use short_spectra::{SampledRecord, SpectralAnalysis, SpectrumSettings};
 use wiperlab::figures::analysis::compare_spectra;
 use wiperlab::figures::ring_down::{self, ComponentDecay, RingDown, RingDownTrace};
 use wiperlab::figures::spectrogram::{self, SpectrogramPlot, SpectrogramRidgePoint, SpeedPoint};
@@ -13,7 +14,6 @@ use wiperlab::figures::spectrum::{
     self, AmplitudeInterval, LabelledComponent, SpectraPlot, SpectrumCurve, SpectrumLevel,
 };
 use wiperlab::figures::windows::{self, WindowOverview, WindowSpan};
-use wiperlab::spectrum::{SampledRecord, SpectralAnalysis, SpectrumSettings};
 
 const VERMILION: (u8, u8, u8) = (0xD5, 0x5E, 0x00);
 const BLUE: (u8, u8, u8) = (0x00, 0x72, 0xB2);
@@ -74,7 +74,7 @@ fn gram() -> SpectrogramPlot {
         frequency_hz: (!(40..50).contains(&i)).then(|| f64::from(30 + i / 4) * 5.0),
     };
     let speed = |i: u32| SpeedPoint {
-        tip_speed_m_per_s: f64::from(i) * 0.02,
+        speed_m_per_s: f64::from(i) * 0.02,
         frequency_hz: f64::from(150 + i),
         frequency_sd_hz: Some(4.0),
     };
@@ -320,7 +320,7 @@ fn what_is_no_finite_number_never_reaches_a_figure() {
         bad_gram.amplitude_m[7] = vec![Some(bad); 100];
         bad_gram.ridge[3].frequency_hz = Some(bad);
         bad_gram.over_speed =
-            vec![SpeedPoint { tip_speed_m_per_s: bad, frequency_hz: bad, frequency_sd_hz: Some(bad) }];
+            vec![SpeedPoint { speed_m_per_s: bad, frequency_hz: bad, frequency_sd_hz: Some(bad) }];
         bad_gram.instants.push(("bad".to_owned(), bad));
         raster::sound("figure", &spectrogram::draw_figure(&bad_gram).to_svg(Medium::Screen));
         bad_gram.frequency_hz[5] = bad;

@@ -1,8 +1,8 @@
 //! Frames of a video behind the links: a picture whose answer is known has its points where the figure draws
 //! those that were tracked.
 
+use plain_charts::{Medium, Raster};
 use std::sync::Mutex;
-use wiperlab::chart::{Medium, Raster};
 use wiperlab::compare::{ConditionComparison, FittedRecording, run_conditions};
 use wiperlab::figures::video_frames::{VideoFrames, details, figure};
 use wiperlab::fit::job::Job;

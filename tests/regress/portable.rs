@@ -36,8 +36,13 @@ fn linked_with(package: &str) -> BTreeSet<String> {
 #[test]
 fn transforms_have_no_variants_for_processors_and_the_turns_of_libm() {
     let asked = "realfft = { version = \"3.5\", default-features = false }";
-    assert!(include_str!("../../Cargo.toml").contains(asked), "its features choose by the processor");
-    assert!(include_str!("../../src/spectrum/transform.rs").contains("RealFftPlanner<PortableReal>"));
+    assert!(
+        include_str!("../../crates/short-spectra/Cargo.toml").contains(asked),
+        "its features choose by the processor"
+    );
+    assert!(
+        include_str!("../../crates/short-spectra/src/transform.rs").contains("RealFftPlanner<PortableReal>")
+    );
 }
 
 #[test]

@@ -4,11 +4,11 @@
 
 use crate::score::{Errors, Reading, deviation, largest, mean, near, read, read_all, rms};
 use crate::signal::{AMPLITUDE_M, FLIPS, Signal, Tone};
-use std::ops::Range;
-use wiperlab::spectrum::{
+use short_spectra::{
     Component, ComponentVerdict, Detrend, Estimator, LONGEST_DECOMPOSED, SampledRecord, SpectralAnalysis,
     SpectrumError, SpectrumSettings,
 };
+use std::ops::Range;
 
 const LOW_HZ: f64 = 78.4;
 const HIGH_HZ: f64 = 900.0;
@@ -391,8 +391,9 @@ fn a_long_record_is_read_by_its_periodogram() {
     }
 }
 
-/// Over whole reversals of the actual blade, head before and after its flip included: no component slower than
-/// the waves that a polynomial draws through the flip, and the ring-down of the head, which is the slowest.
+/// Over whole reversals of the actual blade, head before and after its flip included: no component slower
+/// than the waves that a polynomial draws through the flip, and the ring-down of the head, which is the
+/// slowest.
 #[test]
 fn no_polynomial_swings_through_a_whole_reversal() {
     use wiperlab::recording::channel::Channel;
@@ -431,8 +432,8 @@ fn no_polynomial_swings_through_a_whole_reversal() {
     }
 }
 
-/// Only every second or third frame is kept: tones below half of that rate are read as in a whole record, those
-/// above it are suspected to be folded, and none is mirrored without a word.
+/// Only every second or third frame is kept: tones below half of that rate are read as in a whole record,
+/// those above it are suspected to be folded, and none is mirrored without a word.
 #[test]
 fn a_tone_in_every_second_or_third_frame_is_read_at_the_rate_of_those() {
     for stride in [2, 3] {

@@ -5,8 +5,8 @@
 //! All are dimensionless with unit mass, stiffness and static friction; times are compared absolutely, so an
 //! error is in units of the reciprocal angular frequency and the tolerance is that of one step.
 
-use wiperlab::ode::taylor::{self, TaylorExpansion, TaylorPhase, TaylorWorkspace};
-use wiperlab::ode::{self, HybridPhase, PhaseEnd, PhaseEndCause, PhaseStart, WorkCounters};
+use hybrid_ode::taylor::{self, TaylorExpansion, TaylorPhase, TaylorWorkspace};
+use hybrid_ode::{self as ode, HybridPhase, PhaseEnd, PhaseEndCause, PhaseStart, WorkCounters};
 
 /// Error that a located instant may have in units of the tolerance: a phase takes a few steps and each may
 /// err by the tolerance.

@@ -3,10 +3,10 @@
 //! changelog.
 
 use crate::scenes::committed;
-use wiperlab::math;
+use portable_math as math;
+use short_spectra::{SampledRecord, SpectralAnalysis, SpectrumSettings};
 use wiperlab::simulate::outputs::Transitions;
 use wiperlab::simulate::{RunStatus, run_scene};
-use wiperlab::spectrum::{SampledRecord, SpectralAnalysis, SpectrumSettings};
 use wiperlab::text::text_sha256;
 
 /// Hash of numbers, with all their digits.

@@ -1,10 +1,10 @@
 //! What is done to a recording before it is analysed: deflection, instants, windows, detrending; gaps stay
 //! gaps.
 
+use short_spectra::{SpectrumError, SpectrumSettings, analyse_spectrum};
 use std::f64::consts::TAU;
 use wiperlab::recording::channel::{Channel, InstantKind, ReversalInstants, Window};
 use wiperlab::recording::{FrameGrid, Recording, Traces};
-use wiperlab::spectrum::{SpectrumError, SpectrumSettings, analyse_spectrum};
 
 const RATE_HZ: f64 = 5000.0;
 const START_S: f64 = 0.9;

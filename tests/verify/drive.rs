@@ -1,10 +1,10 @@
 //! The head's motion from a recording: exact where it can be, then against the noise, then on the blade.
 
 use crate::scenes::seen;
+use portable_math::StandardNormal;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
-use wiperlab::math::StandardNormal;
 use wiperlab::recording::{FrameGrid, Recording, Traces};
 use wiperlab::simulate::drive::{HeadSpline, smooth_head_motion};
 use wiperlab::simulate::mode::TipMode;

@@ -4,11 +4,11 @@
 use crate::lagrangian;
 
 use crate::blade::{Parts, STROKE};
+use hybrid_ode::HybridPhase;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use wiperlab::model::shoulder::ShoulderContact;
 use wiperlab::model::{FrictionResponse, HeadMotion, LinkDirections, Linkage, Pose};
-use wiperlab::ode::HybridPhase;
 use wiperlab::simulate::mode::holding_force;
 use wiperlab::simulate::phases::{DrivenBlade, SlipPhase, StickPhase};
 use wiperlab::simulate::scene::Drive;

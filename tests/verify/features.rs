@@ -1,6 +1,7 @@
 //! Every kind of feature against recordings whose answer is known exactly.
 
 use crate::noise::noise;
+use short_spectra::{Detrend, SpectrumSettings, analyse_spectrum};
 use std::f64::consts::{PI, TAU};
 use wiperlab::feature::{
     ASSIGN_DB, ASSIGN_WIDTH, CycleRangeEnd, Feature, FeatureBand, FeatureReader, FeatureValue, MissingValue,
@@ -8,7 +9,6 @@ use wiperlab::feature::{
 };
 use wiperlab::recording::channel::{Channel, InstantNotFound, ReversalInstants, Window};
 use wiperlab::recording::{FrameGrid, Recording, Traces};
-use wiperlab::spectrum::{Detrend, SpectrumSettings, analyse_spectrum};
 
 const RATE_HZ: f64 = 5000.0;
 /// A tenth of a pixel of 20 um, in the deflection.

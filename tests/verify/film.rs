@@ -2,8 +2,8 @@
 //! same camera, and with the noise and the lost points of a recording.
 
 use crate::scenes::committed;
+use short_spectra::sampling::exposure_gain;
 use std::f64::consts::{PI, TAU};
-use wiperlab::camera::exposure_gain;
 use wiperlab::recording::quality::noise_floor;
 use wiperlab::recording::{FrameGrid, Recording, Traces};
 use wiperlab::simulate::SolverOptions;

@@ -3,8 +3,8 @@
 
 use crate::counts::Counts;
 use crate::hard::KINDS;
+use short_spectra::{Component, ComponentVerdict, SampledRecord, SpectralAnalysis, SpectrumSettings};
 use std::f64::consts::TAU;
-use wiperlab::spectrum::{Component, ComponentVerdict, SampledRecord, SpectralAnalysis, SpectrumSettings};
 
 const RATE_HZ: f64 = 5000.0;
 /// Seeds of a kind; long records take a few.
@@ -45,8 +45,8 @@ fn nothing_sought_is_missed_and_nothing_is_wrongly_clear() {
     }
 }
 
-/// Records of the mixtures in which ring-downs overlap, begin late and are large, or lie on a smooth step: each
-/// was cut, missed or off by many deviations before terms were placed again.
+/// Records of the mixtures in which ring-downs overlap, begin late and are large, or lie on a smooth step:
+/// each was cut, missed or off by many deviations before terms were placed again.
 const MIXED: [(&str, &[u64]); 2] = [
     ("one of any kind, on any flip, 30 dB", &[72, 177]),
     ("up to three of any kind, on any flip, 30 dB", &[29, 69, 170, 178, 284, 327, 334, 386]),

@@ -2,13 +2,13 @@
 //! insensitivity to the tolerance.
 
 use crate::scenes::{both, committed, seen, upright_light_blade};
+use hybrid_ode::HybridPhase;
 use nalgebra::{Complex, Matrix4, Vector4};
 use std::f64::consts::TAU;
 use wiperlab::model::friction::FrictionLaw;
 use wiperlab::model::modes::{TipConstraint, natural_modes};
 use wiperlab::model::shoulder::ShoulderContact;
 use wiperlab::model::{LinkDirections, Linkage, Pose, Spring};
-use wiperlab::ode::HybridPhase;
 use wiperlab::simulate::equilibrium::steady_slip_pose;
 use wiperlab::simulate::mode::TipMode;
 use wiperlab::simulate::outputs::SampleObserver;

@@ -1,12 +1,12 @@
 //! Impacts with friction against Routh's method by hand, Newton's law without friction, the closed form of
 //! slip under friction that falls with speed, a plain step-by-step integration, and the Painlevé rod.
 
+use hybrid_ode::WorkCounters;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use wiperlab::model::friction::FrictionLaw;
 use wiperlab::model::shoulder::ShoulderContact;
 use wiperlab::model::{HeadMotion, LinkDirections, Linkage, Pose, Spring};
-use wiperlab::ode::WorkCounters;
 use wiperlab::simulate::impact::{
     ContactSurface, ImpactOrigin, ImpactOutcome, InverseMass, TipVelocity, solve_impact,
 };

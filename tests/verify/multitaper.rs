@@ -1,8 +1,8 @@
 //! The multitaper estimate against records whose density and lines are known.
 
 use crate::noise::noise;
+use short_spectra::{Multitaper, MultitaperError, TAPERS};
 use std::f64::consts::TAU;
-use wiperlab::spectrum::{Multitaper, MultitaperError, TAPERS};
 
 const RATE_HZ: f64 = 5000.0;
 const FRAMES: usize = 750;

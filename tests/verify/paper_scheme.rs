@@ -3,8 +3,8 @@
 
 use crate::belt::{BELTS, Belt, Riding, Sliding};
 use crate::scenes::committed;
-use wiperlab::ode::fixed_step::{FixedStepLocator, FixedStepOptions, integrate_fixed};
-use wiperlab::ode::{PhaseEndCause, WorkCounters};
+use hybrid_ode::fixed_step::{FixedStepLocator, FixedStepOptions, integrate_fixed};
+use hybrid_ode::{PhaseEndCause, WorkCounters};
 use wiperlab::simulate::fixed_step_scheme::FixedStepScheme;
 use wiperlab::simulate::mode::TipMode;
 use wiperlab::simulate::outputs::{EnergyAudit, Transitions};

@@ -1,10 +1,10 @@
 //! The quality verdict against recordings whose faults are known: each is found with its number, and nothing
 //! else is.
 
+use portable_math::StandardNormal;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::{PI, TAU};
-use wiperlab::math::StandardNormal;
 use wiperlab::recording::channel::ReversalInstants;
 use wiperlab::recording::quality::*;
 use wiperlab::recording::{FrameGrid, Recording, Traces};

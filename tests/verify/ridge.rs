@@ -1,11 +1,11 @@
 //! The course of a drifting component against records whose frequency is known at every instant.
 
 use crate::noise::noise;
-use std::f64::consts::TAU;
-use wiperlab::spectrum::SpectrumError;
-use wiperlab::spectrum::time_frequency::{
+use short_spectra::SpectrumError;
+use short_spectra::time_frequency::{
     FrequencyRange, MOST_COLUMNS, Ridge, Spectrogram, SpectrogramSettings, default_band_hz,
 };
+use std::f64::consts::TAU;
 
 const BAND_HZ: (f64, f64) = (250.0, 1500.0);
 const AMPLITUDE_M: f64 = 10e-6;

@@ -2,12 +2,12 @@
 //! mode of contact.
 
 use crate::blade::{Parts, STROKE};
+use hybrid_ode::taylor::{TaylorExpansion, TaylorPhase};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use wiperlab::model::Pose;
 use wiperlab::model::flight::FlightState;
 use wiperlab::model::shoulder::ShoulderContact;
-use wiperlab::ode::taylor::{TaylorExpansion, TaylorPhase};
 use wiperlab::simulate::build_system;
 use wiperlab::simulate::flight::{FlightPhase, flight_state_vector};
 use wiperlab::simulate::phases::{DrivenBlade, GUARDS, JAMS, SlipPhase, StickPhase};
@@ -104,7 +104,7 @@ fn slip_expands_to_its_own_motion() {
         let y = [case.pose.theta, case.pose.phi, case.pose.theta_rate, case.pose.phi_rate];
         // the indicator is constant in the expansion, and near its zero the radius of the series is short; N
         // is taken for its sign alone
-        let guards = wiperlab::ode::HybridPhase::guards(&slip, case.t, &y);
+        let guards = hybrid_ode::HybridPhase::guards(&slip, case.t, &y);
         if guards[JAMS] < 0.5 {
             continue;
         }

@@ -3,7 +3,7 @@
 
 use crate::belt::{BELTS, Riding, Sliding};
 use crate::scenes::committed;
-use wiperlab::ode::{
+use hybrid_ode::{
     EventLocator, HybridPhase, PhaseEnd, PhaseEndCause, PhaseStart, WorkCounters, integrate_with_locator,
 };
 use wiperlab::simulate::outputs::Transitions;

@@ -1,10 +1,10 @@
 //! The spectrum against records whose components are known exactly.
 
 use crate::noise::noise;
-use std::f64::consts::TAU;
-use wiperlab::spectrum::{
+use short_spectra::{
     Component, ComponentVerdict, Detrend, Spectrum, SpectrumError, SpectrumSettings, analyse_spectrum,
 };
+use std::f64::consts::TAU;
 
 const RATE_HZ: f64 = 5000.0;
 

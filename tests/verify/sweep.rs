@@ -1,10 +1,10 @@
 //! A parameter study against exact answers: eigenfrequencies, runs that stick or slip throughout, mirror
 //! images, and the run itself.
 
+use plain_charts::Medium;
 use resvg::{tiny_skia, usvg};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use wiperlab::chart::Medium;
 use wiperlab::checkpoint::{Shard, format_header_line};
 use wiperlab::feature::{self, FeatureReader};
 use wiperlab::figures::sweep_map;

@@ -1,10 +1,10 @@
 //! The tilt of the camera against paths whose slope is known: exact without noise, within its standard
 //! deviation with it, and not claimed where the path does not show it.
 
+use portable_math::StandardNormal;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
-use wiperlab::math::StandardNormal;
 use wiperlab::recording::channel::ReversalInstants;
 use wiperlab::recording::files::{RecordingFile, read_recording};
 use wiperlab::recording::quality::*;

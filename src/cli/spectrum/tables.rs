@@ -4,11 +4,11 @@ use super::{SpectrumRequest, StudiedWindow};
 use crate::cli::failure::{Failure, Outcome};
 use crate::figures::analysis::CoursePoint;
 use crate::recording::channel::{Channel, ReversalInstants, phase_windows};
-use crate::spectrum::time_frequency::FrequencyRange;
-use crate::spectrum::{Component, ComponentVerdict, SpectralAnalysis};
 use crate::text::{format_with_sd, to_ascii};
 use rayon::prelude::*;
 use serde::Serialize;
+use short_spectra::time_frequency::FrequencyRange;
+use short_spectra::{Component, ComponentVerdict, SpectralAnalysis};
 use std::fmt::Write;
 
 /// Rows of a block of text; the blocks of a long record are made in parallel.

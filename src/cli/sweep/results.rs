@@ -1,13 +1,13 @@
 //! The files of a study, from its points.
 
 use super::{LoadedStudy, collection_failure};
-use crate::chart::Figure;
 use crate::cli::prelude::*;
 use crate::figures::{sweep_map, sweep_sheet};
 use crate::sweep::outputs::{SweepSummary, csv_header, csv_row};
 use crate::sweep::{
     MissingReason, PointCollection, PointOutcome as Point, RankCorrelations, SHEET_NAME, Study,
 };
+use plain_charts::Figure;
 use std::collections::BTreeMap;
 use std::fs::File;
 

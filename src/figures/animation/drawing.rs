@@ -1,10 +1,10 @@
 //! The linkage to scale: its joints and the panels in which it moves. Lengths in mm, heights above the glass.
 
 use super::Animation;
-use crate::chart::{ChartAxis, Colour, Mark, Panel, Series, TextAnnotation, value_span};
 use crate::figures::poses::joint_positions;
 use crate::model::Linkage;
 use crate::simulate::ModelSample;
+use plain_charts::{ChartAxis, Colour, Mark, Panel, Series, TextAnnotation, value_span};
 
 const MM: f64 = 1e3;
 /// Estimated width of the axes in half a page, mm; it sets the scale of the drawing.

@@ -2,10 +2,10 @@
 
 use super::drawing::{HEAD_HALF_WIDTH, HEAD_HEIGHT};
 use super::{Animation, PlaybackPace, PlaybackPart, drawing};
-use crate::chart::{Colour, PanelPlacement};
 use crate::figures::animation;
 use crate::simulate::ModelSample;
 use crate::simulate::mode::TipMode;
+use plain_charts::{Colour, PanelPlacement};
 use std::fmt::Write;
 
 /// Largest position error of a drawn point, canvas units: a fiftieth of a millimetre, less than a line width.

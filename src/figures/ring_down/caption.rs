@@ -6,8 +6,8 @@ use crate::feature::Reading;
 use crate::figures::analysis::AnalysedWindow;
 use crate::figures::ring_down::{draw_figure, figure_title};
 use crate::figures::{FigureBlock, FigureText, subtitle};
-use crate::spectrum::{Component, LONGEST_DECOMPOSED, SpectralAnalysis};
 use crate::text::{format_digits, format_length, format_with_sd};
+use short_spectra::{Component, LONGEST_DECOMPOSED, SpectralAnalysis};
 
 /// Index of the window with the lowest sought frequency, and that frequency, Hz; `None` where the job seeks
 /// none.

@@ -3,8 +3,8 @@
 use super::{
     Figure, SpectrogramPlot, colour_range_db, decibel_map, draw_map, full_figure, ridge_points, time_span,
 };
-use crate::chart::{ChartAxis, Colour, HeatMap, Mark, MarkerShape, Panel, Series};
 use crate::figures::spectrogram;
+use plain_charts::{ChartAxis, Colour, HeatMap, Mark, MarkerShape, Panel, Series};
 
 /// Source of a spectrogram.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -148,8 +148,8 @@ fn draw_ridges_over_speed(sides: &[(SpectrogramSide, SpectrogramPlot)]) -> Optio
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chart::Medium;
     use crate::figures::spectrogram::{SpectrogramRidgePoint, SpeedPoint};
+    use plain_charts::Medium;
 
     fn example_spectrogram(columns: usize, scale: f64) -> SpectrogramPlot {
         let column = |i: usize| {
@@ -176,7 +176,7 @@ mod tests {
                 .collect(),
             over_speed: (0..columns)
                 .map(|i| SpeedPoint {
-                    tip_speed_m_per_s: i as f64 * 1e-3,
+                    speed_m_per_s: i as f64 * 1e-3,
                     frequency_hz: 1000.0,
                     frequency_sd_hz: Some(5.0),
                 })

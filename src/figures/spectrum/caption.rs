@@ -8,10 +8,10 @@ use crate::figures::figure_text::file_name_part;
 use crate::figures::spectrum::components::LabelledComponent;
 use crate::figures::spectrum::{SpectraPlot, draw_figure, strongest_claim};
 use crate::figures::{FigureBlock, FigureText, ring_down};
-use crate::spectrum::{SampledRecord, SpectralAnalysis, SpectrumSettings};
 use crate::text::{
     capitalise, format_digits, format_length, format_percent, format_signed_percent, format_with_sd,
 };
+use short_spectra::{SampledRecord, SpectralAnalysis, SpectrumSettings};
 
 /// Highest shown frequency: this many times the upper end of the fit's band, and at least this, Hz. Above it
 /// a fast camera records only noise.

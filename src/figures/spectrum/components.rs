@@ -1,8 +1,8 @@
 //! Components as symbols with error bars, and their labels.
 
 use super::MICROMETRES;
-use crate::chart::{Colour, ErrorBar, Mark, MarkerShape, Series, VerticalLine};
 use crate::text::{format_trimmed, format_with_sd};
+use plain_charts::{Colour, ErrorBar, Mark, MarkerShape, Series, VerticalLine};
 
 /// A component for display: frequency and amplitude with two standard deviations, or the range of a drifting
 /// frequency.

@@ -2,10 +2,10 @@
 
 use super::parameter_words;
 use crate::feature::FeatureUnit;
-use crate::math;
 use crate::sweep::rank_correlation::spearman_correlation;
 use crate::sweep::{PointOutcome, Study, SweepAxis, SweepMap};
 use crate::text::{capitalise, format_decimals, format_trimmed};
+use portable_math as math;
 
 /// Least absolute rank correlation of a trend.
 const CLEAR: f64 = 0.5;

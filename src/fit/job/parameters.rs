@@ -4,8 +4,8 @@ use super::as_written::{self, JobNuisanceEntry, ListedNuisance};
 use super::checks::find_repeated;
 use super::{KeyRefusal, check_above_zero, is_same_quantity};
 use crate::fit::bounds::{Bounds, BoundsSpacing, Prior, SearchAxis};
-use crate::math;
 use crate::toml_file::suggest_key;
+use portable_math as math;
 use serde::Serialize;
 
 /// A parameter that the search may change.

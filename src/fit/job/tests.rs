@@ -11,7 +11,7 @@ use crate::fit::bounds::Prior;
 use crate::fit::search::STAGNANT_GENERATIONS;
 use crate::model::parameters::find_parameter;
 use crate::recording::channel::Channel;
-use crate::spectrum::Detrend;
+use short_spectra::Detrend;
 
 const KNOWN: [&str; 3] = ["friction.a", "friction.c", "blade.neck_stiffness_n_m_per_rad"];
 

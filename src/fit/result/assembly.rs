@@ -15,8 +15,8 @@ use crate::fit::linear_model::Z_95;
 use crate::fit::search::{LocalDescent, SearchOutcome};
 use crate::fit::target_value::TargetValue;
 use crate::fit::uncertainty::{CHI_SQUARED_95, FitUncertainty};
-use crate::math;
 use crate::text::format_short;
+use portable_math as math;
 
 /// Everything that goes into a result.
 pub(in crate::fit) struct FitFindings<'a> {

@@ -10,8 +10,8 @@ use super::stagnation::StagnationCounter;
 use crate::fit::bounds::clamp_unit;
 use crate::fit::evaluation::EvaluationStage;
 use crate::fit::ledger::{Ledger, StopReason};
-use crate::math::{self, StandardNormal};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use portable_math::{self as math, StandardNormal};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 

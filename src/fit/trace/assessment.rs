@@ -8,8 +8,8 @@ use super::search::{TraceDescent, is_same_end, other_ends};
 use super::uncertainty_run::{SearchEnd, UncertaintyRun, Z_95, profile_distances};
 use super::unknowns::UnknownKind;
 use crate::fit::bootstrap::MIN_TWINS;
-use crate::math;
 use nalgebra::DMatrix;
+use portable_math as math;
 use std::collections::BTreeSet;
 
 /// Least eigenvalue of the scaled information that counts as determined: below it rounding decides.

@@ -10,7 +10,6 @@ use crate::fit::trace::model::{TraceModel, TraceRecording};
 use crate::fit::trace::segment_simulation::segment_residuals;
 use crate::fit::trace::unknowns::{CameraUnknown, TraceUnknown, TraceUnknowns, UnknownKind};
 use crate::fit::trace_data::TraceData;
-use crate::math;
 use crate::recording::Recording;
 use crate::recording::channel::ReversalInstants;
 use crate::recording::noise_model::{
@@ -19,6 +18,7 @@ use crate::recording::noise_model::{
 use crate::recording::quality::{CameraTilt, measure_quality, measure_tilt};
 use crate::simulate::drive::{Drive, HeadMotionError, smooth_head_motion};
 use crate::simulate::scene::Scene;
+use portable_math as math;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

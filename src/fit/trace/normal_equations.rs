@@ -4,8 +4,8 @@ use super::checkpoint::{Iterate, SegmentState};
 use super::model::TraceModel;
 use super::segment_simulation::{LinkState, RecordingModel};
 use super::variable_projection::{ProjectedSegment, project_out_state};
-use crate::math;
 use nalgebra::{DMatrix, DVector};
+use portable_math as math;
 use rayon::prelude::*;
 
 /// Chi2 per datum at which a segment has half its weight, so that segments in a wrong state do not dominate.

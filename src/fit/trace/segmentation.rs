@@ -3,10 +3,10 @@
 use super::camera_observation::CameraObservation;
 use super::segment_simulation::LinkState;
 use super::unknowns::CameraParameters;
-use crate::math;
 use crate::model::Linkage;
 use crate::simulate::scene::Scene;
 use nalgebra::{DMatrix, DVector};
+use portable_math as math;
 
 /// Least angle between the links at which the tip's two coordinates determine both angles; a nearly straight
 /// blade does not.

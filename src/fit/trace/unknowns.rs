@@ -1,8 +1,8 @@
 //! Unknowns of a trace fit besides starting states: parameters of the scene and errors of the cameras, each
 //! along a coordinate of order one.
 
-use crate::math;
 use crate::simulate::scene::Scene;
+use portable_math as math;
 
 /// An unknown of the camera that took a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -8,7 +8,7 @@ use crate::fit::bounds::{Bounds, BoundsSpacing, SearchAxis};
 use crate::fit::evaluation::{FailureReason, RunFailure};
 use crate::fit::search::SearchSettings;
 use crate::fit::target_value::TargetValue;
-use crate::math::StandardNormal;
+use portable_math::StandardNormal;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::ops::ControlFlow;

@@ -12,8 +12,8 @@ use crate::fit::profile::AT_BOUND;
 use crate::fit::result::{FitResult, FitStatus};
 use crate::fit::search::{EXACT_COST, MIN_WORTHWHILE_GAIN};
 use crate::fit::target_value::TargetValue;
-use crate::math;
 use nalgebra::DMatrix;
+use portable_math as math;
 
 /// Least correlation at which a parameter at its bound makes another estimate unreliable. If the optimum lies
 /// `k` deviations beyond the bound, the other estimate is off by `k` times the correlation, in its own

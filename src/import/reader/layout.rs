@@ -11,8 +11,8 @@ use crate::import::error::{ImportError, ImportResult};
 use crate::import::reader::instances::{
     InstanceFields, PointFields, RowOrder, RowPosition, RowStamp, TrackCollector,
 };
-use crate::math;
 use crate::recording::quality::{Check, QualityFinding, Severity};
+use portable_math as math;
 
 /// Cells of a point. A coordinate is the sum of its cells: a reference and a displacement are two.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -2,8 +2,8 @@
 
 use super::lane_vector::{LANES, LaneVector};
 use super::{LaneVectorPair, ReferenceMotion, lanes_per_link, sum_over_links};
-use crate::math;
 use crate::model::series::ContactMode;
+use portable_math as math;
 use std::cell::OnceCell;
 use std::ops::Deref;
 

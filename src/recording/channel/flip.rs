@@ -92,9 +92,9 @@ fn interpolate_crossing(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::StandardNormal;
     use crate::recording::channel::{Reversal, ReversalInstants, phase_windows};
     use crate::recording::{FrameGrid, Recording, Traces};
+    use portable_math::StandardNormal;
     use rand::{Rng, SeedableRng};
     use rand_xoshiro::Xoshiro256PlusPlus;
     use std::f64::consts::{PI, TAU};

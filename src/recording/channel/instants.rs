@@ -5,8 +5,8 @@ use super::Channel;
 use super::flip::{self, Flip, TurnNeighbourhood};
 use super::turns::{find_turns, longest_hold};
 use super::{TrackPoints, present_points};
-use crate::math;
 use crate::recording::Recording;
+use portable_math as math;
 use serde::Serialize;
 
 /// An instant that is found in the data.

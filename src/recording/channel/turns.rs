@@ -1,7 +1,7 @@
 //! Where the head turns.
 
 use super::{TrackPoints, median_filter, median_position, noise_sd_m, value_range};
-use crate::math;
+use portable_math as math;
 
 /// Least return of the head after a turn, m: one pixel of the usual 20 um. Jitter of a resting head stays
 /// below it.

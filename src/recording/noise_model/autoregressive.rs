@@ -1,6 +1,6 @@
 //! Stationary autoregressive noise, `n_t = sum phi_i n_(t-i) + e_t` with white `e`.
 
-use crate::math;
+use portable_math as math;
 use std::array::from_fn;
 
 /// Most coefficients of a process.
@@ -235,8 +235,8 @@ impl PredictionCovariance {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::StandardNormal;
     use nalgebra::{DMatrix, DVector};
+    use portable_math::StandardNormal;
     use rand::{Rng, SeedableRng};
     use rand_xoshiro::Xoshiro256PlusPlus;
 

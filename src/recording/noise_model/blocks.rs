@@ -1,7 +1,7 @@
 //! A channel in short blocks. A polynomial in time describes the motion in each; its residuals are noise.
 
-use crate::math;
 use crate::recording::channel::median_in_place;
+use portable_math as math;
 
 /// Fewest frames of a block, as a share of its length.
 const LEAST_SHARE: f64 = 0.5;

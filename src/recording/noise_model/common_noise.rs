@@ -6,8 +6,8 @@
 
 use super::block_length;
 use super::blocks::{BlockCut, NoiseBlock, cut_blocks, dot_product, keep_quiet_blocks};
-use crate::math;
 use crate::recording::Recording;
+use portable_math as math;
 
 /// Frames of a short block: a parabola leaves three quarters of the degrees of freedom.
 const SHORT_BLOCK: usize = 12;

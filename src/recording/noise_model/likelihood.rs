@@ -5,8 +5,8 @@
 use super::autoregressive::{AutoregressiveNoise, Whitener, raise_order};
 use super::blocks::{NoiseBlock, dot_product, project_out};
 use super::{ChannelNoise, NoiseSource};
-use crate::math;
 use nalgebra::{DMatrix, DVector};
+use portable_math as math;
 
 /// Highest order: the noise of trackers is vibration and sub-pixel bias, which last a few frames.
 const MOST_ORDER: usize = 6;

@@ -1,9 +1,9 @@
 //! Synthetic recordings whose noise is known.
 
 use super::*;
-use crate::math::StandardNormal;
 use crate::recording::noise_model::common_noise::CommonNoise;
 use crate::recording::{FrameGrid, Recording, Traces};
+use portable_math::StandardNormal;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;

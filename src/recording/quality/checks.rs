@@ -3,8 +3,8 @@
 use super::finding::{Check, QualityFinding, Severity};
 use super::measurement::{ChannelQuality, FEWEST_CYCLES, MeasuredColumn, Optics, Quality};
 use super::noise::FrameGaps;
-use crate::camera::exposure_gain;
 use crate::recording::{FrameGrid, Traces};
+use short_spectra::sampling::exposure_gain;
 
 /// Share of missing frames that is worth a caution. Least-squares spectra on true frame times stay accurate
 /// up to 40 %, but weak components are lost much earlier.

@@ -1,11 +1,11 @@
 //! A recording as measured: frames, rate, gaps, exposure, and the noise and step of each column.
 
 use super::noise::{FrameGaps, noise_floor, quantisation_step};
-use crate::camera::{alias_hz, exposure_gain, half_power_hz};
-use crate::math;
 use crate::recording::{Recording, Traces};
+use portable_math as math;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use short_spectra::sampling::{alias_hz, exposure_gain, half_power_hz};
 
 /// Fewest cycles in the recording that give a frequency.
 pub(super) const FEWEST_CYCLES: f64 = 3.0;

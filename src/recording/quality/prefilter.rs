@@ -9,7 +9,7 @@
 
 use super::finding::{Check, QualityFinding, Severity};
 use super::measurement::{ChannelQuality, MeasuredColumn};
-use crate::math;
+use portable_math as math;
 use std::f64::consts::TAU;
 
 /// Frames of a segment: it resolves a plateau up to a sixth of the Nyquist frequency, and 32 segments fit

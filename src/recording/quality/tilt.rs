@@ -10,11 +10,11 @@ mod glass_line;
 use super::finding::{Check, QualityFinding, Severity};
 use super::measurement::Quality;
 use super::motion::head_height_m;
-use crate::math;
 use crate::recording::Recording;
 use crate::recording::channel::ReversalInstants;
 use crate::text::{format_degrees, format_with_sd, to_ascii};
 use glass_line::{GlassLine, TipPath};
+use portable_math as math;
 use serde::Serialize;
 
 /// Fewest frames with a height: fewer do not show how their errors are correlated.

@@ -2,14 +2,14 @@
 //! each fit.
 
 use super::{ComparedFit, IntervalRelation, SharedParameter, shorten_name};
-use crate::chart::{
+use crate::compare::ParameterLine;
+use crate::figures::{Drawing, FigureBlock};
+use crate::text::{format_interval, format_number};
+use plain_charts::{
     ChartAxis, Colour, ErrorBar, FULL_WIDTH_MM, Figure, MAX_HEIGHT_MM, Mark, MarkerShape, Medium, Panel,
     Series,
 };
-use crate::compare::ParameterLine;
-use crate::figures::{Drawing, FigureBlock};
-use crate::math;
-use crate::text::{format_interval, format_number};
+use portable_math as math;
 
 const ROW_MM: f64 = 5.5;
 const LEAST_HEIGHT_MM: f64 = 16.0;

@@ -2,15 +2,15 @@
 //! for each fit.
 
 use super::{ComparisonInput, shorten_name};
-use crate::chart::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, VerticalLine};
 use crate::compare::TargetComparison;
 use crate::feature::{FeatureBand, Reading};
 use crate::figures::{Drawing, FigureBlock, NO_TRACES, subtitle};
 use crate::fit::job::FitTarget;
 use crate::recording::Recording;
 use crate::recording::channel::{Channel, InstantKind, ReversalInstants, WindowEnd};
-use crate::spectrum::{self, SpectrumSettings};
 use crate::text::{format_digits, format_trimmed, join_with_and};
+use plain_charts::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, VerticalLine};
+use short_spectra::{self as spectrum, SpectrumSettings};
 
 const MICROMETRES: f64 = 1e6;
 

@@ -1,8 +1,8 @@
 use super::interval_relation;
 use super::*;
-use crate::chart::{MAX_HEIGHT_MM, Medium};
 use crate::compare::{ParameterLine, TargetComparison};
 use crate::fit::uncertainty::ParameterVerdict as Knowledge;
+use plain_charts::{MAX_HEIGHT_MM, Medium};
 
 fn line(verdict: Knowledge, lower_95: Option<f64>, upper_95: Option<f64>) -> ParameterLine {
     ParameterLine {
@@ -123,7 +123,7 @@ fn an_open_end_reaches_the_frame_and_the_first_fit_stands_at_the_top() {
     assert!(low < 0.3 && high > 0.6, "{low} {high}");
     let open = panel.series.iter().find(|s| s.points == [Some((0.5, 1.0))]).unwrap();
     assert!(
-        matches!(open.error_bars[0], crate::chart::ErrorBar::Horizontal { y: 1.0, from: 0.4, to } if to > high),
+        matches!(open.error_bars[0], plain_charts::ErrorBar::Horizontal { y: 1.0, from: 0.4, to } if to > high),
         "{open:?}"
     );
     assert!(block.caption.contains("0 of 1 pairs"), "{}", block.caption);

@@ -1,11 +1,11 @@
 //! HTML parts of a page: escaped text, tables, figures, sections, the document.
 
-use crate::chart::Medium;
 use crate::figures::{Drawing, FigureBlock};
 use crate::model::parameters;
 use crate::report::rich_text::{Sentence, SentencePart, Statement};
 use crate::text::{capitalise, make_printable};
 use html_escape::encode_safe;
+use plain_charts::Medium;
 
 /// Any text escaped for HTML.
 pub(in crate::report) fn escape_text(raw: &str) -> String {

@@ -8,7 +8,7 @@ use crate::recording::Recording;
 use crate::recording::channel::{InstantKind, ReversalInstants, Window, WindowEnd};
 use crate::simulate::scene::Scene;
 use crate::simulate::{IntegrationMethod, RunResult, SolverOptions, run_scene_with};
-use crate::spectrum::{SpectrumSettings, analyse_spectrum};
+use short_spectra::{SpectrumSettings, analyse_spectrum};
 use std::ops::Range;
 
 /// Reference run of a scene.

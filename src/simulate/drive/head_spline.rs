@@ -1,9 +1,9 @@
 //! Motion of a recorded head as a cubic spline with continuous acceleration.
 
 use super::smoothing_spline::{SmoothingSpline, fit_smoothing_spline};
-use crate::math;
 use crate::model::HeadMotion;
 use crate::recording::FrameGrid;
+use portable_math as math;
 use serde::Serialize;
 use std::sync::Arc;
 

@@ -10,8 +10,8 @@
 //! take it for motion. Points are therefore averaged in blocks, and each block is compared with the same
 //! average of the curve. Times are in frames.
 
-use crate::math;
 use nalgebra::{DMatrix, DVector};
+use portable_math as math;
 
 /// Degree of the pieces.
 const DEGREE: usize = 5;

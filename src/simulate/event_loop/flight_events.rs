@@ -3,7 +3,6 @@
 use super::{EventLoop, NextPhase, PendingTransition, RunWatcher, TipStrike, integrate_phase};
 use crate::model::flight::FlightState;
 use crate::model::{LinkDirections, Pose};
-use crate::ode::{HybridPhase, PhaseEndCause as Ended, PhaseStart};
 use crate::simulate::flight::{FlightPhase, LANDING, flight_state_from, flight_state_vector};
 use crate::simulate::impact::{ImpactOrigin, ImpactOutcome, TipVelocity};
 use crate::simulate::mode::TipMode;
@@ -11,6 +10,7 @@ use crate::simulate::phases::{GUARDS, LEVEL_GUARDS};
 use crate::simulate::scene::contact::{ContactLossRule, JamRule};
 use crate::simulate::solution_segment::{SegmentSolution, SolutionSegment};
 use crate::simulate::{Impact, RunStatus, TransitionCause};
+use hybrid_ode::{HybridPhase, PhaseEndCause as Ended, PhaseStart};
 
 impl<W: RunWatcher> EventLoop<'_, W> {
     /// Handles a normal force of zero.

@@ -7,7 +7,6 @@ use super::tangent_segment::{Channel, ChannelWeights, DerivativeSum};
 use crate::model::shoulder::ShoulderContact;
 use crate::model::tangent::{LANES, LaneVector, StateTangent};
 use crate::model::{HeadMotion, LinkDirections, Linkage, Pose};
-use crate::ode::WorkCounters;
 use crate::simulate::event_loop::TipStrike;
 use crate::simulate::flight::LANDING;
 use crate::simulate::mode::TipMode;
@@ -15,6 +14,7 @@ use crate::simulate::phases::{
     BACKWARD_LIMIT, DrivenBlade, FORWARD_LIMIT, SHOULDER_GUARDS, SLIP_CONTACT_LOST, STICK_CONTACT_LOST,
     TIP_STOPS,
 };
+use hybrid_ode::WorkCounters;
 
 /// A guard that falls to zero at the end of a stretch.
 pub(super) struct FallingGuard<'a> {

@@ -1,18 +1,18 @@
 //! Stretches of a piece over which derivatives are collocated, and their length.
 
 use super::source::{HeadPolynomial, TangentSource};
-use crate::math;
 use crate::model::series::ContactMode;
 use crate::model::shoulder::ShoulderContact;
 use crate::model::tangent::{self, LaneVector};
-use crate::ode::collocation::{
+use crate::simulate::phases::DrivenBlade;
+use hybrid_ode::collocation::{
     CollocationRule, LEAST_NODES, LaneNumber, MOST_NODES, SquareMatrix, collocation_rule, invert_square,
     multiply_row,
 };
-use crate::simulate::phases::DrivenBlade;
+use portable_math as math;
 
 /// Number of coefficients of the series of a motion.
-pub(super) const SERIES_TERMS: usize = crate::ode::polynomial::TERMS + 2;
+pub(super) const SERIES_TERMS: usize = hybrid_ode::polynomial::TERMS + 2;
 
 /// The motion whose derivatives are computed.
 pub(super) type SeriesReference<'a> = tangent::ReferenceMotion<'a, SERIES_TERMS>;

@@ -8,9 +8,9 @@ use crate::model::series::ContactMode;
 use crate::model::tangent::{
     LANES, LaneVector, LinkAttitudes, MotionSamples, StateTangent, TangentMatrices, fill_lanes,
 };
-use crate::ode::collocation::{CollocationEquations, CollocationStep, MOST_NODES, NodeArray};
 use crate::simulate::mode::TipMode;
 use crate::simulate::phases::{DrivenBlade, TaylorMotion};
+use hybrid_ode::collocation::{CollocationEquations, CollocationStep, MOST_NODES, NodeArray};
 
 /// Derivatives by the directions of a block.
 #[derive(Debug, Default)]

@@ -6,9 +6,9 @@ use super::stretch::{SERIES_TERMS, StretchPlace, TangentStretch};
 use super::tangent_blocks::TangentBlock;
 pub use crate::model::tangent::ModelChannel as Channel;
 use crate::model::tangent::{LANES, LaneVector, LinearForm, LinkAttitudes};
-use crate::ode::collocation::{MOST_NODES, NodeArray, collocation_rule};
 use crate::simulate::mode::TipMode;
 use crate::simulate::solution_segment::{ModelSample, SolutionSegment};
+use hybrid_ode::collocation::{MOST_NODES, NodeArray, collocation_rule};
 
 /// A piece of the solution with its derivatives.
 pub struct TangentSegment<'a> {

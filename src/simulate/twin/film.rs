@@ -7,12 +7,12 @@
 //! the error falls with the square of the sampling interval: 2 nm on the bundled blade at 20,000 samples/s.
 
 use super::Camera;
-use crate::math::StandardNormal;
 use crate::recording::channel::ReversalInstants;
 use crate::recording::quality::noise_floor;
 use crate::recording::{
     FrameGrid, ON_FRAME_TOLERANCE, Recording, RecordingError, STENCIL, Traces, frame_at, lagrange_through_six,
 };
+use portable_math::StandardNormal;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 

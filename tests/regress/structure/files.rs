@@ -65,14 +65,20 @@ pub fn read_source_files() -> Vec<SourceFile> {
     read_files_below(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"))
 }
 
-/// The same of every package of the workspace; a path is from the `src` of its package.
-pub fn read_workspace_files() -> Vec<SourceFile> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let packages =
-        std::fs::read_dir(root.join("crates")).into_iter().flatten().map(|entry| entry.unwrap().path());
-    let mut packages: Vec<_> = packages.chain([root.to_owned(), root.join("python")]).collect();
+/// The same of every package in `crates`; a path is from the `src` of its package.
+pub fn read_leaf_packages() -> Vec<Vec<SourceFile>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("crates");
+    let mut packages: Vec<_> =
+        std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     packages.sort();
-    packages.iter().flat_map(|package| read_files_below(&package.join("src"))).collect()
+    packages.iter().map(|package| read_files_below(&package.join("src"))).collect()
+}
+
+/// The same of every package of the workspace.
+pub fn read_workspace_files() -> Vec<SourceFile> {
+    let python = Path::new(env!("CARGO_MANIFEST_DIR")).join("python/src");
+    let own = [read_source_files(), read_files_below(&python)];
+    read_leaf_packages().into_iter().chain(own).flatten().collect()
 }
 
 fn read_files_below(root: &Path) -> Vec<SourceFile> {
@@ -95,8 +101,8 @@ fn read_files_below(root: &Path) -> Vec<SourceFile> {
     files
 }
 
-/// Which file uses which, by place in the list. A name counts for the file that defines it, whoever re-exports
-/// it; a re-export counts only where the file that makes it uses the name too.
+/// Which file uses which, by place in the list. A name counts for the file that defines it, whoever
+/// re-exports it; a re-export counts only where the file that makes it uses the name too.
 pub fn find_edges(files: &[SourceFile]) -> Vec<(usize, usize)> {
     let tree = Tree { files, modules: files.iter().enumerate().map(|(i, f)| (&f.module[..], i)).collect() };
     let mut edges = BTreeSet::new();

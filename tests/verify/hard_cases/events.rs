@@ -2,9 +2,9 @@
 //! those at the ends of steps.
 
 use super::{ERRORS, cases};
+use hybrid_ode::taylor::{self, TaylorExpansion, TaylorPhase, TaylorWorkspace};
+use hybrid_ode::{self as ode, HybridPhase, PhaseEnd, PhaseEndCause, PhaseStart, WorkCounters};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
-use wiperlab::ode::taylor::{self, TaylorExpansion, TaylorPhase, TaylorWorkspace};
-use wiperlab::ode::{self, HybridPhase, PhaseEnd, PhaseEndCause, PhaseStart, WorkCounters};
 use wiperlab::simulate::IntegrationMethod;
 
 /// `x'' = -x` with guards `offset + slope x`; from `x = 1` at rest the solution is `cos t`.

@@ -96,7 +96,10 @@ fn a_prior_is_normal_in_the_scale_of_its_parameter() {
             && (priors[1].residual(-0.25) + 0.5).abs() < 1e-12
     );
     let in_units = job(&WHOLE.replace("mean = 1.0, sd_relative = 0.1", "mean = 1.6, sd = 0.4")).unwrap();
-    assert_eq!(in_units.parameters[0].prior, Some(Prior::Log { mean_ln: crate::math::ln(1.6), sd_ln: 0.25 }));
+    assert_eq!(
+        in_units.parameters[0].prior,
+        Some(Prior::Log { mean_ln: portable_math::ln(1.6), sd_ln: 0.25 })
+    );
     let prior = "prior = { mean = 1.0, sd_relative = 0.1 }";
     let of = |other: &str| refusal(WHOLE, prior, other);
     assert!(of("prior = { mean = 3.0, sd = 0.1 }").contains(

@@ -7,7 +7,7 @@ use crate::import::reader::{
     CellNumber, Clock, Document, InstanceFields, PointFields, RowOrder, RowPosition, RowStamp, TimeUnit,
     Track, TrackCollector, TrackFile, parse_number,
 };
-use crate::math;
+use portable_math as math;
 
 /// First line of the text export.
 pub(super) const TITLE: &str = "#Kinovea";

@@ -1,8 +1,8 @@
 //! Least-squares fit of a line and a parabola to the path of the tip; each stroke has a height of its own.
 
-use crate::math;
 use crate::recording::Recording;
 use crate::recording::channel::{ReversalInstants, median_in_place};
+use portable_math as math;
 
 /// Least sum of squares of `q`, relative to the fourth power of the spread of the places: below it the places
 /// have only two values and show no curvature.

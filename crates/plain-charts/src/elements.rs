@@ -1,0 +1,238 @@
+//! Elements of a figure: panels, axes, series, spans and labels.
+
+use super::axis::ChartAxis;
+use super::heat_map::HeatMap;
+use super::style::{Colour, Mark};
+
+/// Points with one style and one entry in the legend.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Series {
+    /// Entry in the legend; equal entries of several panels appear once. Empty for none.
+    pub label: String,
+    /// Colour.
+    pub colour: Colour,
+    /// Line or symbol.
+    pub mark: Mark,
+    /// Points in the units of the axes; `None` interrupts a line.
+    pub points: Vec<Option<(f64, f64)>>,
+    /// Error bars.
+    pub error_bars: Vec<ErrorBar>,
+}
+
+impl Series {
+    /// A series without error bars.
+    pub fn new(
+        label: impl Into<String>,
+        colour: Colour,
+        mark: Mark,
+        points: impl IntoIterator<Item = impl Into<Option<(f64, f64)>>>,
+    ) -> Self {
+        let points = points.into_iter().map(Into::into).collect();
+        Self { label: label.into(), colour, mark, points, error_bars: Vec::new() }
+    }
+}
+
+/// Values at equal steps of a linear x axis, in the units of the y axis.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SampledSeries {
+    /// Position of the first value, in units of the x axis.
+    pub start: f64,
+    /// Distance of two values, in units of the x axis.
+    pub step: f64,
+    /// Values in units of the y axis; `None` where one is missing.
+    pub values: Vec<Option<f64>>,
+}
+
+/// An error bar, in the units of the axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(missing_docs)]
+pub enum ErrorBar {
+    /// Along the x axis, at a height `y`.
+    Horizontal { y: f64, from: f64, to: f64 },
+    /// Along the y axis, at a place `x`.
+    Vertical { x: f64, from: f64, to: f64 },
+}
+
+/// A picture, to scale.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Raster {
+    /// The picture as PNG bytes.
+    pub png: Vec<u8>,
+    /// Its left and right edge, in units of the x axis.
+    pub x: [f64; 2],
+    /// Its lower and upper edge, in units of the y axis.
+    pub y: [f64; 2],
+}
+
+/// The surface between two curves.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Ribbon {
+    /// Entry in the legend; empty for none.
+    pub label: String,
+    /// Colour, drawn pale.
+    pub colour: Colour,
+    /// Position on the x axis with the lower and upper end there, in axis units; `None` interrupts the
+    /// ribbon.
+    pub points: Vec<Option<(f64, f64, f64)>>,
+}
+
+impl Ribbon {
+    /// A ribbon with an entry in the legend, from points as in [`Self::points`].
+    pub fn new(
+        label: impl Into<String>,
+        colour: Colour,
+        points: impl IntoIterator<Item = impl Into<Option<(f64, f64, f64)>>>,
+    ) -> Self {
+        Self { label: label.into(), colour, points: points.into_iter().map(Into::into).collect() }
+    }
+}
+
+/// A shaded interval of the x axis.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ShadedSpan {
+    /// Entry in the legend; empty for none.
+    pub label: String,
+    /// Colour, drawn pale.
+    pub colour: Colour,
+    /// Start, in units of the x axis.
+    pub from: f64,
+    /// End, in units of the x axis.
+    pub to: f64,
+    /// Whether the span is framed, on top of everything else, instead of shaded.
+    pub outlined: bool,
+}
+
+impl ShadedSpan {
+    /// A shaded span between two positions, in units of the x axis.
+    pub fn new(label: impl Into<String>, colour: Colour, from: f64, to: f64) -> Self {
+        Self { label: label.into(), colour, from, to, outlined: false }
+    }
+
+    /// A span framed with a line.
+    pub fn outline(label: impl Into<String>, colour: Colour, from: f64, to: f64) -> Self {
+        Self { outlined: true, ..Self::new(label, colour, from, to) }
+    }
+}
+
+/// A vertical line with a label over the panel.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct VerticalLine {
+    /// Label; empty for none.
+    pub label: String,
+    /// Colour.
+    pub colour: Colour,
+    /// Line style.
+    pub mark: Mark,
+    /// Place, in units of the x axis.
+    pub at: f64,
+    /// Lower end in units of the y axis; `None` for the bottom of the axes.
+    pub above: Option<f64>,
+}
+
+impl VerticalLine {
+    /// A line over the full height of the axes.
+    pub fn new(label: impl Into<String>, colour: Colour, mark: Mark, at: f64) -> Self {
+        Self { label: label.into(), colour, mark, at, above: None }
+    }
+}
+
+/// A label over the panel, without a line.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct TopLabel {
+    /// Label.
+    pub label: String,
+    /// Position of its middle, in units of the x axis.
+    pub at: f64,
+}
+
+/// Text inside the axes.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct TextAnnotation {
+    /// The text.
+    pub text: String,
+    /// Colour.
+    pub colour: Colour,
+    /// Position of its middle, in the units of the axes.
+    pub at: (f64, f64),
+}
+
+impl TextAnnotation {
+    /// A text with its middle at a position, in the units of the axes.
+    pub fn new(text: impl Into<String>, colour: Colour, at: (f64, f64)) -> Self {
+        Self { text: text.into(), colour, at }
+    }
+}
+
+/// Cells with one pattern and one entry in the legend.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Hatch {
+    /// Entry in the legend; empty for none.
+    pub label: String,
+    /// Pattern of the cells.
+    pub pattern: HatchPattern,
+    /// Start and end on the x axis, then on the y axis, in axis units; clipped to the axes. Infinite values
+    /// on the y axis stand for its ends.
+    pub cells: Vec<[f64; 4]>,
+}
+
+/// A pattern of thin lines over the grey of cells without a value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[allow(missing_docs)]
+pub enum HatchPattern {
+    #[default]
+    Plain,
+    Rising,
+    Falling,
+    Level,
+    Upright,
+    Crossed,
+    Checked,
+    Dotted,
+    Dashed,
+    DashedUpright,
+}
+
+/// One pair of axes. Stacked panels with equal x axes share tick labels.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Panel {
+    /// Title above the left corner, of one or more lines; empty for none.
+    pub title: String,
+    /// Horizontal axis.
+    pub x: ChartAxis,
+    /// Vertical axis.
+    pub y: ChartAxis,
+    /// Height of the axes, mm.
+    pub height_mm: f64,
+    /// Lines and symbols, later ones on top.
+    pub series: Vec<Series>,
+    /// Full data of the first series where their points are thinned; shown when a reader enlarges a part on a
+    /// screen.
+    pub sampled_series: Vec<Option<SampledSeries>>,
+    /// Shaded intervals, under the lines.
+    pub shaded_spans: Vec<ShadedSpan>,
+    /// Vertical lines.
+    pub vertical_lines: Vec<VerticalLine>,
+    /// Surfaces between curves, under the lines.
+    pub ribbons: Vec<Ribbon>,
+    /// Labels over the panel.
+    pub top_labels: Vec<TopLabel>,
+    /// A picture under everything else.
+    pub raster: Option<Raster>,
+    /// Heat map, under everything else.
+    pub heat_map: Option<HeatMap>,
+    /// Hatched cells over it.
+    pub hatches: Vec<Hatch>,
+    /// Text inside, over everything else.
+    pub annotations: Vec<TextAnnotation>,
+    /// Whether both axes have one scale, as in a drawing; the shorter range is widened.
+    pub equal_aspect: bool,
+    /// Whether frame, grid and ticks are left out, as in a drawing.
+    pub bare: bool,
+}
+
+impl Panel {
+    /// A panel that holds only series.
+    pub fn new(x: ChartAxis, y: ChartAxis, height_mm: f64, series: impl IntoIterator<Item = Series>) -> Self {
+        Self { x, y, height_mm, series: series.into_iter().collect(), ..Self::default() }
+    }
+}

@@ -1,0 +1,34 @@
+//! A figure, its media, and its rendering as SVG.
+
+use super::elements::Panel;
+
+/// A figure of one or more panels.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Figure {
+    /// Heading on a screen: the main result with its number. Title and subtitle are the name for screen
+    /// readers; in print both belong in the caption.
+    pub title: String,
+    /// Line under the heading: contents, and whether the data are synthetic; empty for none.
+    pub subtitle: String,
+    /// Whether the data are synthetic: print marks that inside the axes, screens in the subtitle.
+    pub watermarked: bool,
+    /// Description for screen readers.
+    pub description: String,
+    /// Width on a screen, mm.
+    pub width_mm: f64,
+    /// Number of panels side by side where the width allows; 0 and 1 stack them.
+    pub columns: usize,
+    /// Panels in the order of reading.
+    pub panels: Vec<Panel>,
+}
+
+/// Medium of a figure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Medium {
+    /// A screen with a light or dark theme, in the figure's own width.
+    Screen,
+    /// A column of a journal, `COLUMN_WIDTH_MM` wide, in fixed colours and without heading or style sheet.
+    Column,
+    /// A page of a journal, `FULL_WIDTH_MM` wide, styled as [`Self::Column`].
+    Page,
+}

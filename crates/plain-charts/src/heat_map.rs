@@ -1,0 +1,433 @@
+//! Heat maps: values of cells over two axes, and their colours.
+
+use super::axis;
+use super::axis::{AxisScale, CanvasAxis, ChartAxis};
+use super::canvas::{Canvas, Lettering, TextAnchor};
+use super::path::CanvasArea;
+use super::style::{
+    ColourMap, FRAME, LINE_MM, NO_VALUE, Rgb, TEXT_MM, TICK_MM, UNITS_PER_MM, Y_TICKS_MM, format_hex,
+    sample_colour_map,
+};
+use super::text::{text_width, truncate_text};
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::ops::Range;
+
+/// Values of cells over the axes of a panel.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct HeatMap {
+    /// Quantity and unit of the values.
+    pub label: String,
+    /// Centres of the columns, ascending, in units of the x axis.
+    pub x: Vec<f64>,
+    /// Centres of the rows, ascending, in units of the y axis.
+    pub y: Vec<f64>,
+    /// One list per column, one value per row; `None` where missing.
+    pub values: Vec<Vec<Option<f64>>>,
+    /// Values of the first and the last colour; `None` takes them from the data. Values beyond have the
+    /// nearer of the two colours.
+    pub range: Option<(f64, f64)>,
+    /// Colours.
+    pub colour_map: ColourMap,
+    /// Whether contours at round values are drawn; only on fine and smooth maps.
+    pub contours: bool,
+    /// Whether the colour bar is left out, as beside a map on the same scale.
+    pub without_bar: bool,
+}
+
+impl HeatMap {
+    pub(super) fn finite_values(&self) -> impl Iterator<Item = f64> {
+        self.values.iter().flatten().flatten().copied().filter(|v| v.is_finite())
+    }
+
+    /// Whether the map has a finite value.
+    pub(super) fn has_values(&self) -> bool {
+        self.value_range().is_some()
+    }
+
+    /// Values of the first and the last colour.
+    pub(super) fn value_range(&self) -> Option<(f64, f64)> {
+        let given = self.range.filter(|(low, high)| low.is_finite() && high.is_finite() && low < high);
+        let (low, high) = given.unwrap_or_else(|| axis::value_span(self.finite_values()));
+        match (low < high, low.is_finite()) {
+            (true, _) => Some((low, high)),
+            (false, true) => Some(axis::axis_limits(&ChartAxis::default(), [low].into_iter())), // a constant
+            (false, false) => None,
+        }
+    }
+
+    /// Largest value of a block of cells.
+    pub(super) fn max_in_block(&self, columns: &Range<usize>, rows: &Range<usize>) -> Option<f64> {
+        let columns = self.values.get(columns.clone()).unwrap_or_default();
+        let cells = columns.iter().flat_map(|column| column.get(rows.clone()).unwrap_or_default());
+        cells.flatten().copied().filter(|v| v.is_finite()).reduce(f64::max)
+    }
+}
+
+/// Edges of cells from their centres: halfway between neighbours on the axis scale, and equally far beyond
+/// the ends. A single cell is unbounded; centres that do not ascend have no edges.
+#[must_use]
+pub fn cell_edges(middles: &[f64], scale: AxisScale) -> Vec<f64> {
+    let [first, second, ..] = middles else {
+        return if middles.is_empty() { Vec::new() } else { vec![f64::NEG_INFINITY, f64::INFINITY] };
+    };
+    if !middles.is_sorted_by(|a, b| a < b) {
+        return Vec::new();
+    }
+    let last = middles.len() - 1;
+    let by_factors = scale == AxisScale::Log && *first > 0.0;
+    let between = |a: f64, b: f64| if by_factors { (a * b).sqrt() } else { (a + b) / 2.0 };
+    let beyond = |a: f64, b: f64| if by_factors { a * (a / b).sqrt() } else { a + (a - b) / 2.0 };
+    let inner = middles.windows(2).map(|pair| between(pair[0], pair[1]));
+    let end = beyond(middles[last], middles[last - 1]);
+    std::iter::once(beyond(*first, *second)).chain(inner).chain([end]).collect()
+}
+
+/// Position of a value between the first and the last colour, 0 to 1.
+pub(super) fn colour_fraction((low, high): (f64, f64), value: f64) -> f64 {
+    ((value - low) / (high - low)).clamp(0.0, 1.0)
+}
+
+/// The colour at a point in axis units; `None` outside the map or without a value.
+pub(super) fn colour_at(heat: &HeatMap, (x, y): (AxisScale, AxisScale), at: (f64, f64)) -> Option<Rgb> {
+    let holder = |middles: &[f64], scale: AxisScale, at: f64| {
+        cell_edges(middles, scale).partition_point(|edge| *edge <= at).checked_sub(1)
+    };
+    let value =
+        heat.values.get(holder(&heat.x, x, at.0)?)?.get(holder(&heat.y, y, at.1)?).copied().flatten()?;
+    Some(sample_colour_map(heat.colour_map, colour_fraction(heat.value_range()?, value)))
+}
+
+// Cells as vectors: runs of one colour along a row are thick lines over a background of the commonest colour.
+
+/// Most columns, rows and colours that are drawn, in steps; the next step is taken while a map takes more
+/// bytes than [`MAX_CELL_BYTES`]. Finer cells are merged by their largest value, which keeps thin lines.
+const CELL_RESOLUTIONS: [(usize, usize, u32); 6] =
+    [(480, 240, 96), (320, 180, 64), (240, 135, 48), (200, 110, 32), (160, 90, 24), (120, 68, 16)];
+const MAX_CELL_BYTES: usize = 150_000;
+/// Lines exceed their cells by this length and thickness, canvas units, so that no background shows between
+/// them.
+const CELL_OVERLAP: i64 = 2;
+
+/// A row or column of cells: its ends on the canvas, ascending, and the covered cells.
+type CellBlock = (i64, i64, Option<Range<usize>>);
+
+/// The cells of a heat map over the axes, as SVG; `None` without values.
+pub(super) fn heat_cells_svg(
+    heat: &HeatMap,
+    x: &CanvasAxis,
+    y: &CanvasAxis,
+    area: &CanvasArea,
+) -> Option<String> {
+    let ends = heat.value_range()?;
+    let mut svg = None;
+    for (columns, rows, colours) in CELL_RESOLUTIONS {
+        let (columns, rows) = (cell_blocks(&heat.x, x, columns), cell_blocks(&heat.y, y, rows));
+        let drawn = svg.insert(cell_rows_svg((heat, ends), &columns, &rows, colours, area));
+        if drawn.len() <= MAX_CELL_BYTES {
+            break;
+        }
+    }
+    svg
+}
+
+/// The cells along an axis; `most` equal steps where there are more.
+fn cell_blocks(middles: &[f64], axis: &CanvasAxis, most: usize) -> Vec<CellBlock> {
+    let edges = cell_edges(middles, axis.scale);
+    let (from, to) = (axis.from.min(axis.to), axis.from.max(axis.to));
+    let place = |value: f64| {
+        // a single cell has infinite edges
+        let beyond = if value > axis.low { axis.to } else { axis.from };
+        axis.canvas_position(value).unwrap_or(beyond).clamp(from, to).round() as i64
+    };
+    let ordered = |a: i64, b: i64| (a.min(b), a.max(b));
+    let cells = edges.windows(2).enumerate().map(|(at, ends)| (ordered(place(ends[0]), place(ends[1])), at));
+    let shown = cells.filter(|((low, high), _)| low < high);
+    let shown: Vec<CellBlock> = shown.map(|((low, high), at)| (low, high, Some(at..at + 1))).collect();
+    // cells that overlap the axis
+    let visible = edges.windows(2).filter(|ends| ends[1] > axis.low && ends[0] < axis.high).count();
+    if (1..=most).contains(&shown.len()) && shown.len() == visible {
+        return shown;
+    }
+    resample_cells(middles, &edges, axis, most)
+}
+
+/// The cells under each of `count` equal steps along an axis: those with centres in the step, or the cell at
+/// its middle.
+fn resample_cells(middles: &[f64], edges: &[f64], axis: &CanvasAxis, count: usize) -> Vec<CellBlock> {
+    let step = (axis.to - axis.from) / count as f64;
+    let place = |k: usize| axis.from + k as f64 * step;
+    let value = |k: f64| axis.value_at(axis.from + k * step);
+    let of = |k: usize| {
+        if edges.is_empty() {
+            return None;
+        }
+        let at = k as f64;
+        let [first, end] = [at, at + 1.0].map(|at| middles.partition_point(|m| *m < value(at)));
+        if first < end {
+            return Some(first..end);
+        }
+        let holder = edges.partition_point(|e| *e <= value(at + 0.5)).checked_sub(1)?;
+        (holder < middles.len()).then_some(holder..holder + 1)
+    };
+    let ends = |k: usize| {
+        let (a, b) = (place(k).round() as i64, place(k + 1).round() as i64);
+        (a.min(b), a.max(b))
+    };
+    (0..count).map(|k| (ends(k).0, ends(k).1, of(k))).collect()
+}
+
+/// The rows as runs of one colour; all lines of one colour and thickness are one path.
+fn cell_rows_svg(
+    (heat, ends): (&HeatMap, (f64, f64)),
+    columns: &[CellBlock],
+    rows: &[CellBlock],
+    colours: u32,
+    area: &CanvasArea,
+) -> String {
+    let last = f64::from(colours - 1);
+    let level = |column: &CellBlock, row: &CellBlock| {
+        let value = heat.max_in_block(column.2.as_ref()?, row.2.as_ref()?)?;
+        Some((colour_fraction(ends, value) * last).round() as u32)
+    };
+    let grid: Vec<Vec<Option<u32>>> =
+        rows.iter().map(|row| columns.iter().map(|column| level(column, row)).collect()).collect();
+    let ground = most_common_level(grid.iter().flatten().copied());
+    let rgb = |level: Option<u32>| {
+        level.map_or(NO_VALUE, |level| sample_colour_map(heat.colour_map, f64::from(level) / last))
+    };
+    let right = area.right as i64;
+    let mut lines: BTreeMap<(Option<u32>, i64), String> = BTreeMap::new();
+    for (row, levels) in rows.iter().zip(&grid) {
+        let (top, bottom) = (row.0, (row.1 + CELL_OVERLAP).min(area.bottom as i64));
+        let mut start = 0;
+        for run in levels.chunk_by(|a, b| a == b) {
+            let end = start + run.len();
+            if run[0] != ground {
+                let (from, to) = (columns[start].0, (columns[end - 1].1 + CELL_OVERLAP).min(right));
+                // the middle may lie at half a unit
+                let middle = format_half(top + bottom);
+                let line = lines.entry((run[0], bottom - top)).or_default();
+                let _ = write!(line, "M{from} {middle}h{}", to - from); // (a string takes everything)
+            }
+            start = end;
+        }
+    }
+    let of = |((level, height), data): ((Option<u32>, i64), String)| {
+        format!("<path stroke=\"{}\" stroke-width=\"{height}\" d=\"{data}\"/>\n", format_hex(rgb(level)))
+    };
+    let whole = (area.left as i64, area.top as i64, area.right as i64, area.bottom as i64);
+    let filled = |(left, top, right, bottom), level| {
+        format!("<path fill=\"{}\" d=\"M{left} {top}H{right}V{bottom}H{left}z\"/>\n", format_hex(rgb(level)))
+    };
+    filled(whole, None)
+        + &filled(blocks_extent(columns, rows), ground)
+        + &lines.into_iter().map(of).collect::<String>()
+}
+
+/// Half of a whole number, exactly.
+fn format_half(twice: i64) -> String {
+    if twice % 2 == 0 { (twice / 2).to_string() } else { format!("{}.5", twice / 2) }
+}
+
+/// The commonest level, the lowest of equally common ones.
+fn most_common_level(levels: impl Iterator<Item = Option<u32>>) -> Option<u32> {
+    let mut counts: BTreeMap<Option<u32>, usize> = BTreeMap::new();
+    levels.for_each(|level| *counts.entry(level).or_default() += 1);
+    counts.into_iter().max_by(|a, b| a.1.cmp(&b.1).then(b.0.cmp(&a.0))).and_then(|(level, _)| level)
+}
+
+/// Left, top, right and bottom of the blocks.
+fn blocks_extent(columns: &[CellBlock], rows: &[CellBlock]) -> (i64, i64, i64, i64) {
+    let least = |blocks: &[CellBlock]| blocks.iter().map(|b| b.0).min().unwrap_or(0);
+    let most = |blocks: &[CellBlock]| blocks.iter().map(|b| b.1).max().unwrap_or(0);
+    (least(columns), least(rows), most(columns), most(rows))
+}
+
+// Colour bar.
+
+/// Distance of the bar from the axes, its width, and the height of a pointed end, mm.
+const BAR_GAP_MM: f64 = 2.5;
+const BAR_MM: f64 = 3.0;
+const POINT_MM: f64 = 2.0;
+
+/// The axis of the bar between two positions.
+fn colour_bar_axis(ends: (f64, f64), from: f64, to: f64) -> CanvasAxis {
+    CanvasAxis { scale: AxisScale::Linear, low: ends.0, high: ends.1, from, to }
+}
+
+/// Width that the bar takes beside the axes, mm.
+pub(super) fn colour_bar_width_mm(heat: &HeatMap, height_mm: f64) -> f64 {
+    let Some(ends) = heat.value_range().filter(|_| !heat.without_bar) else { return 0.0 };
+    let label_mm = widest_bar_label_mm(&colour_bar_axis(ends, 0.0, height_mm), Y_TICKS_MM);
+    BAR_GAP_MM + BAR_MM + TICK_MM + 0.6 + label_mm + LINE_MM
+}
+
+/// Width of the widest label of a bar with this tick distance, mm.
+fn widest_bar_label_mm(scale: &CanvasAxis, apart: f64) -> f64 {
+    /// Width of digits and signs over that of the mean letter.
+    const DIGITS: f64 = 1.2;
+    let labels = scale.ticks(apart).into_iter().filter_map(|t| t.label);
+    labels.map(|l| DIGITS * text_width(&l, TEXT_MM)).fold(0.0, f64::max)
+}
+
+/// Draws the colour bar with ticks and label; an end is pointed where values lie beyond it.
+pub(super) fn draw_colour_bar(canvas: &mut Canvas, heat: &HeatMap, axes: &CanvasArea) {
+    let Some((low, high)) = heat.value_range() else { return };
+    let left = axes.right + BAR_GAP_MM * UNITS_PER_MM;
+    let right = left + BAR_MM * UNITS_PER_MM;
+    let point = |beyond: bool| if beyond { POINT_MM * UNITS_PER_MM } else { 0.0 };
+    let (over, under) =
+        (point(heat.finite_values().any(|v| v > high)), point(heat.finite_values().any(|v| v < low)));
+    let (top, bottom) = (axes.top + over, axes.bottom - under);
+    let middle = (left + right) / 2.0;
+    draw_gradient(canvas, &CanvasArea { left, right, top, bottom }, heat.colour_map);
+    for (room, from, to, share) in [(over, top, axes.top, 1.0), (under, bottom, axes.bottom, 0.0)] {
+        if room > 0.0 {
+            let colour = sample_colour_map(heat.colour_map, share);
+            canvas.fill_polygon(&[(left, from), (middle, to), (right, from)], colour, 1.0);
+        }
+    }
+    let upper = [(left, bottom), (left, top), (middle, axes.top), (right, top)];
+    let lower = [(right, bottom), (middle, axes.bottom), (left, bottom)];
+    canvas.draw_line(&[&upper[..], &lower].concat(), FRAME, 3);
+    let scale = colour_bar_axis((low, high), bottom, top);
+    for tick in scale.ticks(Y_TICKS_MM * UNITS_PER_MM) {
+        let Some(y) = scale.canvas_position(tick.value) else { continue };
+        canvas.draw_line(&[(right, y), (right + tick.length(), y)], FRAME, 3);
+        if let Some(label) = &tick.label {
+            let x = right + (TICK_MM + 0.6) * UNITS_PER_MM;
+            canvas.draw_text(label, (x, y), Lettering::plain(TEXT_MM, TextAnchor::Left));
+        }
+    }
+    let widest_mm = widest_bar_label_mm(&scale, Y_TICKS_MM * UNITS_PER_MM);
+    let label_x = right + (TICK_MM + 0.6 + widest_mm + LINE_MM / 2.0) * UNITS_PER_MM;
+    let upwards = Lettering { upwards: true, ..Lettering::plain(TEXT_MM, TextAnchor::Centre) };
+    let label = truncate_text(&heat.label, TEXT_MM, (axes.bottom - axes.top) / UNITS_PER_MM);
+    canvas.draw_text(&label, (label_x, (axes.top + axes.bottom) / 2.0), upwards);
+}
+
+/// Draws the colours from bottom to top; every stripe reaches to the top, so that there are no gaps.
+fn draw_gradient(canvas: &mut Canvas, area: &CanvasArea, map: ColourMap) {
+    const STRIPES: u32 = 64;
+    for stripe in 0..STRIPES {
+        let share = f64::from(stripe) / f64::from(STRIPES);
+        let bottom = (area.bottom - share * (area.bottom - area.top)).round();
+        let colour = sample_colour_map(map, f64::from(stripe) / f64::from(STRIPES - 1));
+        canvas.fill_rectangle(&CanvasArea { bottom, ..*area }, colour, 1.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::axis::AxisScale;
+
+    #[test]
+    fn edges_lie_half_way_as_the_axis_counts() {
+        let edges = cell_edges(&[1.0, 4.0, 100.0], AxisScale::Log);
+        assert!(
+            edges
+                .iter()
+                .zip([0.5, 2.0, 20.0, 500.0])
+                .all(|(found, expected)| (found / expected - 1.0).abs() < 1e-12),
+            "{edges:?}"
+        );
+    }
+
+    #[test]
+    fn the_colours_span_the_finite_values() {
+        let heat = |values: Vec<Option<f64>>| HeatMap { values: vec![values], ..HeatMap::default() };
+        assert_eq!(
+            heat(vec![Some(1.0), None, Some(f64::INFINITY), Some(f64::NAN), Some(-2.0)]).value_range(),
+            Some((-2.0, 1.0))
+        );
+        assert_eq!(heat(vec![None, Some(f64::NAN)]).value_range(), None);
+        let (low, high) = heat(vec![Some(5.0)]).value_range().unwrap();
+        assert!(low < 5.0 && high > 5.0);
+        assert_eq!(
+            HeatMap { range: Some((0.0, 3.0)), ..heat(vec![Some(5.0)]) }.value_range(),
+            Some((0.0, 3.0))
+        );
+        assert_eq!(
+            heat(vec![Some(1.0), Some(4.0), Some(f64::INFINITY), Some(9.0)]).max_in_block(&(0..1), &(0..3)),
+            Some(4.0)
+        );
+    }
+
+    fn axis(low: f64, high: f64) -> CanvasAxis {
+        CanvasAxis { scale: AxisScale::Linear, low, high, from: 0.0, to: 40.0 }
+    }
+
+    #[test]
+    fn every_step_of_an_axis_has_its_cells() {
+        let covered = |middles: &[f64], count| {
+            resample_cells(middles, &cell_edges(middles, AxisScale::Linear), &axis(0.0, 4.0), count)
+                .into_iter()
+                .map(|b| b.2)
+                .collect::<Vec<_>>()
+        };
+        let some = |r: Range<usize>| Some(r);
+        // cells from 0.5 to 3.5, one wide: the steps beyond have none
+        assert_eq!(
+            covered(&[1.0, 2.0, 3.0], 8),
+            [None, some(0..1), some(0..1), some(1..2), some(1..2), some(2..3), some(2..3), None]
+        );
+        assert_eq!(covered(&[0.1, 0.2, 0.3, 3.9], 2), [some(0..3), some(3..4)]);
+        assert_eq!(covered(&[7.0], 2), [some(0..1), some(0..1)]);
+        assert_eq!(covered(&[], 1), [None]);
+    }
+
+    #[test]
+    fn few_cells_keep_their_own_edges_and_many_become_steps() {
+        assert_eq!(
+            cell_blocks(&[1.0, 2.0, 3.0], &axis(0.0, 4.0), 10),
+            [(5, 15, Some(0..1)), (15, 25, Some(1..2)), (25, 35, Some(2..3))]
+        );
+        assert_eq!(cell_blocks(&[1.0, 2.0, 3.0], &axis(0.0, 4.0), 2).len(), 2);
+        assert_eq!(cell_blocks(&[2.0, 1.0], &axis(0.0, 4.0), 2), [(0, 20, None), (20, 40, None)]);
+        let upwards = CanvasAxis { from: 40.0, to: 0.0, ..axis(0.0, 4.0) };
+        assert_eq!(cell_blocks(&[1.0, 2.0], &upwards, 10), [(25, 35, Some(0..1)), (15, 25, Some(1..2))]);
+    }
+
+    #[test]
+    fn runs_of_one_colour_are_one_line_on_a_ground_of_the_commonest() {
+        let heat = HeatMap {
+            x: vec![0.5, 1.5, 2.5, 3.5],
+            y: vec![2.0],
+            values: vec![vec![Some(0.0)], vec![Some(1.0)], vec![Some(1.0)], vec![Some(0.0)]],
+            ..HeatMap::default()
+        };
+        let area = CanvasArea { left: 0.0, top: 0.0, right: 40.0, bottom: 40.0 };
+        let svg = heat_cells_svg(
+            &heat,
+            &axis(0.0, 4.0),
+            &CanvasAxis { from: 40.0, to: 0.0, ..axis(0.0, 4.0) },
+            &area,
+        )
+        .unwrap();
+        assert_eq!(
+            svg,
+            "<path fill=\"#E4E4E4\" d=\"M0 0H40V40H0z\"/>\n<path fill=\"#440154\" d=\"M0 \
+             0H40V40H0z\"/>\n<path stroke=\"#FDE725\" stroke-width=\"40\" d=\"M10 20h22\"/>\n"
+        );
+        assert!(heat_cells_svg(&HeatMap::default(), &axis(0.0, 4.0), &axis(0.0, 4.0), &area).is_none());
+    }
+
+    #[test]
+    fn noise_of_any_size_stays_small() {
+        let column = |i: usize| (0..400).map(|j| Some(((i * 7919 + j * 104_729) % 997) as f64)).collect();
+        let heat = HeatMap {
+            x: (0..2000).map(f64::from).collect(),
+            y: (0..400).map(f64::from).collect(),
+            values: (0..2000).map(column).collect(),
+            ..HeatMap::default()
+        };
+        let area = CanvasArea { left: 0.0, top: 0.0, right: 2000.0, bottom: 1000.0 };
+        let (x, y) = (
+            CanvasAxis { to: 2000.0, ..axis(0.0, 2000.0) },
+            CanvasAxis { from: 1000.0, to: 0.0, ..axis(0.0, 400.0) },
+        );
+        assert!(heat_cells_svg(&heat, &x, &y, &area).unwrap().len() < 170_000);
+    }
+}

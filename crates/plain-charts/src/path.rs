@@ -1,0 +1,228 @@
+//! Lines on the canvas: splitting at gaps, thinning to pixels, clipping and dashes.
+
+use portable_math as math;
+
+/// A point of the canvas.
+pub(super) type CanvasPoint = (f64, f64);
+
+/// A rectangle of the canvas.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct CanvasArea {
+    pub left: f64,
+    pub top: f64,
+    pub right: f64,
+    pub bottom: f64,
+}
+
+impl CanvasArea {
+    /// Whether a point lies in it.
+    pub(crate) fn contains(&self, (x, y): CanvasPoint) -> bool {
+        x >= self.left && x <= self.right && y >= self.top && y <= self.bottom
+    }
+
+    /// The corners, with the first repeated at the end.
+    pub(crate) fn outline(&self) -> [CanvasPoint; 5] {
+        [
+            (self.left, self.top),
+            (self.right, self.top),
+            (self.right, self.bottom),
+            (self.left, self.bottom),
+            (self.left, self.top),
+        ]
+    }
+
+    /// The part of a segment inside (Liang and Barsky).
+    pub(crate) fn clip(&self, a: CanvasPoint, b: CanvasPoint) -> Option<(CanvasPoint, CanvasPoint)> {
+        let (dx, dy) = (b.0 - a.0, b.1 - a.1);
+        let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
+        for (p, q) in
+            [(-dx, a.0 - self.left), (dx, self.right - a.0), (-dy, a.1 - self.top), (dy, self.bottom - a.1)]
+        {
+            if p == 0.0 {
+                if q < 0.0 {
+                    return None;
+                }
+            } else if p < 0.0 {
+                enter = enter.max(q / p);
+            } else {
+                leave = leave.min(q / p);
+            }
+        }
+        let at = |s: f64| (a.0 + s * dx, a.1 + s * dy);
+        (enter <= leave)
+            .then(|| (if enter > 0.0 { at(enter) } else { a }, if leave < 1.0 { at(leave) } else { b }))
+    }
+}
+
+/// The runs of points between gaps.
+pub(super) fn split_at_gaps(points: impl Iterator<Item = Option<CanvasPoint>>) -> Vec<Vec<CanvasPoint>> {
+    let mut runs = vec![Vec::new()];
+    for point in points {
+        match (point, runs.last_mut()) {
+            (Some(point), Some(run)) => run.push(point),
+            _ => runs.push(Vec::new()),
+        }
+    }
+    runs.retain(|run| !run.is_empty());
+    runs
+}
+
+/// Thins every column of `width` with more than four points to the first, lowest, highest and last. The line
+/// looks the same, and its length is bounded by the width of the canvas.
+pub(super) fn thin_points(run: &[CanvasPoint], width: f64) -> Vec<CanvasPoint> {
+    let column = |p: &CanvasPoint| (p.0 / width).floor();
+    let mut kept = Vec::new();
+    for group in run.chunk_by(|a, b| column(a) == column(b)) {
+        if group.len() <= 4 {
+            kept.extend_from_slice(group);
+            continue;
+        }
+        let by_height = |i: &usize, j: &usize| group[*i].1.total_cmp(&group[*j].1);
+        let last = group.len() - 1;
+        let mut keep = vec![0, last];
+        keep.extend((0..group.len()).min_by(by_height));
+        keep.extend((0..group.len()).max_by(by_height));
+        keep.sort_unstable();
+        keep.dedup();
+        kept.extend(keep.into_iter().map(|i| group[i]));
+    }
+    kept
+}
+
+/// The pieces of a run inside an area.
+pub(super) fn clip_line(run: &[CanvasPoint], area: &CanvasArea) -> Vec<Vec<CanvasPoint>> {
+    let mut pieces: Vec<Vec<CanvasPoint>> = Vec::new();
+    for pair in run.windows(2) {
+        let Some((a, b)) = area.clip(pair[0], pair[1]) else { continue };
+        match pieces.last_mut().filter(|piece| piece.last() == Some(&a)) {
+            Some(piece) => piece.push(b),
+            None => pieces.push(vec![a, b]),
+        }
+    }
+    pieces
+}
+
+/// The part of a polygon inside an area (Sutherland and Hodgman).
+pub(super) fn clip_polygon(corners: &[CanvasPoint], area: &CanvasArea) -> Vec<CanvasPoint> {
+    let depths: [&dyn Fn(CanvasPoint) -> f64; 4] =
+        [&|p| p.0 - area.left, &|p| area.right - p.0, &|p| p.1 - area.top, &|p| area.bottom - p.1];
+    depths.iter().fold(corners.to_vec(), |corners, depth| {
+        let next = corners.iter().cycle().skip(1);
+        let sides = corners.iter().zip(next);
+        sides.flat_map(|(a, b)| clip_polygon_side(*a, *b, depth(*a), depth(*b))).flatten().collect()
+    })
+}
+
+/// The corners that the side from `a` to `b` adds to the clipped polygon: its start where inside (depth of
+/// zero or more), and its crossing.
+fn clip_polygon_side(a: CanvasPoint, b: CanvasPoint, depth_a: f64, depth_b: f64) -> [Option<CanvasPoint>; 2] {
+    let crosses = (depth_a < 0.0) != (depth_b < 0.0);
+    let share = depth_a / (depth_a - depth_b);
+    let crossing = crosses.then_some((a.0 + share * (b.0 - a.0), a.1 + share * (b.1 - a.1)));
+    [(depth_a >= 0.0).then_some(a), crossing]
+}
+
+/// Cuts a line into dashes; the pattern holds lengths of dashes and gaps in turn, and is empty for a full
+/// line.
+pub(super) fn split_into_dashes(line: &[CanvasPoint], pattern: &[f64]) -> Vec<Vec<CanvasPoint>> {
+    let Some(first) = line.first().filter(|_| pattern.iter().sum::<f64>() > 0.0) else {
+        return vec![line.to_vec()];
+    };
+    let (mut dashes, mut current) = (Vec::new(), vec![*first]);
+    let (mut turn, mut left) = (0, pattern[0]);
+    for pair in line.windows(2) {
+        let (a, b) = (pair[0], pair[1]);
+        let length = math::hypot(b.0 - a.0, b.1 - a.1);
+        let mut done = 0.0;
+        while length - done > left {
+            done += left;
+            let point = (a.0 + (b.0 - a.0) * done / length, a.1 + (b.1 - a.1) * done / length);
+            if turn % 2 == 0 {
+                current.push(point);
+                dashes.push(std::mem::take(&mut current));
+            } else {
+                current = vec![point];
+            }
+            turn += 1;
+            left = pattern[turn % pattern.len()];
+        }
+        left -= length - done;
+        if turn % 2 == 0 {
+            current.push(b);
+        }
+    }
+    if turn % 2 == 0 && current.len() > 1 {
+        dashes.push(current);
+    }
+    dashes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const AREA: CanvasArea = CanvasArea { left: 0.0, top: 0.0, right: 10.0, bottom: 10.0 };
+
+    #[test]
+    fn a_segment_is_cut_at_the_axes_and_keeps_its_slope() {
+        assert_eq!(
+            AREA.clip((-10.0, -5.0), (20.0, 10.0)),
+            Some(((0.0, 0.0), (20.0, 10.0))).map(|_| ((0.0, 0.0), (10.0, 5.0)))
+        );
+        assert_eq!(AREA.clip((2.0, 3.0), (4.0, 5.0)), Some(((2.0, 3.0), (4.0, 5.0))));
+        assert_eq!(AREA.clip((-1.0, 5.0), (-2.0, 6.0)), None);
+        assert_eq!(AREA.clip((5.0, -4.0), (5.0, 40.0)), Some(((5.0, 0.0), (5.0, 10.0))));
+    }
+
+    #[test]
+    fn a_line_that_leaves_and_returns_is_two_pieces() {
+        let pieces = clip_line(&[(1.0, 5.0), (2.0, 15.0), (3.0, 5.0), (4.0, 5.0)], &AREA);
+        assert_eq!(pieces, [vec![(1.0, 5.0), (1.5, 10.0)], vec![(2.5, 10.0), (3.0, 5.0), (4.0, 5.0)]]);
+    }
+
+    #[test]
+    fn a_polygon_is_cut_at_the_axes() {
+        assert_eq!(
+            clip_polygon(&[(2.0, 2.0), (12.0, 2.0), (2.0, 7.0)], &AREA),
+            [(2.0, 2.0), (10.0, 2.0), (10.0, 3.0), (2.0, 7.0)]
+        );
+        assert_eq!(clip_polygon(&[(-5.0, -5.0), (15.0, -5.0), (15.0, 15.0), (-5.0, 15.0)], &AREA).len(), 4);
+        assert_eq!(
+            clip_polygon(&[(1.0, 1.0), (2.0, 1.0), (2.0, 2.0)], &AREA),
+            [(1.0, 1.0), (2.0, 1.0), (2.0, 2.0)]
+        );
+        assert_eq!(clip_polygon(&[(11.0, 1.0), (12.0, 1.0), (12.0, 2.0)], &AREA), []);
+        assert_eq!(clip_polygon(&[], &AREA), []);
+    }
+
+    #[test]
+    fn gaps_split_and_long_runs_keep_their_extremes() {
+        assert_eq!(
+            split_at_gaps([None, Some((0.0, 1.0)), None, None, Some((2.0, 1.0))].into_iter()),
+            [vec![(0.0, 1.0)], vec![(2.0, 1.0)]]
+        );
+        let run: Vec<CanvasPoint> = (0..1000)
+            .map(|i| {
+                (
+                    f64::from(i) / 500.0,
+                    if i == 700 {
+                        9.0
+                    } else if i == 300 {
+                        -9.0
+                    } else {
+                        0.0
+                    },
+                )
+            })
+            .collect();
+        let kept = thin_points(&run, 1.0);
+        assert!(kept.len() <= 8 && kept.contains(&(1.4, 9.0)) && kept.contains(&(0.6, -9.0)));
+    }
+
+    #[test]
+    fn dashes_have_the_lengths_of_the_pattern() {
+        let dashes = split_into_dashes(&[(0.0, 0.0), (7.0, 0.0), (10.0, 0.0)], &[3.0, 2.0]);
+        assert_eq!(dashes, [vec![(0.0, 0.0), (3.0, 0.0)], vec![(5.0, 0.0), (7.0, 0.0), (8.0, 0.0)]]);
+        assert_eq!(split_into_dashes(&[(0.0, 0.0), (7.0, 0.0)], &[]), [vec![(0.0, 0.0), (7.0, 0.0)]]);
+    }
+}

@@ -1,0 +1,146 @@
+//! Functions whose last bit is the same on every machine, and draws from the normal distribution.
+//!
+//! The functions of `f64` are those of the system's library, which rounds as it likes: glibc has one version
+//! for processors with fused multiply-add and one for those without. The ones here are made of additions,
+//! multiplications and divisions alone, whose rounding IEEE 754 fixes. So is that of `sqrt`, `mul_add`,
+//! `floor` and the like, which stay methods.
+//!
+//! ```
+//! // the same bits wherever it runs
+//! assert_eq!(portable_math::sin(1.0).to_bits(), 0x3fea_ed54_8f09_0cee);
+//! ```
+
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))] // tests may use them
+
+pub mod gauss_legendre;
+mod normal;
+
+pub use normal::StandardNormal;
+
+/// The sine of an angle, rad.
+#[must_use]
+#[inline]
+pub fn sin(x: f64) -> f64 {
+    libm::sin(x)
+}
+
+/// The cosine of an angle, rad.
+#[must_use]
+#[inline]
+pub fn cos(x: f64) -> f64 {
+    libm::cos(x)
+}
+
+/// Sine and cosine of an angle, rad.
+#[must_use]
+#[inline]
+pub fn sin_cos(x: f64) -> (f64, f64) {
+    libm::sincos(x)
+}
+
+/// The tangent of an angle, rad.
+#[must_use]
+#[inline]
+pub fn tan(x: f64) -> f64 {
+    libm::tan(x)
+}
+
+/// The angle of a sine, rad.
+#[must_use]
+#[inline]
+pub fn asin(x: f64) -> f64 {
+    libm::asin(x)
+}
+
+/// The angle of a cosine, rad.
+#[must_use]
+#[inline]
+pub fn acos(x: f64) -> f64 {
+    libm::acos(x)
+}
+
+/// The angle of a tangent, rad.
+#[must_use]
+#[inline]
+pub fn atan(x: f64) -> f64 {
+    libm::atan(x)
+}
+
+/// The angle of the point `(x, y)`, rad.
+#[must_use]
+#[inline]
+pub fn atan2(y: f64, x: f64) -> f64 {
+    libm::atan2(y, x)
+}
+
+/// The hyperbolic tangent.
+#[must_use]
+#[inline]
+pub fn tanh(x: f64) -> f64 {
+    libm::tanh(x)
+}
+
+/// `e^x`.
+#[must_use]
+#[inline]
+pub fn exp(x: f64) -> f64 {
+    libm::exp(x)
+}
+
+/// The natural logarithm.
+#[must_use]
+#[inline]
+pub fn ln(x: f64) -> f64 {
+    libm::log(x)
+}
+
+/// `ln(1 + x)`, exact for small `x`.
+#[must_use]
+#[inline]
+pub fn ln_1p(x: f64) -> f64 {
+    libm::log1p(x)
+}
+
+/// The complementary error function.
+#[inline]
+pub fn erfc(x: f64) -> f64 {
+    libm::erfc(x)
+}
+
+/// The logarithm to base 10.
+#[must_use]
+#[inline]
+pub fn log10(x: f64) -> f64 {
+    libm::log10(x)
+}
+
+/// `x^y`.
+#[must_use]
+#[inline]
+pub fn powf(x: f64, y: f64) -> f64 {
+    libm::pow(x, y)
+}
+
+/// `x^n` by squaring; the compiler may compute [`f64::powi`] in another way.
+#[must_use]
+#[inline]
+pub fn powi(x: f64, n: i32) -> f64 {
+    let (mut square, mut left, mut power) = (x, n.unsigned_abs(), 1.0);
+    loop {
+        if left & 1 == 1 {
+            power *= square;
+        }
+        left >>= 1;
+        if left == 0 {
+            return if n < 0 { 1.0 / power } else { power };
+        }
+        square *= square;
+    }
+}
+
+/// `sqrt(x^2 + y^2)` without overflow on the way.
+#[must_use]
+#[inline]
+pub fn hypot(x: f64, y: f64) -> f64 {
+    libm::hypot(x, y)
+}

@@ -1,0 +1,330 @@
+//! Oscillations that last for a short time only, read from pieces of a long record.
+
+use crate::analysis::SpectralAnalysis;
+use crate::classification::SINGLE_CYCLE_DAMPING;
+use crate::periodogram::{Periodogram, upper_median};
+use crate::record::SampledRecord;
+use crate::settings::ROUNDING;
+use crate::trend::Trend;
+use crate::{Component, ComponentReason, ComponentVerdict, SpectrumSettings};
+use portable_math as math;
+use rayon::prelude::*;
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+/// Pieces of a length, frames.
+struct SegmentScale {
+    length: usize,
+    /// How many are taken apart.
+    most: usize,
+    /// Whether the first one always is: what is over soon after a record starts is hidden by a window that
+    /// starts at zero.
+    first: bool,
+}
+
+/// An oscillation shows best in pieces as long as it lasts. The longest take most of the time.
+const SCALES: [SegmentScale; 3] = [
+    SegmentScale { length: 4096, most: 2, first: false },
+    SegmentScale { length: 1024, most: 4, first: true },
+    SegmentScale { length: 256, most: 4, first: true },
+];
+/// Resolutions of a piece within which two components are one.
+const SAME_WITHIN_RESOLUTIONS: f64 = 2.0;
+/// Deviations within which two components are one.
+const SAME_WITHIN_DEVIATIONS: f64 = 3.0;
+/// Nepers after which an oscillation is over: a twentieth is left.
+const NEPERS_UNTIL_OVER: f64 = 3.0;
+/// Nepers from which an oscillation ends soon and is no steady line of wavering amplitude.
+const NEPERS_OF_DECAY: f64 = 1.0;
+
+/// A component that was read from a piece.
+#[derive(Debug)]
+pub(super) struct Transient {
+    pub component: Component,
+    /// First frame of the stretch that was taken apart.
+    first: usize,
+    resolution_hz: f64,
+    /// Nepers by which it has decayed at the end of the stretch.
+    nepers: f64,
+}
+
+impl Transient {
+    /// Whether another component is the same within both deviations.
+    pub(super) fn matches_component(&self, other: &Component) -> bool {
+        let c = &self.component;
+        let sd_hz = math::hypot(c.frequency_sd_hz, other.frequency_sd_hz);
+        let within_hz = (SAME_WITHIN_RESOLUTIONS * self.resolution_hz).max(SAME_WITHIN_DEVIATIONS * sd_hz);
+        let holds = |a: &Component, b: &Component| {
+            a.range_hz.is_some_and(|range| (range.low_hz..=range.high_hz).contains(&b.frequency_hz))
+        };
+        (c.frequency_hz - other.frequency_hz).abs() < within_hz || holds(c, other) || holds(other, c)
+    }
+
+    /// Whether another component that changes over the window is what this one looks like there: a line whose
+    /// width grows with the decay.
+    pub(super) fn explains_component(&self, other: &Component) -> bool {
+        let c = &self.component;
+        let width_hz = c.damping_ratio.map_or(0.0, |ratio| 2.0 * ratio * c.frequency_hz);
+        self.matches_component(other) || (c.frequency_hz - other.frequency_hz).abs() < width_hz
+    }
+
+    /// Adds a doubt to a component that does not decay: outside the stretch it may have another frequency.
+    fn with_persistence_doubt(mut self) -> Self {
+        if self.nepers < NEPERS_OF_DECAY {
+            let words = "it goes on outside the part of the window in which it was read, and may drift or \
+                         change there";
+            let reasons = &mut self.component.reasons;
+            reasons.push(ComponentReason { verdict: ComponentVerdict::Ambiguous, words: words.to_owned() });
+            reasons.sort_by_key(|reason| reason.verdict);
+            self.component.verdict = reasons[0].verdict;
+        }
+        self
+    }
+
+    /// Whether the piece describes the component better than a window over which it changes.
+    pub(super) fn is_more_specific(&self) -> bool {
+        self.nepers > NEPERS_OF_DECAY || self.component.range_hz.is_some()
+    }
+}
+
+/// Every component that lasts for a short time only, once.
+pub(super) fn find_transients(record: &SampledRecord, settings: &SpectrumSettings) -> Vec<Transient> {
+    let (low_hz, high_hz) = settings.band_hz.unwrap_or((0.0, record.frame_rate_hz / 2.0));
+    let band = (low_hz / record.frame_rate_hz, (high_hz / record.frame_rate_hz).min(0.5));
+    let of_scale = |scale: &SegmentScale| {
+        let pieces = cut_segments(record.samples, scale.length, band);
+        let chosen = select_unusual(&pieces, scale.most);
+        let is_read = |k: usize| chosen.contains(&k) || (scale.first && k == 0);
+        let numbered = pieces.into_iter().enumerate();
+        numbered.filter(|(k, _)| is_read(*k)).map(|(_, piece)| piece).collect::<Vec<_>>()
+    };
+    let pieces: Vec<UnusualPiece> = SCALES.iter().flat_map(of_scale).collect();
+    let read = |piece: &UnusualPiece| {
+        let samples = &record.samples[piece.frames.clone()];
+        read_piece(&SampledRecord { samples, ..*record }, settings, piece)
+    };
+    let mut found: Vec<Transient> = pieces.par_iter().flat_map_iter(read).collect();
+    found.sort_by(|a, b| a.component.frequency_sd_hz.total_cmp(&b.component.frequency_sd_hz));
+    let mut once: Vec<Transient> = Vec::new();
+    for brief in found {
+        // two components of one piece are distinct
+        let known = |known: &Transient| {
+            (known.first, known.resolution_hz) != (brief.first, brief.resolution_hz)
+                && (known.matches_component(&brief.component) || brief.matches_component(&known.component))
+        };
+        if !once.iter().any(known) {
+            once.push(brief);
+        }
+    }
+    once
+}
+
+/// The components of a piece that are not there all the time: those whose frequency exceeds the normal power,
+/// and those that end within it. Those that end within a cycle are left out, because every step gives one.
+fn read_piece(record: &SampledRecord, settings: &SpectrumSettings, piece: &UnusualPiece) -> Vec<Transient> {
+    let rate_hz = record.frame_rate_hz;
+    let passes = |brief: &Transient| {
+        let c = &brief.component;
+        let (low_hz, high_hz) =
+            c.range_hz.map_or((c.frequency_hz, c.frequency_hz), |range| (range.low_hz, range.high_hz));
+        !c.damping_ratio.is_some_and(|ratio| ratio > SINGLE_CYCLE_DAMPING)
+            && (brief.nepers > NEPERS_UNTIL_OVER
+                || piece.exceeds_normal_power(low_hz / rate_hz, high_hz / rate_hz))
+    };
+    let stretches = SpectralAnalysis::analyse_between_steps(record, settings).into_iter();
+    let found = stretches.flat_map(|stretch| stretch_transients(stretch, piece.frames.start, rate_hz));
+    found.filter(passes).map(Transient::with_persistence_doubt).collect()
+}
+
+/// The components of a stretch of a piece that begins at a frame.
+fn stretch_transients(
+    analysis: SpectralAnalysis,
+    start: usize,
+    rate_hz: f64,
+) -> impl Iterator<Item = Transient> {
+    let first = start + analysis.skipped_frames;
+    let lasts_s = analysis.residual_m.len() as f64 / rate_hz;
+    let resolution_hz = analysis.spectrum.resolution_hz;
+    analysis.spectrum.components.into_iter().map(move |c| {
+        let nepers = decay_nepers(&c, lasts_s);
+        let begins_s = first as f64 / rate_hz + c.begins_s.unwrap_or(0.0);
+        let component = Component { begins_s: (begins_s > 0.0).then_some(begins_s), ..c };
+        Transient { component, first, resolution_hz, nepers }
+    })
+}
+
+/// Nepers by which a component decays before the end of a record; 0 where the decay is not significant.
+fn decay_nepers(c: &Component, lasts_s: f64) -> f64 {
+    let decay =
+        c.damping_ratio.zip(c.damping_ratio_sd).filter(|(ratio, sd)| *ratio > SAME_WITHIN_DEVIATIONS * sd);
+    decay.map_or(0.0, |(ratio, _)| {
+        TAU * c.frequency_hz * ratio / (1.0 - ratio * ratio).sqrt() * (lasts_s - c.begins_s.unwrap_or(0.0))
+    })
+}
+
+// Pieces whose spectrum exceeds what is normal for the record. The pieces overlap by half. In each bin a
+// quarter of them lies below `-ln(3/4)` times the mean power of noise, whatever the rest holds. So steady
+// lines and noise of any colour are normal, even where most of the pieces hold a step.
+
+/// Chance that noise alone exceeds the normal power anywhere in a record.
+const FALSE_ALARM: f64 = 0.01;
+/// The normal power is this quantile of the pieces' powers, divided by the same quantile of noise over its
+/// mean.
+const NORMAL_POWER_QUANTILE: usize = 4;
+const QUARTER_OF_NOISE: f64 = 0.287_682_072_451_780_9;
+/// Half width of the neighbourhood whose median is the least noise of a bin, bins: a quarter of a few pieces
+/// is not well known.
+const NEIGHBOURHOOD: usize = 8;
+/// Cycles in a piece below which a step, not an oscillation, exceeds the normal power.
+const FEWEST_CYCLES: usize = 8;
+/// Half width of the main lobe of a Hann window, bins.
+const LOBE: usize = 2;
+/// Removed from each piece.
+const CUBIC: Trend = Trend::Polynomial(4);
+
+/// A piece of a record, and how its spectrum compares with the other pieces'.
+pub(super) struct UnusualPiece {
+    pub frames: Range<usize>,
+    /// Power over the normal power in each bin.
+    excess: Vec<f64>,
+    /// Excess that noise alone hardly reaches.
+    level: f64,
+}
+
+impl UnusualPiece {
+    /// Whether power between two frequencies, cycles a frame, exceeds the normal.
+    pub(super) fn exceeds_normal_power(&self, low: f64, high: f64) -> bool {
+        let bin = |cycles: f64| (cycles * self.frames.len() as f64).round() as usize;
+        let around = bin(low).saturating_sub(LOBE)..(bin(high) + LOBE + 1).min(self.excess.len());
+        self.excess.get(around).is_some_and(|excess| excess.iter().any(|e| *e > self.level))
+    }
+}
+
+/// The pieces of a length that hold values in half their frames or more; `band` is in cycles a frame.
+pub(super) fn cut_segments(samples: &[Option<f64>], length: usize, band: (f64, f64)) -> Vec<UnusualPiece> {
+    let last = samples.len() - length;
+    let starts: Vec<usize> = (0..last).step_by(length / 2).chain([last]).collect();
+    let piece = |start: &usize| {
+        let (frames, piece) = (*start..start + length, &samples[*start..start + length]);
+        let enough = 2 * piece.iter().flatten().count() >= length;
+        enough.then(|| UnusualPiece { frames, excess: segment_power_spectrum(piece), level: 0.0 })
+    };
+    let mut pieces: Vec<UnusualPiece> = starts.par_iter().filter_map(piece).collect();
+    let largest = samples.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let least = math::powi(ROUNDING * largest, 2).max(f64::MIN_POSITIVE);
+    let normal = normal_power_spectrum(&pieces, length / 2 + 1);
+    let bin = |cycles: f64| (cycles * length as f64) as usize;
+    let inside = FEWEST_CYCLES.max(bin(band.0))..bin(band.1) + 1;
+    let trials = (pieces.len() * inside.len()).max(1) as f64;
+    for piece in &mut pieces {
+        piece.level = math::ln(trials / FALSE_ALARM);
+        for (k, (power, normal)) in piece.excess.iter_mut().zip(&normal).enumerate() {
+            *power = if inside.contains(&k) { *power / normal.max(least) } else { 0.0 };
+        }
+    }
+    pieces
+}
+
+/// The `most` pieces that exceed the normal most, each in bins in which none before it does.
+pub(super) fn select_unusual(pieces: &[UnusualPiece], most: usize) -> Vec<usize> {
+    let mut chosen = Vec::new();
+    let mut open = vec![true; pieces.first().map_or(0, |piece| piece.excess.len())];
+    while chosen.len() < most {
+        let largest = |piece: &UnusualPiece| {
+            let bins = piece.excess.iter().zip(&open).filter(|(_, open)| **open);
+            bins.fold(0.0, |most: f64, (excess, _)| most.max(*excess))
+        };
+        let sizes: Vec<f64> = pieces.par_iter().map(largest).collect();
+        let best = (0..pieces.len()).max_by(|a, b| sizes[*a].total_cmp(&sizes[*b]).then(b.cmp(a)));
+        let Some(best) = best.filter(|best| sizes[*best] > pieces[*best].level) else { break };
+        chosen.push(best);
+        let UnusualPiece { excess, level, .. } = &pieces[best];
+        for k in (0..open.len()).filter(|k| excess[*k] > *level) {
+            let end = (k + LOBE + 1).min(open.len());
+            open[k.saturating_sub(LOBE)..end].fill(false);
+        }
+    }
+    chosen
+}
+
+/// Power in each bin, as the variance of white noise of that power.
+fn segment_power_spectrum(samples: &[Option<f64>]) -> Vec<f64> {
+    let periodogram = Periodogram::new(samples, samples.len());
+    let amplitude_m = periodogram.amplitudes(&CUBIC.residual(samples));
+    amplitude_m.into_iter().map(|a| math::powi(periodogram.noise_sd_m(a), 2)).collect()
+}
+
+/// Power of the record's noise and steady lines in each bin.
+fn normal_power_spectrum(pieces: &[UnusualPiece], bins: usize) -> Vec<f64> {
+    let of_bin = |bin: usize| {
+        let mut powers: Vec<f64> = pieces.iter().map(|piece| piece.excess[bin]).collect();
+        let place = powers.len() / NORMAL_POWER_QUANTILE;
+        if powers.is_empty() {
+            0.0
+        } else {
+            *powers.select_nth_unstable_by(place, f64::total_cmp).1 / QUARTER_OF_NOISE
+        }
+    };
+    let own: Vec<f64> = (0..bins).into_par_iter().map(of_bin).collect();
+    let around = |bin: usize| {
+        upper_median(own[bin.saturating_sub(NEIGHBOURHOOD)..(bin + NEIGHBOURHOOD + 1).min(bins)].to_vec())
+    };
+    (0..bins).map(|bin| own[bin].max(around(bin).unwrap_or(0.0))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+
+    const LENGTH: usize = 512;
+    const FRAMES: usize = 20_000;
+
+    /// A steady line in noise, and a tone for 200 frames.
+    fn record(seed: u64, burst: f64) -> Vec<Option<f64>> {
+        let mut seed = seed;
+        let mut draw = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        let value = |i: usize| {
+            let on = if (7000..7200).contains(&i) { burst } else { 0.0 };
+            10.0 * (TAU * 0.1 * i as f64).sin() + on * (TAU * 0.23 * i as f64).sin()
+        };
+        (0..FRAMES).map(|i| Some(value(i) + draw())).collect()
+    }
+
+    #[test]
+    fn steady_lines_and_noise_exceed_nothing() {
+        let alarms = |seed| {
+            let pieces = cut_segments(&record(seed, 0.0), LENGTH, (0.0, 0.5));
+            select_unusual(&pieces, 4).len()
+        };
+        assert!((0..40).map(alarms).sum::<usize>() <= 1);
+    }
+
+    #[test]
+    fn what_is_there_for_a_short_time_is_found_where_it_is() {
+        let pieces = cut_segments(&record(1, 1.0), LENGTH, (0.0, 0.5));
+        assert_eq!(pieces.len(), FRAMES.div_ceil(LENGTH / 2) - 1);
+        assert_eq!(pieces.last().unwrap().frames, FRAMES - LENGTH..FRAMES);
+        let [k] = select_unusual(&pieces, 4)[..] else { panic!("{:?}", select_unusual(&pieces, 4)) };
+        let piece = &pieces[k];
+        assert!(piece.frames.start < 7100 && piece.frames.end > 7100, "{:?}", piece.frames);
+        assert!(piece.exceeds_normal_power(0.23, 0.23) && piece.exceeds_normal_power(0.2, 0.25));
+        assert!(!piece.exceeds_normal_power(0.1, 0.1) && !piece.exceeds_normal_power(0.3, 0.4));
+        assert!(
+            select_unusual(&cut_segments(&record(1, 1.0), LENGTH, (0.3, 0.5)), 4).is_empty(),
+            "outside the band"
+        );
+    }
+
+    #[test]
+    fn missing_frames_are_no_piece() {
+        let mut samples = record(2, 1.0);
+        samples[6000..9000].fill(None);
+        let pieces = cut_segments(&samples, LENGTH, (0.0, 0.5));
+        assert!(pieces.iter().all(|p| p.frames.start > 8700 || p.frames.end < 6300));
+        assert!(cut_segments(&vec![None; FRAMES], LENGTH, (0.0, 0.5)).is_empty());
+    }
+}

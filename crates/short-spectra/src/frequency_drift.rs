@@ -1,0 +1,268 @@
+//! A cycle whose frequency changes over the record: sought in addition to steady and decaying oscillations,
+//! and read as one component.
+//!
+//! Sinusoids can only split such a cycle into pieces. If they leave as much as they explain, or if three or
+//! more of them lie within the range of a ridge that drifts, the ridge is the component and the pieces are
+//! dropped.
+
+use super::model_selection::{DriftRegion, LOBE, ModelFit, ModelSelector};
+use super::periodogram::upper_median;
+use super::time_frequency::{self, FrequencyRange, Ridge, RidgeEnd, RidgePoint, Spectrogram};
+use portable_math as math;
+use std::f64::consts::{FRAC_1_SQRT_2, TAU};
+
+/// The largest component is slow if every component above four times its frequency has less than a quarter of
+/// its amplitude. The drifting component is sought above it.
+const SLOW_COMPONENT: (f64, f64) = (4.0, 0.25);
+/// The band starts at the lowest strong part of a component divided by this: near the ends of a record the
+/// window hides lower frequencies.
+const BAND_MARGIN: f64 = 2.0;
+/// Share of followed segments from which the component counts as followed everywhere.
+pub(super) const FULLY_FOLLOWED: f64 = 0.9;
+/// Shorter segments tried below that share, and the gain in it that they must bring: noise hides a component
+/// in short segments.
+const SHORTER_SEGMENTS: [f64; 3] = [0.8, 0.65, 0.5];
+const LEAST_GAIN: f64 = 0.1;
+/// Deviation of the instant of a cycle, cycles: its form changes with its frequency, and the fundamental
+/// moves against the start of the cycle.
+const CYCLE_INSTANT_SD: f64 = 0.05;
+/// Distance of points that share too few frames to follow each other's noise, segments.
+const INDEPENDENT_SEGMENTS: f64 = 0.5;
+/// Share of the segments in which a drift must be followed to be one.
+const LEAST_FOLLOWED: f64 = 0.08;
+/// Range of a drift, resolutions; a smaller range is a slightly broad line.
+const LEAST_RANGE: f64 = 2.0;
+/// Sinusoids within the range that are pieces of one cycle.
+const FRAGMENTS: usize = 3;
+/// Peak left within the range, over the largest sinusoid there, from which sinusoids do not explain the
+/// cycle.
+const LARGE_RESIDUAL: f64 = 0.25;
+
+/// The course of the strongest component above the slow ones.
+pub(super) struct DriftCourse {
+    pub ridge: Ridge,
+    /// Share of the segments in which it was followed.
+    pub followed_share: f64,
+    /// Its range, where it is a component that drifts.
+    pub range: Option<FrequencyRange>,
+}
+
+impl DriftCourse {
+    /// Median distance of its frequencies from the extrapolated rates of points half a segment apart,
+    /// resolutions.
+    pub(super) fn median_stray(&self) -> f64 {
+        let ridge = &self.ridge;
+        let apart = ((INDEPENDENT_SEGMENTS * ridge.segment_s / ridge.hop_s).round() as usize).max(1);
+        let stray = |pair: &[RidgePoint]| {
+            let [a, b] = [&pair[0], &pair[pair.len() - 1]];
+            let led_hz = (b.time_s - a.time_s) * (a.rate_hz_per_s + b.rate_hz_per_s) / 2.0;
+            (b.frequency_hz - a.frequency_hz - led_hz).abs() * ridge.segment_s
+        };
+        let pairs = ridge.unbroken_parts().flat_map(|part| part.windows(apart + 1));
+        upper_median(pairs.map(stray).collect()).unwrap_or(0.0)
+    }
+
+    /// The frequencies that it covers in a spectrum, if it is a component that drifts.
+    pub(super) fn drift_region(&self) -> Option<DriftRegion> {
+        let FrequencyRange { low_hz, high_hz, .. } = self.range?;
+        Some(DriftRegion { low_hz, high_hz, lobe_hz: LOBE / self.ridge.segment_s })
+    }
+}
+
+/// Follows the strongest component of a record without its trend and slow oscillations.
+pub(super) fn find_drift_course(
+    search: &ModelSelector,
+    fit: &ModelFit,
+    band_hz: Option<(f64, f64)>,
+) -> Option<DriftCourse> {
+    let (lowest, top) = natural_band_hz(search, fit);
+    let band = band_hz.map_or((lowest, top), |(low, high)| (low.max(lowest), high.min(top)));
+    if band.0 >= band.1 {
+        return None;
+    }
+    let record = remove_slow_parts(search, fit, band.0);
+    let (followed_share, ridge) = select_best_ridge(&record, search.frame_rate_hz, band)?;
+    let range = ridge.range_hz().filter(|range| {
+        followed_share > LEAST_FOLLOWED && ridge.is_drifting() && is_fragmented(search, fit, range)
+    });
+    Some(DriftCourse { ridge, followed_share, range })
+}
+
+/// The ridge of the segment length that shows the component best. If it misses much of the record, the
+/// shorter length that misses least: the component may be weak or fast in a part of the record.
+fn select_best_ridge(record: &[Option<f64>], frame_rate_hz: f64, band: (f64, f64)) -> Option<(f64, Ridge)> {
+    let cut = |segment_s: Option<f64>| {
+        let settings = time_frequency::SpectrogramSettings { segment_s, band_hz: Some(band) };
+        let spectrogram = Spectrogram::new(record, frame_rate_hz, &settings).ok()?;
+        let ridge = spectrogram.find_ridge(record, band).ok()?;
+        Some((ridge.points.len() as f64 / spectrogram.time_s.len().max(1) as f64, ridge))
+    };
+    let best = cut(None).filter(|best| !best.1.points.is_empty())?;
+    if best.0 >= FULLY_FOLLOWED {
+        return Some(best);
+    }
+    let shorter = SHORTER_SEGMENTS.iter().filter_map(|times| cut(Some(times * best.1.segment_s)));
+    let better = shorter.filter(|(covered, _)| *covered > best.0 + LEAST_GAIN);
+    Some(better.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or(best))
+}
+
+/// Band in which the strongest component above the slow ones may run, Hz. The shortest segment holds a few
+/// cycles of the lower end, so the lower end must not lie far below the component.
+fn natural_band_hz(search: &ModelSelector, fit: &ModelFit) -> (f64, f64) {
+    let prominent = prominent_peaks(search, fit);
+    let slow_hz = dominant_slow_hz(&prominent);
+    let (low, top) = time_frequency::default_band_hz(search.samples.len(), search.frame_rate_hz, slow_hz);
+    let above = || prominent.iter().filter(|s| s.hz >= low);
+    let largest_m = above().map(|s| s.amplitude_m).fold(0.0, f64::max);
+    let strong = above().filter(|s| s.amplitude_m >= SLOW_COMPONENT.1 * largest_m);
+    let lowest_hz = strong.map(|s| s.hz).fold(f64::INFINITY, f64::min);
+    (if lowest_hz.is_finite() { low.max(lowest_hz / BAND_MARGIN) } else { low }, top)
+}
+
+/// A sinusoid, or a peak that is left.
+struct ProminentPeak {
+    hz: f64,
+    amplitude_m: f64,
+}
+
+fn prominent_peaks(search: &ModelSelector, fit: &ModelFit) -> Vec<ProminentPeak> {
+    let model = &fit.model;
+    let sinusoid = |k: usize| ProminentPeak {
+        hz: model.terms()[k].cycles * search.resolution_hz(),
+        amplitude_m: model.amplitude_m(k),
+    };
+    let sinusoids = model.oscillations().into_iter().map(sinusoid);
+    let left = fit.peaks.accepted.iter();
+    let left = left.map(|p| ProminentPeak { hz: p.frequency_hz, amplitude_m: p.amplitude_m });
+    sinusoids.chain(left).collect()
+}
+
+/// Frequency of the largest, if it is slow, Hz.
+fn dominant_slow_hz(standing: &[ProminentPeak]) -> Option<f64> {
+    let largest = standing.iter().max_by(|a, b| a.amplitude_m.total_cmp(&b.amplitude_m))?;
+    let mut above = standing.iter().filter(|s| s.hz > SLOW_COMPONENT.0 * largest.hz).peekable();
+    (above.peek().is_some() && above.all(|s| s.amplitude_m < SLOW_COMPONENT.1 * largest.amplitude_m))
+        .then_some(largest.hz)
+}
+
+/// The record without trend, relaxations and the sinusoids below a frequency, m.
+fn remove_slow_parts(search: &ModelSelector, fit: &ModelFit, low_hz: f64) -> Vec<Option<f64>> {
+    let (model, low) = (&fit.model, low_hz / search.resolution_hz());
+    let mut record = fit.residual_m.clone();
+    for k in (0..model.terms().len()).filter(|k| model.terms()[*k].cycles >= low) {
+        let of_term = model.term_values(k);
+        record.iter_mut().zip(of_term).for_each(|(x, value)| *x = x.map(|x| x + value));
+    }
+    record
+}
+
+/// Whether sinusoids only split the cycle into pieces.
+fn is_fragmented(search: &ModelSelector, fit: &ModelFit, range: &FrequencyRange) -> bool {
+    let resolution_hz = search.resolution_hz();
+    if range.high_hz - range.low_hz < LEAST_RANGE * resolution_hz {
+        return false;
+    }
+    let inside = |hz: f64| hz > range.low_hz - resolution_hz && hz < range.high_hz + resolution_hz;
+    let terms = fit.model.terms();
+    let pieces = || (0..terms.len()).filter(|k| inside(terms[*k].cycles * resolution_hz));
+    let largest_m = pieces().map(|k| search.windowed_amplitude_m(&fit.model, k)).fold(0.0, f64::max);
+    let left = fit.peaks.accepted.iter().filter(|p| inside(p.frequency_hz));
+    let left_m = left.map(|p| p.amplitude_m).fold(0.0, f64::max);
+    pieces().count() >= FRAGMENTS || left_m > LARGE_RESIDUAL * largest_m
+}
+
+/// One component from a course.
+pub(super) struct RidgeMean {
+    /// Cycles counted along the course, over its duration, Hz.
+    pub frequency_hz: f64,
+    pub frequency_sd_hz: f64,
+    /// Root of the mean power, m.
+    pub amplitude_m: f64,
+    pub amplitude_sd_m: f64,
+    /// Mean over the points, weighted with their power.
+    pub snr_db: f64,
+}
+
+impl RidgeMean {
+    /// Of a ridge with points. Points half a segment apart count as independent.
+    pub(super) fn from_ridge(ridge: &Ridge) -> Self {
+        let points = &ridge.points;
+        let power: f64 = points.iter().map(|p| math::powi(p.amplitude_m, 2)).sum();
+        let mean = |of: &dyn Fn(usize) -> f64| {
+            (0..points.len()).map(|i| math::powi(points[i].amplitude_m, 2) * of(i)).sum::<f64>() / power
+        };
+        let shared = (0.5 * ridge.segment_s / ridge.hop_s).max(1.0);
+        let noise_m =
+            |i: usize| points[i].amplitude_m * math::powf(10.0, -points[i].snr_db / 20.0) * FRAC_1_SQRT_2;
+        let counted = CycleCount::along_ridge(ridge);
+        Self {
+            frequency_hz: counted.cycles / counted.duration_s,
+            frequency_sd_hz: counted.variance.sqrt() / counted.duration_s,
+            amplitude_m: (power / points.len() as f64).sqrt(),
+            amplitude_sd_m: mean(&|i| noise_m(i)) * (shared / points.len() as f64).sqrt(),
+            snr_db: mean(&|i| points[i].snr_db),
+        }
+    }
+}
+
+/// Cycles along a course, their variance, and its duration.
+#[derive(Default)]
+struct CycleCount {
+    cycles: f64,
+    variance: f64,
+    duration_s: f64,
+}
+
+impl CycleCount {
+    /// Whole cycles and the parts of one at both ends of each part of the ridge, from the phases of its
+    /// points. Where the ridge reaches an end of the record, the cycles up to it follow from the frequencies.
+    fn along_ridge(ridge: &Ridge) -> Self {
+        let mut all = Self::default();
+        ridge.unbroken_parts().for_each(|part| all.add_part(part));
+        for (end, point) in [(&ridge.start, ridge.points.first()), (&ridge.end, ridge.points.last())] {
+            if let (Some(end), Some(point)) = (end, point) {
+                all.add_end(end, point);
+            }
+        }
+        let point = ridge.points.first().filter(|_| all.duration_s == 0.0);
+        point.map_or(all, |point| Self {
+            cycles: point.frequency_hz * ridge.segment_s,
+            variance: math::powi(point.frequency_sd_hz * ridge.segment_s, 2),
+            duration_s: ridge.segment_s,
+        })
+    }
+
+    fn add_part(&mut self, part: &[RidgePoint]) {
+        let (Some(first), Some(last)) = (part.first(), part.last()) else { return };
+        for pair in part.windows(2) {
+            let [a, b] = [&pair[0], &pair[1]];
+            let apart_s = b.time_s - a.time_s;
+            // a cubic through both frequencies and their rates
+            let expected = apart_s * (a.frequency_hz + b.frequency_hz) / 2.0
+                + apart_s * apart_s * (a.rate_hz_per_s - b.rate_hz_per_s) / 12.0;
+            let part_of_one = (b.phase_rad - a.phase_rad) / TAU;
+            self.cycles += part_of_one + (expected - part_of_one).round();
+        }
+        self.variance += phase_variance(first) + phase_variance(last);
+        self.duration_s += last.time_s - first.time_s;
+    }
+
+    fn add_end(&mut self, end: &RidgeEnd, point: &RidgePoint) {
+        let apart_s = (end.time_s - point.time_s).abs();
+        // a parabola through both frequencies with the rate of the point; a mismatch at the end counts as
+        // uncertainty
+        let led_hz = point.frequency_hz + point.rate_hz_per_s * (end.time_s - point.time_s);
+        let off_hz = (end.frequency_hz - led_hz) / 3.0;
+        self.cycles += apart_s * ((point.frequency_hz + led_hz) / 2.0 + off_hz);
+        let sd_hz = math::hypot(end.frequency_sd_hz / 3.0, off_hz);
+        self.variance += math::powi(apart_s * sd_hz, 2);
+        self.duration_s += apart_s;
+    }
+}
+
+/// Variance of a point's phase, cycles squared, from the noise in a bin or the residual along the course,
+/// whichever is larger.
+fn phase_variance(point: &RidgePoint) -> f64 {
+    let noise = math::powf(10.0, -point.snr_db / 20.0).max(point.residual_ratio);
+    math::powi(noise * FRAC_1_SQRT_2 / TAU, 2) + CYCLE_INSTANT_SD * CYCLE_INSTANT_SD
+}

@@ -1,0 +1,543 @@
+//! Power density of noise-like motion, with its uncertainty and a test for steady lines, from several tapers
+//! of one record.
+//!
+//! Each sine taper gives a nearly independent estimate. Their mean is the density, and their scatter its
+//! uncertainty (jackknife over the tapers). Thomson's harmonic F measures how well one steady sine explains
+//! them all. A line is spread over `tapers + 1` resolutions, so other estimators read its frequency better.
+//!
+//! Sources: Riedel and Sidorenko 1995 (IEEE Trans. Signal Process. 43, 188) for the tapers; Thomson 1982
+//! (Proc. IEEE 70, 1055) for F; Thomson and Chave 1991 (in Haykin, Advances in Spectrum Analysis and Array
+//! Processing) for the jackknife.
+
+use super::error::find_unusable;
+use super::periodogram::upper_median;
+use super::transform::{Complex, RealTransform};
+use nalgebra::{DMatrix, DVector};
+use portable_math as math;
+use rayon::prelude::*;
+use std::f64::consts::{FRAC_2_PI, FRAC_PI_2, PI};
+use std::ops::RangeInclusive;
+
+/// Tapers unless asked for otherwise: a density of 14 degrees of freedom scatters by 38 %, and a line takes 8
+/// resolutions, 53 Hz in 0.15 s, so that 78 Hz is still apart from zero and from 900 Hz.
+pub const TAPERS: usize = 7;
+/// Least and most tapers: one has no scatter, and more than fifty smooth away every feature.
+pub(crate) const TAPER_RANGE: RangeInclusive<usize> = 2..=50;
+/// Least width of a noise floor's window, in widths of a line, so that a line does not set its own floor.
+pub(crate) const FLOOR_LINES: f64 = 5.0;
+/// Longest padded record, samples: every taper keeps its transform.
+const MOST_PADDED: usize = 1 << 24;
+/// Values from which threads share the work; fewer take a millisecond or two.
+const PARALLEL_FROM: usize = 1 << 17;
+/// Share of the sum of powers below which the residual of one taper is rounding.
+const ROUNDING: f64 = 1e-15;
+
+/// A multitaper estimate; one value a bin, from 0 to half the frame rate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Multitaper {
+    /// Frequencies of the bins, Hz.
+    pub frequency_hz: Vec<f64>,
+    /// One-sided power density, m^2/Hz: white noise of variance `s^2` reads `2 s^2 / rate`, and the sum over
+    /// the bins times their distance is the mean square of the record as the tapers weigh it. At 0 and half
+    /// the frame rate, which have no mirror image, it is half of that.
+    pub density_m2_per_hz: Vec<f64>,
+    /// Standard deviation of the density's natural logarithm, by the delete-one jackknife over the tapers.
+    pub log_density_sd: Vec<f64>,
+    /// Thomson's F for one steady sine against noise, of 2 and `2 tapers - 2` degrees of freedom; holds where
+    /// a line's half width is clear of 0 and of half the frame rate. Infinite where the sine leaves nothing.
+    pub line_f: Vec<f64>,
+    /// Amplitude of that sine, m.
+    pub line_amplitude_m: Vec<f64>,
+    /// Tapers used; fewer than asked for where long gaps leave room for fewer.
+    pub tapers: usize,
+    /// One over the time from the first to the last frame present, Hz.
+    pub resolution_hz: f64,
+    /// Half the width of a steady line, Hz: `(tapers asked for + 1) / 2` resolutions.
+    pub half_bandwidth_hz: f64,
+    /// Student's t within which 95 % lie.
+    student_t: f64,
+}
+
+/// Why a record has no multitaper estimate.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MultitaperError {
+    /// Not a number of tapers.
+    #[error("tapers: found {found}, expected {} to {}; {TAPERS} are usual", TAPER_RANGE.start(), TAPER_RANGE.end())]
+    Tapers {
+        /// Tapers asked for.
+        found: usize,
+    },
+    /// Too few frames hold a value.
+    #[error(
+        "found {found} frames with a value, expected at least {expected} for this number of tapers; widen the window or take fewer tapers"
+    )]
+    TooFew {
+        /// Frames with a value.
+        found: usize,
+        /// Twice the tapers.
+        expected: usize,
+    },
+    /// The frames present lie in so few clumps that one taper alone fits them.
+    #[error(
+        "the {found} frames with a value lie in clumps that leave room for one taper, expected room for two; choose a window with fewer gaps"
+    )]
+    Clumped {
+        /// Frames with a value.
+        found: usize,
+    },
+    /// A sample is no usable number.
+    #[error(
+        "frame {frame} of the record: found {found}, expected a finite number below 1e100; remove the frame"
+    )]
+    NotFinite {
+        /// 0-based frame.
+        frame: usize,
+        /// The value.
+        found: f64,
+    },
+    /// The frame rate is no rate.
+    #[error("frame rate: found {found} Hz, expected a finite number above 0")]
+    FrameRate {
+        /// The value, Hz.
+        found: f64,
+    },
+    /// The padded record would not fit.
+    #[error(
+        "found a record of {frames} frames padded to {padded} samples, expected at most {MOST_PADDED}; shorten the window or the padding"
+    )]
+    TooLong {
+        /// Frames.
+        frames: usize,
+        /// Padded length, samples.
+        padded: usize,
+    },
+}
+
+impl Multitaper {
+    /// The estimate for a record less its trend, m, one sample a frame (`None` where there is none), padded
+    /// with zeros to the next power of two that holds the record and `padded` samples, from `tapers` tapers,
+    /// [`TAPERS`] as a rule.
+    ///
+    /// # Errors
+    /// [`MultitaperError`] when record, rate, padding or tapers cannot give one.
+    pub fn new(
+        residual_m: &[Option<f64>],
+        frame_rate_hz: f64,
+        padded: usize,
+        tapers: usize,
+    ) -> Result<Self, MultitaperError> {
+        check_input(residual_m, frame_rate_hz, tapers)?;
+        let samples = trim_missing_ends(residual_m);
+        let frames = samples.len();
+        let padded = padded.max(frames).checked_next_power_of_two().filter(|n| *n <= MOST_PADDED);
+        let padded = padded.ok_or(MultitaperError::TooLong { frames, padded: frames })?;
+        let made = SineTapers::new(samples, tapers);
+        if made.rows.nrows() < *TAPER_RANGE.start() {
+            return Err(MultitaperError::Clumped { found: samples.iter().flatten().count() });
+        }
+        let bins = estimate_bins(&made, samples, padded, frame_rate_hz);
+        let (tapers_used, resolution_hz) = (made.rows.nrows(), frame_rate_hz / frames as f64);
+        let column = |of: fn(&MultitaperBin) -> f64| bins.iter().map(of).collect();
+        Ok(Self {
+            frequency_hz: (0..bins.len()).map(|k| k as f64 * (frame_rate_hz / padded as f64)).collect(),
+            density_m2_per_hz: column(|b| b.density_m2_per_hz),
+            log_density_sd: column(|b| b.log_density_sd),
+            line_f: column(|b| b.line_f),
+            line_amplitude_m: column(|b| b.line_amplitude_m),
+            tapers: tapers_used,
+            resolution_hz,
+            half_bandwidth_hz: (tapers + 1) as f64 / 2.0 * resolution_hz,
+            student_t: student_t_quantile(0.95, tapers_used - 1),
+        })
+    }
+
+    /// Degrees of freedom of the density in a bin: two for each taper.
+    #[must_use]
+    pub fn degrees_of_freedom(&self) -> usize {
+        2 * self.tapers
+    }
+
+    /// The 95 % interval of the density in a bin, m^2/Hz, from the jackknife with Student's t of one degree
+    /// of freedom less than tapers; `None` for a bin outside the spectrum.
+    #[must_use]
+    pub fn interval_95(&self, bin: usize) -> Option<(f64, f64)> {
+        let (density, sd) = (self.density_m2_per_hz.get(bin)?, self.log_density_sd.get(bin)?);
+        let factor = math::exp(self.student_t * sd);
+        Some((density / factor, density * factor))
+    }
+
+    /// Probability that noise alone, level within a line's width, gives an F as large as in a bin: `(1 +
+    /// F/(K-1))^-(K-1)` for `K` tapers. In a record of `n` frames, less than `1/n` counts as a line
+    /// (Thomson's rule). `None` for a bin outside the spectrum.
+    #[must_use]
+    pub fn line_probability(&self, bin: usize) -> Option<f64> {
+        let others = (self.tapers - 1) as f64;
+        Some(math::powf(1.0 + self.line_f.get(bin)? / others, -others))
+    }
+
+    /// Mean density of the noise in every bin, m^2/Hz: the running median of the density over `width_hz`, at
+    /// least `FLOOR_LINES` lines wide, without bins that stand out of it. It follows a steady slope of the
+    /// density, and is level over half its width at both ends.
+    #[must_use]
+    pub fn noise_density(&self, width_hz: f64) -> Vec<f64> {
+        let bin_hz = self.frequency_hz.get(1).copied().unwrap_or(f64::INFINITY);
+        let width_hz = width_hz.max(2.0 * FLOOR_LINES * self.half_bandwidth_hz);
+        let window = ((width_hz / bin_hz).ceil() as usize).min(2 * self.density_m2_per_hz.len());
+        noise_floor_curve(&self.density_m2_per_hz, window, self.degrees_of_freedom() as f64)
+    }
+}
+
+fn check_input(samples: &[Option<f64>], frame_rate_hz: f64, tapers: usize) -> Result<(), MultitaperError> {
+    if !TAPER_RANGE.contains(&tapers) {
+        return Err(MultitaperError::Tapers { found: tapers });
+    }
+    if !(frame_rate_hz.is_finite() && frame_rate_hz > 0.0) {
+        return Err(MultitaperError::FrameRate { found: frame_rate_hz });
+    }
+    if let Some((frame, found)) = find_unusable(samples) {
+        return Err(MultitaperError::NotFinite { frame, found });
+    }
+    let (found, expected) = (samples.iter().flatten().count(), 2 * tapers);
+    if found < expected { Err(MultitaperError::TooFew { found, expected }) } else { Ok(()) }
+}
+
+/// The samples from the first to the last frame present: missing frames at the ends are no gap.
+fn trim_missing_ends(samples: &[Option<f64>]) -> &[Option<f64>] {
+    let first = samples.iter().position(Option::is_some).unwrap_or(0);
+    let end = samples.iter().rposition(Option::is_some).map_or(first, |last| last + 1);
+    samples.get(first..end).unwrap_or_default()
+}
+
+/// The values of `of` in order, computed in parallel where `work` is large.
+fn map_parallel_above<T: Send>(count: usize, work: usize, of: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    if work < PARALLEL_FROM {
+        (0..count).map(&of).collect()
+    } else {
+        (0..count).into_par_iter().map(&of).collect()
+    }
+}
+
+/// Estimates at one frequency.
+struct MultitaperBin {
+    density_m2_per_hz: f64,
+    log_density_sd: f64,
+    line_f: f64,
+    line_amplitude_m: f64,
+}
+
+/// A taper's transform of the record, and the sum of the taper's weights.
+struct TaperTransform {
+    values: Vec<Complex>,
+    sum: f64,
+}
+
+fn estimate_bins(
+    tapers: &SineTapers,
+    samples: &[Option<f64>],
+    padded: usize,
+    frame_rate_hz: f64,
+) -> Vec<MultitaperBin> {
+    let transform = RealTransform::new(padded);
+    let tapered = |taper: usize| {
+        let (row, mut sum) = (tapers.coefficients(taper), 0.0);
+        let values = samples.iter().enumerate().map(|(frame, sample)| {
+            sample.map_or(0.0, |sample| {
+                let weight = tapers.value(&row, frame);
+                sum += weight;
+                weight * sample
+            })
+        });
+        TaperTransform { values: transform.spectrum_values(values), sum }
+    };
+    let tapered = map_parallel_above(tapers.rows.nrows(), padded, tapered);
+    let half = padded / 2;
+    let sided = |bin: usize| if bin == 0 || bin == half { 1.0 } else { 2.0 };
+    map_parallel_above(half + 1, padded, |bin| estimate_bin(&tapered, bin, sided(bin) / frame_rate_hz))
+}
+
+fn estimate_bin(tapered: &[TaperTransform], bin: usize, scale: f64) -> MultitaperBin {
+    let values = || tapered.iter().map(|t| (t.values[bin], t.sum));
+    let power: f64 = values().map(|(y, _)| y.norm_sqr()).sum();
+    let own: f64 = values().map(|(_, u)| u * u).sum();
+    let line = values().map(|(y, u)| y * u).sum::<Complex>() / own;
+    let rest: f64 = values().map(|(y, u)| (y - line * u).norm_sqr()).sum();
+    let explained = (tapered.len() - 1) as f64 * line.norm_sqr() * own;
+    MultitaperBin {
+        density_m2_per_hz: scale * power / tapered.len() as f64,
+        log_density_sd: jackknife_log_sd(power, || values().map(|(y, _)| y.norm_sqr())),
+        line_f: if explained > 0.0 { explained / rest } else { 0.0 },
+        line_amplitude_m: 2.0 * math::hypot(line.re, line.im),
+    }
+}
+
+/// Standard deviation of the logarithm of the mean of `powers`, whose sum is `total`, from the means that
+/// omit one of them.
+fn jackknife_log_sd<I: Iterator<Item = f64>>(total: f64, powers: impl Fn() -> I) -> f64 {
+    if total <= 0.0 {
+        return 0.0;
+    }
+    // (the divisor of the means is the same for all, so it moves no deviation)
+    let logs = || powers().map(|p| math::ln(((total - p) / total).max(ROUNDING)));
+    let (count, sum, squares) = logs().fold((0.0, 0.0, 0.0), |(n, s, q), x| (n + 1.0, s + x, q + x * x));
+    let scatter: f64 = squares - sum * sum / count;
+    ((count - 1.0) / count * scatter.max(0.0)).sqrt()
+}
+
+// The noise under the lines of a density: a running median without the lines.
+
+/// Knots of the curve in the width of its window; the logarithms are linear between knots.
+const KNOTS_PER_WINDOW: usize = 4;
+/// Ratio to the curve from which a bin counts as a line: of 14 degrees of freedom one bin of noise in seventy
+/// does.
+const LINE_RATIO: f64 = 2.0;
+/// Passes without the lines found before; the skirts of a line 60 dB above the noise are gone after three.
+const FLOOR_PASSES: usize = 3;
+
+/// Mean of the noise in every bin; `window` is the width of the median, bins, and `degrees` are those of
+/// chi-square in a bin.
+pub(super) fn noise_floor_curve(density: &[f64], window: usize, degrees: f64) -> Vec<f64> {
+    let all = running_median(density, window, |_| true);
+    let without_lines =
+        |curve: Vec<f64>, _| running_median(density, window, |bin| density[bin] <= LINE_RATIO * curve[bin]);
+    let mean_over_median = math::powi(1.0 - 2.0 / (9.0 * degrees), -3); // Wilson and Hilferty 1931
+    (0..FLOOR_PASSES).fold(all, without_lines).into_iter().map(|m| m * mean_over_median).collect()
+}
+
+/// Running median over the bins that count. A window with fewer of them than half its width grows until it
+/// has enough; at the ends it is cut.
+fn running_median(density: &[f64], window: usize, counts: impl Fn(usize) -> bool + Sync) -> Vec<f64> {
+    let Some(last) = density.len().checked_sub(1) else { return Vec::new() };
+    let (half, step) = ((window / 2).max(1), (window / KNOTS_PER_WINDOW).max(1));
+    let knots = last.div_ceil(step) + 1;
+    let within = |centre: usize, half: usize| -> Vec<f64> {
+        let bins = centre.saturating_sub(half)..centre.saturating_add(half + 1).min(density.len());
+        bins.filter(|bin| counts(*bin)).map(|bin| density[bin]).collect()
+    };
+    let of_knot = |knot: usize| {
+        let centre = (knot * step).min(last);
+        let (mut reach, mut values) = (half, within(centre, half));
+        while values.len() < half && reach < last {
+            reach *= 2;
+            values = within(centre, reach);
+        }
+        let median = upper_median(values).unwrap_or(density[centre]);
+        math::ln(median.max(f64::MIN_POSITIVE))
+    };
+    let logs = map_parallel_above(knots, density.len(), of_knot);
+    let between = |bin: usize| {
+        let knot = bin / step;
+        let (from, to) = (knot * step, ((knot + 1) * step).min(last));
+        let share = (bin - from) as f64 / (to.max(from + 1) - from) as f64;
+        let next = logs.get(knot + 1).unwrap_or(&logs[knot]);
+        math::exp(logs[knot] + share * (next - logs[knot]))
+    };
+    map_parallel_above(density.len(), density.len(), between)
+}
+
+// Quantiles of Student's t for whole degrees of freedom.
+
+/// The `t` with the chance `inside` that a value of `degrees` degrees of freedom, one or more, lies between
+/// `-t` and `t`.
+pub(super) fn student_t_quantile(inside: f64, degrees: usize) -> f64 {
+    /// Halvings that leave the last bit of an angle.
+    const HALVINGS: usize = 60;
+    let (mut low, mut high) = (0.0, FRAC_PI_2);
+    for _ in 0..HALVINGS {
+        let angle = (low + high) / 2.0;
+        *(if student_t_probability(angle, degrees) < inside { &mut low } else { &mut high }) = angle;
+    }
+    (degrees as f64).sqrt() * math::tan(low)
+}
+
+/// The chance to lie within `sqrt(degrees) tan(angle)` (Abramowitz and Stegun 26.7.3, 26.7.4).
+fn student_t_probability(angle: f64, degrees: usize) -> f64 {
+    let (sine, cosine) = math::sin_cos(angle);
+    let odd = degrees % 2;
+    let mut term = if odd == 1 { cosine } else { 1.0 };
+    let mut sum = 0.0;
+    for power in (odd..=degrees.saturating_sub(2)).step_by(2) {
+        sum += term;
+        term *= cosine * cosine * (power + 1) as f64 / (power + 2) as f64;
+    }
+    match (odd, degrees) {
+        (_, 1) => FRAC_2_PI * angle,
+        (1, _) => FRAC_2_PI * (angle + sine * sum),
+        _ => sine * sum,
+    }
+}
+
+// Sine tapers, orthonormal over the frames present.
+//
+// Over `n` frames without gaps the tapers `sqrt(2/(n+1)) sin(pi k m/(n+1))`, `m = 1..n`, `k = 1..K`, are
+// orthonormal (Riedel and Sidorenko 1995, eq. 2). Where frames are missing they are not; with their inner
+// products `G` over the frames present, `G^(-1/2)` times the tapers are, and of all such sets these are the
+// nearest to the tapers themselves.
+
+/// Frames whose inner products are summed at a time, so that the sum does not depend on the number of
+/// threads.
+const PRODUCT_BLOCK: usize = 1 << 15;
+/// Energy on the frames present, relative to the largest, below which a combination of tapers is dropped: it
+/// lies in the gaps, and scaled to unit energy it would leak over the whole spectrum.
+const LEAST_ENERGY_SHARE: f64 = 0.1;
+
+/// Combinations of sine tapers.
+pub(super) struct SineTapers {
+    /// Angle of the first taper from frame to frame.
+    turn: f64,
+    /// One row of sine coefficients for each taper.
+    rows: DMatrix<f64>,
+}
+
+impl SineTapers {
+    /// At most `count` tapers for a record; fewer where its gaps leave no room.
+    pub(super) fn new(samples: &[Option<f64>], count: usize) -> Self {
+        let turn = PI / (samples.len() + 1) as f64;
+        let sines = DMatrix::identity(count, count) * (2.0 / (samples.len() + 1) as f64).sqrt();
+        let rows = if samples.iter().all(Option::is_some) {
+            sines
+        } else {
+            orthonormal_combinations(&taper_inner_products(samples, turn, count))
+        };
+        Self { turn, rows }
+    }
+
+    /// The taper of a row in a frame, by Clenshaw's recurrence.
+    pub(super) fn value(&self, row: &[f64], frame: usize) -> f64 {
+        let (sine, cosine) = math::sin_cos(self.turn * (frame + 1) as f64);
+        let next = |(b1, b2): (f64, f64), c: &f64| (c + 2.0 * cosine * b1 - b2, b1);
+        sine * row.iter().rev().fold((0.0, 0.0), next).0
+    }
+
+    /// Coefficients of the sines in a taper.
+    pub(super) fn coefficients(&self, taper: usize) -> Vec<f64> {
+        self.rows.row(taper).iter().copied().collect()
+    }
+}
+
+/// `sum sin(j a) sin(k a)` over the frames present, `a` the angle of the frame.
+fn taper_inner_products(samples: &[Option<f64>], turn: f64, count: usize) -> DMatrix<f64> {
+    let block = |index: usize| {
+        let mut sum = DMatrix::zeros(count, count);
+        let mut sines = DVector::zeros(count);
+        let frames = index * PRODUCT_BLOCK..samples.len().min((index + 1) * PRODUCT_BLOCK);
+        for frame in frames.filter(|frame| samples[*frame].is_some()) {
+            let (sine, cosine) = math::sin_cos(turn * (frame + 1) as f64);
+            let (mut before, mut now) = (0.0, sine);
+            for value in &mut sines {
+                *value = now;
+                (before, now) = (now, 2.0 * cosine * now - before);
+            }
+            sum.ger(1.0, &sines, &sines, 1.0);
+        }
+        sum
+    };
+    map_parallel_above(samples.len().div_ceil(PRODUCT_BLOCK), samples.len(), block).into_iter().sum()
+}
+
+/// `G^(-1/2)`; where some combinations lie in the gaps, the others, each of unit energy.
+fn orthonormal_combinations(products: &DMatrix<f64>) -> DMatrix<f64> {
+    let eigen = products.clone().symmetric_eigen();
+    let least = LEAST_ENERGY_SHARE * eigen.eigenvalues.max();
+    let kept: Vec<usize> = (0..eigen.eigenvalues.len()).filter(|i| eigen.eigenvalues[*i] > least).collect();
+    let directions = eigen.eigenvectors.select_columns(&kept);
+    let scales = kept.iter().map(|i| eigen.eigenvalues[*i].sqrt().recip());
+    let scale = DMatrix::from_diagonal(&DVector::from_iterator(kept.len(), scales));
+    if kept.len() == eigen.eigenvalues.len() {
+        &directions * scale * directions.transpose()
+    } else {
+        scale * directions.transpose()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_monotonous_density_is_followed_and_a_line_is_not() {
+        let slope = |bin: usize| (-(bin as f64) / 300.0).exp();
+        let mut density: Vec<f64> = (0..1000).map(slope).collect();
+        density[480..520].iter_mut().for_each(|d| *d *= 1e6);
+        // with many degrees of freedom the mean and the median agree
+        let curve = noise_floor_curve(&density, 200, 1e9);
+        assert_eq!(curve.len(), 1000);
+        // next to the line the median is that of the bins that are left, at most 20 bins aside: 7 %
+        assert!((100..900).all(|bin| (curve[bin] / slope(bin) - 1.0).abs() < 0.07), "{:?}", &curve[380..620]);
+        assert!([150, 300, 700, 850].iter().all(|bin| (curve[*bin] / slope(*bin) - 1.0).abs() < 1e-3));
+    }
+
+    #[test]
+    fn few_bins_have_a_curve_too() {
+        assert!(noise_floor_curve(&[], 10, 14.0).is_empty());
+        assert!(noise_floor_curve(&[2.0], 10, 1e15).iter().all(|d| (d - 2.0).abs() < 1e-12));
+        assert!(noise_floor_curve(&[2.0; 7], 3, 1e15).iter().all(|d| (d - 2.0).abs() < 1e-12));
+    }
+
+    #[test]
+    fn the_quantiles_are_those_of_the_tables() {
+        // (Abramowitz and Stegun, table 26.10)
+        for (degrees, tabled) in [
+            (1, 12.706),
+            (2, 4.303),
+            (3, 3.182),
+            (4, 2.776),
+            (5, 2.571),
+            (6, 2.447),
+            (7, 2.365),
+            (13, 2.160),
+            (30, 2.042),
+        ] {
+            let found = student_t_quantile(0.95, degrees);
+            assert!((found - tabled).abs() < 6e-4, "{degrees}: {found}");
+        }
+    }
+
+    fn table(samples: &[Option<f64>], count: usize) -> Vec<Vec<f64>> {
+        let tapers = SineTapers::new(samples, count);
+        let taper = |k: usize| {
+            (0..samples.len())
+                .map(|i| samples[i].map_or(0.0, |_| tapers.value(&tapers.coefficients(k), i)))
+                .collect()
+        };
+        (0..tapers.rows.nrows()).map(taper).collect()
+    }
+
+    fn worst(tapers: &[Vec<f64>]) -> f64 {
+        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let mut worst = 0.0_f64;
+        for (j, a) in tapers.iter().enumerate() {
+            for (k, b) in tapers.iter().enumerate() {
+                worst = worst.max((product(a, b) - f64::from(u8::from(j == k))).abs());
+            }
+        }
+        worst
+    }
+
+    #[test]
+    fn without_gaps_they_are_the_sines_and_orthonormal() {
+        let tapers = table(&[Some(0.0); 750], 7);
+        assert_eq!(tapers.len(), 7);
+        assert!((tapers[4][99] - (2.0_f64 / 751.0).sqrt() * (PI * 5.0 * 100.0 / 751.0).sin()).abs() < 1e-14);
+        assert!(worst(&tapers) < 1e-12, "{:e}", worst(&tapers));
+    }
+
+    #[test]
+    fn with_gaps_they_are_orthonormal_over_the_frames_present() {
+        let scattered: Vec<_> = (0..750).map(|i| (i * i % 7 != 2 && i % 11 != 5).then_some(0.0)).collect();
+        let one_long: Vec<_> = (0..750).map(|i| (!(300..420).contains(&i)).then_some(0.0)).collect();
+        for (samples, missing) in [(&scattered, 263), (&one_long, 120)] {
+            assert_eq!(samples.iter().filter(|x| x.is_none()).count(), missing);
+            let tapers = table(samples, 7);
+            assert_eq!(tapers.len(), 7);
+            assert!(worst(&tapers) < 1e-12, "{:e}", worst(&tapers));
+        }
+    }
+
+    #[test]
+    fn combinations_that_lie_in_a_gap_are_left_out() {
+        let half: Vec<_> = (0..750).map(|i| (!(200..550).contains(&i)).then_some(0.0)).collect();
+        let tapers = table(&half, 7);
+        assert!((2..7).contains(&tapers.len()), "{}", tapers.len());
+        assert!(worst(&tapers) < 1e-12, "{:e}", worst(&tapers));
+    }
+}

@@ -1,0 +1,227 @@
+//! The Hann-windowed amplitude spectrum of one pattern of frames, reused for every record of that pattern.
+
+use super::transform::RealTransform;
+use portable_math as math;
+use std::cell::RefCell;
+use std::sync::{Arc, OnceLock};
+
+/// Windows without gaps that a thread keeps: a fit reads a few, of the same lengths in every run of its
+/// model.
+const CACHED_WINDOWS: usize = 16;
+/// Longest padded length of a window that is kept: together they take a few megabytes.
+const LONGEST_CACHED: usize = 1 << 16;
+
+thread_local! {
+    /// The last windows without gaps, newest last.
+    static WINDOWS: RefCell<Vec<HannWindow>> = const { RefCell::new(Vec::new()) };
+}
+
+/// A window over the frames present: weights, and the sidelobes of their transform.
+#[derive(Clone)]
+struct HannWindow {
+    weights: Arc<Vec<f64>>,
+    envelope: Arc<OnceLock<Vec<f64>>>,
+    sums: WindowSums,
+    padded: usize,
+}
+
+impl HannWindow {
+    fn new(pattern: &[Option<f64>], padded: usize) -> Self {
+        let weights = hann_weights(pattern);
+        let sums = WindowSums::from_weights(&weights);
+        Self { weights: Arc::new(weights), envelope: Arc::default(), sums, padded }
+    }
+
+    /// A window from the cache if the pattern has no gaps, else a new one.
+    fn from_cache(pattern: &[Option<f64>], padded: usize) -> Self {
+        if padded > LONGEST_CACHED || pattern.iter().any(Option::is_none) {
+            return Self::new(pattern, padded);
+        }
+        WINDOWS.with_borrow_mut(|kept| {
+            let same = |known: &&HannWindow| known.padded == padded && known.weights.len() == pattern.len();
+            if let Some(known) = kept.iter().find(same) {
+                return known.clone();
+            }
+            if kept.len() == CACHED_WINDOWS {
+                kept.remove(0);
+            }
+            let new = Self::new(pattern, padded);
+            kept.push(new.clone());
+            new
+        })
+    }
+}
+
+/// A window over the frames present, with its transform.
+pub(super) struct Periodogram {
+    transform: RealTransform,
+    /// Weight of each frame.
+    pub weights: Arc<Vec<f64>>,
+    envelope: Arc<OnceLock<Vec<f64>>>,
+    pub sums: WindowSums,
+    padded: usize,
+}
+
+impl Periodogram {
+    /// A window for records with values where `pattern` has them, padded to `padded` values.
+    pub(super) fn new(pattern: &[Option<f64>], padded: usize) -> Self {
+        let HannWindow { weights, envelope, sums, padded } = HannWindow::from_cache(pattern, padded);
+        Self { transform: RealTransform::new(padded), weights, envelope, sums, padded }
+    }
+
+    /// The sidelobes of the weights' transform; computed on first use.
+    pub(super) fn sidelobe_envelope(&self) -> &[f64] {
+        let lobe = || self.transform.magnitudes(self.weights.iter().map(|w| w / self.sums.first));
+        self.envelope.get_or_init(|| sidelobe_maxima(lobe(), self.weights.len(), self.padded))
+    }
+
+    /// Factor that makes a weighted sum an amplitude.
+    pub(super) fn amplitude_scale(&self) -> f64 {
+        2.0 / self.sums.first
+    }
+
+    /// Amplitude that a sine at each bin would have, m.
+    pub(super) fn amplitudes(&self, residual: &[f64]) -> Vec<f64> {
+        let scaled = self.amplitude_scale();
+        self.transform.magnitudes(residual.iter().zip(self.weights.iter()).map(|(x, w)| x * w * scaled))
+    }
+
+    /// The spectrum in which peaks are sought; `least_m` is the amplitude of rounding.
+    pub(super) fn windowed_spectrum<'a>(
+        &'a self,
+        amplitude_m: &'a [f64],
+        frame_rate_hz: f64,
+        least_m: f64,
+    ) -> WindowedSpectrum<'a> {
+        let frames = self.weights.len();
+        WindowedSpectrum {
+            amplitude_m,
+            envelope: self.sidelobe_envelope(),
+            bin_hz: self.bin_hz(frame_rate_hz),
+            resolution_hz: frame_rate_hz / frames as f64,
+            frames,
+            present: self.sums.present,
+            sums: self.sums,
+            least_m,
+        }
+    }
+
+    /// Distance of the bins, Hz.
+    pub(super) fn bin_hz(&self, frame_rate_hz: f64) -> f64 {
+        frame_rate_hz / self.padded as f64
+    }
+
+    /// Amplitude of an oscillation of `cycles` cycles in the spectrum, m: `2 |sum w x exp(-2 pi i n t)| / sum
+    /// w`.
+    pub(super) fn amplitude_at(&self, values: &[f64], cycles: f64) -> f64 {
+        Self::amplitude_with_weights(&self.weights, values, cycles)
+    }
+
+    /// The same by other weights.
+    pub(super) fn amplitude_with_weights(weights: &[f64], values: &[f64], cycles: f64) -> f64 {
+        let turn = std::f64::consts::TAU * cycles / values.len() as f64;
+        let add = |(re, im): (f64, f64), (i, (x, w)): (usize, (&f64, &f64))| {
+            let (sine, cosine) = math::sin_cos(turn * i as f64);
+            (re + x * w * cosine, im + x * w * sine)
+        };
+        let (re, im) = values.iter().zip(weights).enumerate().fold((0.0, 0.0), add);
+        2.0 * math::hypot(re, im) / WindowSums::from_weights(weights).first
+    }
+
+    /// Equivalent noise bandwidth of the window, Hz.
+    pub(super) fn noise_bandwidth_hz(&self, frame_rate_hz: f64) -> f64 {
+        frame_rate_hz * self.sums.second / (self.sums.first * self.sums.first)
+    }
+
+    /// Standard deviation of white noise that has this root mean square in a bin, m.
+    pub(super) fn noise_sd_m(&self, rms_m: f64) -> f64 {
+        rms_m * self.sums.first / (2.0 * self.sums.second.sqrt())
+    }
+}
+
+/// Sums over the weights of a record.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct WindowSums {
+    pub first: f64,
+    pub second: f64,
+    /// Frames that hold a value.
+    pub present: usize,
+}
+
+impl WindowSums {
+    pub(super) fn from_weights(weights: &[f64]) -> Self {
+        let add = |s: Self, w: &f64| Self {
+            first: s.first + w,
+            second: s.second + w * w,
+            present: s.present + usize::from(*w > 0.0),
+        };
+        weights.iter().fold(Self { first: 0.0, second: 0.0, present: 0 }, add)
+    }
+}
+
+/// Weights `sin^2(pi (i + 1/2) / n)`, symmetric and positive; zero for a frame without a value.
+pub(super) fn hann_weights(samples: &[Option<f64>]) -> Vec<f64> {
+    let n = samples.len() as f64;
+    let weight = |i: usize| math::powi(math::sin(std::f64::consts::PI * (i as f64 + 0.5) / n), 2);
+    samples.iter().enumerate().map(|(i, x)| if x.is_some() { weight(i) } else { 0.0 }).collect()
+}
+
+/// The upper median; `None` for an empty list.
+pub(super) fn upper_median(mut values: Vec<f64>) -> Option<f64> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+/// Bin width, resolutions, above which bins miss the top of a sidelobe, which is one resolution wide.
+const COARSE_BINS: f64 = 0.25;
+/// Bins by which the distance of two peaks is then reduced: half a bin for each peak, and one for a
+/// sidelobe's top between two bins.
+const ROUNDED_BINS: usize = 2;
+
+/// An amplitude spectrum with the sidelobes of its window.
+pub(super) struct WindowedSpectrum<'a> {
+    pub amplitude_m: &'a [f64],
+    pub envelope: &'a [f64],
+    pub bin_hz: f64,
+    pub resolution_hz: f64,
+    pub frames: usize,
+    pub present: usize,
+    pub sums: WindowSums,
+    /// Amplitude of rounding, m.
+    pub least_m: f64,
+}
+
+/// Largest value of a window's transform, relative to that at zero, at or beyond each distance, in bins. Gaps
+/// in the record raise it.
+pub(super) fn sidelobe_maxima(lobe: Vec<f64>, frames: usize, padded: usize) -> Vec<f64> {
+    let mut envelope = lobe;
+    for k in (0..envelope.len().saturating_sub(1)).rev() {
+        envelope[k] = envelope[k].max(envelope[k + 1]);
+    }
+    if frames as f64 > COARSE_BINS * padded as f64 {
+        // both peaks are up to half a bin off, which is too much of a sidelobe's width
+        let rounded = ROUNDED_BINS.min(envelope.len());
+        envelope.rotate_right(rounded);
+        envelope.iter_mut().take(rounded).for_each(|value| *value = 1.0);
+    }
+    envelope
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sums_are_those_of_the_hann_window() {
+        let sums = WindowSums::from_weights(&hann_weights(&[Some(1.0); 64]));
+        assert!((sums.first - 32.0).abs() < 1e-12 && (sums.second - 24.0).abs() < 1e-12);
+        assert_eq!(sums.present, 64);
+    }
+
+    #[test]
+    fn a_missing_frame_has_no_weight() {
+        let weights = hann_weights(&[Some(1.0), None, Some(1.0), Some(1.0)]);
+        assert_eq!(weights[1], 0.0);
+        assert!((weights[2] - 0.853_553_390_593_273_8).abs() < 1e-15);
+    }
+}
