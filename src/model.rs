@@ -111,7 +111,7 @@ pub struct LinkDirections {
 }
 
 impl LinkDirections {
-    /// Directions of both links.
+    /// Directions of both links in a pose.
     #[inline]
     #[must_use]
     pub fn from_pose(pose: &Pose) -> Self {
@@ -208,7 +208,8 @@ impl Linkage {
         }
     }
 
-    /// Stiffness and damping of the neck while it leans on this side, and the moment at zero angle and rate.
+    /// Total stiffness and damping of the neck while it leans on this side of the shoulder, and its moment at
+    /// zero angle and rate.
     fn neck_spring(&self, lean: ShoulderContact) -> [f64; 3] {
         let Spring { stiffness, damping } = self.neck;
         match (lean, &self.shoulder) {
@@ -255,7 +256,8 @@ impl Linkage {
         self.energy_with_drop_j(pose, d, head, (self.head_drop_m(d), self.head_drop_rate_m_per_s(pose, d)))
     }
 
-    /// Energy, J, for any drop of the head, m, and its rate, m/s, also in flight.
+    /// Energy as in [`Self::energy_j`], J, for a given drop of the head, m, and its rate, m/s; valid in
+    /// flight too.
     #[must_use]
     pub fn energy_with_drop_j(
         &self,
@@ -279,8 +281,9 @@ impl Linkage {
         along + down + turning + springs + self.shoulder.map_or(0.0, |s| s.energy_j(pose.theta))
     }
 
-    /// Power that flows in, W: that of the drive and of friction, minus that of the dampers. `force` is the
-    /// friction force on the tip, N; the drive's force follows from the momentum along the sweep.
+    /// Power supplied to the blade, W: by the drive and by friction, minus the dissipation of the dampers.
+    /// `force` is the friction force on the tip, N; the force of the drive follows from the momentum along
+    /// the sweep.
     #[must_use]
     pub fn power_w(
         &self,
@@ -295,8 +298,8 @@ impl Linkage {
         self.power_with_drop_w(pose, d, head, lean, force, accelerations, drop_rate)
     }
 
-    /// Power that flows in, W, for any rate of the head's drop, m/s, also in flight.
-    #[allow(clippy::too_many_arguments)] // a state with its forces, as the equations name them
+    /// Power as in [`Self::power_w`], W, for a given rate of the head's drop, m/s; valid in flight too.
+    #[allow(clippy::too_many_arguments)] // a state and its forces, named as in the equations
     #[must_use]
     pub fn power_with_drop_w(
         &self,

@@ -1,6 +1,6 @@
-//! Recordings: where the lip tip and the head were in every frame, in SI units, on the frame grid.
+//! Recordings: positions of the lip tip and the head in every frame, in SI units, on the frame grid.
 //!
-//! x runs along the sweep, y upwards (`tip_x = v3`, `head_x = v`, `head_y = -u`). A frame in which a point
+//! x runs along the sweep, y points up (`tip_x = v3`, `head_x = v`, `head_y = -u`). A frame in which a point
 //! was not tracked holds `None`: nothing is interpolated, and no frame is dropped.
 
 pub mod alignment;
@@ -15,7 +15,7 @@ pub mod video;
 use portable_math as math;
 use serde::Serialize;
 
-/// Uniform instants of the frames: frame `i` was taken at `start_s + i / frame_rate_hz`.
+/// Uniform grid of frame times: frame `i` was taken at `start_s + i / frame_rate_hz`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FrameGrid {
     /// Time of the first frame, s.
@@ -39,34 +39,34 @@ impl FrameGrid {
     }
 }
 
-/// Positions of both points in every frame, m; all columns have the length of the grid.
+/// Positions of both points in every frame, m; every column has one entry per frame of the grid.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Traces {
-    /// Lip tip along the sweep, `v3`, m.
+    /// Position of the lip tip along the sweep, `v3`, m.
     pub tip_x_m: Vec<Option<f64>>,
-    /// Lip tip upwards, m.
+    /// Height of the lip tip, m.
     pub tip_y_m: Vec<Option<f64>>,
-    /// Head along the sweep, `v`, m.
+    /// Position of the head along the sweep, `v`, m.
     pub head_x_m: Vec<Option<f64>>,
-    /// Head upwards, `-u`, m.
+    /// Height of the head, `-u`, m.
     pub head_y_m: Vec<Option<f64>>,
-    /// The tracker's confidence in the tip, 0 to 1, where the source has one.
+    /// Confidence of the tracker in the tip, 0 to 1, if the source has one.
     pub tip_confidence: Option<Vec<Option<f64>>>,
-    /// The tracker's confidence in the head, 0 to 1, where the source has one.
+    /// Confidence of the tracker in the head, 0 to 1, if the source has one.
     pub head_confidence: Option<Vec<Option<f64>>>,
 }
 
-/// Why traces do not make a recording: the column, the frame and the value at fault.
+/// Why traces do not make a recording, with the column, the frame and the value at fault.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{0}")]
 pub struct RecordingError(String);
 
-/// Largest distance from the origin, m. No wiper's recording reaches a thousandth of it, and its square is
-/// far from overflow.
+/// Largest distance from the origin, m. The positions of a wiper stay below a thousandth of this limit, and
+/// its square is far from overflow.
 pub(crate) const LARGEST_M: f64 = 1e6;
 
-/// Traces on their frame grid, with a name for messages. All columns have the length of the grid, and all
-/// values are finite.
+/// Traces on their frame grid, with a name for messages. All columns have one entry per frame, and all values
+/// are finite.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
     name: String,
@@ -76,7 +76,7 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Checks the invariants and builds the recording; `synthetic` marks one that no camera took.
+    /// Checks the traces and builds the recording; `synthetic` marks a recording that no camera took.
     ///
     /// # Errors
     /// [`RecordingError`] naming the column and the frame at fault.
@@ -105,7 +105,7 @@ impl Recording {
         Ok(Self { name: name.into(), grid, traces, synthetic })
     }
 
-    /// The name used in messages and figures, usually that of its folder.
+    /// The name in messages and figures, usually that of the recording's folder.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
@@ -123,7 +123,7 @@ impl Recording {
         &self.traces
     }
 
-    /// Whether no camera took it: a simulation or a twin.
+    /// Whether no camera took the recording: it is a simulation or a twin.
     #[must_use]
     pub fn is_synthetic(&self) -> bool {
         self.synthetic
@@ -164,17 +164,17 @@ fn check_column(column: &str, values: &[Option<f64>], expected: usize) -> Result
     }))
 }
 
-/// Frames of the interpolating polynomial. For 900 Hz at 5,000 frames/s, six frames are low by 0.8 % half way
-/// between two frames; a straight line is low by 16 %.
+/// Frames of the interpolating polynomial. Half way between two frames at 5,000 frames/s, six frames give a
+/// 900 Hz sine 0.8 % too small; a straight line gives it 16 % too small.
 pub(crate) const STENCIL: usize = 6;
-/// A time this close to a frame, in frames, is that of the frame. Times near 1 s at 1e5 frames/s are rounded
-/// far less.
+/// A time counts as the time of a frame if it is this close to it, in frames. Times near 1 s at 1e5 frames/s
+/// have far smaller rounding errors.
 pub(crate) const ON_FRAME_TOLERANCE: f64 = 1e-6;
 
 impl Recording {
-    /// Value of a column of this recording at a time, s. The polynomial runs through three frames before and
-    /// three after; where one of the outer four is missing, a straight line takes its place. `None` outside
-    /// the recording and next to a missing frame.
+    /// Value of a column of this recording at a time, s. It comes from the polynomial through the three
+    /// frames before and the three after that time; if one of the outer four is missing, from a straight
+    /// line. `None` outside the recording and next to a missing frame.
     pub(crate) fn interpolate_column(&self, column: &[Option<f64>], time_s: f64) -> Option<f64> {
         let place = (time_s - self.grid.start_s) * self.grid.frame_rate_hz;
         if let Some(frame) = frame_at(place) {
@@ -188,16 +188,16 @@ impl Recording {
     }
 }
 
-/// Index of the frame at `place`, a real number of frames; `None` between frames. It may exceed the column.
+/// Index of the frame at `place`, a time in frames; `None` between frames. The index may exceed the column.
 pub(crate) fn frame_at(place: f64) -> Option<usize> {
     let nearest = place.round();
     (nearest >= 0.0 && (place - nearest).abs() < ON_FRAME_TOLERANCE).then_some(nearest as usize)
 }
 
-/// Lagrange polynomial through the six frames from `first` on, at `place`, a real number of frames; `None`
-/// where a frame is missing.
+/// Lagrange polynomial through the six frames from `first` on, evaluated at `place`, a time in frames; `None`
+/// if a frame is missing.
 pub(crate) fn lagrange_through_six(column: &[Option<f64>], first: usize, place: f64) -> Option<f64> {
-    /// Denominators: products of the distances of a frame from the other five.
+    /// Denominators of the polynomial: products of the distances of a frame from the other five.
     const APART: [f64; STENCIL] = [-120.0, 24.0, -12.0, 12.0, -24.0, 120.0];
     let place = place - first as f64;
     let mut sum = 0.0;
@@ -208,14 +208,14 @@ pub(crate) fn lagrange_through_six(column: &[Option<f64>], first: usize, place: 
     Some(sum)
 }
 
-/// Why traces cannot be turned.
+/// Why traces cannot be rotated.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "the {point} has only one of x and y in {frames} frames, the first is frame {first}; expected both or \
      neither, because a rotation mixes them"
 )]
 pub struct RotationError {
-    /// `tip` or `head`.
+    /// Name of the point, `tip` or `head`.
     pub point: &'static str,
     /// Number of frames with only one coordinate.
     pub frames: usize,
@@ -223,11 +223,11 @@ pub struct RotationError {
     pub first: usize,
 }
 
-/// Turns both points clockwise by `angle_rad` about `centre_m` (x and y, m): a line that rises by this angle
-/// along x becomes level.
+/// Rotates both points clockwise by `angle_rad` about `centre_m` (x and y, m). A line that rises by this
+/// angle along x becomes level.
 ///
 /// # Errors
-/// [`RotationError`] where a point has only one coordinate in a frame.
+/// [`RotationError`] if a point has only one coordinate in a frame.
 pub fn rotate_traces(traces: &Traces, angle_rad: f64, centre_m: [f64; 2]) -> Result<Traces, RotationError> {
     let ((sin, cos), [cx, cy]) = (math::sin_cos(angle_rad), centre_m);
     let turn = |point, x: &[Option<f64>], y: &[Option<f64>]| {
@@ -275,7 +275,7 @@ mod tests {
             let exact = quintic(place / 5000.0);
             assert!((at(&curve, place) / exact - 1.0).abs() < 1e-13, "{place}");
         }
-        // half way between two frames that stand as far from the crest on either side
+        // half way between two frames, which lie at the same distance from the crest on either side
         let crest = |t: f64| (std::f64::consts::TAU * 900.0 * (t - 4.5 / 5000.0)).cos();
         let sine = recording(0.0, crest);
         assert!((at(&sine, 4.5) - 0.991_64).abs() < 1e-5, "{}", at(&sine, 4.5));

@@ -1,8 +1,9 @@
-//! The stick-slip model run event by event: step, locate, decide, accept.
+//! The stick-slip model run event by event: integrate a step, locate an event, decide the next mode, accept
+//! it.
 //!
-//! Each mode of contact is a smooth phase ([`phases`]), integrated until one of its guards falls to zero. The
-//! next mode is a pure function of the forces ([`mode`]). Observers see every accepted piece of the solution;
-//! nothing else is stored or computed.
+//! Each mode of contact is a smooth phase ([`phases`]), which is integrated until one of its guards falls to
+//! zero. The next mode is a pure function of the forces ([`mode`]). Observers receive every accepted piece of
+//! the solution; nothing else is stored or computed.
 
 pub mod accuracy;
 pub mod bench_checks;
@@ -53,14 +54,14 @@ pub enum RunStatus {
     Chattering,
     /// The state left the range of the model, or no step met the tolerance.
     Diverged,
-    /// The limit of right-hand sides was reached.
+    /// The limit on evaluations of the right-hand side was reached.
     WorkLimit,
-    /// An observer asked for the end.
+    /// An observer ended the run.
     Interrupted,
 }
 
 impl RunStatus {
-    /// Name in files.
+    /// Name of the status in files.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -75,7 +76,7 @@ impl RunStatus {
         }
     }
 
-    /// Meaning in a sentence.
+    /// Meaning of the status as part of a sentence.
     pub(crate) fn meaning(self) -> &'static str {
         match self {
             Self::Completed => "the stop time was reached",
@@ -92,14 +93,14 @@ impl RunStatus {
     }
 }
 
-/// A change of mode.
+/// A change of the mode of contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Transition {
     /// Time of the change, s.
     pub time_s: f64,
-    /// Mode before.
+    /// Mode before the change.
     pub from: TipMode,
-    /// Mode after.
+    /// Mode after the change.
     pub to: TipMode,
     /// Event that causes the change.
     pub cause: TransitionCause,
@@ -110,15 +111,15 @@ pub struct Transition {
 pub struct Impact {
     /// Time of the impact, s.
     pub time_s: f64,
-    /// Velocity of the tip before.
+    /// Velocity of the tip before the impact.
     pub before: TipVelocity,
-    /// Velocity of the tip after.
+    /// Velocity of the tip after the impact.
     pub after: TipVelocity,
     /// Normal and tangential impulse on the tip, N s.
     pub impulse_n_s: [f64; 2],
-    /// Energy lost in the contact, J; not negative except for rounding.
+    /// Energy lost in the contact, J; not negative except for rounding errors.
     pub lost_j: f64,
-    /// Energy that the drive supplies by the impulse that keeps the head at its prescribed velocity, J.
+    /// Energy supplied by the impulse with which the drive keeps the head at its prescribed velocity, J.
     pub driven_j: f64,
 }
 
@@ -130,7 +131,7 @@ pub trait Observer {
     fn observe_transition(&mut self, _transition: &Transition) {}
     /// Receives an impact, before the transition that it causes.
     fn observe_impact(&mut self, _impact: &Impact) {}
-    /// Is asked after every piece; `Break` ends the run as [`RunStatus::Interrupted`].
+    /// Called after every piece; `Break` ends the run as [`RunStatus::Interrupted`].
     fn control_flow(&self) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
@@ -143,10 +144,10 @@ impl Observer for () {
 /// Accuracy, work limit and method of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SolverOptions {
-    /// Relative tolerance: the error of a Runge-Kutta step. Taylor series err by a fraction of it, such that
-    /// transition times err by about this number of seconds. Fixed steps ignore it.
+    /// Relative tolerance: the error of a Runge-Kutta step. The error of a Taylor step is a fraction of it,
+    /// so that transition times have errors of about this number of seconds. Fixed steps ignore it.
     pub relative_tolerance: f64,
-    /// Right-hand sides after which the run ends ([`RunStatus::WorkLimit`]).
+    /// Number of evaluations of the right-hand side after which the run ends ([`RunStatus::WorkLimit`]).
     pub most_evaluations: u64,
     /// Method of integration.
     pub method: IntegrationMethod,
@@ -155,7 +156,7 @@ pub struct SolverOptions {
 /// Method of integration and of locating transitions.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum IntegrationMethod {
-    /// Taylor series with an order set by the tolerance; transitions are roots of the guards' series.
+    /// Taylor series whose order depends on the tolerance; transitions are roots of the guards' series.
     #[default]
     Taylor,
     /// Runge-Kutta of order 8(5,3) with error control; transitions are bracketed on the dense output.
@@ -167,7 +168,7 @@ pub enum IntegrationMethod {
 }
 
 impl IntegrationMethod {
-    /// Name on the command line and in files.
+    /// Name of the method on the command line and in files.
     pub(crate) fn name(&self) -> &'static str {
         match self {
             Self::Taylor => "taylor",
@@ -184,13 +185,13 @@ impl IntegrationMethod {
 }
 
 impl SolverOptions {
-    /// This tolerance with the default method and work limit ([`MOST_EVALUATIONS`]).
+    /// Options with this tolerance, the default method and the default work limit ([`MOST_EVALUATIONS`]).
     #[must_use]
     pub fn new(relative_tolerance: f64) -> Self {
         Self { relative_tolerance, most_evaluations: MOST_EVALUATIONS, method: IntegrationMethod::default() }
     }
 
-    /// Tolerance and work limit of a scene with the default method.
+    /// Options with the tolerance and work limit of a scene and the default method.
     #[must_use]
     pub fn from_scene(scene: &Scene) -> Self {
         let most_evaluations = scene.run.most_evaluations.unwrap_or(MOST_EVALUATIONS);
@@ -201,9 +202,9 @@ impl SolverOptions {
 /// Summary of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RunResult {
-    /// Status at the end.
+    /// Status of the run at its end.
     pub status: RunStatus,
-    /// Time of the end, s.
+    /// Time at which the run ended, s.
     pub stopped_at_s: f64,
     /// Number of changes of mode.
     pub transitions: u64,
@@ -211,18 +212,18 @@ pub struct RunResult {
     pub work: WorkCounters,
 }
 
-/// Runs a scene from its start to its stop time with its own tolerance and work limit.
+/// Runs a scene from its start to its stop time with the scene's own tolerance and work limit.
 pub fn run_scene(scene: &Scene, observer: &mut impl Observer) -> RunResult {
     run_scene_with(scene, SolverOptions::from_scene(scene), observer)
 }
 
 #[cfg(test)]
 thread_local! {
-    /// Runs of this thread.
+    /// Number of runs in this thread.
     pub(crate) static RUNS: std::cell::Cell<usize> = const { std::cell::Cell::new(0) };
 }
 
-/// Runs a scene with other solver options.
+/// Runs a scene with the given solver options instead of its own.
 pub fn run_scene_with(scene: &Scene, effort: SolverOptions, observer: &mut impl Observer) -> RunResult {
     #[cfg(test)]
     RUNS.set(RUNS.get() + 1);
@@ -231,10 +232,11 @@ pub fn run_scene_with(scene: &Scene, effort: SolverOptions, observer: &mut impl 
     EventLoop::new(&system, scene, effort, &mut watch).run()
 }
 
-/// The driven blade of a scene, with the scales below which errors are absolute.
+/// The driven blade of a scene. Below its scales of angle and rate, the tolerance is absolute instead of
+/// relative.
 #[must_use]
 pub fn build_system(scene: &Scene) -> DrivenBlade {
-    /// Angles of a wiper blade in use are 0.1 to 1 rad.
+    /// The angles of a wiper blade in use are 0.1 to 1 rad.
     const ANGLE_SCALE: f64 = 0.1;
     let (slowest, _) = time_scales_rad_per_s(&scene.linkage);
     DrivenBlade {
@@ -256,27 +258,27 @@ fn initial_pose(scene: &Scene) -> Option<Pose> {
     }
 }
 
-/// Cause of a change of mode.
+/// Cause of a change of the mode of contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum TransitionCause {
     /// The tip comes to rest and sticks.
     TipStops,
-    /// The holding force reaches the static limit.
+    /// The force that holds the tip reaches the static limit.
     FrictionLimit,
-    /// The tip's velocity changes sign and friction cannot hold it.
+    /// The tip's velocity changes sign, and static friction cannot hold the tip.
     DirectReversal,
-    /// The shoulder's damping makes the holding force jump as the neck meets it.
+    /// The force that holds the tip jumps at a corner of the shoulder, because of the shoulder's damping.
     ShoulderCorner,
     /// The normal force reaches zero.
     LiftOff,
-    /// An impact from flight; a rebound is one from flight to flight.
+    /// The tip strikes the glass after flight; for a rebound, the modes before and after are both flight.
     Landing,
     /// The impact without collision that resolves the Painlevé paradox.
     JamImpact,
 }
 
 impl TransitionCause {
-    /// Name in files.
+    /// Name of the cause in files.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {

@@ -28,21 +28,21 @@ pub struct FlightState {
     pub pose: Pose,
     /// Height of the tip above the glass, m.
     pub gap_m: f64,
-    /// Its rate, m/s.
+    /// Rate of the gap, m/s.
     pub gap_rate_m_per_s: f64,
 }
 
 /// Accelerations in flight.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FlightAccelerations {
-    /// Of neck and lip, rad/s2.
+    /// Angular accelerations of neck and lip, rad/s2.
     pub links: [f64; 2],
-    /// Of the gap, m/s2.
+    /// Acceleration of the gap, m/s2.
     pub gap_m_per_s2: f64,
 }
 
-/// Change of the motion by a unit impulse on the tip: a column of the inverse mass matrix of the linkage and
-/// of its inverse contact mass.
+/// Changes of the links' rates and of the tip's velocity by a unit impulse on the tip. The changes of
+/// velocity are a column of the inverse contact mass.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImpulseResponse {
     /// Rates of neck and lip, rad/s for 1 N s.
@@ -53,11 +53,12 @@ pub struct ImpulseResponse {
     pub tangential_per_kg: f64,
 }
 
-/// Inverse of the mass matrix without the head's drop, and the coupling of the links to the drop.
+/// Inverse of the links' mass matrix after elimination of the head's drop, and the coupling of the links to
+/// the drop.
 struct ReducedInertia {
     inverse: [[f64; 2]; 2],
-    /// Rate of the drop per rate of each link at zero vertical momentum: `m_a sin theta / M`, `m_b sin phi /
-    /// M`.
+    /// Rate of the drop per rate of each link at zero vertical momentum: `m_a sin theta / M` and
+    /// `m_b sin phi / M`.
     carried: [f64; 2],
 }
 
@@ -117,7 +118,7 @@ impl Linkage {
         )
     }
 
-    /// Responses to a unit impulse away from the glass and to one along the sweep, +v.
+    /// Responses to a unit impulse away from the glass and to a unit impulse along the sweep, +v.
     #[must_use]
     pub fn impulse_responses(&self, d: &LinkDirections) -> [ImpulseResponse; 2] {
         let ReducedInertia { inverse, carried } = self.reduced_inertia(d);
@@ -133,8 +134,8 @@ impl Linkage {
         [response(normal, -1.0), response(along, 0.0)]
     }
 
-    /// Impulse of the drive along the sweep, N s, that keeps the velocity of the head while the rates of the
-    /// links change by `rates`, rad/s, under a tangential impulse on the tip, N s.
+    /// Impulse of the drive along the sweep, N s, that keeps the head's velocity constant while the rates of
+    /// the links change by `rates`, rad/s, and the tip receives a tangential impulse, N s.
     pub(crate) fn drive_impulse_n_s(&self, d: &LinkDirections, rates: [f64; 2], tangential_n_s: f64) -> f64 {
         self.m_a * d.cos_theta * rates[0] + self.m_b * d.cos_phi * rates[1] - tangential_n_s
     }

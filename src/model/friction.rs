@@ -1,5 +1,5 @@
-//! Friction between lip tip and glass, equations (4) and (5): `mu(v) = a exp(-b |v|) + c`, the static limit
-//! being `mu(0)`.
+//! Friction between lip tip and glass, equations (4) and (5): `mu(v) = a exp(-b |v|) + c`; the static
+//! coefficient is `mu(0)`.
 
 use portable_math as math;
 use serde::Serialize;
@@ -7,11 +7,11 @@ use serde::Serialize;
 /// Coefficients of the friction law.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FrictionLaw {
-    /// Part that falls with speed, `A`.
+    /// Part of the coefficient that falls with speed, `A`.
     pub a: f64,
-    /// Its decay, `B`, s/m.
+    /// Decay of that part with speed, `B`, s/m.
     pub b_s_per_m: f64,
-    /// Part that stays, `C`.
+    /// Part of the coefficient that does not depend on speed, `C`.
     pub c: f64,
 }
 
@@ -23,7 +23,8 @@ impl FrictionLaw {
         self.a * math::exp(-self.b_s_per_m * speed_m_per_s) + self.c
     }
 
-    /// Coefficient of static friction, `A + C`: the limit of the dynamic one at rest (equation (5)).
+    /// Coefficient of static friction, `A + C`: the limit of the dynamic coefficient at zero speed (equation
+    /// (5)).
     #[inline]
     #[must_use]
     pub fn static_coefficient(&self) -> f64 {

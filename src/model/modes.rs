@@ -23,15 +23,15 @@ use std::f64::consts::TAU;
 pub struct NaturalMode {
     /// Undamped natural frequency, Hz; `None` for a mode that the preload has made unstable.
     pub frequency_hz: Option<f64>,
-    /// Frequency of the damped oscillation, Hz; `None` where it does not oscillate.
+    /// Frequency of the damped oscillation, Hz; `None` unless all modes oscillate.
     pub damped_frequency_hz: Option<f64>,
-    /// Damping ratio of the damped mode; `None` where it does not oscillate.
+    /// Damping ratio of the damped mode; `None` unless all modes oscillate.
     pub damping_ratio: Option<f64>,
-    /// Ratio of the lip's angle to the neck's.
+    /// Ratio of the lip's angle to the neck's angle.
     pub lip_over_neck: f64,
 }
 
-/// The three natural frequencies of single bodies in the paper, Hz.
+/// Natural frequencies of head, neck and lip as single bodies, Hz, as in the paper.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct BodyFrequencies {
     pub head_hz: f64,
@@ -48,7 +48,6 @@ pub enum TipConstraint {
     Held,
 }
 
-/// Natural frequencies of the single bodies of a blade.
 pub(crate) fn body_frequencies(blade: &Linkage) -> BodyFrequencies {
     BodyFrequencies {
         head_hz: natural_frequency_hz(blade.head.stiffness, blade.mass_kg),
@@ -57,8 +56,8 @@ pub(crate) fn body_frequencies(blade: &Linkage) -> BodyFrequencies {
     }
 }
 
-/// Modes about the upright position in rising frequency; `on_shoulder` adds stiffness and damping of the
-/// shoulder to those of the neck.
+/// Modes about the upright position, in order of rising frequency. With `on_shoulder`, stiffness and damping
+/// of the shoulder are added to those of the neck.
 #[must_use]
 pub fn natural_modes(blade: &Linkage, tip: TipConstraint, on_shoulder: bool) -> Vec<NaturalMode> {
     let (m, c, k) = linearised_matrices(blade, on_shoulder);
@@ -73,8 +72,8 @@ pub fn natural_modes(blade: &Linkage, tip: TipConstraint, on_shoulder: bool) -> 
     }
 }
 
-/// Compliance of the tip along the glass, m/N, at a frequency, Hz: displacement over force on a tip that
-/// slides without friction, as amplitude and phase.
+/// Compliance of the tip along the glass at a frequency, Hz: the complex ratio of displacement to force, m/N,
+/// for a tip that slides without friction.
 ///
 /// `H = b^T (k + i w c - w^2 m)^-1 b` with `b = (l1, l2)`, the head at rest.
 #[must_use]
@@ -115,7 +114,7 @@ fn squared_frequencies(m: &Matrix2<f64>, k: &Matrix2<f64>) -> (f64, f64) {
     let a = m.determinant();
     let b = -(m[(0, 0)] * k[(1, 1)] + m[(1, 1)] * k[(0, 0)] - 2.0 * m[(0, 1)] * k[(0, 1)]);
     let c = k.determinant();
-    // the root without cancellation
+    // the root that is free of cancellation; the other root follows from their product
     let far = -0.5 * (b + b.signum() * (b * b - 4.0 * a * c).max(0.0).sqrt());
     let (first, second) = (far / a, if far == 0.0 { 0.0 } else { c / far });
     (first.min(second), first.max(second))

@@ -17,7 +17,7 @@ pub enum ParameterRange {
     Positive,
     /// Zero or above.
     NotNegative,
-    /// Between two limits, the limits included.
+    /// Between two limits, both included.
     Within(f64, f64),
 }
 
@@ -46,13 +46,13 @@ impl ParameterRange {
 /// Scale of the steps of a search along a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ParameterScale {
-    /// By factors.
+    /// Steps multiply the value.
     Log,
-    /// By differences.
+    /// Steps add to the value.
     Linear,
 }
 
-/// The physical quantity of a parameter, whichever way it is written.
+/// The physical quantity that a parameter describes; several parameters may describe the same quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs)] // the rows of the table say what each is
 pub enum ParameterQuantity {
@@ -83,18 +83,18 @@ pub enum ParameterQuantity {
     Restitution,
 }
 
-/// One row of the table.
+/// One row of the table of parameters.
 #[derive(Debug, Clone, Copy)]
 pub struct ModelParameter {
     /// Name: the scene's table and key.
     pub name: &'static str,
-    /// The paper's letter.
+    /// Symbol in the paper.
     pub symbol: &'static str,
-    /// Unit as shown.
+    /// Unit as shown to users.
     pub unit: &'static str,
-    /// The physical quantity; two rows share one that can be written in two ways.
+    /// Physical quantity; if it can be written in two ways, two rows have the same one.
     pub quantity: ParameterQuantity,
-    /// Value of the quantity when a scene leaves it out; `None` if it must be given.
+    /// Default value of the quantity; `None` if a scene must give it.
     pub default: Option<f64>,
     /// Admissible values.
     pub range: ParameterRange,
@@ -117,7 +117,7 @@ macro_rules! table {
     };
 }
 
-/// The angle of a shoulder lies between upright and level.
+/// Upper limit of the contact angle of a shoulder, rad: there the neck would be level.
 const RIGHT_ANGLE: f64 = std::f64::consts::FRAC_PI_2;
 
 table! {
@@ -157,35 +157,36 @@ table! {
     "contact.restitution" "e" "1" Restitution Some(0.0), Within(0.0, 1.0), Linear, "normal restitution of a landing";
 }
 
-/// The row of a name.
+/// Finds the row of the parameter with this name.
 #[must_use]
 pub fn find_parameter(name: &str) -> Option<&'static ModelParameter> {
     PARAMETERS.iter().find(|p| p.name == name)
 }
 
-/// Every name, in the order of the table.
+/// Names of all parameters, in the order of the table.
 #[must_use]
 pub fn parameter_names() -> Vec<&'static str> {
     PARAMETERS.iter().map(|p| p.name).collect()
 }
 
-/// Natural frequency `sqrt(stiffness/inertia)/2 pi`, Hz.
+/// Natural frequency `sqrt(stiffness / inertia) / (2 pi)`, Hz.
 pub(crate) fn natural_frequency_hz(stiffness: f64, inertia: f64) -> f64 {
     (stiffness / inertia).sqrt() / TAU
 }
 
-/// Stiffness that gives an inertia this natural frequency.
+/// Stiffness that gives this natural frequency to an inertia.
 pub(crate) fn stiffness_from_frequency(frequency_hz: f64, inertia: f64) -> f64 {
     inertia * math::powi(TAU * frequency_hz, 2)
 }
 
-/// Damping of `ratio` times the critical one, `2 sqrt(stiffness inertia)`.
+/// Damping for a damping ratio: `ratio` times the critical damping `2 sqrt(stiffness inertia)`.
 pub(crate) fn damping_from_ratio(ratio: f64, stiffness: f64, inertia: f64) -> f64 {
     2.0 * ratio * (stiffness * inertia).sqrt()
 }
 
-/// Value of the parameter `name` from a blade that may have been given by an equivalent one, such as a
-/// stiffness by a natural frequency. `None` for a name without an equivalent, or a blade without that part.
+/// Value of the parameter `name`, computed from a blade whose scene may have given an equivalent parameter
+/// instead, such as a natural frequency for a stiffness. `None` for a parameter without an equivalent, or for
+/// a part that the blade lacks.
 pub(crate) fn convert_value(name: &str, blade: &Linkage) -> Option<f64> {
     let (mass, theta, phi) = (blade.mass_kg, blade.m_theta, blade.m_phi);
     let (table, key) = name.split_once('.')?;
@@ -213,8 +214,8 @@ pub(crate) fn convert_value(name: &str, blade: &Linkage) -> Option<f64> {
     }
 }
 
-/// Advice on the length of blade that the numbers of a scene are for. The solution of the equations of motion
-/// does not change if all of these are multiplied by one factor, so any length of blade will do.
+/// Advice on the length of blade to which the numbers of a scene apply. The solution of the equations of
+/// motion does not change if all these numbers are multiplied by one factor, so any length of blade will do.
 pub(crate) const SAME_LENGTH_ADVICE: &str = "Masses, inertias, stiffnesses, dampings and the preload are all for one and \
                                the same length of blade: the whole blade, the piece on the rig, or one metre.";
 

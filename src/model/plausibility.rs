@@ -1,5 +1,5 @@
 //! Plausibility of the numbers of a blade: a table of quantities, each with its expected range and the usual
-//! mistakes of its unit.
+//! mistakes with its unit.
 //!
 //! A value outside its range gives a finding, not an error: an unusual blade may have it.
 
@@ -8,13 +8,13 @@ use crate::text::{format_plain, round_to_digits};
 use serde::Serialize;
 use std::f64::consts::{PI, TAU};
 
-/// Digits of a number in a finding.
+/// Significant digits of a number in a finding.
 const DIGITS: usize = 6;
 
 /// A value outside the range of its quantity.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PlausibilityFinding {
-    /// Table and key.
+    /// Table and key of the value.
     pub key: String,
     /// The value and its unit.
     pub found: String,
@@ -31,16 +31,16 @@ impl std::fmt::Display for PlausibilityFinding {
     }
 }
 
-/// A usual mistake of a unit.
+/// A usual mistake with a unit.
 #[derive(Debug, Clone, Copy)]
 pub struct UnitSlip {
     /// Factor that corrects the value.
     pub factor: f64,
-    /// The mistake in words: "millimetres written as metres".
+    /// The mistake in words, for example "millimetres written as metres".
     pub words: &'static str,
 }
 
-/// Values by key; `None` for a key without one.
+/// Looks up the value of a key; `None` for a key without a value.
 pub(crate) type ValueLookup<'a> = dyn Fn(&str) -> Option<f64> + 'a;
 
 /// The number that is compared with a range.
@@ -48,29 +48,29 @@ pub(crate) type ValueLookup<'a> = dyn Fn(&str) -> Option<f64> + 'a;
 pub enum PlausibilitySubject {
     /// The value of the key.
     Value,
-    /// A number computed from several keys; skipped where one of them has a finding.
+    /// A number computed from several keys; not judged if one of these keys has a finding.
     Derived {
-        /// Its name: "the static friction A + C".
+        /// Name of the number, for example "the static friction A + C".
         name: &'static str,
-        /// The keys that it depends on, its own first.
+        /// Keys that the number depends on; the first is the key of the row.
         keys: &'static [&'static str],
-        /// Its equation.
+        /// Computes the number from the values of the keys.
         of: fn(&ValueLookup<'_>) -> Option<f64>,
     },
 }
 
-/// A row of the table.
+/// A row of the table of plausible ranges.
 #[derive(Debug, Clone, Copy)]
 pub struct PlausibleRange {
-    /// Table and key.
+    /// Table and key of the value in a file.
     pub key: &'static str,
     /// The number that is compared with the range.
     pub judged: PlausibilitySubject,
-    /// Unit of that number.
+    /// Unit of the judged number.
     pub unit: &'static str,
-    /// Least and greatest value without a finding.
+    /// Smallest and largest plausible value.
     pub range: [f64; 2],
-    /// Reason of these limits.
+    /// Reason for these limits.
     pub reason: &'static str,
     /// Possible mistakes, the likeliest first.
     pub slips: &'static [UnitSlip],
@@ -78,8 +78,8 @@ pub struct PlausibleRange {
 
 /// Findings on the values of a file, in the order of the table.
 ///
-/// `written` gives the key under which a file has the quantity of a row. A quantity that is written under
-/// another key is computed, so it is judged like a derived number.
+/// `written` maps the key of a row to the key under which the file gives the same quantity. If the two
+/// differ, the value of the row is computed, so it is judged like a derived number.
 pub(crate) fn find_implausible(
     table: &[PlausibleRange],
     value: &ValueLookup<'_>,
@@ -90,7 +90,8 @@ pub(crate) fn find_implausible(
         let doubted = |key: &&str| found.iter().any(|finding| finding.key == *key);
         let (judged, rests_on_doubt) = match row.judged {
             PlausibilitySubject::Derived { keys, of, .. } => (of(value), keys.iter().any(doubted)),
-            // a frequency depends on masses and lengths besides the stiffness, and the reverse
+            // a frequency depends on masses and lengths besides the stiffness, and so does a stiffness
+            // computed from it
             PlausibilitySubject::Value => (value(row.key), written(row.key) != row.key && !found.is_empty()),
         };
         let judged = judged.filter(|judged| !rests_on_doubt && !row.admits(*judged));
@@ -124,13 +125,13 @@ impl PlausibleRange {
             key: key.to_owned(),
             found: format!("{}{unit}{name}", format_value(judged)),
             expected: format!("{least} to {greatest}{unit} ({})", self.reason),
-            // a mistake concerns the unit of the row's own key
+            // the listed mistakes concern the unit of the row's own key
             advice: self.advise_correction(judged, value(key).filter(|_| key == self.key)),
         }
     }
 
-    /// The likeliest mistake whose correction leads into the range, or general advice. Numbers with mistakes
-    /// are proportional to the value of their own key.
+    /// Advice on the likeliest mistake whose correction brings the number into its range, or general advice.
+    /// A number with listed mistakes is proportional to the value of its own key.
     fn advise_correction(&self, judged: f64, written: Option<f64>) -> String {
         let slip = self.slips.iter().find(|slip| self.admits(judged * slip.factor));
         match slip.zip(written) {
@@ -146,14 +147,14 @@ fn format_value(value: f64) -> String {
     format_plain(round_to_digits(value, DIGITS))
 }
 
-// Ranges of several rows. They are wide: no blade in use lies outside.
+// Ranges that several rows share. They are wide: every blade in use lies within them.
 
-/// Height of a link, m: the rubber of a wiper is 5 to 20 mm high, and a part that bends on its own at least
-/// 0.5 mm.
+/// Height of a link, m: the rubber of a wiper is 5 to 20 mm high, and a part that bends on its own is at
+/// least 0.5 mm high.
 const LINK_M: [f64; 2] = [5e-4, 2e-2];
 /// Thickness of a link, m: from the edge of a lip to the widest body of a profile.
 const THICKNESS_M: [f64; 2] = [1e-4, 1e-2];
-/// Thickness of a hinge, m: thinner ones tear, thicker ones are bodies.
+/// Thickness of a hinge, m: a thinner hinge tears, and a thicker part is a body of its own.
 const HINGE_THICKNESS_M: [f64; 2] = [1e-4, 3e-3];
 /// Height of a hinge, m.
 const HINGE_M: [f64; 2] = [1e-4, 5e-3];
@@ -161,27 +162,28 @@ const HINGE_M: [f64; 2] = [1e-4, 5e-3];
 const PIECE_M: [f64; 2] = [5e-3, 1.5];
 /// Density of rubber, kg/m3: from pure natural rubber and EPDM (860 to 930) to highly filled chloroprene.
 const DENSITY_KG_PER_M3: [f64; 2] = [850.0, 1600.0];
-/// Mass of a link, kg: the smallest section and piece, and the largest.
+/// Mass of a link, kg: from the smallest section and the shortest piece to the largest section and piece.
 const LINK_MASS_KG: [f64; 2] = [
     DENSITY_KG_PER_M3[0] * THICKNESS_M[0] * LINK_M[0] * PIECE_M[0],
     DENSITY_KG_PER_M3[1] * THICKNESS_M[1] * LINK_M[1] * PIECE_M[1],
 ];
-/// Mass of a link over its height, kg/m: density, thickness and length of blade.
+/// Ratio of the mass of a link to its height, kg/m: density times thickness times length of blade.
 const MASS_OVER_HEIGHT_KG_PER_M: [f64; 2] =
     [DENSITY_KG_PER_M3[0] * THICKNESS_M[0] * PIECE_M[0], DENSITY_KG_PER_M3[1] * THICKNESS_M[1] * PIECE_M[1]];
-/// Centre of mass over length: a third is that of a triangle on its base, two thirds on its edge; with room
-/// for a bead at either end.
+/// Ratio of the distance of the centre of mass from the top to the length of a link: 1/3 for a triangle with
+/// its base at the top, 2/3 for one with its base at the bottom; the range leaves room for a bead at either
+/// end.
 const CENTRE_OVER_LENGTH: [f64; 2] = [0.2, 0.8];
-/// Inertia over mass times length squared: 1/12 for a rod, 1/18 for a triangle, 1/4 for two masses at the
-/// ends; a link may be twice as thick as it is long, which adds 1/3.
+/// Ratio of the inertia of a link to its mass times its length squared: 1/12 for a rod, 1/18 for a triangle,
+/// 1/4 for two masses at the ends. A link may be twice as thick as it is long, which adds 1/3.
 const INERTIA_OVER_ROD: [f64; 2] = [0.02, 0.6];
-/// Natural frequency of the head, Hz; 8.88 and 20 are published.
+/// Natural frequency of the head, Hz; published values are 8.88 and 20 Hz.
 const HEAD_HZ: [f64; 2] = [0.5, 200.0];
 /// Damping ratio of a rubber link: half the loss factor.
 const RUBBER_RATIO: [f64; 2] = [0.0, 0.5];
-/// Force on the glass per metre, N/m: arms press with 10 to 20 N/m.
+/// Force on the glass per metre of blade, N/m: wiper arms press with 10 to 20 N/m.
 const PRESS_N_PER_M: [f64; 2] = [1.0, 60.0];
-/// Force on the glass, N: the shortest piece and a whole blade.
+/// Force on the glass, N: from the shortest piece to a whole blade.
 const PRESS_N: [f64; 2] = [PRESS_N_PER_M[0] * PIECE_M[0], PRESS_N_PER_M[1] * PIECE_M[1]];
 /// Friction coefficient of rubber on glass: 0.1 to 0.6 wet, up to 2 dry.
 const FRICTION: [f64; 2] = [0.0, 2.0];
@@ -211,8 +213,8 @@ const LENGTHS: &[UnitSlip] = &[MILLIMETRES, CENTIMETRES, METRES_TWICE];
 const MASSES: &[UnitSlip] = &[GRAMS, MILLIGRAMS];
 const INERTIAS: &[UnitSlip] = &[THOUSAND_TOO_LARGE, KG_MM2, G_CM2, G_MM2, THOUSAND_TOO_SMALL];
 
-/// Rows of a table: key, unit, range, reason and slips; of a derived number also its name, the other keys
-/// that it depends on and its equation.
+/// Makes the rows of a table from key, unit, range, reason and slips. The row of a derived number also has
+/// its name, the other keys that it depends on, and its equation.
 macro_rules! ranges {
     (@judged) => { PlausibilitySubject::Value };
     (@judged $name:literal, [$($key:literal)*], $of:expr) => {
@@ -229,7 +231,7 @@ macro_rules! ranges {
     };
 }
 
-/// Inertia of a link over its mass times its length squared.
+/// Ratio of the inertia of a link to its mass times its length squared.
 fn inertia_over_rod(value: &ValueLookup<'_>, link: &str) -> Option<f64> {
     let of = |key: &str| value(&format!("blade.{link}_{key}"));
     let length = of("length_m")?;
@@ -246,7 +248,7 @@ const INERTIA_WHY: &str = "1/12 for a rod, 1/18 for a triangle, up to 1/3 more i
 const RUBBER_WHY: &str = "half the loss factor of rubber, which is at most about 1";
 const FRICTION_WHY: &str = "rubber on glass has 0.1 to 0.6 wet and up to 2 dry";
 
-/// The numbers of a scene.
+/// Plausible ranges of the numbers of a scene.
 pub const SCENE_RANGES: &[PlausibleRange] = ranges! {
     "blade.neck_length_m" "m" LINK_M, LINK_WHY, LENGTHS;
     "blade.lip_length_m" "m" LINK_M, LINK_WHY, LENGTHS;
@@ -300,7 +302,7 @@ pub const SCENE_RANGES: &[PlausibleRange] = ranges! {
         |value| Some(TAU * value("drive.amplitude_m")? * value("drive.frequency_hz")?);
 };
 
-/// The numbers of a blade's section.
+/// Plausible ranges of the numbers of a blade's section.
 pub const SECTION_RANGES: &[PlausibleRange] = ranges! {
     "length_m" "m" PIECE_M, "a slice on a rig to the longest blade of a bus", LENGTHS;
     "rubber.density_kg_per_m3" "kg/m3" DENSITY_KG_PER_M3,

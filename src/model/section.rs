@@ -1,4 +1,4 @@
-//! The `[blade]` table of a scene from the cross section of a rubber blade.
+//! Computes the `[blade]` table of a scene from the cross section of a rubber blade.
 //!
 //! Neck and lip are trapezoids of rubber of density `rho` over a length `b` of blade: height `h`, thickness
 //! `t1` at the top and `t2` at the bottom.
@@ -11,16 +11,17 @@
 //!
 //! For a rectangle this is `g = h/2` and `J = m (h^2 + t^2)/12`. A blade is long compared with its thickness
 //! and bends as a plate, with `E' = E/(1 - nu^2)` in place of Young's modulus; rubber keeps its volume, so
-//! `nu = 1/2`. A link turns on a hinge of thickness `t` and height `L`. Without a hinge it bends over its own
-//! height, with `s` from the bottom; its spring has the same deflection under a force at the bottom:
+//! `nu = 1/2`. A link turns on a hinge of thickness `t` and height `L`. A link without a hinge bends over its
+//! own height; the spring of the model then gives the same deflection under a force at the bottom as this
+//! bending, with `s` the height above the bottom:
 //!
 //! ```text
 //! with a hinge     k = E' b t^3/(12 L)
 //! without          1/k = 12/(E' b h^2) int_0^h s^2/t(s)^3 ds     (rectangle: k = 3 E' b t^3/(12 h))
 //! ```
 //!
-//! A loss factor `eta` gives a resonance the damping ratio `eta/2`. Everything but lengths of the section,
-//! ratios and frequencies is proportional to `b`.
+//! A loss factor `eta` gives a resonance the damping ratio `eta/2`. Lengths of the section, ratios and
+//! frequencies do not depend on `b`; all other numbers are proportional to it.
 
 mod input;
 
@@ -31,12 +32,12 @@ use portable_math::{gauss_legendre, powi};
 use serde::Serialize;
 use std::fmt::Write;
 
-/// Significant digits of a number in the table: more than its uncertainty needs.
+/// Significant digits of a number in the table, more than its uncertainty warrants.
 const DIGITS: usize = 4;
-/// Numbers of the table.
+/// Number of entries in the table.
 const COUNT: usize = 15;
-/// Least value in a difference, as a share of the number itself: a dimension whose standard deviation exceeds
-/// it stays above zero.
+/// Smallest value of an input in a finite difference, as a fraction of the input: a dimension stays above
+/// zero even if its standard deviation exceeds it.
 const LEAST_SHARE: f64 = 0.1;
 
 /// A number of the `[blade]` table.
@@ -46,9 +47,9 @@ pub struct BladeTableEntry {
     pub key: &'static str,
     /// Value, in the unit of the key.
     pub value: f64,
-    /// Relative standard deviation, from those of the inputs alone.
+    /// Relative standard deviation that follows from the standard deviations of the inputs alone.
     pub relative_uncertainty: f64,
-    /// Its equation, in the letters of [`super::section`].
+    /// Equation of the value, in the letters of [`super::section`].
     pub equation: &'static str,
 }
 
@@ -83,13 +84,13 @@ impl BladeEstimate {
         Self { title: section.title.clone(), length_m: section.number("length_m"), blade }
     }
 
-    /// The value of a key of the table.
+    /// Value of a key of the table.
     #[must_use]
     pub fn value(&self, key: &str) -> Option<f64> {
         self.blade.iter().find(|quantity| quantity.key == key).map(|quantity| quantity.value)
     }
 
-    /// The table as a scene has it, with comments.
+    /// The table as TOML for a scene, with comments.
     #[must_use]
     pub fn to_toml(&self) -> String {
         let mut text = format!(
@@ -112,7 +113,7 @@ impl BladeEstimate {
     }
 }
 
-/// Key, value and equation of every number.
+/// Key, value and equation of every entry.
 fn compute_entries(section: &BladeSection) -> [(&'static str, f64, &'static str); COUNT] {
     let b = section.number("length_m");
     let rho = section.number("rubber.density_kg_per_m3");
@@ -141,7 +142,7 @@ fn compute_entries(section: &BladeSection) -> [(&'static str, f64, &'static str)
     ]
 }
 
-/// Change of the number `at` by one standard deviation of an input, from a central difference.
+/// Change of the entry with index `at` by one standard deviation of an input, from a central difference.
 fn entry_change(section: &BladeSection, input: &SectionKey, at: usize) -> f64 {
     let value = section.number(input.name);
     let deviation = match input.deviation {
@@ -155,30 +156,30 @@ fn entry_change(section: &BladeSection, input: &SectionKey, at: usize) -> f64 {
 
 /// Poisson's ratio of rubber: its volume hardly changes.
 const POISSON_RATIO: f64 = 0.5;
-/// Parts of the integral over the bending of a link, each by the five-point rule. The error is 1e-12 for a
-/// link that is 20 times thinner at its edge.
+/// Number of parts of the bending integral of a link; each is integrated by the five-point rule. The error is
+/// 1e-12 for a link that is 20 times thinner at its edge.
 const PARTS: u32 = 256;
 
-/// Modulus of a wide plate `E/(1 - nu^2)`, Pa, from Young's modulus, Pa.
+/// Modulus of a wide plate, `E/(1 - nu^2)`, Pa, from Young's modulus `E`, Pa.
 #[must_use]
 pub fn plate_modulus_pa(youngs_modulus_pa: f64) -> f64 {
     youngs_modulus_pa / (1.0 - POISSON_RATIO * POISSON_RATIO)
 }
 
-/// The trapezoid of a link, m.
+/// Trapezoidal section of a link; dimensions in m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinkSection {
-    /// Height `h`, from hinge to hinge or to the edge.
+    /// Height `h` of the link, from its hinge to the next hinge or to the edge.
     pub height_m: f64,
     /// Thickness at the top `t1`.
     pub top_thickness_m: f64,
     /// Thickness at the bottom `t2`.
     pub bottom_thickness_m: f64,
-    /// The hinge at its top, where it has one.
+    /// Hinge at the top of the link, if it has one.
     pub hinge: Option<RubberHinge>,
 }
 
-/// A thin neck of rubber that bends in place of the link below it, m.
+/// A thin strip of rubber that bends in place of the link below it; dimensions in m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RubberHinge {
     /// Thickness `t`.

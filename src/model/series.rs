@@ -13,8 +13,8 @@
 //! flight:   N = f = 0,   M u'' = m_a q1' + m_b q2' + k0 (h_d - u) - c0 u'
 //! ```
 //!
-//! A coefficient costs eight products of series, and two more for friction. The highest coefficients enter
-//! linearly with the matrix at the instant itself, which is inverted once.
+//! Each coefficient costs eight products of series, and friction adds two. The highest coefficients enter
+//! linearly; their matrix depends only on the angles at the instant and is inverted once.
 
 use super::{LinkDirections, Linkage, Pose, ShoulderContact};
 
@@ -24,11 +24,11 @@ pub(super) type LinkPair = [f64; 2];
 /// Contact between tip and glass during the expansion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum ContactMode {
-    /// It slides in this direction, +1 or -1.
+    /// The tip slides in this direction, +1 or -1.
     Slip(f64),
-    /// It sticks.
+    /// The tip sticks.
     Stick,
-    /// It is off the glass: drop of the head, m, and its rate, m/s.
+    /// The tip is off the glass; drop of the head, m, and its rate, m/s.
     Flight(f64, f64),
 }
 
@@ -48,12 +48,11 @@ impl ContactMode {
 pub(super) struct LeftFactors {
     pub cos: LinkPair,
     pub sin: LinkPair,
-    /// `mu_j` and `j v3'_j`.
+    /// Coefficients `mu_j` and `j v3'_j`.
     pub slip: LinkPair,
 }
 
-/// Right factors, of index `m`, of the products in the recurrence. Those that are known one order later have
-/// the index `m + 1`.
+/// Right factors, of index `m`, of the products in the recurrence; some have the index `m + 1` instead.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct RightFactors {
     /// Angular rates of index `m + 1`.
@@ -64,7 +63,7 @@ pub(super) struct RightFactors {
     slip: LinkPair,
 }
 
-/// Taylor coefficients of the motion; `K` is their number, that of `x^0` included.
+/// Taylor coefficients of the motion; `K` is the number of coefficients, including that of `x^0`.
 ///
 /// After `expand` to the order `n` the motion is known up to `x^n`, forces up to `x^(n-1)`.
 #[derive(Debug, Clone)]
@@ -81,7 +80,7 @@ pub struct MotionSeries<const K: usize> {
     pub drop_m: [f64; K],
     /// Friction force on the tip, N.
     pub friction_n: [f64; K],
-    /// In flight: velocity of the tip away from the glass, m/s. The caller sets the first coefficient.
+    /// Velocity of the tip away from the glass in flight, m/s; the caller sets the first coefficient.
     pub gap_rate: [f64; K],
     /// Painlevé indicator of slip at the instant; 1 in stick and in flight.
     pub indicator: f64,
@@ -116,7 +115,7 @@ impl<const K: usize> Default for MotionSeries<K> {
     }
 }
 
-/// Sums over the products of lower orders.
+/// Sums of the products of coefficients of lower orders.
 #[derive(Clone, Copy, Default)]
 struct ProductSums {
     p: LinkPair,
@@ -135,32 +134,35 @@ pub(super) struct RecurrenceConstants {
     pub arm: LinkPair,
     /// Inverse of the coefficient matrix of the accelerations, with friction.
     pub inverse: [LinkPair; 2],
-    /// `A^-1 w` and `1 / (w.A^-1 w)` with `w = (l1 cos theta, l2 cos phi)`, for stick.
+    /// `w = (l1 cos theta, l2 cos phi)`, `A^-1 w` and `1 / (w.A^-1 w)`, for stick.
     pub w: LinkPair,
     pub per_force: LinkPair,
     pub mobility: f64,
-    /// Coefficients of the accelerations and of the rest of `q'` in `u''`, and of the accelerations in `N`.
+    /// Coefficients in `u''` of the accelerations and of the remaining part of `q'`, and coefficients in `N`
+    /// of the accelerations.
     pub drop: LinkPair,
     pub drop_rest: LinkPair,
     pub normal: LinkPair,
-    /// Moments of neck and lip per newton of normal force, and per newton of the lower orders of friction.
+    /// Moments on neck and lip per newton of normal force, and per newton of friction from lower orders.
     pub per_normal: LinkPair,
     pub per_slip: LinkPair,
-    /// `cos` and `sin` of the instant times `m_c` and times `m`.
+    /// Cosines and sines at the instant, times `m_c` and times `m`.
     pub cos_m_c: LinkPair,
     pub sin_m_c: LinkPair,
     pub cos_m: LinkPair,
     pub sin_m: LinkPair,
-    /// Friction coefficient with the sign of its force.
+    /// Friction coefficient with the sign of the friction force.
     pub mu: f64,
-    /// Stiffness and damping of the neck, with the shoulder's where it leans, and the moment at zero angle.
+    /// Total stiffness and damping of the neck, with those of a shoulder on which it leans, and its moment at
+    /// zero angle.
     pub neck: [f64; 3],
     /// Painlevé indicator of slip; 1 in stick and in flight.
     pub indicator: f64,
 }
 
 impl<const K: usize> MotionSeries<K> {
-    /// Coefficients up to `x^order` of the motion from `pose`; `self.head_velocity` holds those of the head.
+    /// Computes the coefficients of the motion from `pose` up to `x^order`; `self.head_velocity` must hold
+    /// the coefficients of the head's velocity.
     pub(crate) fn expand(
         &mut self,
         linkage: &Linkage,
@@ -185,19 +187,19 @@ impl<const K: usize> MotionSeries<K> {
         }
     }
 
-    /// Cosines of both angles, coefficient `k`.
+    /// Coefficient `k` of the cosines of both angles.
     #[inline]
     pub(crate) fn cosines(&self, k: usize) -> [f64; 2] {
         self.left[k].cos
     }
 
-    /// Sines of both angles, coefficient `k`.
+    /// Coefficient `k` of the sines of both angles.
     #[inline]
     pub(crate) fn sines(&self, k: usize) -> [f64; 2] {
         self.left[k].sin
     }
 
-    /// Normal force, N, coefficient `k`.
+    /// Coefficient `k` of the normal force, N.
     #[inline]
     pub(crate) fn normal_n(&self, k: usize) -> f64 {
         self.right[k].slip[0]
@@ -230,7 +232,7 @@ impl<const K: usize> MotionSeries<K> {
         self.head_velocity[k] + linkage.l1_m * self.p[0] + linkage.l2_m * self.p[1]
     }
 
-    /// Constants from the first coefficients.
+    /// Constants of the recurrence from the coefficients of order 0.
     pub(super) fn recurrence_constants(
         &self,
         linkage: &Linkage,
@@ -285,8 +287,8 @@ impl<const K: usize> MotionSeries<K> {
         }
     }
 
-    /// Advances from the coefficients of angles and rates up to `x^k` to those of `x^(k + 1)`. `FALLING`
-    /// means slip with friction that falls with speed.
+    /// Computes the coefficients of angles and rates at `x^(k + 1)` from those up to `x^k`. `FALLING` means
+    /// slip with friction that falls with speed.
     #[inline(always)]
     fn advance_order<const FALLING: bool>(
         &mut self,
@@ -302,7 +304,7 @@ impl<const K: usize> MotionSeries<K> {
         self.angle[k + 1] = per_link(|i| self.rate[k][i] * share);
         let (cos, sin) = (per_link(|i| -self.q[i] * share), per_link(|i| self.p[i] * share));
         let sums = self.sum_products::<FALLING>(k);
-        // p and q of the next order without the unknown part of the rate
+        // p and q of the next order without the contribution of the unknown accelerations
         let rest_p = per_link(|i| sums.p[i] + cos[i] * self.rate[0][i]);
         let rest_q = per_link(|i| sums.q[i] + sin[i] * self.rate[0][i]);
         let (tp, tq) = (per_link(|i| next * rest_p[i]), per_link(|i| next * rest_q[i]));
@@ -364,8 +366,8 @@ impl<const K: usize> MotionSeries<K> {
         self.right[k] = RightFactors { next_rate: rate, x, y, slip: [normal, falling] };
     }
 
-    /// Products of known coefficients. The newest factors come last, because the processor may still compute
-    /// them when the sum starts.
+    /// Sums the products of known coefficients. The newest factors are added last, because the processor may
+    /// still be computing them when the sum starts.
     #[inline(always)]
     fn sum_products<const FALLING: bool>(&self, k: usize) -> ProductSums {
         let mut sums = ProductSums::default();
@@ -383,7 +385,7 @@ impl<const K: usize> MotionSeries<K> {
         sums
     }
 
-    /// Moments of the springs and dampers of both links, N m, coefficient `k`.
+    /// Coefficient `k` of the moments of springs and dampers on both links, N m.
     #[inline(always)]
     fn spring_moments(&self, linkage: &Linkage, at: &RecurrenceConstants, k: usize) -> LinkPair {
         let ([theta, phi], [theta_rate, phi_rate]) = (self.angle[k], self.rate[k]);
@@ -392,7 +394,7 @@ impl<const K: usize> MotionSeries<K> {
         [neck - lip, lip]
     }
 
-    /// Force of the head's support on the head, N, coefficient `k`.
+    /// Coefficient `k` of the force of the support on the head, N.
     #[inline(always)]
     fn support_force(&self, linkage: &Linkage, k: usize) -> f64 {
         let preload = if k == 0 { linkage.preload_displacement_m } else { 0.0 };
@@ -400,7 +402,7 @@ impl<const K: usize> MotionSeries<K> {
     }
 }
 
-/// One value per link.
+/// Applies `f` to the index of each link.
 #[inline(always)]
 pub(super) fn per_link(f: impl Fn(usize) -> f64) -> LinkPair {
     [f(0), f(1)]

@@ -18,7 +18,7 @@ pub struct Shoulder {
 }
 
 impl Shoulder {
-    /// Moment on the neck while it leans on the `side` (+1 or -1), N m.
+    /// Moment on the neck while it leans on side `side` (+1 or -1) of the shoulder, N m.
     #[inline]
     #[must_use]
     pub fn moment(&self, theta: f64, theta_rate: f64, side: f64) -> f64 {
@@ -26,7 +26,7 @@ impl Shoulder {
             + self.damping_n_m_s_per_rad * theta_rate
     }
 
-    /// Which side a neck at this angle leans on.
+    /// Side of the shoulder on which a neck at this angle leans.
     #[must_use]
     pub fn contact_at(&self, theta: f64) -> ShoulderContact {
         match theta {
@@ -45,16 +45,16 @@ impl Shoulder {
 /// Whether the neck leans on the shoulder, and on which side of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ShoulderContact {
-    /// Free of the shoulder.
+    /// The neck does not touch the shoulder.
     Off,
-    /// On the side of positive angles.
+    /// The neck leans on the side of positive angles.
     Forward,
-    /// On the side of negative angles.
+    /// The neck leans on the side of negative angles.
     Backward,
 }
 
 impl ShoulderContact {
-    /// Sign of the angles on this side, 0 when free.
+    /// Sign of the neck's angle on this side, 0 off the shoulder.
     #[inline]
     #[must_use]
     pub fn angle_sign(self) -> f64 {

@@ -36,13 +36,13 @@ pub(crate) use motion_samples::{LinkAttitudes, MotionSamples, fill_lanes};
 /// Derivatives of the state at the start of a step.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct StateTangent {
-    /// Of the angles of neck and lip, rad over the unit of the direction.
+    /// Derivatives of the angles of neck and lip, rad per unit of the direction.
     pub angle: [LaneVector; 2],
-    /// Of the angular rates, rad/s.
+    /// Derivatives of the angular rates, rad/s per unit of the direction.
     pub rate: [LaneVector; 2],
-    /// Of the gap between tip and glass, m: zero in contact.
+    /// Derivative of the gap between tip and glass, m per unit of the direction; zero in contact.
     pub gap_m: LaneVector,
-    /// Of the rate of the gap, m/s.
+    /// Derivative of the rate of the gap, m/s per unit of the direction.
     pub gap_rate: LaneVector,
 }
 
@@ -52,11 +52,10 @@ pub(super) type LaneVectorPair = [LaneVector; 2];
 /// The motion about which the variation is computed; `K` is the size of its series.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ReferenceMotion<'a, const K: usize> {
-    /// The linkage that moves.
     pub linkage: &'a Linkage,
-    /// Contact between its tip and the glass.
+    /// Contact between the tip and the glass.
     pub touch: ContactMode,
-    /// Side on which its neck leans.
+    /// Side of the shoulder on which the neck leans.
     pub lean: ShoulderContact,
     pub motion: &'a MotionSeries<K>,
 }
@@ -81,7 +80,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
     }
 }
 
-/// One vector per link.
+/// Applies `f` to the index of each link.
 #[inline(always)]
 pub(super) fn lanes_per_link(f: impl Fn(usize) -> LaneVector) -> LaneVectorPair {
     [f(0), f(1)]
@@ -93,8 +92,8 @@ pub(super) fn sum_over_links(weights: [f64; 2], rows: &LaneVectorPair) -> LaneVe
     weights[0] * rows[0] + weights[1] * rows[1]
 }
 
-/// Mass, damping and stiffness matrices of the variation at a few instants: equations by unknowns. The third
-/// of both, the gap, matters only in flight.
+/// Mass, damping and stiffness matrices of the variation at a few instants, with a row per equation and a
+/// column per unknown. The third row (the head) and the third column (the gap) matter only in flight.
 #[derive(Debug, Clone)]
 pub(crate) struct TangentMatrices {
     pub mass: [[LaneVector; 3]; 3],
@@ -123,13 +122,13 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         }
     }
 
-    /// Derivative of the friction force by the tip's speed, N s/m.
+    /// Derivative of the friction force with respect to the tip's velocity, N s/m.
     #[inline(always)]
     pub(super) fn friction_per_speed(&self, at: &MotionSamples) -> LaneVector {
         self.linkage.friction.b_s_per_m * at.falling
     }
 
-    /// The matrices at these instants; in stick without the friction force.
+    /// The matrices at these instants; in stick, they leave out the friction force.
     pub(crate) fn tangent_matrices(&self, at: &MotionSamples) -> TangentMatrices {
         let linkage = self.linkage;
         let (l, m, arms, m_c) = (self.lengths(), self.moments(), self.arms(), linkage.m_c);
@@ -170,8 +169,8 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         out
     }
 
-    /// Adds the terms of `S_j = t_j y_j` to equation `i`: `pushed` multiplies its second derivative, and
-    /// `held` the force of the support, which depends on its first derivative and its value.
+    /// Adds the terms of `S_j = t_j y_j` to equation `i`: `pushed` times the second derivative of `S_j`, and
+    /// `held` times the change of the support's force, which depends on `S_j` and its first derivative.
     #[inline(always)]
     fn add_support(
         &self,
@@ -203,7 +202,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         }
     }
 
-    /// Adds the gap in flight: it lifts the head, and the equation of the head is the third.
+    /// Adds the terms of the gap in flight. The gap lifts the head, whose equation is the third.
     #[inline(always)]
     fn add_gap(&self, out: &mut TangentMatrices, at: &MotionSamples) {
         const GAP: usize = 2;
@@ -221,7 +220,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         out.stiffness[GAP][GAP] = LaneVector::splat(-head.stiffness);
     }
 
-    /// The equation in stick.
+    /// Combines the equations of both links into the equation for `y1` in stick.
     pub(crate) fn stick_equation(&self, matrices: &TangentMatrices) -> StickEquation {
         let l = self.lengths();
         let ratio = l[0] / l[1];

@@ -5,21 +5,22 @@ use crate::recording::channel::{Channel, ReversalInstants, central_moments};
 use portable_math as math;
 use serde::Serialize;
 
-/// Offsets of the model's times and positions at which its head follows the recorded one.
+/// Offsets that are added to the model's times and positions so that its head follows the recorded head.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Alignment {
-    /// Added to the model's times, s.
+    /// Offset of the model's times, s.
     pub shift_s: f64,
-    /// Added to the model's head and tip along the sweep, m.
+    /// Offset of the model's head and tip along the sweep, m.
     pub along_m: f64,
-    /// Added to the model's head drop, m.
+    /// Offset of the model's head drop, m.
     pub drop_m: f64,
-    /// The point whose paths are compared.
+    /// Point whose paths are aligned.
     pub followed: AlignmentPoint,
-    /// Standard deviation of the time shift, s: infinite where the path does not determine it, `None` where
+    /// Standard deviation of the time shift, s; infinite if the path does not determine the shift, `None` if
     /// no path is fitted.
     pub shift_sd_s: Option<f64>,
-    /// Whether the recorded head turns in the opposite direction: then the paths meet only at the turn.
+    /// Whether the recorded head turns in the opposite direction; then the paths are aligned only at the
+    /// turn.
     pub opposite_turn: bool,
 }
 
@@ -30,12 +31,12 @@ pub enum AlignmentPoint {
     /// The head.
     #[default]
     Head,
-    /// The tip, where no head was tracked.
+    /// The tip, if no head was tracked.
     Tip,
 }
 
 impl AlignmentPoint {
-    /// Its name in a sentence and in files.
+    /// Name of the point in a sentence and in files.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Head => "head",
@@ -56,17 +57,18 @@ pub(crate) fn is_tracked(column: &[Option<f64>]) -> bool {
     column.iter().any(Option::is_some)
 }
 
-/// Most steps of the least squares. The head's path is smooth, and three steps reach a nanosecond.
+/// Maximum number of least-squares steps. The head's path is smooth, and three steps reach a nanosecond.
 const MAX_STEPS: usize = 8;
 /// Step below which the iteration ends, s.
 const MIN_STEP_S: f64 = 1e-9;
-/// Most frames that are used; more would change the time shift by less than a microsecond.
+/// Maximum number of frames that are used; more frames would change the time shift by less than a
+/// microsecond.
 const MAX_FRAMES: usize = 20_000;
 
 impl Alignment {
-    /// Estimates shift and offsets, because a camera has a clock and an origin of its own. It starts from the
-    /// first turn of the head in both, then minimises the squared distance of the head's paths, or of the
-    /// tip's where no head was tracked.
+    /// Estimates the time shift and the offsets; a camera has its own clock and origin. The estimate starts
+    /// from the first turn of the head in recording and model, then minimises the squared distance of their
+    /// head paths, or of their tip paths if no head was tracked.
     pub(crate) fn estimate(measured: &Recording, model: &Recording) -> Self {
         let turns = ReversalInstants::first_turn_s(measured).zip(ReversalInstants::first_turn_s(model));
         let head_tracked = is_tracked(&measured.traces().head_x_m);
@@ -107,16 +109,16 @@ fn head_at(recording: &Recording, t: f64) -> Option<f64> {
     recording.interpolate_column(&recording.traces().head_x_m, t)
 }
 
-/// Travel of the head in a short time after a turn, m; its sign is the direction after the turn. The longest
-/// of a few times whose end is tracked.
+/// Travel of the head in a short time after a turn, m; its sign is the direction after the turn. The time is
+/// the longest of a few whose end is tracked.
 fn head_turn_m(recording: &Recording, turn_s: f64) -> f64 {
     const TIMES_S: [f64; 4] = [0.04, 0.02, 0.01, 0.005];
     let travel = |time_s: &f64| Some(head_at(recording, turn_s + time_s)? - head_at(recording, turn_s)?);
     TIMES_S.iter().find_map(travel).unwrap_or_default()
 }
 
-/// Time shift, out of evenly spaced ones, at which the recorded path differs least from the model's: for a
-/// recording without a turn.
+/// Time shift, of a series of evenly spaced ones, at which the recorded path differs least from the model's
+/// path apart from a constant offset; for a recording without a turn.
 fn best_overlap_shift_s(measured: &Recording, model: &Recording, by: AlignmentPoint) -> f64 {
     const PLACES: u32 = 200;
     const FRAMES: usize = 100;
@@ -140,16 +142,16 @@ fn best_overlap_shift_s(measured: &Recording, model: &Recording, by: AlignmentPo
     best.map_or(0.0, |(shift_s, _)| shift_s)
 }
 
-/// At most [`MAX_FRAMES`] frames, evenly spaced.
+/// Indices of at most [`MAX_FRAMES`] evenly spaced frames.
 fn used_frames(recording: &Recording) -> impl Iterator<Item = usize> {
     let frames = recording.grid().frames;
     (0..frames).step_by(frames.div_ceil(MAX_FRAMES).max(1))
 }
 
-/// One Gauss-Newton step for the time shift and the mean distance of the paths.
+/// One Gauss-Newton step of the time shift, with the mean distance of the paths.
 struct AlignmentStep {
     time_s: f64,
-    /// Standard deviation of the time from the residuals, s.
+    /// Standard deviation of the time shift from the residuals, s.
     time_sd_s: f64,
     mean_m: f64,
 }
@@ -171,7 +173,7 @@ impl AlignmentStep {
         let points: Vec<(f64, f64)> = used_frames(measured).filter_map(point).collect();
         let count = points.len() as f64;
         let ([mean_speed, mean_m], [spread, both]) = central_moments(&points);
-        // a model that is late by a time lags by its speed times that time
+        // a model that is late by some time lags by its speed times that time
         let time_s = if spread > 0.0 { -both / spread } else { 0.0 };
         let residual = |p: &(f64, f64)| p.1 - mean_m + time_s * (p.0 - mean_speed);
         let left: f64 = points.iter().map(|p| math::powi(residual(p), 2)).sum();

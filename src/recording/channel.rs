@@ -1,4 +1,4 @@
-//! Channels derived from a recording, and the windows and instants that cut them.
+//! Channels derived from a recording, and the windows and instants that delimit parts of them.
 
 mod flip;
 mod instants;
@@ -14,16 +14,16 @@ use serde::Serialize;
 use std::ops::Range;
 pub use window::{Window, WindowEnd, WindowError};
 
-/// A quantity followed over the frames, m.
+/// A quantity that is followed over the frames, m.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 pub enum Channel {
     /// Deflection of the blade, `tip_x - head_x` = `v3 - v`.
     Deflection,
-    /// Drop of the head towards the glass, `-head_y` = `u`.
+    /// Drop of the head towards the glass, `u` = `-head_y`.
     HeadDrop,
-    /// Lip tip along the sweep, `v3`.
+    /// Position of the lip tip along the sweep, `v3`.
     TipX,
-    /// Head along the sweep, `v`.
+    /// Position of the head along the sweep, `v`.
     HeadX,
 }
 
@@ -33,7 +33,7 @@ pub enum Channel {
 pub struct UnknownChannel {
     /// The name as written.
     pub found: String,
-    /// The nearest known name, or the list of them.
+    /// The nearest known name, or the list of all names.
     pub advice: String,
 }
 
@@ -56,7 +56,7 @@ impl Channel {
         self.name().replace('-', " ")
     }
 
-    /// Parses a [`Self::name`].
+    /// Parses a name that [`Self::name`] gives.
     ///
     /// # Errors
     /// [`UnknownChannel`] with the nearest known name.
@@ -69,7 +69,7 @@ impl Channel {
         })
     }
 
-    /// The channel in every frame, m; `None` where a point that it needs was not tracked.
+    /// Value of the channel in every frame, m; `None` if a point that the channel needs was not tracked.
     #[must_use]
     pub fn samples(self, recording: &Recording) -> Vec<Option<f64>> {
         let traces = recording.traces();
@@ -99,8 +99,8 @@ impl std::fmt::Display for Channel {
     }
 }
 
-/// Least-squares slope of a channel over the frames present in `frames`, m/s; `None` for fewer than two, or
-/// outside the recording.
+/// Least-squares slope of a channel over the tracked frames of `frames`, m/s; `None` for fewer than two
+/// tracked frames or a range outside the recording.
 pub(crate) fn mean_speed_m_per_s(
     samples: &[Option<f64>],
     frame_rate_hz: f64,
@@ -113,7 +113,7 @@ pub(crate) fn mean_speed_m_per_s(
     (spread > 0.0).then(|| both / spread)
 }
 
-/// Means of x and y; sums of the squared distances of x from its mean and of their products with those of y.
+/// Means of x and y, then the sum of `(x - mean x)^2` and the sum of `(x - mean x) (y - mean y)`.
 pub(super) fn central_moments(points: &[(f64, f64)]) -> ([f64; 2], [f64; 2]) {
     let count = points.len() as f64;
     let [x, y] = points.iter().fold([0.0; 2], |sum, p| [sum[0] + p.0 / count, sum[1] + p.1 / count]);
@@ -123,7 +123,7 @@ pub(super) fn central_moments(points: &[(f64, f64)]) -> ([f64; 2], [f64; 2]) {
     ([x, y], sums)
 }
 
-/// The tracked frames of a channel with their noise, m, and their smallest step, m (0 without one).
+/// The tracked frames of a channel, their noise, m, and the step of the positions, m (0 without a step).
 pub(super) struct TrackPoints {
     /// Frame and position, m.
     pub points: Vec<(usize, f64)>,
@@ -146,18 +146,18 @@ impl TrackPoints {
     }
 }
 
-/// Frame and position, m, of the tracked frames.
+/// Frame number and position, m, of every tracked frame.
 pub(super) fn present_points(samples: &[Option<f64>]) -> Vec<(usize, f64)> {
-    // (growing the vector would cost a fifth of the search for instants)
+    // (a vector that grows would add a fifth to the time of the search for instants)
     let mut points = Vec::with_capacity(samples.len());
     points.extend(samples.iter().enumerate().filter_map(|(frame, x)| x.map(|x| (frame, x))));
     points
 }
 
-/// Standard deviation of white noise on a smooth path, m, from fourth differences over consecutive frames: a
-/// motion up to the third degree drops out.
+/// Standard deviation of white noise on a smooth path, m, from the fourth differences of consecutive frames,
+/// which are zero for a motion up to the third degree.
 pub(super) fn noise_sd_m(points: &[(usize, f64)]) -> f64 {
-    /// Fourth differences of white noise have 1 + 16 + 36 + 16 + 1 times its variance.
+    /// Fourth differences of white noise have 1 + 16 + 36 + 16 + 1 times the variance of the noise.
     const GAIN: f64 = 70.0;
     /// Median of |x| of a standard normal variable.
     const NORMAL_MEDIAN: f64 = 0.674_489_75;
@@ -183,19 +183,19 @@ pub(super) fn median_position(points: &[(usize, f64)]) -> Option<f64> {
     median_in_place(&mut points.iter().map(|p| p.1).collect::<Vec<_>>())
 }
 
-/// Median of a point and its two neighbours: it removes an outlier of a single frame.
+/// Median of a point and its two neighbours; the median removes an outlier of a single frame.
 pub(super) fn median_of_three(points: &[(usize, f64)], index: usize) -> f64 {
     let last = points.len().saturating_sub(1);
     let [a, b, c] = [index.saturating_sub(1), index, (index + 1).min(last)].map(|i| points[i].1);
     a.max(b).min(a.min(b).max(c))
 }
 
-/// Smallest and largest value; infinity and minus infinity for none.
+/// Smallest and largest value; infinity and minus infinity without values.
 pub(super) fn value_range(values: &[f64]) -> (f64, f64) {
     values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)))
 }
 
-/// Median of three at every point: it removes outliers of a single frame, and a turn is far longer.
+/// Median of three at every point: the filter removes outliers of a single frame; a turn takes far longer.
 pub(super) fn median_filter(points: &[(usize, f64)]) -> Vec<f64> {
     (0..points.len()).map(|index| median_of_three(points, index)).collect()
 }

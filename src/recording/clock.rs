@@ -1,28 +1,28 @@
-//! Frame numbers from a column of times, which may be rounded or lack rows.
+//! Frame numbers from a column of times; the times may be rounded, and rows may be missing.
 
 /// Largest distance of a time from its frame, frames. Rounding to half a frame moves a time by up to a
-/// quarter; beyond a third the nearest frame is uncertain.
+/// quarter of a frame; for more than a third, the nearest frame is uncertain.
 pub(crate) const OFF_GRID_LIMIT_FRAMES: f64 = 0.3;
 
-/// Longest grid, frames: 17 minutes at 10,000 frames/s. A longer jump of the times is damage.
+/// Longest grid, frames: 17 minutes at 10,000 frames/s. A larger jump in the times is damage.
 pub(crate) const MAX_FRAMES: f64 = 10_000_000.0;
 
-/// Share of a row's distance from the grid by which the phase of the grid is corrected. With a seed that is 1
-/// % off the phase lags by a tenth of a frame.
+/// Fraction of a row's distance from the grid by which the phase of the grid is corrected. If the seed is 1 %
+/// off, the phase lags by a tenth of a frame.
 const PHASE_GAIN: f64 = 0.1;
-/// Most digits that a frame rate read from times can carry.
+/// Maximum number of digits to which a fitted frame rate is rounded.
 const RATE_DIGITS: usize = 16;
-/// Most rounds of renumbering; one suffices unless the first slope is far off.
+/// Maximum number of rounds of renumbering; one suffices unless the first slope is far off.
 const ROUNDS: usize = 4;
 
-/// Numbered rows and the line that fits their times.
+/// Frame numbers of the rows, and the line that fits their times.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FrameFit {
-    /// Frame of every row, counted from the first row.
+    /// Frame number of every row, counted from the first row.
     pub frames: Vec<usize>,
-    /// Frame time from the least-squares line, s.
+    /// Time from frame to frame, from the least-squares line, s.
     pub frame_s: f64,
-    /// Row that lies furthest off the grid.
+    /// Row that is furthest off the grid.
     pub worst_row: usize,
     /// Distance of that row from its frame, frames.
     pub worst_frames: f64,
@@ -34,16 +34,16 @@ impl FrameFit {
         self.worst_frames <= OFF_GRID_LIMIT_FRAMES
     }
 
-    /// Fewest frames from one row to the next: above 1 where only every n-th frame has a row.
+    /// Smallest number of frames from one row to the next; above 1 if only every n-th frame has a row.
     pub(crate) fn smallest_step(&self) -> usize {
         self.frames.windows(2).map(|w| w[1].saturating_sub(w[0])).min().unwrap_or(1)
     }
 }
 
-/// Assigns frames to strictly increasing finite `times_s` on a grid of about `seed_s` per frame. The phase of
-/// the grid follows the times slowly: errors of rounding or of the seed do not accumulate, and a damaged row
-/// does not shift the rows after it. Then a line is fitted and the rows are numbered again. `None` for fewer
-/// than two rows, a seed that is not positive, or a grid longer than [`MAX_FRAMES`].
+/// Assigns frame numbers to strictly increasing finite `times_s` on a grid with about `seed_s` per frame. The
+/// phase of the grid follows the times slowly, so that errors of rounding or of the seed do not accumulate
+/// and a damaged row does not shift the rows after it. Then a line is fitted and the rows are numbered again.
+/// `None` for fewer than two rows, a seed that is not positive, or a grid longer than [`MAX_FRAMES`].
 pub(crate) fn number_frames(times_s: &[f64], seed_s: f64) -> Option<FrameFit> {
     let first = *times_s.first()?;
     let span_frames = (times_s.last()? - first) / seed_s;
@@ -72,21 +72,22 @@ fn follow_grid(times_s: &[f64], first: f64, seed_s: f64) -> Vec<usize> {
     times_s.iter().map(&mut number).collect()
 }
 
-/// Median time from row to row, s: the frame time where most rows are neighbours. Of two middle values it is
-/// the shorter, because gaps only lengthen times.
+/// Median time from row to row, s: the time per frame if most rows are neighbours. The shorter of two middle
+/// values is taken, because gaps only lengthen these times.
 pub(crate) fn median_step_s(times_s: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> = times_s.windows(2).map(|w| w[1] - w[0]).collect();
     steps.sort_by(f64::total_cmp);
     steps.get(steps.len().saturating_sub(1) / 2).copied()
 }
 
-/// The rate with the fewest digits near `fitted`, 1/s, for which `explains` is true; `fitted` without one.
+/// The rate with the fewest digits near `fitted`, 1/s, for which `explains` is true; if there is none,
+/// `fitted`.
 pub(crate) fn simplest_rate(fitted: f64, explains: impl Fn(f64) -> bool) -> f64 {
     let mut rounded = (0..RATE_DIGITS).filter_map(|digits| format!("{fitted:.digits$e}").parse::<f64>().ok());
     rounded.find(|&rate| explains(rate)).unwrap_or(fitted)
 }
 
-/// Intercept and slope by least squares.
+/// Intercept and slope of the least-squares line of time over frame number.
 fn fit_line(frames: &[usize], times_s: &[f64]) -> (f64, f64) {
     let count = frames.len() as f64;
     let mean_frame = frames.iter().map(|&n| n as f64).sum::<f64>() / count;
@@ -110,8 +111,8 @@ fn renumber_frames(times_s: &[f64], (intercept, slope): (f64, f64)) -> Option<Ve
     usable.then(|| nearest.iter().map(|n| (n - first) as usize).collect())
 }
 
-/// Finds the row furthest off the grid. A row in the same frame as the row above counts as one frame further
-/// off.
+/// Finds the row that is furthest off the grid. A row with the same frame as the row above it counts as one
+/// frame further off.
 fn assess_fit(frames: Vec<usize>, times_s: &[f64], (intercept, slope): (f64, f64)) -> FrameFit {
     let off = |row: usize| {
         let distance = (times_s[row] - intercept - slope * frames[row] as f64).abs() / slope;

@@ -1,4 +1,4 @@
-//! `trace.csv` and `recording.toml`, the files of a recording in its folder.
+//! `trace.csv` and `recording.toml`, the files in the folder of a recording.
 
 mod description;
 mod trace;
@@ -10,7 +10,7 @@ pub use trace::{HEADER, parse_trace_csv, parse_trace_csv_at, push_trace_row, tra
 use crate::recording::Recording;
 use crate::toml_file::TomlError;
 
-/// Name of the traces in a recording's folder.
+/// Name of the file of traces in a recording's folder.
 pub(crate) const TRACE_FILE: &str = "trace.csv";
 /// Name of the description in a recording's folder.
 pub(crate) const DESCRIPTION_FILE: &str = "recording.toml";
@@ -18,7 +18,7 @@ pub(crate) const DESCRIPTION_FILE: &str = "recording.toml";
 /// Why a recording's files were refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FilesError {
-    /// `recording.toml` is no TOML, or has a key or value that the format does not allow.
+    /// `recording.toml` is not TOML, or has a key or value that the format does not allow.
     #[error(transparent)]
     Toml(#[from] TomlError),
     /// A key of `[video]` has a value that cannot be used.
@@ -26,12 +26,12 @@ pub enum FilesError {
     Video {
         /// File as named by the user.
         file: String,
-        /// The key.
+        /// The key in `[video]`.
         key: &'static str,
         /// What was found, what was expected and what to do.
         problem: String,
     },
-    /// Another fault: its place in the file, what was found, what was expected and what to do.
+    /// Another fault, with its place in the file, what was found, what was expected and what to do.
     #[error("{file}{problem}")]
     Refused {
         /// File as named by the user.
@@ -47,12 +47,12 @@ impl FilesError {
     }
 }
 
-/// Reads a recording from the text of its `trace.csv` and its description. Without a description the frame
-/// rate is estimated from the times, and the recording counts as taken by a camera. A trace whose hash
-/// differs from that in the description is refused.
+/// Reads a recording from the text of its `trace.csv` and its description. Without a description, the frame
+/// rate is estimated from the times, and the recording counts as taken by a camera. A trace is refused if its
+/// hash differs from the hash in the description.
 ///
 /// # Errors
-/// [`FilesError`] naming `file` (that of the traces) and the place at fault.
+/// [`FilesError`] naming `file`, the file of the traces, and the place at fault.
 pub fn read_recording(
     name: &str,
     file: &str,

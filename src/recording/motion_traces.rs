@@ -5,22 +5,22 @@ use crate::recording::Recording;
 use crate::recording::channel::Channel;
 use serde::Serialize;
 
-/// Motion over time; all columns have the length of `time_s`, `None` where a point is missing.
+/// Motion over time; all columns are as long as `time_s`, with `None` for a missing point.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct MotionTraces {
-    /// Instants, s.
+    /// Times of the samples, s.
     pub time_s: Vec<f64>,
-    /// Lip tip along the sweep, m.
+    /// Position of the lip tip along the sweep, m.
     pub tip_x_m: Vec<Option<f64>>,
-    /// Head along the sweep, m.
+    /// Position of the head along the sweep, m.
     pub head_x_m: Vec<Option<f64>>,
-    /// Deflection, m.
+    /// Deflection of the blade, m.
     pub deflection_m: Vec<Option<f64>>,
-    /// Head drop, m.
+    /// Drop of the head, m.
     pub head_drop_m: Vec<Option<f64>>,
 }
 
-/// The channels in the order of a figure.
+/// The channels in the order of their panels in a figure.
 pub(crate) const MOTION_CHANNELS: [Channel; 4] =
     [Channel::TipX, Channel::HeadX, Channel::Deflection, Channel::HeadDrop];
 
@@ -30,7 +30,7 @@ impl MotionTraces {
         Self::from_columns(recording, |channel| channel.samples(recording))
     }
 
-    /// Motion of a model, on the clock and from the origin of a recording.
+    /// Motion of a model, with the clock and the origin of a recording.
     pub(crate) fn from_model(model: &Recording, alignment: &Alignment) -> Self {
         let mut moved = Self::from_columns(model, |channel| {
             let by_m = alignment.offset_m(channel);
@@ -40,7 +40,7 @@ impl MotionTraces {
         moved
     }
 
-    /// Motion of a model at the frames of a recording, on the clock and from the origin of that.
+    /// Motion of a model at the frames of a recording, with the clock and the origin of the recording.
     pub(crate) fn from_model_at_frames(
         recording: &Recording,
         model: &Recording,
@@ -55,7 +55,7 @@ impl MotionTraces {
         })
     }
 
-    /// Measured minus model at the frames of the recording; missing where either is missing.
+    /// Recording minus model at the frames of the recording; missing if either is missing.
     pub(crate) fn residual(recording: &Recording, model: &Recording, alignment: &Alignment) -> Self {
         let grid = recording.grid();
         Self::from_columns(recording, |channel| {
@@ -88,7 +88,8 @@ impl MotionTraces {
         }
     }
 
-    /// Root mean square of a channel between two instants, s, or over all; `None` without a value.
+    /// Root mean square of a channel between two instants, s, or over the whole motion; `None` without a
+    /// value.
     pub(crate) fn rms_m(&self, channel: Channel, within_s: Option<(f64, f64)>) -> Option<f64> {
         let inside = |t: f64| within_s.is_none_or(|(from, to)| t >= from && t <= to);
         let frames = self.time_s.iter().zip(self.column(channel)).filter(|(t, _)| inside(**t));

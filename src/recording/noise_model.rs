@@ -1,5 +1,5 @@
 //! Tracking noise that is correlated between neighbouring frames: an autoregressive process, its estimate
-//! from a recording, the part that both points share, and the map that makes it white.
+//! from a recording, the noise that both points share, and the map that makes the noise white.
 
 mod autoregressive;
 mod blocks;
@@ -11,30 +11,32 @@ pub(crate) use autoregressive::{AutoregressiveNoise, Whitener};
 use blocks::{BlockCut, NoiseBlock, cut_blocks, keep_quiet_blocks};
 pub(crate) use common_noise::{SharedNoise, measure_common_noise};
 
-// The head along the sweep is compared with its smooth motion; the tip upwards with the glass, which in the
-// picture is a line along the sweep. In the other two channels the blade itself moves as fast as frames
-// follow, so their noise cannot be separated. One tracker is assumed to treat both points alike: the tip
-// along the sweep gets the noise of the head, and the head upwards that of the tip.
+// The position of the head along the sweep is compared with its smooth motion. The height of the tip is
+// compared with the glass, which is a straight line in the picture. In the other two channels the blade
+// itself moves from frame to frame, so their noise cannot be separated. The tracker is assumed to treat both
+// points alike: the noise of the head along the sweep also stands for the tip, and the noise of the tip's
+// height also stands for the head.
 
-/// Length of a block, s, in which the motion is fitted by a cubic: at 50 Hz a hundredth of the amplitude is
-/// left.
+/// Length of a block, s, in which a cubic is fitted to the motion. Its residual is a hundredth of the
+/// amplitude for a motion at 50 Hz.
 const BLOCK_S: f64 = 8e-3;
-/// Fewest frames of a block: in fewer, a cubic removes most of the correlation between neighbours.
+/// Minimum number of frames of a block: in a shorter block, a cubic removes most of the correlation between
+/// neighbouring frames.
 const LEAST_BLOCK: usize = 24;
-/// Most frames that are used, spread over the recording: they give a correlation to 0.01.
+/// Maximum number of frames that are used, spread over the recording: they give a correlation to 0.01.
 const MOST_FRAMES: usize = 6_000;
-/// Fewest degrees of freedom of an estimate.
+/// Minimum number of degrees of freedom of an estimate.
 const FEWEST_FRAMES: usize = 100;
-/// Least standard deviation of noise, m; below it lies rounding.
+/// Smallest standard deviation that counts as noise, m; a smaller one is rounding.
 const LEAST_SD_M: f64 = 1e-9;
 
 /// Noise of a channel.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ChannelNoise {
     pub noise: AutoregressiveNoise,
-    /// Uncertainty of its standard deviation, m.
+    /// Standard deviation of the estimated standard deviation of the noise, m.
     pub sd_of_sd_m: f64,
-    /// Standard deviations of its coefficients.
+    /// Standard deviations of the estimated coefficients of the noise.
     pub sd_of_coefficients: Vec<f64>,
     /// Degrees of freedom: frames minus the coefficients of the motion.
     pub frames: usize,
@@ -44,28 +46,28 @@ pub(crate) struct ChannelNoise {
 /// The residuals on which the noise was measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum NoiseSource {
-    /// The head along the sweep, against its smooth motion.
+    /// The residuals of the head along the sweep from its smooth motion.
     SmoothHead,
-    /// The tip upwards, against the glass.
+    /// The residuals of the tip's height from the glass.
     Glass,
 }
 
 /// Noise of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct RecordingNoise {
-    /// Of tip and head along the sweep.
+    /// Noise of tip and head along the sweep.
     pub along_sweep: Option<ChannelNoise>,
-    /// Of tip and head upwards.
+    /// Noise of the heights of tip and head.
     pub upwards: Option<ChannelNoise>,
 }
 
-/// Frames of a block at a frame rate.
+/// Number of frames of a block at a frame rate.
 pub(super) fn block_length(frame_rate_hz: f64) -> usize {
     ((BLOCK_S * frame_rate_hz).round() as usize).max(LEAST_BLOCK)
 }
 
-/// Measures the noise of a recording along the sweep and upwards, each on its own channel or, where that
-/// gives none, on the other.
+/// Measures the noise of a recording along the sweep and in height. Each is measured on its own channel; if
+/// that fails, the noise of the other stands in.
 pub(crate) fn measure_noise(recording: &Recording) -> RecordingNoise {
     let (traces, length) = (recording.traces(), block_length(recording.grid().frame_rate_hz));
     let head = BlockCut { length, degree: 3, covariate: None };

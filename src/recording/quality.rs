@@ -1,7 +1,8 @@
-//! Quality of a recording: its rate, gaps and noise, measured on the traces, and findings on them.
+//! Quality of a recording: its rate, gaps and noise, measured on the traces, and the findings on them.
 //!
-//! [`measure_quality`] measures; [`collect_findings`] judges, each finding with a severity, a number and
-//! advice; `verdict_lines` writes both as text; [`Quality::component_visibility`] judges a single frequency.
+//! [`measure_quality`] measures; [`collect_findings`] judges and gives each finding a severity, a number and
+//! advice; `verdict_lines` writes measurements and findings as text; [`Quality::component_visibility`] judges
+//! a single frequency.
 
 mod checks;
 mod finding;
@@ -27,9 +28,9 @@ pub use outliers::outlier_frames;
 use serde::Serialize;
 pub use tilt::{CameraTilt, Curvature, TiltNotFound, measure_tilt};
 
-/// Everything that looks wrong with a recording, gravest first, together with the findings of its import.
+/// All findings on a recording, the gravest first, with the findings of its import.
 ///
-/// `measured` is the [`measure_quality`] of the same recording, `instants` are its
+/// `measured` is the result of [`measure_quality`] for the same recording, `instants` that of
 /// [`ReversalInstants::find_instants`].
 #[must_use]
 pub fn collect_findings(
@@ -52,23 +53,25 @@ pub fn collect_findings(
         found.extend(prefilter::check_prefilter(column, measured.frame_rate_hz));
     }
     found.extend(checks::check_confidence(recording.traces()));
-    // (stable: the order above within a severity)
+    // (a stable sort keeps the order of the checks within a severity)
     found.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
     found
 }
 
-/// Amplitude of an oscillation that is visible in single frames, in standard deviations of the noise.
+/// Smallest amplitude of an oscillation that is visible in single frames, in standard deviations of the
+/// noise.
 const VISIBLE_COMPONENTS: f64 = 3.0;
 
 /// Overall grade of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Grade {
-    /// No finding above a note.
+    /// No finding graver than a note.
     Good,
-    /// Cautions, nothing serious.
+    /// At least one caution, but no serious finding.
     UsableWithCare,
-    /// A serious finding: frequencies, lengths or directions are probably wrong, or nothing can be shown.
+    /// A serious finding: frequencies, lengths or directions are probably wrong, or the recording can show
+    /// nothing.
     NotUsable,
 }
 
@@ -81,9 +84,9 @@ pub fn grade_findings(findings: &[QualityFinding]) -> Grade {
     }
 }
 
-/// The verdict, one statement a line: the grade with the visible frequencies, then the findings, gravest
-/// first. A finding on several channels is one line with its largest number. Notes without advice are left
-/// out.
+/// The verdict, one statement per line: the grade with the visible frequencies, then the findings, the
+/// gravest first. A finding on several channels becomes one line with its largest number. Notes without
+/// advice are left out.
 pub fn verdict_lines(measured: &Quality, findings: &[QualityFinding]) -> Vec<String> {
     let mut lines = vec![grade_line(measured, findings)];
     let mut stated: Vec<(Check, Severity)> = vec![];
@@ -134,7 +137,7 @@ fn grade_line(measured: &Quality, findings: &[QualityFinding]) -> String {
     )
 }
 
-/// Joins the findings of one check and severity on single channels in one line.
+/// Joins the findings of one check and severity on single channels into one line.
 fn join_channel_findings(findings: &[&QualityFinding], key: (Check, Severity)) -> Option<String> {
     let alike = || findings.iter().filter(|f| f.channel.is_some() && (f.check, f.severity) == key);
     let channels: Vec<&str> = alike().filter_map(|finding| finding.channel.as_deref()).collect();
@@ -146,7 +149,7 @@ fn join_channel_findings(findings: &[&QualityFinding], key: (Check, Severity)) -
     Some(worst.clone().on_channel(&named).to_line())
 }
 
-/// The measurements as a text table in display units, one a line.
+/// The measurements as a text table in display units, one measurement per line.
 pub(crate) fn measurement_table(quality: &Quality, start_s: f64) -> String {
     let grid = FrameGrid { start_s, frame_rate_hz: quality.frame_rate_hz, frames: quality.frames };
     let share = 100.0 * quality.missing_deflection_frames as f64 / quality.frames as f64;

@@ -1,4 +1,5 @@
-//! Pictures of the video from which a recording was tracked, and the pixel of a tracked point in them.
+//! Pictures of the video from which a recording was tracked, and the pixel at which a tracked point lies in
+//! them.
 
 use super::files::{CameraEntry, FilesError, LevelEntry};
 use crate::toml_file::NumberPair;
@@ -8,47 +9,48 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::io::Cursor;
 
-/// Most memory for a picture, bytes: 60 million pixels in four channels.
+/// Maximum memory for a picture, bytes: 60 million pixels in four channels.
 const MOST_BYTES: usize = 256 << 20;
-/// Number of greys of a picture in a figure: half a byte a pixel, so that four pictures fit on a page.
+/// Number of grey levels of a picture in a figure: a pixel takes half a byte, so that four pictures fit on a
+/// page.
 const GREYS: u16 = 16;
-/// Most samples of the picture along either side of a pixel of a figure.
+/// Maximum number of samples of the picture along either side of a pixel of a figure.
 const MOST_SAMPLES: f64 = 8.0;
 
 /// Why a picture cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum PictureError {
-    /// It is no PNG, or it is damaged.
+    /// The file is not a PNG, or it is damaged.
     #[error("found no readable PNG picture ({0}), expected one; save the frames of the video as PNG")]
     Png(#[from] png::DecodingError),
-    /// It takes too much memory.
+    /// The picture needs too much memory.
     #[error(
         "found a picture of {width} x {height} pixels, expected at most 60 million; save the frames smaller"
     )]
     Large {
-        /// Pixels across.
+        /// Width, pixels.
         width: u32,
-        /// Pixels down.
+        /// Height, pixels.
         height: u32,
     },
 }
 
-/// A picture in greys, row by row from the upper left corner, 0 for black.
+/// A greyscale picture, row by row from the upper left corner, 0 for black.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Picture {
-    /// Pixels across.
+    /// Width, pixels.
     pub width: usize,
-    /// Pixels down.
+    /// Height, pixels.
     pub height: usize,
-    /// Their greys.
+    /// Grey levels of the pixels.
     pub grey: Vec<u8>,
 }
 
 impl Picture {
-    /// Reads a PNG of any kind; transparent pixels lie on white.
+    /// Reads a PNG of any kind; transparent pixels are shown on white.
     ///
     /// # Errors
-    /// [`PictureError`] where it is no PNG, is damaged or too large.
+    /// [`PictureError`] if the file is not a PNG, is damaged or is too large.
     pub fn from_png(png: &[u8]) -> Result<Self, PictureError> {
         let mut decoder = Decoder::new_with_limits(Cursor::new(png), Limits { bytes: MOST_BYTES });
         decoder.set_transformations(Transformations::normalize_to_color8());
@@ -63,7 +65,7 @@ impl Picture {
         Ok(Self { width: frame.width as usize, height: frame.height as usize, grey })
     }
 
-    /// The picture as a PNG with 16 greys.
+    /// The picture as a PNG with 16 grey levels.
     ///
     /// # Errors
     /// [`png::EncodingError`] for a picture without pixels.
@@ -83,9 +85,9 @@ impl Picture {
         Ok(bytes)
     }
 
-    /// Resamples to `width` x `height` pixels, each the mean over its area. `pixel` maps a place in the new
-    /// picture to one in this picture, both in pixels from the upper left corner. The outside of this picture
-    /// is white.
+    /// Resamples the picture to `width` x `height` pixels, each the mean over its area. `pixel` maps a point
+    /// of the new picture to a point of this picture, both in pixels from the upper left corner. The
+    /// surroundings of this picture are white.
     pub(crate) fn resample(&self, width: usize, height: usize, pixel: impl Fn([f64; 2]) -> [f64; 2]) -> Self {
         let ([x0, y0], [x1, y1]) = (pixel([0.0, 0.0]), pixel([1.0, 0.0]));
         let samples = math::hypot(x1 - x0, y1 - y0).ceil().clamp(1.0, MOST_SAMPLES) as usize;
@@ -100,7 +102,7 @@ impl Picture {
         Self { width, height, grey: (0..width * height).map(point).collect() }
     }
 
-    /// Whether a place lies in the picture.
+    /// Whether a point lies in the picture.
     pub(crate) fn contains_point(&self, [x, y]: [f64; 2]) -> bool {
         (0.0..self.width as f64).contains(&x) && (0.0..self.height as f64).contains(&y)
     }
@@ -113,7 +115,7 @@ impl Picture {
     }
 }
 
-/// Grey of the samples of a pixel, on white (ITU-R BT.601 weights).
+/// Grey level of a pixel with these samples, shown on white (ITU-R BT.601 weights).
 fn grey_on_white(samples: &[u8]) -> u8 {
     let (colour, alpha) = match samples {
         [grey] => (u32::from(*grey), 255),
@@ -127,18 +129,18 @@ fn grey_on_white(samples: &[u8]) -> u8 {
     ((colour * alpha + 255 * (255 - alpha) + 127) / 255) as u8
 }
 
-/// Gives pictures of frames.
+/// Provides pictures of frames.
 pub trait PictureSource: Sync {
-    /// The picture of a frame, counted from 0, where there is one.
+    /// The picture of a frame, counted from 0; `None` if there is none.
     fn frame_picture(&self, frame: usize) -> Option<Picture>;
 }
 
 /// The frames of a recording's video.
 #[derive(Clone, Copy)]
 pub struct RecordingVideo<'a> {
-    /// Mapping of points to pixels.
+    /// Mapping of points of the recording to pixels.
     pub mapping: PixelMapping,
-    /// The pictures.
+    /// Source of the pictures.
     pub pictures: &'a dyn PictureSource,
 }
 
@@ -148,33 +150,34 @@ impl std::fmt::Debug for RecordingVideo<'_> {
     }
 }
 
-/// Largest distance of the origin from the picture, pixels: an origin a thousand pictures away is a mistake.
+/// Largest distance of the origin from the picture's corner, pixels; an origin a thousand pictures away is a
+/// mistake.
 const MOST_PIXELS: f64 = 1e7;
-/// Admissible length of a pixel, m: from a microscope to far beyond a camera on a wiper.
+/// Admissible length of a pixel, m: from a microscope to far more than a camera on a wiper shows.
 const LENGTHS_M: std::ops::RangeInclusive<f64> = 1e-9..=1.0;
 
 /// `[video]`: pictures of frames, for figures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct VideoEntry {
-    /// Folder of PNG pictures, a frame each, in the order of their names, or a single PNG; relative to
-    /// this file.
+    /// Folder of PNG pictures, one per frame, in the order of their names, or a single PNG; relative to this
+    /// file.
     pub frames: String,
     /// Number of the frame that the first picture shows, counted from 0; 0 if left out.
     #[serde(default)]
     pub first_frame: usize,
-    /// Pixel at which x and y of the export are 0: to the right and down from the upper left corner.
+    /// Pixel at which x and y of the export are 0, counted to the right and down from the upper left corner.
     pub origin_px: NumberPair,
-    /// Length that a pixel shows, m; that of the camera if left out.
+    /// Length that a pixel shows, m; the length in `[camera]` if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub metres_per_pixel: Option<f64>,
 }
 
 impl VideoEntry {
-    /// Mapping to the pictures from points of a recording with this camera and this rotation.
+    /// Mapping from points of a recording with this camera and this rotation to pixels of the pictures.
     ///
     /// # Errors
-    /// [`FilesError::Video`] for a number that no picture has, or without the length of a pixel.
+    /// [`FilesError::Video`] for an impossible number, or if the length of a pixel is missing.
     pub(crate) fn pixel_mapping(
         &self,
         file: &str,
@@ -199,10 +202,10 @@ impl VideoEntry {
     }
 }
 
-/// Mapping of a tracked point to its pixel.
+/// Mapping from a tracked point to its pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PixelMapping {
-    /// Pixel of the export's origin.
+    /// Pixel at the origin of the export.
     pub origin_px: [f64; 2],
     /// Length that a pixel shows, m.
     pub metres_per_pixel: f64,
@@ -219,7 +222,7 @@ impl PixelMapping {
         Self { origin_px, metres_per_pixel, rotation }
     }
 
-    /// Pixel of a point of the recording, m, y upwards.
+    /// Pixel of a point of the recording, m; y points up.
     #[must_use]
     pub fn to_pixel(&self, [x_m, y_m]: [f64; 2]) -> [f64; 2] {
         let [x_m, y_m] = match self.rotation {
@@ -260,7 +263,7 @@ mod tests {
         assert_eq!(read(Grayscale, Eight, (2, 1), &[0, 200]), [0, 200]);
         assert_eq!(read(Grayscale, One, (3, 1), &[0b1010_0000]), [255, 0, 255]);
         assert_eq!(read(Grayscale, Sixteen, (1, 1), &[0x80, 0xFF]), [0x80]);
-        // half transparent black on white
+        // half-transparent black on white
         assert_eq!(read(GrayscaleAlpha, Eight, (2, 1), &[0, 0, 0, 128]), [255, 127]);
         assert_eq!(read(Rgb, Eight, (3, 1), &[255, 0, 0, 0, 255, 0, 0, 0, 255]), [76, 150, 29]);
         assert_eq!(read(Rgba, Eight, (1, 1), &[0, 0, 0, 0]), [255]);
@@ -335,7 +338,7 @@ mod tests {
             frames: 1,
             curvature_per_m: None,
         };
-        // turned clockwise, a point above the centre came to lie to its right
+        // the tracks were rotated clockwise: a point above the centre has moved to the right of it
         let [x, y] = PixelMapping::new([100.0, 50.0], 1e-3, Some(&level)).to_pixel([0.02, 0.0]);
         assert!((x - 110.0).abs() < 1e-9 && (y - 40.0).abs() < 1e-9, "{x} {y}");
         let unused = LevelEntry { applied: false, ..level };

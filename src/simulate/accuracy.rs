@@ -1,8 +1,8 @@
-//! Work-precision study: error and cost of every method on a scene, against a reference with a tenfold
-//! tighter tolerance.
+//! Work-precision study: error and cost of every method on a scene, relative to a reference run with a
+//! tolerance tenfold tighter than any studied.
 //!
-//! Errors are those of transition times, of the deflection at common times, and of two spectral components.
-//! The caller measures the run times.
+//! The study compares transition times, the deflection at common times, and two spectral components. The
+//! caller measures the run times.
 
 mod reference;
 mod sampled_run;
@@ -14,23 +14,24 @@ use super::scene::contact::{ContactLossRule, JamRule};
 use super::{IntegrationMethod, SolverOptions};
 pub(crate) use reference::{AccuracyRow, HIGH_COMPONENT, LOW_COMPONENT, ReferenceRun};
 
-/// Tolerances of a study.
+/// Relative tolerances of the studied runs.
 pub(crate) const TOLERANCES: [f64; 9] = [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12];
-/// Fixed steps of a study, s: from a tenth of a stick-slip cycle of 1 kHz down to the limit of rounding.
+/// Fixed steps of the studied runs, s: from a tenth of a stick-slip cycle of 1 kHz down to the limit of
+/// rounding.
 pub(crate) const FIXED_STEPS_S: [f64; 5] = [1e-4, 3e-5, 1e-5, 3e-6, 1e-6];
-/// Tolerance of the reference.
+/// Relative tolerance of the reference run.
 pub(crate) const REFERENCE_TOLERANCE: f64 = 1e-13;
 
-/// A method with its tolerance or step.
+/// A method with its tolerance or step size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SolverSetting {
     pub method: IntegrationMethod,
-    /// Relative tolerance; `None` for fixed steps.
+    /// Relative tolerance; `None` for a method with fixed steps.
     pub relative_tolerance: Option<f64>,
 }
 
 impl SolverSetting {
-    /// Name in tables and figures.
+    /// Name of the setting in tables and figures.
     pub(crate) fn name(&self) -> &'static str {
         match self.method {
             IntegrationMethod::FixedStep(scheme) => match scheme.locate {
@@ -47,8 +48,8 @@ impl SolverSetting {
     }
 }
 
-/// All settings for a scene: each adaptive method at each tolerance, then the fixed steps, unless the scene
-/// has flight or impacts.
+/// All settings for a scene: each adaptive method with each tolerance, then the fixed steps. The fixed steps
+/// are left out if the scene has flight or impacts.
 pub(crate) fn list_settings(scene: &Scene) -> Vec<SolverSetting> {
     let adaptive = [IntegrationMethod::Taylor, IntegrationMethod::RungeKutta, IntegrationMethod::Slack];
     let tolerances =
@@ -71,14 +72,14 @@ fn format_optional(value: Option<f64>) -> String {
     value.map_or_else(String::new, |v| format!("{v:e}"))
 }
 
-/// Cells of tolerance, step and worst error of a transition time.
+/// Table cells with the tolerance, the step, and the largest error of a transition time.
 fn setting_cells(row: &AccuracyRow) -> [String; 3] {
     let AccuracyRow { setting, lists, .. } = row;
     [setting.relative_tolerance, setting.method.step_s(), lists.worst_s].map(format_optional)
 }
 
-/// `work-precision.csv`: one row per setting. `error` is the worst error of a transition time, s, and empty
-/// if the transitions differ from the reference's.
+/// `work-precision.csv`: one row per setting. `error` is the largest error of a transition time, s; it is
+/// empty if the transitions differ from those of the reference.
 pub(crate) fn write_work_precision_csv(rows: &[AccuracyRow]) -> String {
     let row = |r: &AccuracyRow| {
         let [tolerance, step, error] = setting_cells(r);
@@ -89,8 +90,8 @@ pub(crate) fn write_work_precision_csv(rows: &[AccuracyRow]) -> String {
     std::iter::once(header.to_owned()).chain(rows.iter().map(row)).collect()
 }
 
-/// `accuracy.csv`: all errors of every setting. `above_reference_uncertainty` says whether the error of
-/// transition times exceeds the difference of the two references.
+/// `accuracy.csv`: all errors of every setting. `above_reference_uncertainty` says whether the error of the
+/// transition times exceeds the difference between the two reference runs.
 pub(crate) fn write_accuracy_csv(reference: &ReferenceRun<'_>, rows: &[AccuracyRow]) -> String {
     let row = |r: &AccuracyRow| {
         let [tolerance, step, error] = setting_cells(r);

@@ -1,4 +1,4 @@
-//! Properties of a scene's blade that ruler, scale and spectrum can check on the real one.
+//! Properties of a scene's blade that can be checked on the real blade with ruler, scale and spectrum.
 
 use super::equilibrium::steady_slip_pose;
 use super::scene::{Drive, Scene};
@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 /// Standard acceleration of free fall, m/s^2 (CGPM 1901).
 pub(crate) const FREE_FALL_M_PER_S2: f64 = 9.806_65;
 
-/// Properties of a blade that simple means can check.
+/// Properties of a blade that can be checked with simple means.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BenchChecks {
     /// Mass of neck and lip, the rubber below the head, kg.
@@ -19,35 +19,37 @@ pub struct BenchChecks {
     pub mass_kg: f64,
     /// Weight of head, neck and lip, N.
     pub weight_n: f64,
-    /// Masses and preload per length of blade; `None` for an unknown length.
+    /// Masses and preload per metre of blade; `None` if the length is unknown.
     pub per_metre: Option<ChecksPerMetre>,
-    /// Force on the tip for the displacements, N.
+    /// Force on the tip at which the displacements are given, N.
     pub tip_force_n: f64,
-    /// Displacement of the tip along the glass by this force in free air with the head held, m: `F ((l1 +
-    /// l2)^2/k1 + l2^2/k2)`.
+    /// Displacement of the tip along the glass under this force, in free air with the head held, m:
+    /// `F ((l1 + l2)^2/k1 + l2^2/k2)`.
     pub tip_displacement_m: f64,
-    /// Displacement of the tip with the neck held too, m: `F l2^2/k2`.
+    /// Displacement of the tip if the neck is held too, m: `F l2^2/k2`.
     pub lip_displacement_m: f64,
-    /// Displacement of the support by the preload, m: `N0/k0`.
+    /// Displacement of the support under the preload, m: `N0/k0`.
     pub preload_displacement_m: f64,
     /// Preload `N0`, N.
     pub preload_force_n: f64,
     /// Natural frequencies of the single parts.
     pub parts: PartFrequencies,
-    /// Coupled modes in free air, the head held, Hz.
+    /// Natural frequencies of the coupled modes in free air with the head held, Hz.
     pub free_air_hz: Vec<Option<f64>>,
-    /// Coupled modes on the glass under the preload with a frictionless tip, Hz; `None` for a mode that the
-    /// preload makes unstable.
+    /// Natural frequencies of the coupled modes on the glass under the preload with a frictionless tip, Hz;
+    /// `None` for a mode that the preload makes unstable.
     pub sliding_tip_hz: Vec<Option<f64>>,
-    /// Coupled modes on the glass with a held tip, Hz; `None` likewise.
+    /// Natural frequencies of the coupled modes on the glass with a held tip, Hz; `None` for an unstable
+    /// mode.
     pub held_tip_hz: Vec<Option<f64>>,
-    /// Steady slip at the head's top speed; `None` for a recorded drive or without such an equilibrium.
+    /// Steady slip at the head's top speed; `None` for a recorded drive, or if the blade has no such
+    /// equilibrium.
     pub slide: Option<SteadySlipCheck>,
 }
 
 /// Masses and preload per metre of blade.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[allow(missing_docs)] // named with their units
+#[allow(missing_docs)] // the names include the units
 pub struct ChecksPerMetre {
     pub rubber_mass_kg_per_m: f64,
     pub mass_kg_per_m: f64,
@@ -56,7 +58,7 @@ pub struct ChecksPerMetre {
 
 /// Natural frequencies of head, neck and lip, Hz.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[allow(missing_docs)] // named with their unit
+#[allow(missing_docs)] // the names include the unit
 pub struct PartFrequencies {
     pub head_hz: f64,
     pub neck_hz: f64,
@@ -79,7 +81,7 @@ pub struct SteadySlipCheck {
 }
 
 impl BenchChecks {
-    /// Computes the checks for a force on the tip, N, and the length of blade that the masses belong to, m.
+    /// Computes the checks for a force on the tip, N, and the length of blade to which the masses apply, m.
     #[must_use]
     pub fn from_scene(scene: &Scene, tip_force_n: f64, length_m: Option<f64>) -> Self {
         let blade = &scene.linkage;

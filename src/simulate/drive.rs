@@ -1,4 +1,4 @@
-//! Motion of the head along the sweep: the paper's cosine, uniform motion, or a recorded head.
+//! Motion of the head along the sweep: the paper's cosine, uniform motion, or the motion of a recorded head.
 
 mod head_spline;
 mod smoothing_spline;
@@ -14,22 +14,23 @@ use std::sync::Arc;
 /// Motion of the head along the sweep, `v(t)`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub enum Drive {
-    /// `v = a (1 - cos 2 pi f (t - t0))`, the paper's drive; its `t0` is 0.
+    /// Cosine `v = a (1 - cos 2 pi f (t - t0))`, the paper's drive; in the paper, `t0` is 0.
     Cosine {
-        /// `a`, m.
+        /// Amplitude `a`, m.
         amplitude_m: f64,
-        /// `f`, Hz.
+        /// Frequency `f`, Hz.
         frequency_hz: f64,
-        /// `t0`, s; 0 is not serialised, which keeps the hashes of scenes without delay.
+        /// Delay `t0`, s; a delay of 0 is not serialised, so that the hash of a scene without delay does not
+        /// change.
         #[serde(skip_serializing_if = "is_zero")]
         delay_s: f64,
     },
-    /// `v = speed t`; scene files cannot ask for it, tests with exact solutions do.
+    /// Uniform motion `v = speed t`, for tests with exact solutions; scene files cannot ask for it.
     Uniform {
         /// Speed of the head, m/s.
         speed_m_per_s: f64,
     },
-    /// The head of a recording; copies of a scene share it.
+    /// Motion of the head of a recording; copies of a scene share it.
     Recorded(Arc<HeadSpline>),
 }
 
@@ -57,8 +58,8 @@ impl Drive {
         }
     }
 
-    /// Fills `out` with Taylor coefficients of the head's velocity about `t`, m/s^k, lowest first. They hold
-    /// from `t` to the [next break](Self::next_break).
+    /// Fills `out` with the Taylor coefficients of the head's velocity about `t`, m/s^(k+1), in rising order.
+    /// The series holds from `t` to the [next break](Self::next_break).
     #[inline]
     pub(crate) fn velocity_series(&self, t: f64, out: &mut [f64]) {
         match *self {
@@ -100,7 +101,7 @@ impl Drive {
         if let Self::Cosine { delay_s, .. } = *self { delay_s } else { 0.0 }
     }
 
-    /// The next instant after `t`, s, at which a derivative of the motion jumps; integration steps must not
+    /// The next instant after `t`, s, at which a derivative of the motion jumps; an integration step must not
     /// cross it.
     #[inline]
     #[must_use]
@@ -111,7 +112,7 @@ impl Drive {
         }
     }
 
-    /// End of an integration from `t`, s: the next break or `stop`.
+    /// Latest end of an integration from `t`, s: the next break, or `stop` if that is earlier.
     #[inline]
     pub(crate) fn horizon(&self, t: f64, stop: f64) -> f64 {
         self.next_break(t).map_or(stop, |next| next.min(stop))
@@ -125,15 +126,15 @@ fn is_zero(value: &f64) -> bool {
 
 // Motion of a recorded head.
 
-/// Time over which frames are averaged before smoothing, and between knots of the spline, s. Tracking noise
-/// is correlated over a few frames (vibration, sub-pixel bias), and cross-validation would take it for
-/// motion. A head moves smoothly within this time.
+/// Time over which frames are averaged before smoothing, and time between knots of the spline, s. Tracking
+/// noise is correlated over a few frames (vibration, sub-pixel bias), and cross-validation would mistake it
+/// for motion. A head moves smoothly within this time.
 const BLOCK_S: f64 = 4e-3;
-/// Fewest frames with the head: cross-validation needs several points per degree of freedom.
+/// Minimum number of frames that show the head: cross-validation needs several points per degree of freedom.
 const FEWEST_FRAMES: usize = 10;
 
 /// Time at either end of a recording in which the acceleration of the head is ten times less certain, s. A
-/// run avoids it.
+/// run avoids these times.
 pub(crate) const UNCERTAIN_END_S: f64 = 0.01;
 /// Fraction of the head's top speed above which a run may start in steady slip.
 pub(crate) const EVEN_SPEED_SHARE: f64 = 0.2;
@@ -148,16 +149,16 @@ pub enum HeadMotionError {
     Few {
         /// Name of the recording.
         recording: String,
-        /// Frames with the head's x.
+        /// Number of frames with the head's x.
         found: usize,
-        /// Frames.
+        /// Number of frames of the recording.
         frames: usize,
     },
 }
 
-/// A smooth curve through the tracked positions of the head, `x`.
+/// Smooth curve through the tracked positions `x` of the head.
 ///
-/// Its uncertainty grows towards the first and the last frame.
+/// The uncertainty of the curve grows towards the first and the last frame.
 ///
 /// # Errors
 /// [`HeadMotionError`] if too few frames show the head.
@@ -176,7 +177,8 @@ pub fn smooth_head_motion(recording: &Recording) -> Result<HeadSpline, HeadMotio
     Ok(HeadSpline::from_points(&grid, &points, block, &knots))
 }
 
-/// First time at which the head is fast enough for a start in steady slip, s, after its uncertain start.
+/// First time at which the head is fast enough for a start in steady slip, s; it lies after the uncertain
+/// start of the recording.
 pub(crate) fn even_motion_start_s(motion: &HeadSpline) -> f64 {
     const STEP_S: f64 = 1e-3;
     let [first_s, last_s] = motion.span_s();
@@ -193,7 +195,7 @@ mod tests {
     use super::*;
     use crate::recording::FrameGrid;
 
-    /// The series about `t` gives the velocity a little later.
+    /// The series about `t` gives the velocity at a slightly later time.
     #[test]
     fn the_series_is_that_of_the_velocity() {
         let grid = FrameGrid { start_s: 0.1, frame_rate_hz: 20.0, frames: 40 };

@@ -1,4 +1,4 @@
-//! Steady slip: the static equilibrium of a blade that moves at constant speed.
+//! Steady slip: the static equilibrium of a blade whose head moves at constant speed.
 
 use crate::model::shoulder::ShoulderContact;
 use crate::model::{HeadMotion, LinkDirections, Linkage, Pose};
@@ -7,15 +7,16 @@ use nalgebra::{Matrix2, Vector2};
 /// Angles of neck and lip, rad, or moments on them, N m.
 type Pair = Vector2<f64>;
 
-/// Steps in which friction rises from zero to its value, so that each Newton iteration starts near its
-/// solution.
+/// Number of steps in which friction rises from zero to its value, so that each Newton iteration starts near
+/// its solution.
 const LOAD_STEPS: u32 = 64;
 const MOST_ITERATIONS: u32 = 50;
-/// Convergence limit of the residual moment relative to the stiffness of neck and lip times a radian.
+/// The iteration has converged if the residual moment is below this multiple of the stiffness of neck and lip
+/// times one radian.
 const RESIDUAL: f64 = 1e-14;
 
-/// Pose with `A qdd = 0` under the friction at the head's speed, m/s; `None` if the head rests, if no such
-/// pose exists with both links above level, or if the glass would have to pull the tip.
+/// Pose with `A qdd = 0` under the friction at the head's speed, m/s. `None` if the head is at rest, if no
+/// such pose with both links above level exists, or if the glass would have to pull the tip.
 #[must_use]
 pub fn steady_slip_pose(linkage: &Linkage, speed_m_per_s: f64) -> Option<Pose> {
     if speed_m_per_s == 0.0 {
@@ -34,14 +35,15 @@ pub fn steady_slip_pose(linkage: &Linkage, speed_m_per_s: f64) -> Option<Pose> {
     (is_pressed && is_upright).then_some(pose)
 }
 
-/// Largest trial coefficient of friction, and number of steps up to it.
+/// Largest trial coefficient of friction, and number of steps up to this coefficient.
 const MOST_FRICTION: f64 = 1.5;
 const FRICTIONS: u32 = 300;
 
-/// Equilibria in slow slip, in order of deflection: the coefficient of friction with the sign of the tip's
-/// velocity, and the deflection `tip_x - head_x`, m.
+/// Equilibria in slow slip, in order of deflection. Each has a coefficient of friction with the sign of the
+/// tip's velocity, and the deflection `tip_x - head_x`, m.
 ///
-/// Each direction ends where no equilibrium exists or a larger coefficient no longer bends the blade farther.
+/// In each direction, the list ends where no equilibrium exists or where a larger coefficient no longer
+/// increases the deflection.
 pub(crate) fn static_deflections(linkage: &Linkage) -> Vec<(f64, f64)> {
     let one_way = |sign: f64| {
         let mut angles = Vector2::zeros();
@@ -69,13 +71,13 @@ fn pose_at_rest(angles: &Pair) -> Pose {
     Pose { theta: angles[0], phi: angles[1], theta_rate: 0.0, phi_rate: 0.0 }
 }
 
-/// Side of the shoulder at a neck angle, rad.
+/// Side of the shoulder on which the neck leans at an angle, rad.
 pub(super) fn shoulder_contact(linkage: &Linkage, theta: f64) -> ShoulderContact {
     linkage.shoulder.map_or(ShoulderContact::Off, |s| s.contact_at(theta))
 }
 
-/// The equilibrium at one load. The side of the shoulder is fixed in each iteration, because Newton's steps
-/// could cycle across the kink at its corner.
+/// The equilibrium for one coefficient of friction. Each iteration keeps the side of the shoulder fixed,
+/// because Newton's steps could otherwise cycle across the kink at its corner.
 fn solve_for_load(linkage: &Linkage, mu: f64, angles: Pair) -> Option<Pair> {
     let here = shoulder_contact(linkage, angles[0]);
     let sides = [here, ShoulderContact::Off, ShoulderContact::Forward, ShoulderContact::Backward];
@@ -103,8 +105,8 @@ fn solve_newton(linkage: &Linkage, mu: f64, mut angles: Pair, side: ShoulderCont
     None
 }
 
-/// Residual moments of springs, normal force and friction on neck and lip at rest, N m: equations (1) and
-/// (2) of [`crate::model`] without rates.
+/// Residual moments of springs, normal force and friction on neck and lip at rest, N m: equations (1) and (2)
+/// of [`crate::model`] without rates.
 pub(super) fn residual_moments(linkage: &Linkage, mu: f64, angles: &Pair, side: ShoulderContact) -> Pair {
     let pose = pose_at_rest(angles);
     let d = LinkDirections::from_pose(&pose);

@@ -1,4 +1,4 @@
-//! The loop of a run: integrate a phase, locate its end, decide what follows.
+//! The event loop of a run: integrate a phase, locate its end, decide the next phase.
 
 mod flight_events;
 
@@ -26,7 +26,7 @@ use hybrid_ode::{
 use hybrid_ode::{fixed_step, taylor};
 use std::ops::ControlFlow;
 
-/// A run: its settings, and its state between phases.
+/// A run, with its settings and its state between phases.
 pub(super) struct EventLoop<'a, W> {
     system: &'a DrivenBlade,
     scene: &'a Scene,
@@ -51,18 +51,18 @@ pub(super) struct EventLoop<'a, W> {
     ),
 }
 
-/// Continuation after a phase.
+/// The next phase, or the end of the run.
 enum NextPhase {
     /// A phase of contact, with the order of the zero of each guard at its start (0 for none).
     Phase(TipMode, Pose, [u8; GUARDS]),
-    /// Flight, with the same orders.
+    /// Flight, with the order of the zero of each guard at its start.
     Flight(FlightState, [u8; GUARDS]),
     /// The end of the run.
     End(RunStatus),
 }
 
-/// A transition to record once the next mode is known: the mode before, and the cause unless the forces
-/// decide it.
+/// A transition that is recorded once the next mode is known: the mode before, and the cause if the forces do
+/// not decide it.
 type PendingTransition = Option<(TipMode, Option<TransitionCause>)>;
 
 impl<'a, W: RunWatcher> EventLoop<'a, W> {
@@ -109,7 +109,7 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
         }
     }
 
-    /// Status after a step that became too small.
+    /// Status of a run whose step became too small.
     fn failure_status(&self) -> RunStatus {
         if self.work.is_spent() { RunStatus::WorkLimit } else { RunStatus::Diverged }
     }
@@ -118,7 +118,7 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
         RunResult { status, stopped_at_s: self.t, transitions: self.transitions, work: self.work }
     }
 
-    /// The first mode: by the tip's velocity, or by the forces if it is at rest.
+    /// The first phase: its mode follows from the tip's velocity, or from the forces if the tip is at rest.
     fn first_phase(&mut self, pose: &Pose) -> NextPhase {
         if let StartKind::Airborne(state) = self.scene.start {
             let mut zero_order = [0; GUARDS];
@@ -176,11 +176,12 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
         }
     }
 
-    /// Removes the residual tip velocity of event location by an impulse on the tip, so that the decision
-    /// sees a tip exactly at rest. The residual is rounding, or the tolerance if the tip only grazes rest.
+    /// Removes the small tip velocity that event location leaves, by an impulse on the tip, so that the next
+    /// mode is decided for a tip exactly at rest. This velocity is a rounding error, or up to the tolerance
+    /// if the tip nearly stops.
     fn remove_tip_velocity(&self, mut pose: Pose) -> Pose {
         if matches!(self.effort.method, IntegrationMethod::FixedStep(scheme) if scheme.gain_per_s > 0.0) {
-            return pose; // the stabilisation removes it
+            return pose; // the stabilisation removes the velocity
         }
         let at = self.system.contact_instant(self.t, &pose, self.lean);
         let impulse =
@@ -223,7 +224,7 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
         self.decide_after_stick(end.cause, pose)
     }
 
-    /// Stick of the fixed-step scheme.
+    /// Integrates stick by the fixed-step scheme.
     fn hold_tip(&mut self, scheme: &FixedStepScheme, pose: &Pose, zero_order: [u8; GUARDS]) -> NextPhase {
         let phase = StabilisedStickPhase::from_pose(self.system, self.t, pose, self.lean, scheme.gain_per_s);
         let y = [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate];
@@ -274,7 +275,7 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
         NextPhase::Phase(mode, pose, zero_order)
     }
 
-    /// Decides again at a corner of the shoulder, where its damping makes the holding force jump.
+    /// Decides the next mode at a corner of the shoulder, where its damping makes the holding force jump.
     fn decide_at_corner(&mut self, guard: usize, pose: &Pose) -> NextPhase {
         let corner = self.cross_corner(guard);
         let mut next = self.decide_at_rest(pose, Some((TipMode::Stick, None)));
@@ -317,9 +318,9 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
             }
             Ended::StepTooSmall => NextPhase::End(RunStatus::Diverged),
             Ended::Guard(JAMS) if self.is_at_pole(&phase, &pose) => self.resolve_jam(&pose, mode),
-            // extrapolated past rest, steeply falling friction grows without bound, and the interpolant of
-            // the indicator may dip below zero although the indicator does not: the phase goes on from this
-            // state
+            // a series or interpolant that extends past the tip's rest may put the indicator below zero,
+            // because steeply falling friction grows without bound there; the indicator itself has not
+            // fallen, so the phase continues from this state
             Ended::Guard(JAMS) => {
                 self.recent.note_event(self.t);
                 self.shorten_slip_step();
@@ -331,14 +332,14 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
                 self.recent.note_event(self.t);
                 let next = self.decide_at_rest(&self.remove_tip_velocity(pose), Some((mode, None)));
                 if matches!(next, NextPhase::Phase(same, ..) if same == mode) {
-                    // the tip has not stopped: the first step was too long to resolve the release
+                    // the tip has not stopped: the first step was too long to resolve the start of slip
                     self.shorten_slip_step();
                 }
                 next
             }
             Ended::Guard(guard) => {
                 let corner = self.cross_corner(guard);
-                // at the instant of a release the tip's velocity still has its zero
+                // at the instant of a release, the tip's velocity is still zero
                 let mut next_order = if end.t == started { zero_order } else { [0; GUARDS] };
                 next_order[corner] = 1;
                 NextPhase::Phase(mode, pose, next_order)
@@ -347,17 +348,17 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
     }
 
     fn shorten_slip_step(&mut self) {
-        /// Factor on the next first step of slip.
+        /// Factor by which the next first step of slip is shortened.
         const SHORTER: f64 = 0.1;
         self.steps[1] = self.steps[1].map(|step| SHORTER * step);
     }
 
-    /// Whether the tip is about to jam. Near the paradox the indicator vanishes as the square root of the
-    /// remaining time and the normal force grows without bound. No step resolves the last instant; a step
-    /// beyond it, by rounding, finds a force that pulls.
+    /// Whether the tip is about to jam. Near the Painlevé paradox, the indicator vanishes as the square root
+    /// of the remaining time, and the normal force grows without bound. No step resolves the last instant; a
+    /// step that passes it because of rounding finds a normal force that pulls.
     fn is_at_pole(&self, phase: &SlipPhase<'_>, pose: &Pose) -> bool {
-        /// An empirical limit: of 300 random blades with heavy heads, runs that ended at the paradox had an
-        /// indicator of at most 5e-6 in size, all others 0.5 or more.
+        /// An empirical limit. Of runs with 300 random blades with heavy heads, those that ended at the
+        /// paradox had an indicator of at most 5e-6 in size, all others one of at least 0.5.
         const VANISHED: f64 = 1e-4;
         let (_, forces) = phase.slip_forces(pose, &self.system.contact_instant(self.t, pose, self.lean));
         forces.indicator < VANISHED
@@ -376,18 +377,19 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
     }
 }
 
-/// Order of the zero of the tip's velocity as slip starts from rest: 1 if friction is less than the holding
-/// force, 2 if both are equal up to rounding, as at the end of stick.
+/// Order of the zero of the tip's velocity when slip starts from rest: 1 if the holding force exceeds the
+/// static limit, 2 if both are equal up to rounding, as at the end of stick.
 fn release_order(contact: &FrictionResponse, mu: f64) -> u8 {
-    /// Relative excess over the limit up to which the forces count as equal: far above rounding, far below
-    /// the resolution of a step.
+    /// Largest relative excess of the holding force over the limit at which the two count as equal: far above
+    /// rounding, far below the resolution of a step.
     const EQUAL: f64 = 1e-11;
     let force = holding_force(contact);
     let limit = mu * (contact.n_free + contact.nu * force);
     if force.abs() > limit * (1.0 + EQUAL) { 1 } else { 2 }
 }
 
-/// Cause of a transition at rest; stick is decided again only at a corner of the shoulder.
+/// Cause of the transition of a tip at rest. A transition out of stick comes here only at a corner of the
+/// shoulder.
 fn cause_of_change(from: TipMode, to: TipMode) -> TransitionCause {
     match (from, to) {
         (_, TipMode::Stick) => TransitionCause::TipStops,
@@ -396,10 +398,10 @@ fn cause_of_change(from: TipMode, to: TipMode) -> TransitionCause {
     }
 }
 
-/// Integrates a phase by the method of the run, horizon by horizon.
+/// Integrates a phase by the method of the run, from one horizon to the next.
 ///
-/// `horizon` maps a time to the latest end of a step from there; the phase stops at a time that it maps to
-/// itself.
+/// `horizon(t)` is the latest time up to which the integration from `t` may run; the phase stops where
+/// `horizon(t)` is not later than `t`.
 pub(super) fn integrate_phase<const N: usize, P: TaylorPhase<N, GUARDS>>(
     phase: &P,
     mut start: PhaseStart<N, GUARDS>,
@@ -454,10 +456,10 @@ pub(super) struct ChatterDetector {
 }
 
 impl ChatterDetector {
-    /// Number of recent events.
+    /// Number of the latest events that are considered.
     const WINDOW: usize = 64;
-    /// Fraction of the blade's shortest period in which this many events count as chattering; real cycles
-    /// take about a period each.
+    /// These events count as chattering if they lie within this fraction of the blade's shortest period; real
+    /// stick-slip cycles take about a period each.
     const SHARE: f64 = 1e-6;
 
     pub(super) fn new(period_s: f64) -> Self {
@@ -478,7 +480,7 @@ impl ChatterDetector {
 pub(in crate::simulate) trait RunWatcher {
     /// Receives a piece of the solution, in order of time.
     fn watch_segment(&mut self, piece: &SolutionSegment<'_>);
-    /// Receives the guard that falls to zero at the end of the last piece, and the series of that piece.
+    /// Receives the guard that has fallen to zero at the end of the last piece, and the series of that piece.
     fn watch_guard(&mut self, _guard: usize, _motion: &TaylorMotion) {}
     /// Receives a strike of the tip on the glass at the end of the last piece.
     fn watch_strike(&mut self, _strike: &TipStrike) {}
@@ -490,7 +492,7 @@ pub(in crate::simulate) trait RunWatcher {
     fn control_flow(&self) -> ControlFlow<()>;
 }
 
-/// Passes a run on to an observer.
+/// Passes the events of a run on to an observer.
 pub(in crate::simulate) struct ObserverWatcher<'a, O>(pub &'a mut O);
 
 impl<O: Observer> RunWatcher for ObserverWatcher<'_, O> {
@@ -512,8 +514,8 @@ impl<O: Observer> RunWatcher for ObserverWatcher<'_, O> {
 mod tests {
     use super::*;
 
-    /// A full window of events within a millionth of the shortest period is chattering; one event per
-    /// period is not.
+    /// A full window of events within a millionth of the shortest period is chattering; one event per period
+    /// is not.
     #[test]
     fn events_that_accumulate_differ_from_cycles() {
         let period_s = 2e-3;

@@ -6,8 +6,8 @@
 //! Phi'' + 2 a Phi' + b^2 Phi = 0,   a = b
 //! ```
 //!
-//! Transitions happen at the end of a step or are located by the slack variable method. The paper gives
-//! neither step nor gain.
+//! Transitions happen at the end of a step or are located by the slack variable method. The paper states
+//! neither the step nor the gain.
 
 use super::phases::{ContactInstant, DrivenBlade, GUARDS, TipForces, apply_friction, pose_from_states};
 use crate::model::shoulder::ShoulderContact;
@@ -16,7 +16,7 @@ use hybrid_ode::HybridPhase;
 pub(crate) use hybrid_ode::fixed_step::FixedStepLocator;
 use hybrid_ode::fixed_step::FixedStepOptions;
 
-/// Default gain of the stabilisation, 1/s: drift of the tip decays within 0.1 ms, a tenth of a stick-slip
+/// Default gain of the stabilisation, 1/s: a drift of the tip decays within 0.1 ms, a tenth of a stick-slip
 /// cycle.
 pub(crate) const DEFAULT_GAIN_PER_S: f64 = 1e4;
 /// Largest stable product of gain and step for the double pole at `-a` (Hairer and Wanner, "Solving Ordinary
@@ -30,34 +30,34 @@ pub struct FixedStepScheme {
     pub step_s: f64,
     /// Method of locating transitions.
     pub locate: FixedStepLocator,
-    /// Gains `a = b` of the stabilisation, 1/s. With zero gain the tip's velocity is removed at the
+    /// Gains `a = b` of the stabilisation, 1/s. If the gain is zero, the tip's velocity is removed at the
     /// transition, because it would not decay.
     pub gain_per_s: f64,
 }
 
 impl FixedStepScheme {
-    /// Options of the integrator.
+    /// Settings of the fixed-step integrator.
     pub(crate) fn integrator_options(&self) -> FixedStepOptions {
         FixedStepOptions { step_s: self.step_s, locate: self.locate }
     }
 }
 
-/// Stick that draws the tip to `place_m`; states `(theta, phi, theta_rate, phi_rate)`, guards as in
-/// [`super::phases::StickPhase`].
+/// Stick in which the stabilisation draws the tip to `place_m`; the states are
+/// `(theta, phi, theta_rate, phi_rate)`, the guards those of [`super::phases::StickPhase`].
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StabilisedStickPhase<'a> {
     /// The blade on its drive.
     pub system: &'a DrivenBlade,
     /// Target position of the tip, `alpha`, m.
     pub place_m: f64,
-    /// Side of the shoulder.
+    /// Side of the shoulder on which the neck leans.
     pub lean: ShoulderContact,
     /// Gains of the stabilisation, 1/s.
     pub gain_per_s: f64,
 }
 
 impl<'a> StabilisedStickPhase<'a> {
-    /// Holds the tip at its position in a pose.
+    /// Stick that holds the tip at its position in a pose.
     pub(crate) fn from_pose(
         system: &'a DrivenBlade,
         t: f64,

@@ -1,4 +1,4 @@
-//! Flight as a smooth phase with guards: no contact force acts until the tip lands.
+//! Flight as a smooth phase with guards: no contact force acts on the tip until it lands.
 
 use super::phases::{DrivenBlade, GUARDS, GuardedExpansion, LEVEL_GUARDS, SHOULDER_GUARDS, TaylorMotion};
 use crate::model::flight::FlightState;
@@ -9,19 +9,20 @@ use hybrid_ode::HybridPhase;
 use hybrid_ode::taylor::TaylorPhase;
 use portable_math as math;
 
-/// The gap falls to zero. Guards of shoulder and level are as in contact; the others do not apply.
+/// Guard of landing: the gap falls to zero. The guards of shoulder and level are those of contact; the other
+/// guards of contact do not apply.
 pub(crate) const LANDING: usize = 0;
 
-/// Flight; states `(theta, phi, gap, theta_rate, phi_rate, gap_rate)`.
+/// The phase of flight; the states are `(theta, phi, gap, theta_rate, phi_rate, gap_rate)`.
 #[derive(Debug, Clone, Copy)]
 pub struct FlightPhase<'a> {
     /// The blade on its drive.
     pub system: &'a DrivenBlade,
-    /// Side of the shoulder.
+    /// Side of the shoulder on which the neck leans.
     pub lean: ShoulderContact,
 }
 
-/// State of flight from its six numbers.
+/// State of flight from its six numbers, in the order of [`FlightPhase`].
 #[inline]
 pub(crate) fn flight_state_from(y: &[f64; 6]) -> FlightState {
     FlightState {
@@ -31,7 +32,7 @@ pub(crate) fn flight_state_from(y: &[f64; 6]) -> FlightState {
     }
 }
 
-/// Six numbers of a state of flight.
+/// The six numbers of a state of flight, in the order of [`FlightPhase`].
 #[must_use]
 pub fn flight_state_vector(state: &FlightState) -> [f64; 6] {
     let FlightState { pose, gap_m, gap_rate_m_per_s } = *state;

@@ -1,8 +1,8 @@
-//! Impact at one contact with Coulomb friction, integrated in the normal impulse (Routh's method; Keller, J.
-//! Appl. Mech. 53, 1986).
+//! Impact at a single contact with Coulomb friction, integrated over the normal impulse (Routh's method;
+//! Keller, J. Appl. Mech. 53, 1986).
 //!
-//! An impact takes no time: positions and finite forces stay, the impulse on the tip grows. With the inverse
-//! contact mass `W` and the normal impulse `p` as the independent variable,
+//! An impact takes no time: positions and finite forces do not change, while the impulse on the tip grows.
+//! With the inverse contact mass `W` and the normal impulse `p` as the independent variable,
 //!
 //! ```text
 //! dv_n/dp = W_nn + W_nt lambda     dv_t/dp = W_nt + W_tt lambda
@@ -11,14 +11,15 @@
 //!         otherwise the tip slips on in the direction of W_nt
 //! ```
 //!
-//! Compression lasts while `v_n < 0`; restitution until the normal force has given back the share `e^2` of
-//! the work that compression took (Stronge's energetic coefficient, Impact Mechanics, chapter 3), so that an
-//! impact never gains energy.
+//! Compression lasts while `v_n < 0`. Restitution lasts until the normal force has given back the fraction
+//! `e^2` of the work that compression took (Stronge's energetic coefficient, Impact Mechanics, chapter 3), so
+//! that an impact never gains energy.
 //!
-//! The same integration resolves the Painlevé paradox as an impact without collision: in slip with `W_nn -
-//! sigma mu W_nt <= 0` compression grows by itself from `v_n = 0`. It ends: there `sigma W_nt >= W_nn / mu`,
-//! so by `W_nt^2 < W_nn W_tt` the tip is braked at `sigma dv_t/dp < 0` down to rest, where `|W_nt| < mu
-//! W_tt` lets it stick, and sticking restores at `W_nn - W_nt^2 / W_tt > 0`.
+//! The same integration resolves the Painlevé paradox as an impact without collision: in slip with
+//! `W_nn - sigma mu W_nt <= 0`, compression grows by itself from `v_n = 0`. This compression ends: since
+//! `sigma W_nt >= W_nn / mu` and `W_nt^2 < W_nn W_tt`, the tip is braked at `sigma dv_t/dp < 0` down to rest.
+//! There, `|W_nt| < mu W_tt` lets the tip stick, and restitution follows at the rate
+//! `W_nn - W_nt^2 / W_tt > 0`.
 
 use crate::model::flight::FlightState;
 use crate::model::friction::FrictionLaw;
@@ -32,7 +33,7 @@ use portable_math as math;
 pub struct InverseMass {
     /// `W_nn`: normal velocity per normal impulse.
     pub nn: f64,
-    /// `W_nt`: normal velocity per tangential impulse, and the reverse.
+    /// `W_nt`: normal velocity per tangential impulse, and tangential velocity per normal impulse.
     pub nt: f64,
     /// `W_tt`: tangential velocity per tangential impulse.
     pub tt: f64,
@@ -41,7 +42,7 @@ pub struct InverseMass {
 /// Restitution and friction of a contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactSurface {
-    /// Law of friction, the same as in slip.
+    /// Friction law, the same as in slip.
     pub friction: FrictionLaw,
     /// Stronge's energetic coefficient of restitution, 0 to 1.
     pub restitution: f64,
@@ -59,7 +60,7 @@ pub struct TipVelocity {
 /// Result of an impact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImpactOutcome {
-    /// Velocity of the tip after the impact; exactly zero at rest.
+    /// Velocity of the tip after the impact; exactly zero for a tip at rest.
     pub velocity: TipVelocity,
     /// Normal and tangential impulse on the tip, N s.
     pub impulse_n_s: [f64; 2],
@@ -76,7 +77,7 @@ pub enum ImpactOrigin {
     Jam,
 }
 
-/// Solves an impact from the velocity `before`; `None` if the integration meets numbers that are not finite.
+/// Solves an impact from the velocity `before`; `None` if the integration yields numbers that are not finite.
 ///
 /// `relative` is the tolerance of the integration.
 #[must_use]
@@ -88,8 +89,8 @@ pub fn solve_impact(
     relative: f64,
     work: &mut WorkCounters,
 ) -> Option<ImpactOutcome> {
-    /// Ratio of tangential to normal velocity above which the tangential one sets the unit of velocity, so
-    /// that the quotient stays finite.
+    /// If the ratio of tangential to normal velocity exceeds this value, the tangential velocity sets the
+    /// unit of velocity, so that the quotient stays finite.
     const FLATTEST: f64 = 1e12;
     let unit = before.normal.abs().max(before.tangential.abs() / FLATTEST);
     let unit = if origin == ImpactOrigin::Jam { before.tangential.abs() } else { unit };
@@ -129,21 +130,21 @@ enum ImpactStage {
     Ended,
 }
 
-/// State of an impact: velocities in units of one velocity, `unit`, impulses in units of `unit / W_nn`.
+/// State of an impact, with velocities in units of `unit` and impulses in units of `unit / W_nn`.
 #[derive(Debug, Clone, Copy)]
 struct ImpactState {
     impulse: f64,
     normal: f64,
     tangential: f64,
-    /// Work taken by compression and given back by restitution, both positive.
+    /// Work taken up in compression and given back in restitution, both positive.
     taken: f64,
     given: f64,
     stage: ImpactStage,
 }
 
-/// A dimensionless impact.
+/// An impact in dimensionless variables.
 struct ScaledImpact {
-    /// `W_nt / W_nn` and `W_tt / W_nn`.
+    /// Ratios `W_nt / W_nn` and `W_tt / W_nn`.
     cross: f64,
     along: f64,
     friction: FrictionLaw,
@@ -155,7 +156,8 @@ struct ScaledImpact {
 impl ScaledImpact {
     /// Integrates an impact to its end.
     fn integrate_impact(&self, mut state: ImpactState, work: &mut WorkCounters) -> Option<ImpactState> {
-        /// The tip slips at most twice, before and after rest, and each slip has a few stages at most.
+        /// Maximum number of parts of an impact: the tip slips at most twice, before and after rest, and each
+        /// slip has a few stages.
         const MOST_PARTS: usize = 32;
         for _ in 0..MOST_PARTS {
             if state.stage == ImpactStage::Ended {
@@ -176,7 +178,7 @@ impl ScaledImpact {
         (tangential != 0.0 || !holds).then(|| leading.signum())
     }
 
-    /// The state after compression that ends in slip.
+    /// The state after a compression that ends during slip.
     fn end_compression(&self, state: ImpactState) -> ImpactState {
         let restores = self.remaining_work(&state) > 0.0;
         let stage = if restores { ImpactStage::Restitution } else { ImpactStage::Ended };
@@ -188,7 +190,7 @@ impl ScaledImpact {
         self.restitution * self.restitution * state.taken - state.given
     }
 
-    /// The end in stick, in closed form: the normal velocity is linear in the impulse.
+    /// The end of an impact in stick, in closed form: the normal velocity is linear in the impulse.
     fn finish_in_stick(&self, state: ImpactState) -> ImpactState {
         let growth = 1.0 - self.cross * self.cross / self.along;
         let mut at_zero = state;
@@ -202,7 +204,7 @@ impl ScaledImpact {
         ImpactState { impulse, normal, stage: ImpactStage::Ended, ..at_zero }
     }
 
-    /// Slips until the tip is at rest or the stage ends.
+    /// Integrates slip until the tip is at rest or the stage ends.
     fn slip(&self, state: ImpactState, direction: f64, work: &mut WorkCounters) -> Option<ImpactState> {
         let restores = state.stage == ImpactStage::Restitution;
         let slide = ImpactSlip { blow: self, direction, from: state, open: false };
@@ -220,8 +222,8 @@ impl ScaledImpact {
         Some(next)
     }
 
-    /// The slip of a jam, down to rest. No stage ends it: the normal velocity starts at a zero of unknown
-    /// order, which depends on how the indicator vanished.
+    /// Integrates the slip of a jam until the tip is at rest. A stage cannot end it: the normal velocity
+    /// starts at a zero whose order is unknown, because it depends on how the indicator vanished.
     fn integrate_jam(&self, state: ImpactState, work: &mut WorkCounters) -> Option<ImpactState> {
         let slide = ImpactSlip { blow: self, direction: state.tangential.signum(), from: state, open: true };
         let (next, cause) = slide.integrate([0; 3], work);
@@ -231,20 +233,21 @@ impl ScaledImpact {
     }
 }
 
-/// Guards of slip: the tip comes to rest; the stage ends; in restitution the tip approaches the glass again.
+/// Guards of slip: the tip comes to rest, the stage ends, or the tip approaches the glass again in
+/// restitution.
 const RESTS: usize = 0;
 const CLOSES: usize = 1;
 const REOPENS: usize = 2;
 
 /// Slip in one direction as a function of the normal impulse.
 ///
-/// States: change of the tangential speed in that direction, which is far smaller than the speed in a
-/// glancing impact, and work of the normal force.
+/// The states are the change of the tangential speed in that direction, which is far smaller than the speed
+/// in a glancing impact, and the work of the normal force.
 struct ImpactSlip<'a> {
     blow: &'a ScaledImpact,
     direction: f64,
     from: ImpactState,
-    /// Whether only rest ends it.
+    /// Whether the slip ends only when the tip is at rest.
     open: bool,
 }
 
@@ -253,7 +256,7 @@ impl ImpactSlip<'_> {
         self.direction * self.from.tangential + growth
     }
 
-    /// Normal velocity from both impulses; integrated as a state of its own it would drift from them.
+    /// Normal velocity from both impulses; if it were integrated as a state, it would drift from them.
     fn normal_velocity(&self, impulse: f64, growth: f64) -> f64 {
         let ScaledImpact { cross, along, .. } = *self.blow;
         let grown = impulse - self.from.impulse;
@@ -262,9 +265,10 @@ impl ImpactSlip<'_> {
     }
 
     fn integrate(&self, zero_order: [u8; 3], work: &mut WorkCounters) -> (ImpactState, PhaseEndCause) {
-        /// Impulse at which slip counts as endless, in units of the impulse that stops the tip alone.
+        /// Impulse at which slip counts as endless, in units of the impulse that stops the tip without
+        /// friction.
         const MOST: f64 = 1e15;
-        /// First trial step in the same unit: slip usually ends within it.
+        /// First trial step in the same unit; slip usually ends within this step.
         const FIRST: f64 = 1.0;
         let start = PhaseStart { t: self.from.impulse, y: [0.0; 2], zero_order, step: Some(FIRST) };
         let end = ode::integrate(self, start, MOST, self.blow.relative, work, |_| ());
@@ -312,7 +316,7 @@ impl HybridPhase<2, 3> for ImpactSlip<'_> {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TipStrike {
     pub pose: Pose,
-    /// Velocity of the tip before.
+    /// Velocity of the tip before the strike.
     pub before: TipVelocity,
     pub origin: ImpactOrigin,
     /// Energetic coefficient of restitution.
@@ -320,7 +324,7 @@ pub(crate) struct TipStrike {
 }
 
 impl TipStrike {
-    /// State after the impact, and its outcome; `None` if the integration meets numbers that are not finite.
+    /// State after the impact, and its outcome; `None` if the integration yields numbers that are not finite.
     pub(crate) fn solve_on_blade(
         &self,
         linkage: &Linkage,

@@ -1,5 +1,4 @@
-//! Modes of contact, and the mode that follows when the tip is at rest on the glass: a pure function of the
-//! forces.
+//! Modes of contact, and the next mode of a tip at rest on the glass, which is a pure function of the forces.
 
 use crate::model::FrictionResponse;
 use serde::Serialize;
@@ -22,7 +21,7 @@ pub enum TipMode {
 }
 
 impl TipMode {
-    /// Name in files.
+    /// Name of the mode in files.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -43,7 +42,7 @@ impl TipMode {
         }
     }
 
-    /// The slip mode of a direction.
+    /// The mode of slip in a direction.
     pub(crate) fn slip_towards(direction: f64) -> Self {
         if direction < 0.0 { Self::SlipBackward } else { Self::SlipForward }
     }
@@ -52,7 +51,7 @@ impl TipMode {
 /// Next mode of a tip at rest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum RestDecision {
-    /// The only consistent mode.
+    /// The tip takes the only consistent mode.
     Becomes(TipMode),
     /// More than one mode is consistent with the forces.
     Indeterminate,
@@ -69,8 +68,8 @@ pub fn holding_force(contact: &FrictionResponse) -> f64 {
 /// Decides the next mode of a tip at rest; `mu` is the static friction coefficient `A + C`.
 ///
 /// If `1 + sigma mu nu` is positive in both directions, exactly one mode is consistent: stick if the holding
-/// force is within the static limit and the normal force presses, lift-off if the glass would have to pull,
-/// otherwise slip against the holding force. Elsewhere (the Painlevé region) every mode is tried.
+/// force is within the static limit and the glass presses on the tip, lift-off if the glass would have to
+/// pull, otherwise slip against the holding force. If it is not (the Painlevé region), every mode is tried.
 pub(crate) fn decide_mode_at_rest(contact: &FrictionResponse, mu: f64) -> RestDecision {
     let force = holding_force(contact);
     let normal = contact.n_free + contact.nu * force;
@@ -96,7 +95,7 @@ pub(crate) fn decide_mode_at_rest(contact: &FrictionResponse, mu: f64) -> RestDe
     }
 }
 
-/// Whether slip in a direction has a normal force that presses and an acceleration in that direction.
+/// Whether slip in a direction gives a normal force that presses and an acceleration in the same direction.
 fn is_slip_consistent(contact: &FrictionResponse, mu: f64, direction: f64) -> bool {
     let indicator = 1.0 + direction * mu * contact.nu;
     let normal = contact.n_free / indicator;
@@ -114,7 +113,7 @@ mod tests {
 
     #[test]
     fn the_holding_force_within_the_limit_sticks_and_beyond_it_slips_against_it() {
-        // needs 0.5 N of at most 0.6 N
+        // holding the tip needs 0.5 N of at most 0.6 N
         assert_eq!(decide_mode_at_rest(&contact(1.0, 1.0, 0.0), 0.6), RestDecision::Becomes(TipMode::Stick));
         assert_eq!(
             decide_mode_at_rest(&contact(1.0, 1.0, 0.0), 0.4),

@@ -6,14 +6,15 @@ use crate::simulate::scene::Scene;
 use crate::simulate::{Impact, ModelSample, Observer, RunResult, SolutionSegment, Transition, run_scene};
 use std::ops::ControlFlow;
 
-/// Samples of a run: twenty per cycle of 1 kHz over the 0.25 s of a reversal.
+/// Number of samples of a run: 24 per cycle of 1 kHz over the 0.25 s of a reversal.
 pub(crate) const MOTION_SAMPLES: usize = 6000;
-/// Time between fine samples, s: fifty per cycle of 1 kHz.
+/// Time between fine samples, s: fifty samples per cycle of 1 kHz.
 const FINE_STEP_S: f64 = 2e-5;
-/// Most fine samples of a run (14 MB); a longer run has wider steps.
+/// Maximum number of fine samples of a run (14 MB); in a longer run, the time between them is longer.
 const MAX_FINE_SAMPLES: usize = 100_000;
 
-/// Least return of the head after a turn as a fraction of its travel; less is vibration of the drive.
+/// Fraction of its travel by which the head must move to an extremum and back for it to count as a turn;
+/// vibration of the drive is smaller.
 const RETURN: f64 = 0.005;
 
 /// Samples and events of a run.
@@ -21,9 +22,9 @@ const RETURN: f64 = 0.005;
 pub struct RunMotion {
     /// Links, springs and friction of the blade.
     pub linkage: Linkage,
-    /// States at equal steps of time until the end of the run.
+    /// States at equal time steps until the end of the run.
     pub samples: Vec<ModelSample>,
-    /// States at finer steps, for figures of a part of the run.
+    /// States at finer time steps, for figures of a part of the run.
     pub fine: Vec<ModelSample>,
     /// Every change of mode.
     pub transitions: Vec<Transition>,
@@ -31,7 +32,7 @@ pub struct RunMotion {
     pub stick_s: Vec<[f64; 2]>,
     /// Every impact of the tip on the glass.
     pub impacts: Vec<Impact>,
-    /// Extremes over the whole run, not only over the samples.
+    /// Extremes over the whole run, not only at the samples.
     pub extremes: EnergyAudit,
     /// Status and work of the run.
     pub run: RunResult,
@@ -53,7 +54,8 @@ impl RunMotion {
         self.fine.get(first..end).unwrap_or_default()
     }
 
-    /// Index of the sample at the first turn of the head: an extremum well away from its start and end.
+    /// Index of the sample at the first turn of the head, an extremum that the head reaches and leaves by
+    /// more than [`RETURN`] of its travel.
     pub(crate) fn turn(&self) -> Option<usize> {
         let x = |at: usize| self.samples[at].head_x_m;
         let (least, most) = self
@@ -78,7 +80,7 @@ impl RunMotion {
         self.samples.get(self.turn()?).map(|sample| sample.time_s)
     }
 
-    /// The longest interval of stick, s; the last of equal ones.
+    /// The longest interval of stick, s; if several are equal, the last of them.
     pub(crate) fn longest_stick_s(&self) -> Option<[f64; 2]> {
         self.stick_s.iter().copied().max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))
     }
@@ -116,7 +118,7 @@ impl Observer for MotionRecorder {
     forward_to_observers!(self: self.states, self.events);
 }
 
-/// States at equal steps of time from the start of a scene to its stop.
+/// States at equal time steps from the start of a scene to its stop.
 struct EvenSamples {
     span_s: [f64; 2],
     count: usize,

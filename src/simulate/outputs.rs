@@ -16,14 +16,14 @@ use std::fmt::Write;
 use std::iter::Peekable;
 use std::ops::ControlFlow;
 
-/// Passes samples at given rising times to `sink`.
+/// Passes samples at given times to `sink`.
 pub struct SampleObserver<I: Iterator<Item = f64>, F: FnMut(&ModelSample)> {
     times: Peekable<I>,
     sink: F,
 }
 
 impl<I: Iterator<Item = f64>, F: FnMut(&ModelSample)> SampleObserver<I, F> {
-    /// Samples at these rising times, s.
+    /// Samples at these times, s, which must rise.
     pub fn new(times: I, sink: F) -> Self {
         Self { times: times.peekable(), sink }
     }
@@ -37,7 +37,7 @@ impl<I: Iterator<Item = f64>, F: FnMut(&ModelSample)> Observer for SampleObserve
     }
 }
 
-/// Collects the transitions.
+/// Collects the transitions of a run.
 #[derive(Debug, Clone, Default)]
 pub struct Transitions(pub Vec<Transition>);
 
@@ -48,7 +48,7 @@ impl Observer for Transitions {
     }
 }
 
-/// Collects the impacts.
+/// Collects the impacts of a run.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Impacts(pub Vec<Impact>);
 
@@ -59,7 +59,7 @@ impl Observer for Impacts {
     }
 }
 
-/// Collects the intervals of stick, s.
+/// Collects the intervals of stick of a run, s.
 #[derive(Debug, Clone, Default)]
 pub struct StickIntervals(pub Vec<[f64; 2]>);
 
@@ -78,9 +78,9 @@ impl Observer for StickIntervals {
 /// Largest angle of a link from the vertical.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct LargestTilt {
-    /// The angle, rad, at the ends of pieces; a swing has many pieces.
+    /// The largest angle at the ends of pieces, rad; a swing has many pieces.
     pub largest_rad: f64,
-    /// Time of the angle, s.
+    /// Time of the largest angle, s.
     pub at_s: f64,
 }
 
@@ -94,7 +94,7 @@ impl Observer for LargestTilt {
     }
 }
 
-/// Methods of an [`Observer`] that pass everything on to one or more observers.
+/// Methods of an [`Observer`] that pass all events on to one or two observers.
 macro_rules! forward_to_observers {
     ($self:ident: $first:expr $(, $other:expr)?) => {
         fn observe_segment(&mut $self, piece: &SolutionSegment<'_>) {
@@ -118,7 +118,7 @@ macro_rules! forward_to_observers {
 }
 pub(super) use forward_to_observers;
 
-/// Both observers see the run.
+/// A pair of observers; both receive the events of a run.
 impl<A: Observer, B: Observer> Observer for (A, B) {
     forward_to_observers!(self: self.0, self.1);
 }
@@ -128,7 +128,8 @@ impl<A: Observer> Observer for &mut A {
     forward_to_observers!(self: (**self));
 }
 
-/// Extremes and energy balance of a run: drive power = storage + damping + friction work + losses of impacts.
+/// Extremes and energy balance of a run. In balance, the drive's power equals the sum of storage, damping,
+/// friction and losses of impacts.
 #[derive(Debug, Clone, Default)]
 pub struct EnergyAudit {
     start_energy_j: Option<f64>,
@@ -138,14 +139,15 @@ pub struct EnergyAudit {
     largest_residual_j: f64,
     /// Largest drift of the tip in stick, m.
     pub max_constraint_drift_m: f64,
-    /// Least normal force in contact, N.
+    /// Smallest normal force in contact, N.
     pub min_normal_force_n: Option<f64>,
-    /// Least Painlevé indicator in slip.
+    /// Smallest Painlevé indicator in slip.
     pub min_painleve_indicator: Option<f64>,
 }
 
 impl EnergyAudit {
-    /// Largest error of the energy balance relative to the stored or exchanged energy; 0 without energy.
+    /// Largest error of the energy balance relative to the stored or exchanged energy; 0 if there is no
+    /// energy.
     #[must_use]
     pub fn energy_residual_relative(&self) -> f64 {
         let scale = self.largest_energy_j.max(self.exchanged_j);
@@ -207,23 +209,23 @@ pub struct SimulationSummary {
     pub rejected_steps: u64,
     pub wall_s: f64,
     pub method: &'static str,
-    /// `None` for fixed steps.
+    /// Relative tolerance; `None` for fixed steps.
     pub relative_tolerance: Option<f64>,
-    /// `None` for adaptive steps.
+    /// Length of a step, s; `None` for adaptive steps.
     pub step_s: Option<f64>,
     pub max_constraint_drift_m: f64,
     pub energy_residual_relative: f64,
     pub min_normal_force_n: Option<f64>,
     pub min_painleve_indicator: Option<f64>,
     pub model_parts: Vec<&'static str>,
-    /// Implausible numbers of the scene.
+    /// Findings on implausible numbers of the scene.
     pub findings: Vec<PlausibilityFinding>,
-    /// Always true: the numbers are simulated, not measured.
+    /// Always true, because the numbers are simulated and not measured.
     pub synthetic: bool,
 }
 
 impl SimulationSummary {
-    /// Summary of a run with its audit; `wall_s` is the duration of the run alone.
+    /// Summary of a run with its audit; `wall_s` is the duration of the run alone, s.
     #[must_use]
     pub fn new(
         scene: &Scene,
@@ -256,7 +258,7 @@ impl SimulationSummary {
     }
 }
 
-/// Names of the active parts of the model.
+/// Names of the parts of the model that the scene uses.
 pub(crate) fn model_parts(scene: &Scene) -> Vec<&'static str> {
     let Linkage { head, neck, lip, friction, shoulder, .. } = &scene.linkage;
     let parts = [
@@ -297,7 +299,7 @@ pub fn recorded_points_m(linkage: &Linkage, sample: &ModelSample) -> [f64; 4] {
     [sample.tip_x_m, glass_y_m + sample.tip_height_m, sample.head_x_m, -sample.head_drop_m]
 }
 
-/// Appends the row of a sample in `state.csv`.
+/// Appends a sample as a row of `state.csv`.
 pub fn push_state_row(text: &mut String, sample: &ModelSample) {
     let ModelSample { time_s, pose, head_drop_m, tip_velocity_m_per_s, normal_n, friction_n, mode, .. } =
         sample;
@@ -309,14 +311,14 @@ pub fn push_state_row(text: &mut String, sample: &ModelSample) {
     );
 }
 
-/// Appends the row of a transition in `events.csv`; the time has 17 significant digits.
+/// Appends a transition as a row of `events.csv`; the time has 17 significant digits.
 pub fn push_event_row(text: &mut String, Transition { time_s, from, to, cause }: &Transition) {
     let [from, to] = [from, to].map(|mode| mode.name());
     let _ = writeln!(text, "{time_s:.16e},{from},{to},{}", cause.name()); // writing to a String cannot fail
 }
 
-/// Averages head and tip over the intervals of an open shutter and passes the means to `sink`; an interval of
-/// zero length gives the positions at that time.
+/// Averages the positions of head and tip over the intervals in which a shutter is open, and passes the means
+/// to `sink`. For an interval of zero length, the mean is the position at that time.
 pub(crate) struct ShutterObserver<I: Iterator<Item = [f64; 2]>, F: FnMut(&BladePoints)> {
     intervals: Peekable<I>,
     sink: F,
@@ -325,13 +327,13 @@ pub(crate) struct ShutterObserver<I: Iterator<Item = [f64; 2]>, F: FnMut(&BladeP
 }
 
 impl<I: Iterator<Item = [f64; 2]>, F: FnMut(&BladePoints)> ShutterObserver<I, F> {
-    /// `intervals` are rising times of opening and closing, s, without overlap. An interval that is still
-    /// open at the end of the run gives no mean.
+    /// `intervals` are the times at which the shutter opens and closes, s, in rising order and without
+    /// overlap. An interval that is still open at the end of the run gives no mean.
     pub(crate) fn new(intervals: I, sink: F) -> Self {
         Self { intervals: intervals.peekable(), sink, sum: [0.0; 4], open_s: 0.0 }
     }
 
-    /// Adds the exposure between two times of a piece.
+    /// Adds the integral of the positions between two times of a piece.
     fn add_exposure(&mut self, path: &SegmentPath<'_>, from_s: f64, to_s: f64) {
         if to_s > from_s {
             let integral = path.integrate_points(from_s, to_s).to_array();
@@ -340,7 +342,7 @@ impl<I: Iterator<Item = [f64; 2]>, F: FnMut(&BladePoints)> ShutterObserver<I, F>
         }
     }
 
-    /// Mean over the interval that closes at `close_s`; resets the sums for the next one.
+    /// Mean over the interval that closes at `close_s`; resets the sums for the next interval.
     fn take_mean(&mut self, path: &SegmentPath<'_>, close_s: f64) -> BladePoints {
         let (sum, open_s) = (std::mem::take(&mut self.sum), std::mem::take(&mut self.open_s));
         if open_s > 0.0 {

@@ -12,9 +12,9 @@ use portable_math as math;
 
 /// Number of guards of a phase.
 pub const GUARDS: usize = 7;
-/// Guards of the neck's angle in all phases: forward and backward corner of the shoulder.
+/// Guards of the neck's angle in all phases: the forward and the backward corner of the shoulder.
 pub(crate) const SHOULDER_GUARDS: [usize; 2] = [3, 4];
-/// Guards of the level of neck and lip in all phases: past level the hinge would lie below the glass.
+/// Guards of the level of neck and lip in all phases: past level, the hinge would lie below the glass.
 pub(crate) const LEVEL_GUARDS: [usize; 2] = [5, 6];
 
 /// Slip: the tip's speed in the direction of slip reaches zero.
@@ -30,20 +30,20 @@ pub(crate) const BACKWARD_LIMIT: usize = 1;
 /// Stick: the normal force reaches zero.
 pub(crate) const STICK_CONTACT_LOST: usize = 2;
 
-/// A blade, its drive, and the scales below which errors are absolute.
+/// A blade and its drive. Below the scales, the tolerance is absolute instead of relative.
 #[derive(Debug, Clone)]
 pub struct DrivenBlade {
     /// The blade.
     pub linkage: Linkage,
     /// The head's motion.
     pub drive: Drive,
-    /// Angle below which errors are absolute, rad.
+    /// Angle below which the tolerance is absolute, rad.
     pub angle_scale: f64,
-    /// Angular rate below which errors are absolute, rad/s.
+    /// Angular rate below which the tolerance is absolute, rad/s.
     pub rate_scale: f64,
 }
 
-/// Head, directions and contact response at one instant.
+/// Head, link directions and response to friction at one instant.
 pub(super) struct ContactInstant {
     pub head: HeadMotion,
     pub directions: LinkDirections,
@@ -58,7 +58,7 @@ impl DrivenBlade {
         ContactInstant { head, directions, contact }
     }
 
-    /// Guards of the shoulder's corners, rad: positive while the neck stays on its side.
+    /// Guards of the shoulder's corners, rad; positive while the neck stays on its side of the corner.
     #[inline]
     pub(super) fn corner_distances(&self, theta: f64, lean: ShoulderContact) -> [f64; 2] {
         match (&self.linkage.shoulder, lean) {
@@ -84,7 +84,8 @@ impl DrivenBlade {
         motion.expand(&self.linkage, touch, lean, pose, order);
     }
 
-    /// Signs of the neck's angle in the guards of both corners; 0 for a corner that does not apply.
+    /// Factors of the neck's angle in the guards of both corners, +1 or -1; 0 for a corner that does not
+    /// apply.
     pub(super) fn corner_signs(&self, lean: ShoulderContact) -> [f64; 2] {
         match (&self.linkage.shoulder, lean) {
             (None, _) => [0.0, 0.0],
@@ -95,9 +96,10 @@ impl DrivenBlade {
     }
 }
 
-/// Taylor coefficients of the blade's motion, one order more than the states use: forces lose one order.
+/// Taylor coefficients of the blade's motion, one order higher than the states need, because forces are known
+/// to one order less.
 pub(crate) type TaylorMotion = MotionSeries<{ TERMS + 2 }>;
-/// Taylor coefficients of `N` states and the guards.
+/// Taylor coefficients of the `N` states and of the guards.
 pub(super) type GuardedExpansion<const N: usize> = TaylorExpansion<N, GUARDS>;
 
 /// Forces on the tip and the angular accelerations that they cause.
@@ -113,14 +115,14 @@ pub(crate) struct TipForces {
     pub accelerations: [f64; 2],
 }
 
-/// Slip in one direction; states `(theta, phi, theta_rate, phi_rate)`.
+/// The phase of slip in one direction; the states are `(theta, phi, theta_rate, phi_rate)`.
 #[derive(Debug, Clone, Copy)]
 pub struct SlipPhase<'a> {
     /// The blade on its drive.
     pub system: &'a DrivenBlade,
     /// Direction of slip, +1 or -1.
     pub direction: f64,
-    /// Side of the shoulder.
+    /// Side of the shoulder on which the neck leans.
     pub lean: ShoulderContact,
 }
 
@@ -131,8 +133,8 @@ pub(crate) fn pose_from_states(y: &[f64; 4]) -> Pose {
 }
 
 impl SlipPhase<'_> {
-    /// Speed of the tip in the direction of slip, m/s, and the forces `f = -sigma mu N`, `N = n_free / (1 +
-    /// sigma mu nu)`.
+    /// Speed of the tip in the direction of slip, m/s, and the forces `f = -sigma mu N` with
+    /// `N = n_free / (1 + sigma mu nu)`.
     #[inline]
     pub(super) fn slip_forces(&self, pose: &Pose, at: &ContactInstant) -> (f64, TipForces) {
         let speed = self.direction * self.system.linkage.tip_velocity_m_per_s(pose, &at.directions, &at.head);
@@ -169,7 +171,7 @@ impl HybridPhase<4, GUARDS> for SlipPhase<'_> {
         let (speed, forces) = self.slip_forces(&pose, &at);
         let [forward, backward] = self.system.corner_distances(y[0], self.lean);
         let LinkDirections { cos_theta, cos_phi, .. } = at.directions;
-        // `n_free` has the sign of the normal force, but no pole at a zero of the indicator
+        // `n_free` has the sign of the normal force, but no pole where the indicator is zero
         [speed, at.contact.n_free, forces.indicator, forward, backward, cos_theta, cos_phi]
     }
 
@@ -190,7 +192,8 @@ impl TaylorPhase<4, GUARDS> for SlipPhase<'_> {
             let ([theta, phi], [theta_rate, phi_rate]) = (motion.angle[k], motion.rate[k]);
             let [cos_theta, cos_phi] = motion.cosines(k);
             out.states[k] = [theta, phi, theta_rate, phi_rate];
-            // the indicator needs no series: the accelerations have a pole at its zero, which no step crosses
+            // the indicator needs no series: the accelerations have a pole at its zero, and no step crosses a
+            // pole
             let speed = self.direction * motion.tip_velocity[k];
             out.guards[k] =
                 [speed, motion.normal_n(k), 0.0, corners[0] * theta, corners[1] * theta, cos_theta, cos_phi];
@@ -205,17 +208,19 @@ impl TaylorPhase<4, GUARDS> for SlipPhase<'_> {
     }
 }
 
-/// Stick: the tip is held at `place_m`. The states are angle and rate of the free link; the other link
-/// follows from `l1 sin theta + l2 sin phi = place - v(t)`, so the tip cannot drift.
+/// The phase of stick, with the tip held at `place_m`. The states are angle and rate of the free link; the
+/// other link, the follower, satisfies `l1 sin theta + l2 sin phi = place - v(t)`, so that the tip cannot
+/// drift.
 #[derive(Debug, Clone, Copy)]
 pub struct StickPhase<'a> {
     /// The blade on its drive.
     pub system: &'a DrivenBlade,
     /// Position of the tip, `alpha`, m.
     pub place_m: f64,
-    /// Side of the shoulder.
+    /// Side of the shoulder on which the neck leans.
     pub lean: ShoulderContact,
-    /// Link whose angle follows: the one that moves the tip more.
+    /// The follower, the link whose angle follows from that of the free link: the link that moves the tip
+    /// more.
     follower: Link,
 }
 
@@ -226,11 +231,11 @@ enum Link {
 }
 
 impl<'a> StickPhase<'a> {
-    /// Cosine of the follower at which it counts as level, 1e-3 rad early. At level the follower's rate is
-    /// 0/0 and its cosine does not change sign; 1e-3 rad before, the state loses about nine bits.
+    /// Cosine at which the follower counts as level, 1e-3 rad before it is. At level itself the follower's
+    /// rate is 0/0 and its cosine does not change sign; 1e-3 rad before, the state loses about nine bits.
     const LEAST_COSINE: f64 = 1e-3;
 
-    /// Holds the tip at its position in a pose with both links above level.
+    /// Stick that holds the tip at its position in a pose with both links above level.
     #[must_use]
     pub fn from_pose(system: &'a DrivenBlade, t: f64, pose: &Pose, lean: ShoulderContact) -> Self {
         let directions = LinkDirections::from_pose(pose);
@@ -250,8 +255,8 @@ impl<'a> StickPhase<'a> {
         }
     }
 
-    /// Pose and directions from the two states: the follower's angle from the tip's position, its rate from
-    /// the tip's rest.
+    /// Pose and directions from the two states. The follower's angle follows from the position of the tip,
+    /// its rate from the condition that the tip is at rest.
     #[inline]
     pub(super) fn full_pose(&self, head: &HeadMotion, y: &[f64; 2]) -> (Pose, LinkDirections) {
         let (l1, l2) = (self.system.linkage.l1_m, self.system.linkage.l2_m);
@@ -348,7 +353,7 @@ impl TaylorPhase<2, GUARDS> for StickPhase<'_> {
     }
 }
 
-/// Mode after a guard of stick; `None` unless it is a friction limit.
+/// Mode that follows when a guard of stick falls; `None` unless the guard is a friction limit.
 pub(crate) fn mode_after_release(guard: usize) -> Option<TipMode> {
     match guard {
         FORWARD_LIMIT => Some(TipMode::SlipForward),

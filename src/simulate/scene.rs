@@ -25,7 +25,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// A validated scene. Its serialised form holds all that decides a run and nothing else.
+/// A validated scene. Its serialised form contains exactly what determines a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Scene {
     #[serde(skip)]
@@ -34,9 +34,9 @@ pub struct Scene {
     title: String,
     values: BTreeMap<&'static str, f64>,
     has_shoulder: bool,
-    /// Response to a loss of contact.
+    /// What happens at a loss of contact.
     pub loss: ContactLossRule,
-    /// Response to the Painlevé paradox.
+    /// What happens at the Painlevé paradox.
     pub jam: JamRule,
     /// Motion of the head.
     pub drive: Drive,
@@ -51,12 +51,11 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Reads and validates a scene that needs no other file; error texts call it `file`.
+    /// Reads and validates a scene that needs no other file; error messages name the scene `file`.
     ///
     /// # Errors
     /// [`SceneError`] with file, line, key, finding and advice; also for a scene with `drive.recording`,
-    /// which
-    /// needs [`Self::parse_with_recording`].
+    /// which needs [`Self::parse_with_recording`].
     pub fn parse(file: &str, text: &str) -> Result<Self, SceneError> {
         Self::parse_with_recording(file, text, |path| {
             Err(format!(
@@ -65,7 +64,8 @@ impl Scene {
         })
     }
 
-    /// Reads and validates a scene; `recording` loads the file that `drive.recording` names, or says why not.
+    /// Reads and validates a scene. `recording` loads the file that `drive.recording` names, or returns the
+    /// reason why it cannot.
     ///
     /// # Errors
     /// [`SceneError`] with file, line, key, finding and advice.
@@ -127,7 +127,8 @@ impl Scene {
         self.values.get("contact.restitution").copied().unwrap_or(0.0)
     }
 
-    /// The same scene with one parameter set; it replaces any other way to write the quantity.
+    /// The same scene with one parameter set; the parameter replaces an equivalent one in which the scene
+    /// gave the same quantity.
     ///
     /// # Errors
     /// [`SceneError::Key`] for an unknown name or a value out of range.
@@ -143,7 +144,7 @@ impl Scene {
         Ok(scene)
     }
 
-    /// The same scene driven by the head of a recording. The run covers the tracked time without its
+    /// The same scene, driven by the head of a recording. The run covers the tracked time except for its
     /// uncertain ends; a start in steady slip waits until the head moves.
     ///
     /// # Errors
@@ -172,7 +173,7 @@ impl Scene {
         Ok(scene)
     }
 
-    /// The linkage with one parameter set to any value, admissible or not, for finite differences.
+    /// The linkage with one parameter set to any value, for finite differences; the value is not checked.
     pub(super) fn linkage_with(&self, parameter: &ModelParameter, value: f64) -> Linkage {
         linkage_constants(&self.values_with(parameter, value), self.has_shoulder)
     }
@@ -185,7 +186,7 @@ impl Scene {
         values
     }
 
-    /// A parameter that this scene has.
+    /// Finds a parameter that this scene has.
     ///
     /// # Errors
     /// [`SceneError::Key`] for an unknown name or a parameter of an absent part.
@@ -213,15 +214,15 @@ impl Scene {
         plausibility::find_implausible(plausibility::SCENE_RANGES, &|name| self.value(name), &written)
     }
 
-    /// Value of a parameter in SI, converted if the scene writes its quantity another way; `None` for a part
-    /// that the scene lacks.
+    /// Value of a parameter in its SI unit, converted if the scene gives the same quantity by an equivalent
+    /// parameter; `None` for a part that the scene lacks.
     #[must_use]
     pub fn value(&self, name: &str) -> Option<f64> {
         self.values.get(name).copied().or_else(|| parameters::convert_value(name, &self.linkage))
     }
 }
 
-/// The key with which a scene writes the quantity of `name`.
+/// The key under which a scene gives the quantity of the parameter `name`.
 fn find_written_key(values: &BTreeMap<&'static str, f64>, name: &'static str) -> &'static str {
     let quantity = parameters::find_parameter(name).map(|p| p.quantity);
     let mut ways = PARAMETERS.iter().filter(|p| Some(p.quantity) == quantity).map(|p| p.name);
@@ -234,7 +235,7 @@ fn cosine_drive(values: &BTreeMap<&'static str, f64>, delay_s: f64) -> Drive {
     Drive::Cosine { amplitude_m, frequency_hz, delay_s }
 }
 
-/// The head's recorded motion; refuses a run outside the tracked time.
+/// Motion of a recorded head; refuses a run outside the tracked time.
 fn recorded_drive(
     place: &str,
     recording: Result<Recording, String>,

@@ -1,18 +1,19 @@
-//! Derivatives of a run by parameters, initial state and drive, within the tolerance, along the steps of
-//! the run and through its transitions.
+//! Derivatives of a run with respect to parameters, initial state and drive. They are as accurate as the
+//! tolerance and are computed along the steps of the run and through its transitions.
 //!
-//! Between transitions the derivatives obey the linear equations of [`crate::model::tangent`] along the
-//! series of each step. Collocation ([`hybrid_ode::collocation`]) solves them; all directions share one
-//! factorisation per step. At the zero of a guard `G` the transition time changes by `d tau = -dG / G'` and
-//! the derivative of the state jumps (saltation; Leine and Nijmeijer, "Dynamics and Bifurcations of
+//! Between transitions, the derivatives obey the linear equations of [`crate::model::tangent`] along the
+//! series of each step. These are solved by collocation ([`hybrid_ode::collocation`]); all directions share
+//! one factorisation per step. At the zero of a guard `G`, the transition time changes by `d tau = -dG / G'`,
+//! and the derivative of the state jumps (saltation; Leine and Nijmeijer, "Dynamics and Bifurcations of
 //! Non-Smooth Mechanical Systems", chapter 7),
 //!
 //! ```text
 //! d y+ = R_y (d y- + f- d tau) + R_p - f+ d tau
 //! ```
 //!
-//! with the right-hand sides `f` before and after and the map `R` of an impact, elsewhere the identity. A
-//! guard that only grazes zero makes the derivative infinite; from there on derivatives are unknown.
+//! with the right-hand sides `f` before and after the transition, and with the map `R` of an impact, which is
+//! the identity for other transitions. A guard that only grazes zero makes the derivative infinite; from then
+//! on, the derivatives are unknown.
 
 mod propagation;
 mod saltation;
@@ -30,20 +31,20 @@ pub use seeds::{TangentDirection, TangentSeeds};
 use std::ops::ControlFlow;
 pub use tangent_segment::{Channel, ChannelWeights, TangentSegment};
 
-/// Receives a run and its derivatives as they are accepted.
+/// Receives a run and its derivatives, piece by piece as they are accepted.
 pub trait TangentObserver {
     /// Receives a piece of the solution, in order of time.
     fn observe_segment(&mut self, piece: &TangentSegment<'_>);
-    /// Receives a change of mode, between the pieces that it separates. `d_time_s` are the derivatives of
-    /// its time, s per unit of each direction; `None` if they do not exist.
+    /// Receives a change of mode, between the pieces that it separates. `d_time_s` contains the derivatives
+    /// of its time, s per unit of each direction; `None` if they do not exist.
     fn observe_transition(&mut self, _transition: &Transition, _d_time_s: Option<&[f64]>) {}
-    /// Is asked after every piece; `Break` ends the run as `RunStatus::Interrupted`.
+    /// Called after every piece; `Break` ends the run as `RunStatus::Interrupted`.
     fn control_flow(&self) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
 }
 
-/// Runs scenes with derivatives; keeps its workspace from run to run.
+/// Runs scenes with derivatives; the workspace is kept from run to run.
 #[derive(Debug, Default)]
 pub struct TangentRunner {
     room: TangentWorkspace,
@@ -51,18 +52,18 @@ pub struct TangentRunner {
 }
 
 impl TangentRunner {
-    /// A runner with derivatives to the relative accuracy `relative` within a step, for searches that need
-    /// no more; at the ends of steps they are far more accurate. The default accuracy is the tolerance of
-    /// the run, which this does not change.
+    /// A runner whose derivatives within a step have the relative accuracy `relative`, for searches that need
+    /// no more; at the ends of steps, they are far more accurate. The default accuracy is the tolerance of
+    /// the run; `relative` does not change the tolerance.
     #[must_use]
     pub fn with_accuracy(relative: f64) -> Self {
         Self { room: TangentWorkspace::default(), accuracy: Some(relative) }
     }
 
-    /// Runs a scene with its derivatives, always by Taylor series. Solution and transitions have the same
-    /// bits as with [`run_scene_with`](super::run_scene_with).
+    /// Runs a scene with its derivatives, always by Taylor series. The solution and its transitions are bit
+    /// for bit those of [`run_scene_with`](super::run_scene_with).
     ///
-    /// `seeds` belong to a scene with the same parameters and drive; start and stop may differ.
+    /// `seeds` must belong to a scene with the same parameters and drive; start and stop may differ.
     pub fn run_scene(
         &mut self,
         scene: &Scene,
@@ -91,13 +92,11 @@ pub fn run_with_tangents(
     TangentRunner::default().run_scene(scene, effort, seeds, observer)
 }
 
-// Central differences of cheap, smooth functions.
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Bits of the derivatives at the ends of all pieces.
+    /// Bit patterns of the derivatives at the ends of all pieces.
     #[derive(Default)]
     struct Ends(Vec<u64>);
 

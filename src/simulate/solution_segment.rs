@@ -1,4 +1,4 @@
-//! Pieces of the solution, and the model at an instant within them.
+//! Pieces of the solution, and the state of the model at an instant within a piece.
 
 use super::fixed_step_scheme::StabilisedStickPhase;
 use super::flight::{FlightPhase, flight_state_from};
@@ -18,7 +18,7 @@ pub struct SolutionSegment<'a> {
     pub end_s: f64,
     /// Mode of contact.
     pub mode: TipMode,
-    /// Taylor coefficients of the motion about the start; `None` for other methods.
+    /// Taylor coefficients of the motion about the start of the piece; `None` for methods without series.
     pub(super) motion: Option<&'a TaylorMotion>,
     pub(super) solution: SegmentSolution<'a>,
 }
@@ -30,14 +30,14 @@ pub(super) enum SegmentSolution<'a> {
     Held(&'a StabilisedStickPhase<'a>, &'a ode::AcceptedStep<'a, 4>),
 }
 
-/// The model at one instant.
+/// State of the model at one instant.
 #[derive(Debug, Clone, Copy)]
 pub struct ModelSample {
     /// Time, s.
     pub time_s: f64,
     /// Mode of contact.
     pub mode: TipMode,
-    /// Angles and rates.
+    /// Angles and rates of the links.
     pub pose: Pose,
     /// Position of the head along the sweep, `v`, m.
     pub head_x_m: f64,
@@ -97,15 +97,15 @@ impl<'a> SolutionSegment<'a> {
         Self { start_s: step.start, end_s: step.end, mode, motion, solution }
     }
 
-    /// Positions of head and tip over the piece and their integrals; from Taylor polynomials if the method
-    /// has them.
+    /// Positions of head and tip over the piece, and their integrals; computed from Taylor polynomials if the
+    /// method provides them.
     #[must_use]
     pub fn path(&self) -> SegmentPath<'_> {
         let polynomials = self.motion.and_then(|motion| PathPolynomials::from_segment(self, motion));
         SegmentPath { piece: self, polynomials }
     }
 
-    /// Angles and rates at a time within the piece; the same bits as in [`Self::sample_at`].
+    /// Angles and rates at a time within the piece, bit for bit those of [`Self::sample_at`].
     #[must_use]
     pub fn pose_at(&self, t: f64) -> Pose {
         match &self.solution {
@@ -118,7 +118,7 @@ impl<'a> SolutionSegment<'a> {
         }
     }
 
-    /// Positions of head and tip at a time within the piece; the same bits as in [`Self::sample_at`],
+    /// Positions of head and tip at a time within the piece, bit for bit those of [`Self::sample_at`],
     /// without the cost of forces and energies.
     #[must_use]
     pub fn points_at(&self, t: f64) -> BladePoints {
@@ -157,7 +157,7 @@ impl<'a> SolutionSegment<'a> {
         }
     }
 
-    /// The model at a time within the piece.
+    /// State of the model at a time within the piece.
     #[must_use]
     pub fn sample_at(&self, t: f64) -> ModelSample {
         match &self.solution {
@@ -219,12 +219,12 @@ impl<'a> SolutionSegment<'a> {
     }
 }
 
-/// The state at a time within a step.
+/// State vector at a time within a step.
 fn state_in_step<const N: usize>(step: &ode::AcceptedStep<'_, N>, t: f64) -> [f64; N] {
     if t == step.end { *step.y_end } else { step.solution.state_at(t) }
 }
 
-/// The model in flight, without forces on the tip.
+/// State of the model in flight, without forces on the tip.
 fn sample_in_flight(t: f64, flight: &FlightPhase<'_>, y: &[f64; 6]) -> ModelSample {
     let (linkage, state) = (&flight.system.linkage, flight_state_from(y));
     let (d, head) = (LinkDirections::from_pose(&state.pose), flight.system.drive.motion_at(t));
@@ -248,17 +248,18 @@ fn sample_in_flight(t: f64, flight: &FlightPhase<'_>, y: &[f64; 6]) -> ModelSamp
     }
 }
 
-// Positions over a piece and their integrals.
+// Positions over a piece, and their integrals.
 //
-// Taylor coefficients of a step include the velocities of head and tip and the drop. Positions are therefore
-// polynomials of the time `x` since the start, and their integrals over an open shutter are exact:
+// The Taylor coefficients of a step include the velocities of head and tip and the drop. Positions are
+// therefore polynomials of the time `x` since the start of the piece, and their integrals over an open
+// shutter are exact:
 //
 // ```text
 // v3(x) = v3(0) + sum v3'_(j-1) x^j / j        int v3 = v3(0) x + sum v3'_(j-1) x^(j+1) / (j (j+1))
 // ```
 //
-// Other methods have no such coefficients: positions follow from the angles, and an integral from five of
-// them.
+// Other methods provide no such coefficients: positions follow from the angles, and an integral follows from
+// the positions at five instants.
 
 /// `1 / j`, and 0 for `j = 0`.
 const RECIPROCALS: [f64; TERMS + 4] = {
@@ -271,7 +272,7 @@ const RECIPROCALS: [f64; TERMS + 4] = {
     share
 };
 
-/// Positions of head and tip over a piece; one path serves all queries of the piece.
+/// Positions of head and tip over a piece; one path serves all queries on the piece.
 pub struct SegmentPath<'a> {
     piece: &'a SolutionSegment<'a>,
     polynomials: Option<PathPolynomials<'a>>,
@@ -312,7 +313,7 @@ impl SegmentPath<'_> {
 }
 
 impl<'a> PathPolynomials<'a> {
-    /// `None` for stick of the fixed-step scheme.
+    /// The polynomials of a piece; `None` for stick of the fixed-step scheme.
     fn from_segment(piece: &SolutionSegment<'a>, motion: &'a TaylorMotion) -> Option<Self> {
         let (system, height, held): (&DrivenBlade, f64, Option<f64>) = match &piece.solution {
             SegmentSolution::Slip(slip, _) => (slip.system, 0.0, None),
@@ -328,7 +329,7 @@ impl<'a> PathPolynomials<'a> {
         Some(Self { motion, start: [head, motion.drop_m[0], tip, height], sticks: held.is_some() })
     }
 
-    /// Coefficients of `x^j`, `j > 0`.
+    /// Coefficients of `x^j` in the positions, for `j > 0`.
     #[inline(always)]
     fn coefficients_of(&self, j: usize) -> [f64; 4] {
         let TaylorMotion { head_velocity, drop_m, tip_velocity, gap_rate, .. } = self.motion;
@@ -357,7 +358,8 @@ impl<'a> PathPolynomials<'a> {
         self.add_start(to - from, four_values(|i| high[i] * to * to - low[i] * from * from))
     }
 
-    /// Positions at the start times a weight, plus the change since then; a tip in stick does not move.
+    /// Adds the change since the start to `weight` times the positions at the start; a tip in stick does not
+    /// move.
     #[inline]
     fn add_start(&self, weight: f64, mut change: [f64; 4]) -> [f64; 4] {
         const TIP: usize = 2;

@@ -1,5 +1,5 @@
 //! Twins: synthetic recordings of a scene by a camera with frame rate, exposure, pixel size, tracking noise
-//! and dropouts. They are marked as synthetic.
+//! and dropouts. Every twin is marked as synthetic.
 
 pub mod film;
 pub mod spec;
@@ -24,11 +24,11 @@ pub struct TrackingModel {
     pub noise_px: f64,
     /// Probability that a point is lost in a frame, 0 to 1.
     pub dropout_fraction: f64,
-    /// Seed of noise and dropouts.
+    /// Seed of the random numbers for noise and dropouts.
     pub seed: u64,
 }
 
-/// Recording of a scene before tracking.
+/// Recording of a scene before tracking errors are added.
 #[derive(Debug, Clone)]
 pub struct TwinView {
     /// Traces without noise.
@@ -45,9 +45,9 @@ pub enum TwinViewError {
     /// The simulation stopped before two frames were taken.
     #[error("the simulation ended as {} at {stopped_at_s} s, before two frames were taken: {}", .status.name(), .status.meaning())]
     Early {
-        /// How it ended.
+        /// Status with which the simulation ended.
         status: super::RunStatus,
-        /// When, s.
+        /// Time at which the simulation ended, s.
         stopped_at_s: f64,
     },
     /// The traces are not a valid recording.
@@ -57,11 +57,11 @@ pub enum TwinViewError {
 
 /// Runs a scene and records it without noise from `start_s` to `stop_s`, in the scene's time.
 ///
-/// The origin is the head of the upright blade; the glass lies at `y = -(l1 + l2)`. A frame averages over its
-/// exposure, cut off at `start_s` and `stop_s`.
+/// The origin is the position of the head of the upright blade; the glass lies at `y = -(l1 + l2)`. A frame
+/// averages over the part of its exposure between `start_s` and `stop_s`.
 ///
 /// # Errors
-/// [`TwinViewError`]; a run that stops early after two frames gives a shorter recording.
+/// [`TwinViewError`]. A run that stops early, but after two frames, gives a shorter recording.
 pub fn film_scene(
     scene: &Scene,
     camera: &Camera,
@@ -72,10 +72,10 @@ pub fn film_scene(
     film_scene_with_observer(scene, camera, [start_s, stop_s], effort, &mut ())
 }
 
-/// [`film_scene`] with a further observer of the run.
+/// As [`film_scene`], with a further observer of the run.
 ///
 /// # Errors
-/// As [`film_scene`].
+/// The errors of [`film_scene`].
 pub fn film_scene_with_observer(
     scene: &Scene,
     camera: &Camera,
@@ -122,7 +122,8 @@ pub fn add_tracking_noise(
     let seen = view.traces();
     for i in 0..view.grid().frames {
         let mut point = |x: Option<f64>, y: Option<f64>| {
-            // three draws per point, lost or not: dropouts do not change the noise of other points
+            // three random numbers per point, whether it is lost or not, so that dropouts do not change the
+            // noise of other points
             let lost = generator.random::<f64>() < tracking.dropout_fraction;
             let (dx, dy): (f64, f64) = (generator.sample(StandardNormal), generator.sample(StandardNormal));
             let place = |value: Option<f64>, noise: f64| value.filter(|_| !lost).map(|v| v + noise_m * noise);
@@ -138,18 +139,18 @@ pub fn add_tracking_noise(
     Recording::new(name, view.grid(), traces, true)
 }
 
-/// All parameters of a twin's scene by name, SI: the truth for a fit.
+/// All parameters of a twin's scene by name, in SI units: the true values for a fit.
 pub(crate) fn true_parameters(scene: &Scene) -> toml::Table {
     let row = |name: &str| Some((name.to_owned(), toml::Value::Float(scene.value(name)?)));
     PARAMETERS.iter().filter_map(|p| row(p.name)).collect()
 }
 
-// Export in the layout of Tracker, to test the importer.
+// Export in the file layout of Tracker, to test the importer.
 
 /// Track names that mark the data as synthetic inside the file.
 pub(crate) const SYNTHETIC_TRACK_NAMES: [&str; 2] = ["synthetic tip", "synthetic head"];
 
-/// The recording as Tracker exports it: two tracks in pixels, y upwards, time from the first frame, empty
+/// The recording as Tracker exports it: two tracks in pixels with y up, time from the first frame, empty
 /// cells for lost points, seven digits in Java's notation (`1.234567E-1`).
 pub(crate) fn write_tracker_table(recording: &Recording, metres_per_pixel: f64) -> String {
     let [tip, head] = SYNTHETIC_TRACK_NAMES;
@@ -157,7 +158,7 @@ pub(crate) fn write_tracker_table(recording: &Recording, metres_per_pixel: f64) 
     let traces = recording.traces();
     let columns = [&traces.tip_x_m, &traces.tip_y_m, &traces.head_x_m, &traces.head_y_m];
     for i in 0..recording.grid().frames {
-        let _ = write!(text, "{:.6E}", i as f64 / recording.grid().frame_rate_hz); // a String takes all writes
+        let _ = write!(text, "{:.6E}", i as f64 / recording.grid().frame_rate_hz); // cannot fail
         for column in columns {
             let cell = column[i].map(|value| format!("{:.6E}", value / metres_per_pixel));
             text.push('\t');

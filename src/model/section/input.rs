@@ -1,4 +1,4 @@
-//! `section.toml` as written and as validated.
+//! Reads and validates the file `section.toml`.
 
 use super::{LinkSection, RubberHinge};
 use crate::model::plausibility::{self, PlausibilityFinding};
@@ -19,7 +19,7 @@ pub enum SectionError {
     HalfAHinge {
         /// File as named by the user.
         file: String,
-        /// Table and key.
+        /// Table and key that is missing.
         key: &'static str,
         /// Range, meaning and unit of the key.
         expected: String,
@@ -40,7 +40,7 @@ struct SectionFile {
     /// The rubber of neck and lip.
     #[schemars(schema_with = "number_table::<0>")]
     rubber: BTreeMap<String, f64>,
-    /// What moves with the head, per metre of blade.
+    /// Parts that move with the head, per metre of blade.
     #[schemars(schema_with = "number_table::<1>")]
     head: BTreeMap<String, f64>,
     /// The neck.
@@ -86,7 +86,7 @@ impl BladeSection {
             numbers.into_iter().map(move |(key, value)| (format!("{table}.{key}"), value))
         });
         let numbers = numbers.chain([("length_m".to_owned(), written.length_m)]);
-        // (the schema knows the same keys)
+        // (the schema allows exactly these keys, so that none is lost)
         let known =
             |(name, value): (String, f64)| Some((KEYS.iter().find(|key| key.name == name)?.name, value));
         let values = numbers.filter_map(known).collect();
@@ -94,7 +94,7 @@ impl BladeSection {
         Ok(Self { title: written.title, values })
     }
 
-    /// The JSON Schema of section.toml: for editors, and for messages.
+    /// JSON Schema of section.toml, for editors and messages.
     #[must_use]
     pub fn schema() -> Value {
         toml_file::schema_of::<SectionFile>()
@@ -111,19 +111,19 @@ impl BladeSection {
         self.values.get(key).copied().unwrap_or(0.0) // completeness was checked
     }
 
-    /// The keys that the file has.
+    /// Keys that the file contains.
     pub(super) fn present_keys(&self) -> impl Iterator<Item = &'static SectionKey> {
         KEYS.iter().filter(|key| self.values.contains_key(key.name))
     }
 
-    /// The same section with another value, which is not checked: for differences.
+    /// The same section with another value of one key, for finite differences; the value is not checked.
     pub(super) fn with_value(&self, key: &'static str, value: f64) -> Self {
         let mut section = self.clone();
         section.values.insert(key, value);
         section
     }
 
-    /// The section of `neck` or `lip`.
+    /// Cross section of the neck or the lip, as `table` names it.
     pub(super) fn link_section(&self, table: &str) -> LinkSection {
         let of = |key: &str| self.values.get(format!("{table}.{key}").as_str()).copied();
         let number = |key: &str| of(key).unwrap_or(0.0); // completeness was checked
@@ -137,7 +137,7 @@ impl BladeSection {
     }
 }
 
-/// A hinge has both of its dimensions or none.
+/// Checks that each hinge has both of its dimensions or neither.
 fn check_hinges(file: &str, values: &BTreeMap<&'static str, f64>) -> Result<(), SectionError> {
     let hinge_of = |name: &str| name.split_once(".hinge_").map(|(link, _)| link.to_owned());
     let hinged = |link: &str| values.keys().any(|name| hinge_of(name).as_deref() == Some(link));
@@ -157,33 +157,33 @@ pub(super) enum InputDeviation {
     Relative(f64),
 }
 
-/// A calliper on soft rubber, or the pixels of a picture of the section, m.
+/// Dimension measured with a calliper on soft rubber, or in a picture of the section, m.
 const CALLIPER: InputDeviation = InputDeviation::Absolute(5e-5);
-/// A ruler along the blade, m.
+/// Length measured with a ruler along the blade, m.
 const RULER: InputDeviation = InputDeviation::Absolute(5e-4);
-/// Weight over volume of a piece.
+/// Density from weight and volume of a piece.
 const DENSITY: InputDeviation = InputDeviation::Relative(0.03);
 /// Young's modulus from hardness, or from the bending of a strip.
 const MODULUS: InputDeviation = InputDeviation::Relative(0.3);
-/// A loss factor from a table or a ring-down of a strip.
+/// Loss factor from a table, or from the ring-down of a strip.
 const LOSS: InputDeviation = InputDeviation::Relative(0.3);
-/// A kitchen scale; which parts move with the head is uncertain.
+/// Mass measured with a kitchen scale; it is uncertain which parts move with the head.
 const HEAD: InputDeviation = InputDeviation::Relative(0.05);
-/// A force gauge over its travel, or a scale below the blade.
+/// Force or stiffness measured with a force gauge over its travel, or with a scale below the blade.
 const FORCE: InputDeviation = InputDeviation::Relative(0.1);
 
-/// Limits of every number: no blade lies outside, and no product overflows inside.
+/// Limits of every number: every blade lies within them, and no product of such numbers overflows.
 const LEAST_VALUE: f64 = 1e-9;
 const GREATEST_VALUE: f64 = 1e12;
 
-/// A row of the table.
+/// A row of the table of keys.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SectionKey {
     pub name: &'static str,
     pub unit: &'static str,
     pub deviation: InputDeviation,
     pub meaning: &'static str,
-    /// Whether a file may leave it out.
+    /// Whether a file may leave out the key.
     pub optional: bool,
 }
 
@@ -198,7 +198,7 @@ impl SectionKey {
     }
 }
 
-/// Rows: key, unit, deviation and meaning; an optional key ends with `optional`.
+/// Makes the rows from key, unit, deviation and meaning; the row of an optional key ends with `optional`.
 macro_rules! section_keys {
     (@optional) => { false };
     (@optional optional) => { true };

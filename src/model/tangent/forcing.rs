@@ -10,13 +10,13 @@ use super::{ReferenceMotion, lanes_per_link};
 use crate::model::series::ContactMode;
 use crate::model::shoulder::ShoulderContact;
 
-/// Terms of a change at a few instants, per unit of the change; in a [`super::LinearForm`], the factors of
-/// these terms.
+/// Forcing terms of a change at a few instants, per unit of the change. In a [`super::LinearForm`], each
+/// field is the factor of that term.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ForcingTerms {
     /// Displacement of the head along the sweep, m.
     pub head: LaneVector,
-    /// Displacement of the tip along the sweep at constant angles, m, with its first two derivatives in time.
+    /// Displacement of the tip along the sweep at constant angles, m, and its first two derivatives in time.
     pub tip: [LaneVector; 3],
     /// Drop of the head at constant angles, m.
     pub drop: LaneVector,
@@ -24,24 +24,24 @@ pub struct ForcingTerms {
     pub normal: LaneVector,
     /// Friction force in slip at constant angles and normal force, N.
     pub force: LaneVector,
-    /// Term of each equation.
+    /// Forcing term of each equation.
     pub equations: [LaneVector; 3],
 }
 
-/// A change of the head's motion along the sweep at a few instants, m, with the first two derivatives.
+/// Change of the head's position along the sweep at a few instants, m, and its first two derivatives in time.
 pub(crate) type HeadMotionChange = [LaneVector; 3];
 
-/// Terms of a change before their effects on each other.
+/// Forcing terms of a change, before the effects of these terms on each other are added.
 #[derive(Default)]
 struct DirectForcing {
     effect: ForcingTerms,
-    /// Term of the equation of each link, divided by the cosine of its angle.
+    /// Term in the equation of each link, divided by the cosine of the link's angle.
     links: [LaneVector; 2],
     drop_acceleration: LaneVector,
 }
 
 impl ForcingTerms {
-    /// Sum of the products with the factors of a form.
+    /// Sum of the products of these terms with the factors in a linear form.
     pub(crate) fn dot(&self, factors: &Self) -> LaneVector {
         let numbers = |e: &Self| {
             let ([t_0, t_1, t_2], [e_0, e_1, e_2]) = (e.tip, e.equations);
@@ -53,7 +53,7 @@ impl ForcingTerms {
 }
 
 impl<const K: usize> ReferenceMotion<'_, K> {
-    /// Whether a constant matters in this mode of contact.
+    /// Whether the motion depends on a constant in this mode of contact.
     pub(crate) fn depends_on(&self, constant: LinkageConstant) -> bool {
         match constant {
             LinkageConstant::FrictionA | LinkageConstant::FrictionB | LinkageConstant::FrictionC => {
@@ -66,13 +66,13 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         }
     }
 
-    /// Terms of a unit change of a constant.
+    /// Forcing terms of a unit change of a constant.
     #[inline(always)]
     pub(crate) fn constant_forcing(&self, at: &MotionSamples, constant: LinkageConstant) -> ForcingTerms {
         let mut direct = DirectForcing::default();
         if let LinkageConstant::FrictionA | LinkageConstant::FrictionB | LinkageConstant::FrictionC = constant
         {
-            // (a shortcut: these change only a force, and fits often free all three)
+            // (a shortcut: these constants change only the friction force, and fits often free all three)
             direct.effect.force = self.friction_law_forcing(at, constant);
             let l = self.lengths();
             direct.effect.equations[0] = -l[0] * direct.effect.force;
@@ -83,8 +83,8 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         self.complete_forcing(at, direct)
     }
 
-    /// Whether a constant displaces tip or head at constant angles, so that [`Self::displacement_terms`] are
-    /// not zero.
+    /// Whether a change of a constant displaces tip or head at constant angles, so that the
+    /// [`Self::displacement_terms`] are not zero.
     pub(crate) fn displaces_points(&self, constant: LinkageConstant) -> bool {
         matches!(constant, LinkageConstant::Length(_))
     }
@@ -99,7 +99,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         effect
     }
 
-    /// Terms of a change of the head's motion.
+    /// Forcing terms of a change of the head's motion.
     #[inline(always)]
     pub(crate) fn head_motion_forcing(&self, at: &MotionSamples, shift: &HeadMotionChange) -> ForcingTerms {
         let m = self.moments();
@@ -142,7 +142,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         }
     }
 
-    /// Adds the terms of the springs and dampers of the links.
+    /// Adds the forcing terms of the springs and dampers of the links.
     #[inline(always)]
     fn add_spring_forcing(&self, links: &mut [LaneVector; 2], at: &MotionSamples, constant: LinkageConstant) {
         let secant = &at.secant[0];
@@ -167,7 +167,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         }
     }
 
-    /// Derivative of the friction force in slip by a coefficient of the friction law.
+    /// Derivative of the friction force in slip with respect to a coefficient of the friction law.
     #[inline(always)]
     fn friction_law_forcing(&self, at: &MotionSamples, constant: LinkageConstant) -> LaneVector {
         let direction = self.touch.slip_direction();

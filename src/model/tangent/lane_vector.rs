@@ -3,7 +3,7 @@
 use std::array::from_fn;
 use std::ops::{Add, AddAssign, Index, IndexMut, Mul, Neg, Sub, SubAssign};
 
-/// Number of lanes: the width of a vector register of most processors.
+/// Number of lanes, the width of a vector register of most processors.
 pub(crate) const LANES: usize = 4;
 
 /// One number per direction, or per instant.
@@ -20,13 +20,13 @@ impl LaneVector {
         Self([x; LANES])
     }
 
-    /// One over each number.
+    /// Reciprocal of each number.
     #[inline(always)]
     pub(crate) fn inverse(self) -> Self {
         Self(from_fn(|lane| 1.0 / self.0[lane]))
     }
 
-    /// Sum of the products of two rows' numbers.
+    /// Scalar product of two vectors.
     #[inline(always)]
     pub(crate) fn dot(&self, other: &Self) -> f64 {
         (0..LANES).map(|lane| self.0[lane] * other.0[lane]).sum()
@@ -38,7 +38,7 @@ impl LaneVector {
         self.0.iter().sum()
     }
 
-    /// Adds `factor` times a row.
+    /// Adds `factor` times the vector `row`.
     #[inline(always)]
     pub(crate) fn add_scaled(&mut self, factor: f64, row: &Self) {
         for lane in 0..LANES {

@@ -5,7 +5,7 @@
 use super::{ForcingTerms, LaneVector, LinkAttitudes, MotionSamples, ReferenceMotion, TangentMatrices};
 use crate::model::series::ContactMode;
 
-/// A quantity of the blade with derivatives.
+/// A quantity of the blade whose derivatives are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ModelChannel {
     /// Position of the tip along the sweep, m.
@@ -37,18 +37,18 @@ pub enum ModelChannel {
 pub struct LinearForm {
     /// Coefficients of `y1`, `y2` and the gap.
     pub value: [LaneVector; 3],
-    /// Coefficients of their rates.
+    /// Coefficients of the rates of `y1`, `y2` and the gap.
     pub rate: [LaneVector; 3],
-    /// Coefficients of their second derivatives; zero after the elimination.
+    /// Coefficients of the second derivatives of `y1`, `y2` and the gap; zero after their elimination.
     second: [LaneVector; 3],
-    /// Coefficient of the position where the tip sticks.
+    /// Coefficient of the position at which the tip sticks.
     pub place: LaneVector,
     /// Coefficients of the forcing terms.
     pub forcing: ForcingTerms,
 }
 
 impl<const K: usize> ReferenceMotion<'_, K> {
-    /// Form of the tip's position along the sweep; it is the same at all instants.
+    /// Linear form of the tip's position along the sweep; it is the same at all instants.
     pub(crate) fn tip_position_form(&self) -> LinearForm {
         let (mut form, l, one) = (LinearForm::default(), self.lengths(), LaneVector::splat(1.0));
         if self.touch == ContactMode::Stick {
@@ -60,15 +60,15 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         form
     }
 
-    /// Form of the head's position along the sweep; it is the same at all instants.
+    /// Linear form of the head's position along the sweep; it is the same at all instants.
     pub(crate) fn head_position_form(&self) -> LinearForm {
         let mut form = LinearForm::default();
         form.forcing.head = LaneVector::splat(1.0);
         form
     }
 
-    /// Form of a quantity at these instants, in stick with `y2` eliminated; zero for forces, which
-    /// [`Self::force_form`] gives.
+    /// Linear form of a quantity at these instants; `y2` is eliminated in stick. It is zero for a force,
+    /// whose form [`Self::force_form`] gives.
     pub(crate) fn channel_form(&self, at: &LinkAttitudes, quantity: ModelChannel) -> LinearForm {
         let (mut form, l, one) = (LinearForm::default(), self.lengths(), LaneVector::splat(1.0));
         let gap = if self.is_in_flight() { one } else { LaneVector::ZERO };
@@ -101,7 +101,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         form
     }
 
-    /// Form of a force at these instants, with second derivatives eliminated; zero in flight.
+    /// Linear form of a force at these instants, with the second derivatives eliminated; zero in flight.
     pub(crate) fn force_form(&self, at: &MotionSamples, quantity: ModelChannel) -> LinearForm {
         let mut form = match (quantity, self.touch) {
             (_, ContactMode::Flight(..)) => return LinearForm::default(),
@@ -113,7 +113,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         form
     }
 
-    /// `dN = sum arm S'' - k0 l S - c0 l S' + ...`.
+    /// Linear form of the normal force, `dN = sum arm S'' - k0 l S - c0 l S' + ...`.
     fn normal_force_form(&self, at: &MotionSamples) -> LinearForm {
         let mut form = LinearForm::default();
         let (l, arms, head) = (self.lengths(), self.arms(), self.linkage.head);
@@ -128,7 +128,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         form
     }
 
-    /// `df = -sigma mu dN + b N E d v3' + ...`.
+    /// Linear form of friction in slip, `df = -sigma mu dN + b N E d v3' + ...`.
     fn slip_friction_form(&self, at: &MotionSamples) -> LinearForm {
         let mut form = self.normal_force_form(at);
         let (l, per_speed) = (self.lengths(), self.friction_per_speed(at));
@@ -141,7 +141,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         form
     }
 
-    /// Friction force in stick, from the equation of the neck.
+    /// Linear form of friction in stick, from the equation of the neck.
     fn stick_friction_form(&self, matrices: &TangentMatrices) -> LinearForm {
         let mut form = LinearForm::default();
         let share = 1.0 / self.linkage.l1_m;
@@ -154,7 +154,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         form
     }
 
-    /// Eliminates the second derivatives by the equations of the variation.
+    /// Eliminates the second derivatives with the equations of the variation.
     fn eliminate_accelerations(&self, form: &mut LinearForm, matrices: &TangentMatrices) {
         if self.touch == ContactMode::Stick {
             self.eliminate_lip(form);
@@ -174,7 +174,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         form.second = [LaneVector::ZERO; 3];
     }
 
-    /// Eliminates `y1''` by the equation in stick.
+    /// Eliminates `y1''` with the equation in stick.
     fn eliminate_in_stick(&self, form: &mut LinearForm, matrices: &TangentMatrices) {
         let (single, l) = (self.stick_equation(matrices), self.lengths());
         let factor = form.second[0] * single.first[0].inverse();
@@ -183,7 +183,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         let share = 1.0 / l[1];
         form.place -= share * (factor * single.second[2]);
         for k in 0..3 {
-            // (the second derivative comes first in the equation)
+            // (the coefficient of the second derivative comes first in the equation)
             form.forcing.tip[k] += share * (factor * single.second[2 - k]);
         }
         form.forcing.equations[0] -= l[1] * factor;
@@ -191,7 +191,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         form.second = [LaneVector::ZERO; 3];
     }
 
-    /// Eliminates `y2` in stick by `y2 = (place - tip - l1 y1) / l2` and its derivatives.
+    /// Eliminates `y2` in stick with `y2 = (place - tip - l1 y1) / l2` and its derivatives.
     fn eliminate_lip(&self, form: &mut LinearForm) {
         let l = self.lengths();
         let (ratio, share) = (l[0] / l[1], 1.0 / l[1]);

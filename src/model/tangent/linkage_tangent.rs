@@ -3,8 +3,8 @@
 use super::lane_vector::LaneVector;
 use crate::model::Linkage;
 
-/// Derivatives of every constant of a [`Linkage`], one lane per direction, in the unit of the constant over
-/// that of the direction.
+/// Derivatives of every constant of a [`Linkage`], one lane per direction, in the unit of the constant per
+/// unit of the direction.
 #[derive(Debug, Clone, Default)]
 #[allow(missing_docs)] // the fields are those of the linkage
 pub struct LinkageTangent {
@@ -32,7 +32,7 @@ pub struct SpringTangent {
     pub damping: LaneVector,
 }
 
-/// A constant of a linkage; index 0 is that of the neck, 1 that of the lip.
+/// A constant of a linkage; index 0 stands for the neck, 1 for the lip.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs)] // the names are those of the linkage's fields
 pub enum LinkageConstant {
@@ -56,8 +56,8 @@ pub enum LinkageConstant {
     ShoulderDamping,
 }
 
-/// A constant with its row of a [`LinkageTangent`] and its place in a [`Linkage`], which a linkage without
-/// shoulder may lack.
+/// A constant with two functions: one selects its row in a [`LinkageTangent`], the other its value in a
+/// [`Linkage`], which is `None` for a constant of a missing shoulder.
 type ConstantRow =
     (LinkageConstant, fn(&mut LinkageTangent) -> &mut LaneVector, fn(&mut Linkage) -> Option<&mut f64>);
 
@@ -101,13 +101,14 @@ const CONSTANTS: &[ConstantRow] = constants! {
 };
 
 impl LinkageTangent {
-    /// Sets a direction to the difference quotient `sum weight * linkage`, whose weights add up to zero.
+    /// Sets the derivatives in the direction `lane` to the difference quotient `sum weight * linkage`; the
+    /// weights add up to zero.
     pub(crate) fn set_direction(&mut self, lane: usize, terms: &[(f64, Linkage)]) {
         let mut first = terms.first().map(|(_, linkage)| *linkage);
         for (_, row, place) in CONSTANTS {
             let (row, mut sum) = (row(self), 0.0);
             for (weight, mut linkage) in terms.iter().copied() {
-                // (a constant that is the same in all of them has a derivative of exactly zero, and costs
+                // (a constant that is the same in all linkages has a derivative of exactly zero and costs
                 // nothing)
                 if let (Some(constant), Some(first)) = (place(&mut linkage), first.as_mut().and_then(place)) {
                     sum += weight * (*constant - *first);
@@ -117,14 +118,14 @@ impl LinkageTangent {
         }
     }
 
-    /// The constants that change in a direction, each with its derivative.
+    /// The constants that change in the direction `lane`, each with its derivative.
     pub(crate) fn nonzero_changes(&self, lane: usize) -> impl Iterator<Item = (LinkageConstant, f64)> {
         let mut tangent = self.clone();
         let changes = CONSTANTS.iter().map(move |(constant, row, _)| (*constant, row(&mut tangent)[lane]));
         changes.filter(|(_, change)| *change != 0.0)
     }
 
-    /// The linkage displaced by `step` along a direction.
+    /// The linkage displaced by `step` in the direction `lane`.
     pub(crate) fn displace_linkage(&self, linkage: &Linkage, lane: usize, step: f64) -> Linkage {
         let (mut tangent, mut moved) = (self.clone(), *linkage);
         for (_, row, place) in CONSTANTS {

@@ -127,7 +127,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         at
     }
 
-    /// The forces on the tip.
+    /// Samples the forces on the tip.
     #[inline(always)]
     fn sample_tip_forces(&self, at: &mut MotionSamples) {
         let (motion, order) = (self.motion, self.motion.order);
@@ -151,18 +151,18 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         }
     }
 
-    /// Both angles there, rad.
+    /// Both angles at the sampled instants, rad.
     pub(super) fn sample_angles(&self, at: &MotionSamples) -> LaneVectorPair {
         *at.angles.get_or_init(|| sum_horner(at.x, self.motion.order, |k| self.motion.angle[k]))
     }
 
-    /// Velocity of the tip there, m/s.
+    /// Velocity of the tip at the times `x`, m/s.
     pub(super) fn sample_tip_velocity(&self, x: LaneVector) -> LaneVector {
         let [velocity] = sum_horner(x, self.motion.order, |k| [self.motion.tip_velocity[k]]);
         velocity
     }
 
-    /// Drop of the head there, m, and its rate, m/s.
+    /// Drop of the head at the sampled instants, m, and its rate, m/s.
     pub(super) fn sample_head_drop(&self, at: &MotionSamples) -> [LaneVector; 2] {
         let motion = self.motion;
         if self.is_in_flight() {
@@ -175,7 +175,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         ]
     }
 
-    /// `e = exp(-b |v3'|)`: the falling part of the friction coefficient is `a e`.
+    /// Factor `e = exp(-b |v3'|)` of friction: the falling part of the friction coefficient is `a e`.
     pub(super) fn friction_decay(&self, at: &MotionSamples, direction: f64) -> LaneVector {
         let law = &self.linkage.friction;
         if law.a == 0.0 {
@@ -186,7 +186,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
     }
 }
 
-/// Times as a vector; the last one also fills the remaining lanes.
+/// Times as a vector; the last time also fills the remaining lanes.
 pub(crate) fn fill_lanes(times: impl IntoIterator<Item = f64>) -> LaneVector {
     let mut row = LaneVector::ZERO;
     for (lane, time) in times.into_iter().take(LANES).enumerate() {

@@ -3,29 +3,30 @@
 use super::{index_at_frame, median_of_three, median_position};
 use std::ops::Range;
 
-/// Share of the change at which the flip starts: usual for rise times, and far above tracking noise.
+/// Fraction of the change at which the flip starts; 5 % is usual for rise times and far above tracking noise.
 const START_SHARE: f64 = 0.05;
-/// Share of the change at which the flip ends.
+/// Fraction of the change at which the flip ends.
 const END_SHARE: f64 = 0.95;
-/// Tracked frames on either side of the turn that always count for the level before.
+/// Number of tracked frames on either side of the turn that always count for the level before the turn.
 const NEAR_TURN: usize = 5;
-/// Fewest tracked frames of the level after: noise dominates a median of fewer.
+/// Minimum number of tracked frames for the level after the turn: noise dominates a median of fewer frames.
 const FEWEST_POINTS: usize = 8;
-/// Least change in units of the deflection's noise. The extremes of white noise in 1e5 frames are about 9
-/// apart.
+/// Smallest change that counts as a flip, in units of the deflection's noise. The extremes of white noise in
+/// 1e5 frames are about 9 units apart.
 const CHANGE_NOISES: f64 = 12.0;
 
 /// Passage of the deflection from its level before a turn to its level after, in s of the recording.
 ///
 /// The level before is the median deflection from the stop of the tip to the turn of the head. The level
-/// after is the median over a time after the release that is as long as the tip's rest: oscillation about it
-/// averages out. The flip starts when the deflection last leaves the first 5 % of the change, and ends when
-/// it first reaches 95 %. A zero crossing would not do, because zero depends on which points are tracked.
+/// after is the median over a time that begins at the release and is as long as the tip's rest, so that the
+/// oscillation about this level averages out. The flip starts when the deflection last leaves the first 5 %
+/// of the change, and ends when it first reaches 95 %. A zero crossing would not serve as a criterion,
+/// because zero depends on the choice of the tracked points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Flip {
-    /// The deflection leaves its level before, s.
+    /// Time at which the deflection leaves its level before the turn, s.
     pub start_s: f64,
-    /// The deflection reaches its level after, s.
+    /// Time at which the deflection reaches its level after the turn, s.
     pub end_s: f64,
 }
 
@@ -35,12 +36,12 @@ pub(super) struct TurnNeighbourhood {
     pub turn: f64,
     pub hold: Option<f64>,
     pub release: f64,
-    /// The next turn; infinite where there is none.
+    /// The next turn; infinite if there is none.
     pub next_turn: f64,
 }
 
-/// Start and end of the flip, frames; `points` are the tracked frames of the deflection. `None` where too few
-/// frames are tracked or the change is within the noise.
+/// Start and end of the flip, frames; `points` are the tracked frames of the deflection. `None` if too few
+/// frames are tracked or if the change is within the noise.
 pub(super) fn find_flip(
     points: &[(usize, f64)],
     noise_m: f64,
@@ -60,7 +61,7 @@ pub(super) fn find_flip(
     Some((start, interpolate_crossing(points, &share, end.checked_sub(1)?, END_SHARE)))
 }
 
-/// Points between the stop of the tip and the turn, whichever comes first, and a few about the turn.
+/// Points between the stop of the tip and the turn, in either order, and a few points about the turn.
 fn level_before(points: &[(usize, f64)], around: &TurnNeighbourhood) -> Range<usize> {
     let frames = [around.turn, around.hold.unwrap_or(around.turn)];
     let [turn, hold] = frames.map(|frame| index_at_frame(points, frame));
@@ -68,14 +69,14 @@ fn level_before(points: &[(usize, f64)], around: &TurnNeighbourhood) -> Range<us
         ..turn.max(hold).max((turn + NEAR_TURN).min(points.len()))
 }
 
-/// Points after the release, for as long as the tip rested and not beyond the next turn.
+/// Points after the release, for as long as the tip rested but not past the next turn.
 fn level_after(points: &[(usize, f64)], around: &TurnNeighbourhood) -> Range<usize> {
     let rested = around.release - around.hold.unwrap_or(around.turn).min(around.turn);
     let from = index_at_frame(points, around.release);
     from..index_at_frame(points, (around.release + rested).min(around.next_turn)).max(from)
 }
 
-/// Frame at which the share passes `level` on the way from a point to the next.
+/// Frame at which the fraction `share` of the change passes `level` between a point and the next.
 fn interpolate_crossing(
     points: &[(usize, f64)],
     share: &impl Fn(usize) -> f64,
@@ -105,21 +106,21 @@ mod tests {
     const TRAILS_M: f64 = 1.1e-3;
     const HOLD_BEFORE_S: f64 = 0.02;
 
-    /// Head on a cosine of 0.5 Hz that turns at 1, 2, 3 s ...
+    /// Head on a cosine of 0.5 Hz, with turns at 1, 2, 3 s ...
     fn head(t: f64) -> f64 {
         AMPLITUDE_M * (1.0 - (PI * t).cos())
     }
 
-    /// Time after a turn at which the head has come back by `back_m` from where it was when the tip stopped,
-    /// s.
+    /// Time after a turn, s, at which the head has moved back past its position at the tip's stop by
+    /// `back_m`.
     fn back_s(back_m: f64) -> f64 {
         ((PI * HOLD_BEFORE_S).cos() - back_m / AMPLITUDE_M).acos() / PI
     }
 
     /// A tip that trails, stops before each turn, sticks until the blade is deflected as far to the other
-    /// side, and trails again; then it swings by `swing_m` about its place, 80 times a second.
+    /// side, and trails again; after the release it swings about its path by `swing_m` at 80 Hz.
     fn tip(t: f64, swing_m: f64) -> f64 {
-        let since = (t - 0.5).rem_euclid(1.0) - 0.5; // from the nearest turn
+        let since = (t - 0.5).rem_euclid(1.0) - 0.5; // time since the nearest turn
         let turn = t - since;
         let sign = if turn.round() as i64 % 2 == 0 { -1.0 } else { 1.0 };
         let release_s = back_s(2.0 * TRAILS_M);
@@ -160,8 +161,8 @@ mod tests {
         ReversalInstants::find_instants(recording).reversals
     }
 
-    /// 5 % and 95 % of the way from the median of the deflection at rest, which the head passes half-way in
-    /// time, to the new side.
+    /// Times at 5 % and 95 % of the change to the new side; the change starts at the median of the deflection
+    /// at rest, which the head passes half-way in time.
     fn expected_s(turn_s: f64) -> [f64; 2] {
         let excursion_m = head(1.0 - HOLD_BEFORE_S / 2.0) - head(1.0 - HOLD_BEFORE_S);
         let change_m = 2.0 * TRAILS_M + excursion_m;
@@ -190,8 +191,9 @@ mod tests {
     #[test]
     fn noise_and_gaps_move_it_by_a_few_frames() {
         let gappy = |i: usize| i % 7 == 3 || (1900..2100).contains(&i) || (2355..2380).contains(&i);
-        // noise of 3 um is 4 frames of the head where the flip starts; a gap at the turn hides the half of
-        // the rest in which the blade is deflected most, by 10 um or 16 frames of the head
+        // noise of 3 um is as much as the head moves in 4 frames where the flip starts; a gap at the turn
+        // hides the half of the rest in which the blade is deflected most, by 10 um or 16 frames of the
+        // head's motion
         for (missing, frames) in [(&(|_| false) as &dyn Fn(usize) -> bool, 12.0), (&gappy, 30.0)] {
             let found = find(&stroke(0.8, 1.4, [2e-6, 0.0], missing));
             assert_eq!(found.len(), 1);

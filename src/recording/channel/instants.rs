@@ -1,5 +1,5 @@
-//! Instants of a stroke found in a recording: the head turns, the tip stops, the deflection flips, the tip
-//! slips again.
+//! Instants of a stroke that are found in a recording: the head turns, the tip stops, the deflection flips,
+//! the tip slips again.
 
 use super::Channel;
 use super::flip::{self, Flip, TurnNeighbourhood};
@@ -25,7 +25,7 @@ pub enum InstantKind {
 impl InstantKind {
     pub(crate) const ALL: [Self; 4] = [Self::Hold, Self::Reversal, Self::Flip, Self::Release];
 
-    /// Name in a window.
+    /// Name of the instant in a window.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Hold => "hold",
@@ -36,23 +36,24 @@ impl InstantKind {
     }
 }
 
-/// The instants of one turn of the head; times in s of the recording.
+/// The instants around one turn of the head, in s of the recording's time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reversal {
-    /// The head turns.
+    /// Time at which the head turns.
     pub reversal_s: f64,
-    /// The tip stops; `None` if it stops before the recording starts, or not at all.
+    /// Time at which the tip stops; `None` if it stops before the recording starts, or not at all.
     pub hold_s: Option<f64>,
-    /// The tip slips again; `None` if that is after the end of the recording, or the tip does not stop.
+    /// Time at which the tip slips again; `None` if this is after the end of the recording, or if the tip
+    /// does not stop.
     pub release_s: Option<f64>,
-    /// The deflection changes sides; `None` without a release, or where the deflection changes by no more
-    /// than its noise.
+    /// The flip of the deflection to the other side; `None` without a release, or if the deflection changes
+    /// by no more than its noise.
     pub flip: Option<Flip>,
 }
 
 impl Reversal {
-    /// End of the flip, s, or the tip's release where that is later: from then on the blade trails on its new
-    /// side.
+    /// End of the flip, s, or the release of the tip if that is later: from this time on the blade trails on
+    /// its new side.
     pub(crate) fn settling_time_s(&self) -> Option<f64> {
         Some(self.flip?.end_s.max(self.release_s?))
     }
@@ -61,13 +62,13 @@ impl Reversal {
 /// Why a recording does not show an instant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum InstantNotFound {
-    /// There is no head to turn.
+    /// The head was not tracked.
     #[error("the head was tracked in none of its frames")]
     HeadNotTracked,
-    /// No turn at all.
+    /// The head does not turn.
     #[error("the head does not turn in it")]
     NoTurn,
-    /// Fewer turns than asked for, at least 1.
+    /// The head turns at least once, but fewer times than asked for.
     #[error("{turns} reversal{} found", if *turns == 1 { " was" } else { "s were" })]
     FewerTurns {
         /// Number of turns that were found.
@@ -87,7 +88,7 @@ pub enum InstantNotFound {
     NoFlip,
 }
 
-/// Every turn of the head that a recording shows, in order of time.
+/// All turns of the head that a recording shows, in order of time.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ReversalInstants {
     /// One entry per turn.
@@ -145,10 +146,11 @@ impl ReversalInstants {
         }
     }
 
-    /// End of the flip at the `reversal`-th turn (counted from 1), s; the tip's release where that is later.
+    /// Time from which the blade trails on its new side after the `reversal`-th turn (counted from 1), s: the
+    /// end of the flip, or the release of the tip if that is later.
     ///
     /// # Errors
-    /// As [`Self::time_s`] of [`InstantKind::Flip`].
+    /// The errors of [`Self::time_s`] for [`InstantKind::Flip`].
     pub(crate) fn settling_time_s(&self, reversal: usize) -> Result<f64, InstantNotFound> {
         self.time_s(InstantKind::Flip, reversal)?;
         self.find_reversal(reversal).and_then(Reversal::settling_time_s).ok_or(InstantNotFound::NoRelease)
@@ -170,8 +172,8 @@ mod tests {
     const HOLD_BEFORE_S: f64 = 0.02;
     const RELEASE_AFTER_S: f64 = 0.05;
 
-    /// A head on a cosine of 0.5 Hz (turns at 1, 2, 3 s ...) and a tip that trails by 2 mm, holds around each
-    /// turn, and is then dragged along again.
+    /// A head on a cosine of 0.5 Hz (with turns at 1, 2, 3 s ...) and a tip that trails by 2 mm, holds around
+    /// each turn, and is then dragged along again.
     fn stroke(start_s: f64, stop_s: f64, noise_m: f64, missing: impl Fn(usize) -> bool) -> Recording {
         let frames = ((stop_s - start_s) * RATE_HZ).round() as usize;
         let head = |t: f64| 0.018 * (1.0 - (TAU * 0.5 * t).cos());
@@ -179,7 +181,7 @@ mod tests {
             let (turn, sign) = (t.round(), if t.round() as i64 % 2 == 0 { -1.0 } else { 1.0 });
             let (hold, release) = (turn - HOLD_BEFORE_S, turn + RELEASE_AFTER_S);
             let place = head(hold) - sign * 2e-3;
-            // it stops as a parabola and leaves as a cube, and is far away within 20 ms
+            // the tip stops along a parabola and leaves along a cubic, and is far away within 20 ms
             if t < hold {
                 place - sign * 40.0 * (hold - t).powi(2)
             } else if t > release {
@@ -214,7 +216,7 @@ mod tests {
         Recording::new("r", FrameGrid { start_s, frame_rate_hz: RATE_HZ, frames }, traces, true).unwrap()
     }
 
-    /// Within `frames` of the truth.
+    /// Asserts that an instant is found within `frames` of its true time.
     fn assert_near(found_s: Option<f64>, truth_s: f64, frames: f64) {
         let found_s = found_s.unwrap_or_else(|| panic!("nothing found near {truth_s} s"));
         assert!((found_s - truth_s).abs() * RATE_HZ <= frames, "found {found_s} s, expected {truth_s} s");
@@ -303,7 +305,8 @@ mod tests {
         for (i, x) in traces.tip_x_m.iter_mut().enumerate() {
             let t = 0.8 + i as f64 / RATE_HZ;
             let since_rest = (1.0 - HOLD_BEFORE_S - t).max(t - 1.0 - RELEASE_AFTER_S - 2e-3).max(0.0);
-            // sticks and slips 900 times a second, each slip 60 um, and comes to rest where the chatter ends
+            // the tip sticks and slips 900 times a second, each slip 60 um, and comes to rest where the
+            // chatter ends
             *x = x.map(|x| {
                 x + 60e-6 * ((since_rest * 900.0).fract() - 0.5) * f64::from(u8::from(since_rest > 0.0))
             });

@@ -6,8 +6,8 @@ use crate::recording::Recording;
 use serde::Serialize;
 use std::ops::Range;
 
-/// A part of the motion around a reversal. The four follow one another without a gap: each ends where the
-/// next starts.
+/// A part of the motion around a reversal. The four phases follow one another without a gap: each ends where
+/// the next starts.
 ///
 /// | name | from | to |
 /// |---|---|---|
@@ -17,8 +17,8 @@ use std::ops::Range;
 /// | `after` | settled | the tip stops at the next reversal (`hold`), or the end of the recording |
 ///
 /// The tip still sticks during most of `flip`, while the head passes over it. During `stick` the blade rests,
-/// so a ring-down there does not overlap with the flip. `before` of a later reversal is `after` of the
-/// previous one. `Flip` describes how the flip is found.
+/// so a ring-down in this phase does not overlap with the flip. The phase `before` of a later reversal is the
+/// phase `after` of the previous one. `Flip` describes how the flip is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum ReversalPhase {
     /// The blade trails on its old side.
@@ -35,7 +35,7 @@ impl ReversalPhase {
     /// Every phase, in order of time.
     pub(crate) const ALL: [Self; 4] = [Self::Before, Self::Stick, Self::Flip, Self::After];
 
-    /// Name on the command line.
+    /// Name of the phase on the command line.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Before => "before",
@@ -45,8 +45,8 @@ impl ReversalPhase {
         }
     }
 
-    /// End or start at the `reversal`-th turn (counted from 1), s; `None` for the end or the start of the
-    /// recording.
+    /// Time of the end (if `at_end`) or the start of the phase at the `reversal`-th turn (counted from 1), s;
+    /// `None` stands for the end or the start of the recording.
     pub(super) fn boundary_s(
         self,
         at_end: bool,
@@ -69,16 +69,16 @@ impl ReversalPhase {
     }
 }
 
-/// A phase of a reversal as a recording shows it.
+/// A phase of a reversal that a recording shows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhaseWindow {
-    /// As written in a window: `after`, `after[2]`.
+    /// Name of the phase in a window: `after`, `after[2]`.
     pub name: String,
-    /// Which phase.
+    /// The phase.
     pub phase: ReversalPhase,
-    /// Of which reversal, counted from 1.
+    /// Number of the reversal, counted from 1.
     pub reversal: usize,
-    /// Its frames: those with `from_s <= time < to_s`; at least one.
+    /// Frames of the phase, those with `from_s <= time < to_s`; at least one.
     pub frames: Range<usize>,
     /// Start, s.
     pub from_s: f64,
@@ -86,9 +86,9 @@ pub struct PhaseWindow {
     pub to_s: f64,
 }
 
-/// The phases of every reversal that a recording shows, in order of time and without overlap. The motion
-/// between two reversals is listed once, as `after` of the first. A phase without one of its instants is left
-/// out.
+/// The phases of all reversals that a recording shows, in order of time and without overlap. The motion
+/// between two reversals is listed once, as `after` of the first reversal. A phase is left out if the
+/// recording does not show the instants at its ends.
 #[must_use]
 pub fn phase_windows(recording: &Recording, instants: &ReversalInstants) -> Vec<PhaseWindow> {
     let mut windows: Vec<PhaseWindow> = Vec::new();

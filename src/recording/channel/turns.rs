@@ -1,26 +1,29 @@
-//! Where the head turns.
+//! Turns of the head, and the rest of the tip around them.
 
 use super::{TrackPoints, median_filter, median_position, noise_sd_m, value_range};
 use portable_math as math;
 
-/// Least return of the head after a turn, m: one pixel of the usual 20 um. Jitter of a resting head stays
-/// below it.
+/// Smallest distance by which the head must move to an extremum and back for it to count as a turn, m: one
+/// pixel of the usual 20 um. Jitter of a resting head is smaller.
 pub(super) const LEAST_RETURN_M: f64 = 20e-6;
-/// Least return in units of the tracking noise: two extremes of white noise in 1e5 frames are about 9 apart.
+/// Smallest distance to an extremum and back in units of the tracking noise; two extremes of white noise in
+/// 1e5 frames are about 9 apart.
 const RETURN_NOISES: f64 = 12.0;
-/// Least return as a share of the head's whole travel. Vibration of the drive stays below it.
+/// Smallest distance to an extremum and back as a fraction of the head's whole travel; vibration of the drive
+/// is smaller.
 const RETURN_TRAVEL: f64 = 0.005;
-/// Turns are timed by a parabola through the frames within this many returns of the extremum.
+/// A turn is timed by a parabola through the frames that are nearer to the extremum than this multiple of the
+/// smallest distance.
 const FIT_RETURNS: f64 = 4.0;
 
-/// A turn of the head: its frame (a real number) and the frames of the parabola that timed it.
+/// A turn of the head: its time in frames, and the first and last frame of the parabola that timed it.
 pub(super) struct HeadTurn {
     pub frame: f64,
     pub first: usize,
     pub last: usize,
 }
 
-/// Extrema from which the head returns by more than noise, jitter and vibration.
+/// Finds the extrema from which the head returns by more than noise, jitter and vibration.
 pub(super) fn find_turns(head: &TrackPoints) -> Vec<HeadTurn> {
     let smooth = median_filter(&head.points);
     let (low, high) = value_range(&smooth);
@@ -29,8 +32,8 @@ pub(super) fn find_turns(head: &TrackPoints) -> Vec<HeadTurn> {
     extrema.map(|index| time_extremum(head, &smooth, index, FIT_RETURNS * least)).collect()
 }
 
-/// Indices of alternating maxima and minima. The values before and after each differ from it by at least
-/// `least`.
+/// Indices of alternating maxima and minima. Before and after each extremum, the values move away from it by
+/// at least `least`.
 fn alternating_extrema(values: &[f64], least: f64) -> Vec<usize> {
     let Some(first) = values.first() else { return Vec::new() };
     let (mut top, mut bottom) = ((0, *first), (0, *first));
@@ -58,7 +61,7 @@ fn alternating_extrema(values: &[f64], least: f64) -> Vec<usize> {
     found
 }
 
-/// Times an extremum by the vertex of a parabola through the frames within `reach_m` of it.
+/// Times an extremum by the vertex of a parabola through the frames whose position is within `reach_m` of it.
 fn time_extremum(head: &TrackPoints, smooth: &[f64], index: usize, reach_m: f64) -> HeadTurn {
     let near = |i: &usize| (smooth[*i] - smooth[index]).abs() <= reach_m;
     let first = (0..=index).rev().take_while(near).last().unwrap_or(index);
@@ -92,23 +95,24 @@ fn parabola_vertex(points: &[(usize, f64)]) -> Option<f64> {
     s.is_finite().then_some(centre + half * s)
 }
 
-/// Tolerance of a hold, in standard deviations of the noise: one frame in 2 million of white noise lies
-/// outside.
+/// Tolerance of a hold, in standard deviations of the noise. White noise exceeds it in one frame of 2
+/// million.
 const HOLD_NOISES: f64 = 5.0;
 /// Smallest tolerance of a hold, m: a hundredth of a pixel of 20 um, finer than any tracker.
 const LEAST_TOLERANCE_M: f64 = 0.2e-6;
-/// Tolerance of a hold, in steps of the tracker: whole-pixel tracking flickers between two neighbours.
+/// Tolerance of a hold, in steps of the tracker: whole-pixel tracking flickers between two adjacent values.
 const HOLD_STEPS: f64 = 1.1;
-/// Consecutive frames outside, on one side, that end a hold; fewer are outliers of the tracker.
+/// Number of consecutive frames outside the tolerance, on one side, that end a hold; fewer frames are
+/// outliers of the tracker.
 const LEFT_FRAMES: usize = 3;
-/// Seeds of the search for a hold on either side of a turn, spread over the frames of the parabola.
+/// Number of seeds of the search for a hold on either side of a turn, spread over the frames of the parabola.
 const SEEDS: isize = 4;
-/// Half the number of frames whose median seeds the place of a hold.
+/// Half the number of frames whose median is the first estimate of the position of a hold.
 const SEED_HALF: usize = 5;
-/// Least travel of the head during a hold, in tolerances. A tip that follows a slow head stays within two,
-/// and noise adds less than two.
+/// Smallest travel of the head during a hold, in tolerances. A tip that only follows a slow head stays within
+/// the tolerance for at most two tolerances of the head's travel, and noise adds less than two.
 const HEAD_TOLERANCES: f64 = 6.0;
-/// Bound on the extrapolation back to the start or end of a hold, frames.
+/// Limit on the extrapolation back to the start or end of a hold, frames.
 const MOST_EXTRAPOLATED: f64 = 5.0;
 /// Exponent of the tip's path after release: its acceleration starts at zero, so the path grows as the cube
 /// of time.
@@ -116,7 +120,8 @@ const RELEASE_POWER: f64 = 3.0;
 /// Exponent of the tip's path before a hold: it decelerates to rest along a parabola.
 const HOLD_POWER: f64 = 2.0;
 
-/// An interval in which the tip rests, in frames (real numbers); an end outside the recording is `None`.
+/// An interval in which the tip rests, in frames (real numbers); an end that lies outside the recording is
+/// `None`.
 pub(super) struct TipHold {
     pub start: Option<f64>,
     pub end: Option<f64>,
@@ -131,7 +136,8 @@ pub(super) fn longest_hold(head: &TrackPoints, tip: &TrackPoints, turn: &HeadTur
     holds.reduce(|best, hold| if hold.points > best.points { hold } else { best })
 }
 
-/// Tolerance of a hold, m, from the noise in the middle third about the turn, where the drive is slow.
+/// Tolerance of a hold, m, from the noise in the middle third of the frames of the parabola, where the drive
+/// is slow.
 fn hold_tolerance_m(tip: &TrackPoints, turn: &HeadTurn) -> f64 {
     let sixth = (turn.last - turn.first) as f64 / 6.0;
     let near = &tip.points[tip.index_at_frame(turn.frame - sixth)..tip.index_at_frame(turn.frame + sixth)];

@@ -1,5 +1,5 @@
-//! Windows `A..B` in seconds of the recording's time or relative to instants found in it, or a phase of a
-//! reversal by its name.
+//! Windows `A..B`: in seconds of the recording's time, relative to instants found in the recording, or a
+//! phase of a reversal by its name.
 
 use super::instants::{InstantKind, InstantNotFound, ReversalInstants};
 use super::phase::ReversalPhase;
@@ -8,7 +8,7 @@ use serde::Serialize;
 use std::fmt;
 use std::ops::Range;
 
-/// Fewest frames of a window: a cubic trend takes four, and four are left.
+/// Minimum number of frames of a window: a cubic trend uses four degrees of freedom, so that four are left.
 pub(crate) const MIN_FRAMES: usize = 8;
 
 /// One end of a window.
@@ -18,20 +18,20 @@ pub enum WindowEnd {
     Open,
     /// A time of the recording, s.
     Time(f64),
-    /// An instant found in the data and an offset from it.
+    /// An instant found in the recording, and an offset from it.
     Found {
-        /// Which instant.
+        /// The instant.
         anchor: InstantKind,
-        /// Of which reversal, counted from 1.
+        /// Number of the reversal, counted from 1.
         reversal: usize,
         /// Time from the instant, s.
         offset_s: f64,
     },
-    /// A phase of a reversal: its start at the start of a window, its end at the end.
+    /// A phase of a reversal: its start if this is the start of a window, its end if this is the end.
     Phase {
-        /// Which phase.
+        /// The phase.
         phase: ReversalPhase,
-        /// Of which reversal, counted from 1.
+        /// Number of the reversal, counted from 1.
         reversal: usize,
     },
 }
@@ -39,9 +39,9 @@ pub enum WindowEnd {
 /// Frames from `from` (included) to `to` (not included).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Window {
-    /// Where it starts.
+    /// Start of the window.
     pub from: WindowEnd,
-    /// Where it ends.
+    /// End of the window.
     pub to: WindowEnd,
 }
 
@@ -81,7 +81,7 @@ impl Window {
         WindowError { window: self.to_string(), problem }
     }
 
-    /// Frames, without a least number, and start and end, s.
+    /// Frames of the window, which may be fewer than `MIN_FRAMES`, and its start and end, s.
     pub(super) fn locate_span(
         &self,
         recording: &Recording,
@@ -118,7 +118,8 @@ impl Window {
 }
 
 impl WindowEnd {
-    /// Its time, s, at the end of a window or at its start; `None` for that of the recording.
+    /// Time of this end, s, as the end of a window (if `at_end`) or as its start; `None` stands for the end
+    /// or the start of the recording.
     fn time_s(self, at_end: bool, instants: &ReversalInstants) -> Result<Option<f64>, AbsentInstant> {
         match self {
             Self::Open => Ok(None),
@@ -142,9 +143,10 @@ const EXPECTED_END: &str = "seconds or one of `hold`, `reversal`, `flip`, `relea
 const EXPECTED_PHASE: &str = "two ends with `..` between them, or one of `before`, `stick`, `flip`, `after`";
 
 impl Window {
-    /// Reads `A..B`; an end is empty, seconds, or `hold|reversal|flip|release`, then `[k]` (the k-th
-    /// reversal, default 1), then `+seconds` or `-seconds`. Or a whole phase of a reversal,
-    /// `before|stick|flip|after`, then `[k]`: see [`ReversalPhase`].
+    /// Parses `A..B`. Each end is empty, or a number of seconds, or `hold|reversal|flip|release` followed by
+    /// an optional `[k]` (the k-th reversal, default 1) and an optional `+seconds` or `-seconds`. A whole
+    /// phase of a reversal, `before|stick|flip|after` with an optional `[k]`, may stand for the window: see
+    /// [`ReversalPhase`].
     ///
     /// # Errors
     /// [`WindowError`] with the part at fault.
@@ -221,7 +223,7 @@ fn parse_end(part: &str) -> Result<WindowEnd, &'static str> {
     Ok(WindowEnd::Found { anchor, reversal, offset_s })
 }
 
-/// A whole phase of a reversal: `after`, `after[2]`.
+/// Parses a whole phase of a reversal: `after`, `after[2]`.
 fn parse_phase(text: &str) -> Result<Window, &'static str> {
     let named = |phase: ReversalPhase| Some((phase, text.strip_prefix(phase.name())?));
     let (phase, rest) = ReversalPhase::ALL.into_iter().find_map(named).ok_or(EXPECTED_PHASE)?;
@@ -230,7 +232,7 @@ fn parse_phase(text: &str) -> Result<Window, &'static str> {
     if rest.trim().is_empty() { Ok(Window { from: end, to: end }) } else { Err(EXPECTED_PHASE) }
 }
 
-/// The number in `[k]`, by default 1, and the text after it.
+/// The number in `[k]`, 1 without brackets, and the text after it.
 fn parse_reversal(text: &str) -> Result<(usize, &str), &'static str> {
     let Some(rest) = text.strip_prefix('[') else { return Ok((1, text)) };
     let (number, rest) = rest.split_once(']').ok_or("`]` after the number of the reversal")?;
@@ -238,7 +240,7 @@ fn parse_reversal(text: &str) -> Result<(usize, &str), &'static str> {
     Ok((number.ok_or("the number of a reversal, counted from 1, in `[]`")?, rest))
 }
 
-/// A finite number; words such as `inf` are not seconds.
+/// Parses a finite number; words such as `inf` are not seconds.
 fn parse_seconds(text: &str) -> Option<f64> {
     text.parse().ok().filter(|value: &f64| value.is_finite())
 }

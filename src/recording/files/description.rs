@@ -1,4 +1,4 @@
-//! `recording.toml`: where a recording comes from, how it was taken and what was measured on it.
+//! `recording.toml`: the source of a recording, the camera, and the measured quality.
 
 use super::{DESCRIPTION_FILE, FilesError, VideoEntry};
 use crate::recording::quality::{Optics, Quality, QualityFinding};
@@ -13,29 +13,29 @@ use serde::{Deserialize, Serialize};
 pub struct RecordingFile {
     /// Version of the format.
     pub format: u32,
-    /// Whether no camera took it: a simulation or a twin.
+    /// Whether no camera took the recording: it is a simulation or a twin.
     #[serde(default)]
     pub synthetic: bool,
-    /// SHA-256 of `trace.csv`, without byte-order mark and with line feeds; a trace without one is not
-    /// verified.
+    /// SHA-256 of `trace.csv`, without byte-order mark and with line feeds. A trace is not verified if this
+    /// is absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub trace_sha256: Option<String>,
     /// The export that was imported; absent for a twin that was never exported.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub source: Option<SourceEntry>,
-    /// How it was taken.
+    /// How the recording was taken.
     pub camera: CameraEntry,
-    /// How the tilt of the camera was measured and taken out; absent where the traces are as in the export.
+    /// How the tilt of the camera was measured and removed; absent if the traces were left as in the export.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub level: Option<LevelEntry>,
-    /// What was measured when it was written.
+    /// Quality that was measured when this file was written.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quality: Option<Quality>,
-    /// Whatever the user notes of the test: glass, speed, humidity.
+    /// Any notes of the user on the test: glass, speed, humidity.
     #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
     #[schemars(with = "serde_json::Map<String, serde_json::Value>")]
     pub conditions: toml::Table,
-    /// Pictures of the frames, for figures; absent where there are none.
+    /// Pictures of the frames, for figures; absent if there are none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub video: Option<VideoEntry>,
     /// The whole specification of a twin.
@@ -51,13 +51,13 @@ pub struct RecordingFile {
 pub struct SourceEntry {
     /// Name of the file in the folder.
     pub file: OneOrMany,
-    /// SHA-256 of its bytes, hexadecimal.
+    /// SHA-256 of the bytes of the file, hexadecimal.
     pub sha256: OneOrMany,
-    /// Format that it was read as.
+    /// Format as which the file was read.
     pub detected_format: String,
-    /// Text encoding that it was read with.
+    /// Text encoding with which the file was read.
     pub encoding: String,
-    /// What only the export could show: its times, its rejected positions, how it was filtered.
+    /// Findings that only the export could show: on its times, its rejected positions and its filters.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub findings: Vec<QualityFinding>,
 }
@@ -66,14 +66,14 @@ pub struct SourceEntry {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum OneOrMany {
-    /// A single one.
+    /// A single text.
     One(String),
-    /// Several, in order.
+    /// Several texts, in order.
     Many(Vec<String>),
 }
 
 impl OneOrMany {
-    /// All of them, in order.
+    /// All texts, in order.
     #[must_use]
     pub fn as_slice(&self) -> &[String] {
         match self {
@@ -98,13 +98,13 @@ impl From<Vec<String>> for OneOrMany {
 pub struct CameraEntry {
     /// Recording rate, 1/s (not the playback rate).
     pub frame_rate_hz: f64,
-    /// Exposure of a frame, s, where known.
+    /// Exposure of a frame, s, if known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exposure_s: Option<f64>,
-    /// Length that a pixel shows, m; absent where the export was in a length unit already.
+    /// Length that a pixel shows, m; absent if the export was already in a length unit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub metres_per_pixel: Option<f64>,
-    /// Direction of y in the export; `trace.csv` always has y upwards.
+    /// Direction of y in the export; in `trace.csv`, y always points up.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub y_axis: Option<YAxis>,
 }
@@ -115,30 +115,30 @@ impl From<&CameraEntry> for Optics {
     }
 }
 
-/// `[level]`: the tilt of the camera that `import --level` found. The traces of the export, turned clockwise
-/// by `angle_rad` about the centre, are those of `trace.csv` where `applied` is true.
+/// `[level]`: the tilt of the camera that `import --level` found. If `applied` is true, the traces in
+/// `trace.csv` are those of the export, rotated clockwise by `angle_rad` about the centre.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LevelEntry {
-    /// Whether both tracks were turned; a tilt that is not clear is left alone.
+    /// Whether both tracks were rotated; a tilt that is not clear is not corrected.
     pub applied: bool,
-    /// Angle from the x axis to the glass, rad; positive where the glass rose towards positive x.
+    /// Angle from the x axis to the glass, rad; positive if the glass rose towards positive x.
     pub angle_rad: f64,
-    /// Its standard deviation, rad.
+    /// Standard deviation of the angle, rad.
     pub sd_rad: f64,
-    /// Centre of the rotation along the sweep, m: it keeps its place.
+    /// Position of the centre of rotation along the sweep, m; the rotation leaves this point in place.
     pub centre_x_m: f64,
-    /// Centre of the rotation upwards, m.
+    /// Height of the centre of rotation, m.
     pub centre_y_m: f64,
-    /// Frames with the tip on the glass, which gave the angle.
+    /// Number of frames with the tip on the glass, from which the angle was found.
     pub frames: usize,
-    /// Curvature of the glass in the picture, 1/m, where it is clear.
+    /// Curvature of the glass in the picture, 1/m, if it is clear.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub curvature_per_m: Option<f64>,
 }
 
 impl LevelEntry {
-    /// The rotation in words.
+    /// Description of the rotation in words.
     pub(crate) fn describe(&self) -> String {
         let angle = format_degrees(self.angle_rad, self.sd_rad);
         if !self.applied {
@@ -160,7 +160,7 @@ impl LevelEntry {
     }
 }
 
-/// Direction in which y grows.
+/// Direction in which y increases.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum YAxis {
@@ -171,13 +171,13 @@ pub enum YAxis {
 }
 
 impl RecordingFile {
-    /// The JSON Schema of recording.toml: for editors, and for messages.
+    /// JSON Schema of recording.toml, for editors and messages.
     #[must_use]
     pub fn schema() -> serde_json::Value {
         toml_file::schema_of::<Self>()
     }
 
-    /// A description of the present format with nothing but its camera.
+    /// A description in the present format that has only the camera.
     pub(crate) fn new(camera: CameraEntry, synthetic: bool) -> Self {
         Self {
             format: FORMAT,
@@ -227,8 +227,8 @@ impl RecordingFile {
         }
     }
 
-    /// Refuses a trace whose hash differs from that in the description; `file` is the trace's name in the
-    /// refusal. A description without a hash accepts any trace.
+    /// Refuses a trace whose hash differs from the hash in the description; `file` is the name of the trace
+    /// in the refusal. A description without a hash accepts any trace.
     ///
     /// # Errors
     /// [`FilesError`] with the first digits of both hashes.

@@ -1,4 +1,4 @@
-//! `trace.csv`: one row per frame, an empty cell where a point was not tracked.
+//! `trace.csv`: one row per frame; a cell is empty if the point was not tracked.
 
 use super::FilesError;
 use crate::recording::clock::{self, FrameFit};
@@ -9,25 +9,26 @@ use std::fmt::Write;
 const NO_ROWS: &str = ": found no rows of numbers, expected the header \
     `time_s,tip_x_m,tip_y_m,head_x_m,head_y_m` and a row a frame; import the recording again";
 
-/// Header of every `trace.csv`; the confidences may follow.
+/// First columns in the header of every `trace.csv`; the confidences may follow.
 pub const HEADER: &str = "time_s,tip_x_m,tip_y_m,head_x_m,head_y_m";
 const CONFIDENCES: [&str; 2] = ["tip_confidence", "head_confidence"];
 const POSITIONS: usize = 4;
-/// Rows of a block of text, about half a megabyte, and number of blocks that are made in parallel.
+/// Number of rows in a block of text, about half a megabyte, and number of blocks that are made in parallel.
 const BLOCK_ROWS: usize = 4096;
 const BLOCKS: usize = 8;
 
-/// Largest distance of a time from the grid of a rounded rate, frames. Printed times carry 16 digits and lie
-/// far closer.
+/// Largest distance of a time from the grid of a rounded rate, frames. Times printed with 16 digits lie far
+/// closer.
 const SNAP_FRAMES: f64 = 1e-6;
 
-/// The recording as `trace.csv`: times from the grid, shortest numbers that read back to the same value.
+/// The recording as `trace.csv`: times from the grid, each number with the fewest digits that preserve its
+/// value.
 #[must_use]
 pub fn trace_csv(recording: &Recording) -> String {
     trace_blocks(recording).collect()
 }
 
-/// The text of [`trace_csv`] piece by piece: a long recording never lies in memory as text.
+/// The text of [`trace_csv`] in pieces, so that the text of a long recording never lies in memory as a whole.
 pub fn trace_blocks(recording: &Recording) -> impl Iterator<Item = String> {
     let columns: Vec<_> = recording.traces().columns().collect();
     let optional = columns.iter().skip(POSITIONS).map(|(name, _)| format!(",{name}"));
@@ -47,7 +48,8 @@ pub fn trace_blocks(recording: &Recording) -> impl Iterator<Item = String> {
     std::iter::once(header).chain(rows)
 }
 
-/// Adds a row of `trace.csv` to `text`: the time, s, and a cell a column, empty where the value is missing.
+/// Adds a row of `trace.csv` to `text`: the time, s, and one cell per column, which is empty if the value is
+/// missing.
 pub fn push_trace_row(text: &mut String, time_s: f64, cells: impl IntoIterator<Item = Option<f64>>) {
     push_number(text, time_s);
     for cell in cells {
@@ -59,7 +61,8 @@ pub fn push_trace_row(text: &mut String, time_s: f64, cells: impl IntoIterator<I
     text.push('\n');
 }
 
-/// The shortest text that reads back to the same number; an exponent only where plain digits would run long.
+/// Adds the shortest text that reads back to the same number, with an exponent only if plain digits would be
+/// long.
 fn push_number(text: &mut String, value: f64) {
     // (writing to a String cannot fail)
     let _ = if value != 0.0 && !(1e-4..1e16).contains(&value.abs()) {
@@ -69,8 +72,8 @@ fn push_number(text: &mut String, value: f64) {
     };
 }
 
-/// Reads `trace.csv` without its description: the rate is estimated from the times and taken with the fewest
-/// digits that explain them. Absent rows become missing frames.
+/// Reads `trace.csv` without its description. The frame rate is estimated from the times: it has the fewest
+/// digits that explain them. Missing rows become missing frames.
 ///
 /// # Errors
 /// [`FilesError`] with file, line and column.
@@ -82,10 +85,10 @@ pub fn parse_trace_csv(file: &str, text: &str) -> Result<(FrameGrid, Traces), Fi
     Ok(table.place_on_grid(&fit, frame_rate_hz))
 }
 
-/// Reads `trace.csv` on a grid of known rate, 1/s. Absent rows become missing frames.
+/// Reads `trace.csv` on a grid of known rate, 1/s. Missing rows become missing frames.
 ///
 /// # Errors
-/// [`FilesError`] with file, line and column; also where the times do not lie on that grid.
+/// [`FilesError`] with file, line and column; also if the times do not lie on that grid.
 pub fn parse_trace_csv_at(
     file: &str,
     text: &str,
@@ -100,11 +103,11 @@ pub fn parse_trace_csv_at(
     Ok(table.place_on_grid(&fit, frame_rate_hz))
 }
 
-/// Most frames without a row: a fixed number, and a number per row. The limit keeps a small file with a jump
-/// in its times from filling memory.
+/// Maximum number of frames without a row: a fixed number plus a number per row. The limit keeps a small file
+/// with a jump in its times from filling the memory.
 const FRAMES_WITHOUT_ROWS: (usize, usize) = (250_000, 4);
 
-/// The rows as written, before frames are assigned.
+/// The rows as written, before frame numbers are assigned.
 struct TraceTable<'a> {
     text: &'a str,
     confidences: [bool; 2],
@@ -240,7 +243,7 @@ fn too_long_error(file: &str) -> FilesError {
     FilesError::refuse(file, problem)
 }
 
-/// The rows of numbers with their 1-based lines.
+/// The non-empty rows of numbers with their line numbers, counted from 1.
 fn numbered_rows(text: &str) -> impl Iterator<Item = (u64, &str)> {
     let lines = (1..).zip(text.lines()).skip(1);
     lines.filter(|(_, line)| !line.trim().is_empty())
@@ -250,7 +253,7 @@ fn frame_count(fit: &FrameFit) -> usize {
     fit.frames.last().map_or(0, |last| last + 1)
 }
 
-/// Row furthest from its frame on a grid that starts at the first row, and its distance, frames.
+/// Row that is furthest from its frame on a grid that starts at the first row, and the distance, frames.
 fn farthest_off_grid(times_s: &[f64], frames: &[usize], frame_rate_hz: f64) -> (usize, f64) {
     let off = times_s.iter().zip(frames).map(|(t, &n)| ((t - times_s[0]) * frame_rate_hz - n as f64).abs());
     off.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, 0.0))

@@ -3,7 +3,7 @@
 use portable_math as math;
 use std::array::from_fn;
 
-/// Most coefficients of a process.
+/// Maximum number of coefficients of a process.
 pub(crate) const MOST_COEFFICIENTS: usize = 8;
 
 /// Stationary autoregressive noise of a channel.
@@ -13,7 +13,7 @@ pub struct AutoregressiveNoise {
     coefficients: Vec<f64>,
 }
 
-/// Coefficients that describe no stationary process.
+/// The coefficients describe no stationary process, or the standard deviation is not a positive number.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
     "found a standard deviation of {sd} and the coefficients {coefficients:?} of noise, expected a positive number and at most {MOST_COEFFICIENTS} coefficients of a stationary process"
@@ -24,11 +24,11 @@ pub(crate) struct NotStationary {
 }
 
 impl AutoregressiveNoise {
-    /// Noise with this standard deviation, in the unit of its channel, and these coefficients, that of the
-    /// previous frame first.
+    /// Noise with a standard deviation, in the unit of its channel, and coefficients; the coefficient of the
+    /// previous frame comes first.
     ///
     /// # Errors
-    /// [`NotStationary`] unless the standard deviation is positive and the noise stays finite.
+    /// [`NotStationary`] unless the standard deviation is positive and the process is stationary.
     pub(crate) fn new(sd: f64, coefficients: Vec<f64>) -> Result<Self, NotStationary> {
         let usable = sd > 0.0 && sd.is_finite() && coefficients.len() <= MOST_COEFFICIENTS;
         if usable && reflection_coefficients(&coefficients).iter().all(|kappa| kappa.abs() < 1.0) {
@@ -51,19 +51,20 @@ impl AutoregressiveNoise {
         self.sd
     }
 
-    /// Coefficients, that of the previous frame first; none for white noise.
+    /// Coefficients, beginning with that of the previous frame; none for white noise.
     pub(crate) fn coefficients(&self) -> &[f64] {
         &self.coefficients
     }
 
-    /// Standard deviation of the innovation: the part of a frame that the previous ones do not predict.
+    /// Standard deviation of the innovation, the part of a frame's noise that the previous frames do not
+    /// predict.
     pub(crate) fn innovation_sd(&self) -> f64 {
         let unexplained: f64 =
             reflection_coefficients(&self.coefficients).iter().map(|kappa| 1.0 - kappa * kappa).product();
         self.sd * unexplained.sqrt()
     }
 
-    /// Correlation of frames 0, 1, ... `count - 1` apart.
+    /// Correlations of frames that are 0, 1, ... `count - 1` frames apart.
     pub(crate) fn correlations(&self, count: usize) -> Vec<f64> {
         let mut correlations = vec![1.0];
         let (mut known, mut unexplained) = (Vec::new(), 1.0);
@@ -80,13 +81,14 @@ impl AutoregressiveNoise {
     }
 }
 
-/// One-step prediction: the sum of the coefficients times the latest values, the last value first.
+/// One-step prediction: the sum of the coefficients times the latest values; the first coefficient belongs to
+/// the last value.
 fn predict_value(coefficients: &[f64], values: &[f64]) -> f64 {
     coefficients.iter().zip(values.iter().rev()).map(|(a, b)| a * b).sum()
 }
 
-/// Coefficients of the next higher order from its reflection coefficient (Levinson's recursion; Percival and
-/// Walden 1993, section 9.4).
+/// Coefficients of a process of the next higher order, from those of the present order and the reflection
+/// coefficient of the next (Levinson's recursion; Percival and Walden 1993, section 9.4).
 pub(super) fn raise_order(coefficients: &[f64], kappa: f64) -> Vec<f64> {
     let turned = coefficients.iter().rev();
     let mut longer: Vec<f64> = coefficients.iter().zip(turned).map(|(a, b)| a - kappa * b).collect();
@@ -94,7 +96,7 @@ pub(super) fn raise_order(coefficients: &[f64], kappa: f64) -> Vec<f64> {
     longer
 }
 
-/// Reflection coefficients, that of the lowest order first (Levinson's recursion in reverse).
+/// Reflection coefficients, beginning with that of the lowest order (Levinson's recursion in reverse).
 fn reflection_coefficients(coefficients: &[f64]) -> Vec<f64> {
     let mut left = coefficients.to_vec();
     let mut found = Vec::with_capacity(left.len());
@@ -107,12 +109,12 @@ fn reflection_coefficients(coefficients: &[f64]) -> Vec<f64> {
     found
 }
 
-// Whitening with missing frames: the inverse of the lower Cholesky factor of the covariance of the frames
-// that are present, computed as the innovations of a Kalman filter over the last few frames (Jones 1980,
-// *Technometrics* 22). Its gains do not depend on the data, so they are computed once. A gap is a prediction
-// over several frames.
+// Whitening with missing frames. The map is the inverse of the lower Cholesky factor of the covariance of the
+// present frames. It is computed from the innovations of a Kalman filter over the last few frames (Jones
+// 1980, *Technometrics* 22). The gains of the filter do not depend on the data, so they are computed once. A
+// gap is a prediction over several frames.
 
-/// The last frames of the noise, the latest first.
+/// Noise of the last frames, beginning with the latest.
 type NoiseMemory = [f64; MOST_COEFFICIENTS];
 
 /// Linear map that makes the noise white for a given pattern of present frames.
@@ -127,7 +129,7 @@ pub(crate) struct Whitener {
 /// Step from one present frame to the next.
 #[derive(Debug, Clone, PartialEq)]
 struct WhiteningStep {
-    /// Frames since the previous present one.
+    /// Number of frames since the previous present frame.
     ahead: usize,
     /// Standard deviation of the innovation.
     sd: f64,
@@ -154,8 +156,8 @@ impl Whitener {
         whitener
     }
 
-    /// Whitens a column in place; it has one value a frame, in the unit of the noise. Whitened noise is
-    /// independent with unit variance.
+    /// Whitens a column in place; the column has one value per present frame, in the unit of the noise.
+    /// Whitened noise is independent from frame to frame and has unit variance.
     pub(crate) fn whiten_column(&self, column: &mut [f64]) {
         let mut memory = [0.0; MOST_COEFFICIENTS];
         for (value, step) in column.iter_mut().zip(&self.steps) {
@@ -179,7 +181,7 @@ impl Whitener {
     }
 }
 
-/// Covariance of the last frames, given the present ones.
+/// Covariance of the noise of the last frames, given the present frames before.
 struct PredictionCovariance {
     order: usize,
     covariance: [NoiseMemory; MOST_COEFFICIENTS],
@@ -248,7 +250,7 @@ mod tests {
         assert!((noise.innovation_sd() - 2.0 * 0.51f64.sqrt()).abs() < 1e-15);
     }
 
-    /// `rho_1 = phi_1 / (1 - phi_2)`, and the variance as in Box and Jenkins, equation (3.2.28).
+    /// Correlation `rho_1 = phi_1 / (1 - phi_2)`, and variance as in Box and Jenkins, equation (3.2.28).
     #[test]
     fn two_coefficients_have_their_closed_form() {
         let (a, b) = (1.1, -0.4);
@@ -316,8 +318,8 @@ mod tests {
         }
     }
 
-    /// With one coefficient `r` a frame `g` after the one before is predicted by `r^g` of it, with the
-    /// variance `1 - r^(2 g)`.
+    /// With one coefficient `r`, the noise `g` frames after the previous present frame is predicted as `r^g`
+    /// times the noise of that frame, with the variance `1 - r^(2 g)`.
     #[test]
     fn one_coefficient_has_its_closed_form_over_gaps() {
         let noise = AutoregressiveNoise::new(2.0, vec![0.8]).unwrap();
@@ -338,7 +340,8 @@ mod tests {
         assert_eq!(column, expected);
     }
 
-    /// Noise of every model, with a fifth of the frames lost: unit variance and no correlation of neighbours.
+    /// Noise of every model, with a fifth of the frames lost, gets unit variance and no correlation of
+    /// neighbouring frames.
     #[test]
     fn whitened_noise_is_white() {
         const FRAMES: usize = 20_000;

@@ -1,31 +1,32 @@
-//! A channel in short blocks. A polynomial in time describes the motion in each; its residuals are noise.
+//! A channel in short blocks. In each block, a polynomial in time describes the motion; the residuals are
+//! noise.
 
 use crate::recording::channel::median_in_place;
 use portable_math as math;
 
-/// Fewest frames of a block, as a share of its length.
+/// Minimum number of frames of a block, as a fraction of its length.
 const LEAST_SHARE: f64 = 0.5;
-/// Fewest degrees of freedom of a block.
+/// Minimum number of degrees of freedom of a block.
 const LEAST_LEFT: usize = 4;
-/// Largest scatter of a block, in units of the median: beyond it the block has an outlier, or the tip is off
-/// the glass.
+/// Largest scatter of a block, in units of the median scatter. A block with a larger scatter has an outlier,
+/// or the tip is off the glass.
 const OUTLYING_SCATTER: f64 = 3.0;
 
-/// How a channel is cut.
+/// Length of the blocks of a channel, and the terms that are fitted in them.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BlockCut<'a> {
-    /// Frames of a block.
+    /// Number of frames of a block.
     pub length: usize,
-    /// Degree of the polynomial of time.
+    /// Degree of the polynomial in time.
     pub degree: usize,
-    /// A channel that is a further linear term of the fit.
+    /// A channel that enters the fit as a further linear term.
     pub covariate: Option<&'a [Option<f64>]>,
 }
 
 /// Frames in which the motion is a linear combination of a few columns.
 #[derive(Debug, Clone)]
 pub(super) struct NoiseBlock {
-    /// Numbers of the frames that are present.
+    /// Indices of the frames that are present.
     pub frames: Vec<usize>,
     pub values: Vec<f64>,
     pub columns: Vec<Vec<f64>>,
@@ -91,7 +92,7 @@ fn cut_block(channel: &[Option<f64>], cut: &BlockCut<'_>, first: usize) -> Optio
     let mut columns: Vec<Vec<f64>> = powers.collect();
     if cut.covariate.is_some() {
         let moved = centred(&beside)?;
-        // (a channel that does not move is no independent column)
+        // (a channel that does not move is not an independent column)
         if dot_product(&moved, &moved) > 0.0 {
             columns.push(moved);
         }
@@ -99,7 +100,7 @@ fn cut_block(channel: &[Option<f64>], cut: &BlockCut<'_>, first: usize) -> Optio
     Some(NoiseBlock { values: centred(&|i| channel[i])?, columns, frames })
 }
 
-/// Leaves out the blocks whose scatter is far above the median: they hold more than noise.
+/// Leaves out the blocks whose scatter is far above the median, because they contain more than noise.
 pub(super) fn keep_quiet_blocks(blocks: Vec<NoiseBlock>) -> Vec<NoiseBlock> {
     let scatter = |block: &NoiseBlock| {
         let squares: f64 = block.residuals().iter().map(|x| x * x).sum();

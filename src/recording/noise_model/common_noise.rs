@@ -1,38 +1,38 @@
-//! Noise that both points share: a camera that shakes moves them alike.
+//! Noise that both points share: a camera that shakes moves both points alike.
 //!
-//! The noise of one point is regressed on that of the other within short blocks, in which a parabola
-//! describes the motion. Blocks are weighted by the inverse of their residual variance: a blade that rings
-//! counts little, one that sticks counts much.
+//! The noise of one point is regressed on the noise of the other within short blocks, in which a parabola
+//! describes the motion. The weight of a block is the inverse of its residual variance: a block in which the
+//! blade rings counts little, one in which it sticks counts much.
 
 use super::block_length;
 use super::blocks::{BlockCut, NoiseBlock, cut_blocks, dot_product, keep_quiet_blocks};
 use crate::recording::Recording;
 use portable_math as math;
 
-/// Frames of a short block: a parabola leaves three quarters of the degrees of freedom.
+/// Number of frames of a short block: a parabola leaves three quarters of the degrees of freedom.
 const SHORT_BLOCK: usize = 12;
-/// Least share, in its standard deviations: chance reaches it in one recording of 370.
+/// Smallest significant share, in its standard deviations; chance exceeds it in one recording of 370.
 const CLEAR_DEVIATIONS: f64 = 3.0;
-/// Fewest blocks: the scatter over fewer is not known.
+/// Minimum number of blocks: the scatter over fewer blocks is too uncertain.
 const FEWEST_BLOCKS: usize = 30;
 
 /// The part of a channel's noise that it shares with the other point.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SharedNoise {
-    /// Noise of the channel per noise of the other point.
+    /// Ratio of the channel's shared noise to the noise of the other point.
     pub share: f64,
     pub sd: f64,
-    /// Shared noise in every frame, m, to be subtracted from the channel; `None` where the noise of the other
-    /// point is not known.
+    /// Shared noise in every frame, m, which is to be subtracted from the channel; `None` if the noise of the
+    /// other point is unknown.
     pub noise_m: Vec<Option<f64>>,
 }
 
 /// Common noise of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct CommonNoise {
-    /// Noise of the tip along the sweep that the head shows too; `None` where the share is not clear.
+    /// Noise of the tip along the sweep that the head shows too; `None` if the share is not significant.
     pub tip_x: Option<SharedNoise>,
-    /// Noise of the head upwards that the tip on the glass shows too.
+    /// Vertical noise of the head that the tip on the glass shows too.
     pub head_y: Option<SharedNoise>,
 }
 
@@ -50,7 +50,7 @@ pub(crate) fn measure_common_noise(recording: &Recording) -> CommonNoise {
     }
 }
 
-/// Residuals of a channel from its fitted motion in every frame, m.
+/// Residuals of a channel from its fitted motion, m; `None` for a frame outside the fitted blocks.
 fn channel_residuals(channel: &[Option<f64>], cut: &BlockCut<'_>) -> Vec<Option<f64>> {
     let mut left = vec![None; channel.len()];
     for block in keep_quiet_blocks(cut_blocks(channel, cut)) {
@@ -61,8 +61,8 @@ fn channel_residuals(channel: &[Option<f64>], cut: &BlockCut<'_>) -> Vec<Option<
     left
 }
 
-/// Regression of a channel on that of the other point, in the frames in which the noise of that (`residuals`)
-/// is known.
+/// Regression of the noise of a channel on the noise of the other point, in the frames in which the latter
+/// (`residuals`) is known.
 fn regress_on_other_point(
     channel: &[Option<f64>],
     other: &[Option<f64>],
@@ -89,8 +89,8 @@ fn residual_pair(block: &NoiseBlock, other: &[Option<f64>]) -> Option<[Vec<f64>;
     Some([block.residuals(), NoiseBlock { values, ..block.clone() }.residuals()])
 }
 
-/// Share and its standard deviation from the scatter over blocks, by iteratively reweighted least squares.
-/// The weight of a block is the inverse of its residual variance.
+/// Share and its standard deviation by iteratively reweighted least squares; the standard deviation follows
+/// from the scatter over the blocks. The weight of a block is the inverse of its residual variance.
 fn regress_pairs(pairs: &[[Vec<f64>; 2]]) -> Option<(f64, f64)> {
     const ROUNDS: usize = 4;
     let mut share = 0.0;

@@ -1,6 +1,6 @@
-//! Estimate of autoregressive noise from blocks of frames. Residual likelihood accounts for the degrees of
-//! freedom of the fitted motion (Patterson and Thompson 1971, *Biometrika* 58); Schwarz's criterion selects
-//! the order.
+//! Estimate of autoregressive noise from blocks of frames. The residual likelihood accounts for the degrees
+//! of freedom of the fitted motion (Patterson and Thompson 1971, *Biometrika* 58); Schwarz's criterion
+//! selects the order.
 
 use super::autoregressive::{AutoregressiveNoise, Whitener, raise_order};
 use super::blocks::{NoiseBlock, dot_product, project_out};
@@ -8,12 +8,12 @@ use super::{ChannelNoise, NoiseSource};
 use nalgebra::{DMatrix, DVector};
 use portable_math as math;
 
-/// Highest order: the noise of trackers is vibration and sub-pixel bias, which last a few frames.
+/// Highest order: the noise of trackers consists of vibration and sub-pixel bias, which last a few frames.
 const MOST_ORDER: usize = 6;
-/// Number of consecutive orders without a lower criterion that ends the search.
+/// The search ends after this number of consecutive orders without a lower criterion.
 const ORDERS_WITHOUT_GAIN: usize = 2;
 
-/// Estimates the noise of blocks; `None` where they hold too few frames, or no noise.
+/// Estimates the noise of blocks; `None` if the blocks have too few frames or no noise.
 pub(super) fn estimate_noise(blocks: &[NoiseBlock], source: NoiseSource) -> Option<ChannelNoise> {
     let freedoms: usize = blocks.iter().map(NoiseBlock::degrees_of_freedom).sum();
     let price = math::ln(freedoms as f64);
@@ -33,7 +33,7 @@ pub(super) fn estimate_noise(blocks: &[NoiseBlock], source: NoiseSource) -> Opti
     estimate_at_optimum(blocks, &best.1, freedoms, source)
 }
 
-/// The noise at the optimum, with standard deviations from the curvature of the criterion.
+/// The noise at the optimum, with standard deviations from the curvature of the deviance.
 fn estimate_at_optimum(
     blocks: &[NoiseBlock],
     turns: &[f64],
@@ -58,7 +58,7 @@ fn estimate_at_optimum(
         }
     }
     let (_, curvature) = deviance_derivatives(blocks, turns, restricted_deviance(blocks, turns)?)?;
-    // the criterion is minus twice the logarithm of the likelihood
+    // the deviance is minus twice the logarithm of the likelihood
     let covariance = 2.0 * &by_turn * curvature.cholesky()?.inverse() * by_turn.transpose();
     let sd = math::exp(0.5 * log_variance);
     Some(ChannelNoise {
@@ -82,7 +82,8 @@ fn restricted_deviance(blocks: &[NoiseBlock], turns: &[f64]) -> Option<f64> {
     deviance.is_finite().then_some(deviance)
 }
 
-/// Deviance and variance of the noise; a whitener serves all neighbouring blocks with the same frames.
+/// Deviance and variance of the noise; neighbouring blocks with the same pattern of frames use the same
+/// whitener.
 fn deviance_and_variance(blocks: &[NoiseBlock], noise: &AutoregressiveNoise) -> Option<(f64, f64)> {
     let (mut left, mut logs, mut freedoms) = (0.0, 0.0, 0);
     let mut last: Option<(Vec<usize>, Whitener)> = None;

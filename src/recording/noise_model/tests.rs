@@ -1,4 +1,4 @@
-//! Synthetic recordings whose noise is known.
+//! Synthetic recordings with known noise.
 
 use super::*;
 use crate::recording::noise_model::common_noise::CommonNoise;
@@ -21,12 +21,12 @@ fn series(noise: &AutoregressiveNoise, frames: usize, generator: &mut Xoshiro256
     values.split_off(BEFORE)
 }
 
-/// A second of a sweep: a slow head, a tip that rings at 1.1 kHz half of the time, a glass that the camera
-/// sees tilted, and a part of the frames lost.
+/// One second of a sweep: a slow head, a tip that rings at 1.1 kHz half of the time, a glass that is tilted
+/// in the picture, and a fraction of the frames lost.
 struct Sweep {
     rate_hz: f64,
     noise: AutoregressiveNoise,
-    /// Share of the variance that both points have in common.
+    /// Fraction of the variance that both points have in common.
     shared: f64,
     lost: f64,
     seed: u64,
@@ -57,7 +57,8 @@ impl Sweep {
         [tip, -6e-3 + 0.01 * tip, head, -1e-4 + 0.1 * ring]
     }
 
-    /// The recording and its noise; `bias_m` is what a place along the sweep adds to itself.
+    /// The recording and its noise; `bias_m` is the error of a position along the sweep as a function of this
+    /// position.
     fn with_bias(&self, bias_m: fn(f64) -> f64) -> (Recording, [Vec<f64>; 4]) {
         let mut generator = Xoshiro256PlusPlus::seed_from_u64(self.seed);
         let noise = self.noise(&mut generator);
@@ -95,7 +96,7 @@ fn white_noise_is_found_to_be_white_and_of_its_size() {
     assert!(coloured <= 2, "{coloured} of 30");
 }
 
-/// In units of their stated standard deviations the errors are normal.
+/// The errors are normal in units of their estimated standard deviations.
 #[test]
 fn noise_that_resembles_its_neighbours_is_found() {
     let mut scores = Vec::new();
@@ -116,8 +117,8 @@ fn noise_that_resembles_its_neighbours_is_found() {
     assert!(scores.iter().all(|z| z.abs() < 4.0), "{scores:?}");
 }
 
-/// A bias of a twentieth of a pixel that follows the place in the pixel: as noise it is one more part, and
-/// the map whitens what there is of it in the neighbours.
+/// A bias of a twentieth of a pixel that depends on the position within the pixel counts as a further part of
+/// the noise.
 #[test]
 fn a_bias_within_the_pixel_counts_as_noise() {
     const PIXEL_M: f64 = 2e-5;
@@ -131,8 +132,9 @@ fn a_bias_within_the_pixel_counts_as_noise() {
     }
 }
 
-/// Where a share `s` of the variance is common, the best share to take is `s`. It leaves `1 - s^2` of white
-/// noise, and what the smooth motion, 4 freedoms of a block of 40 frames, takes of the head's.
+/// If both points share a fraction `s` of the variance, the best multiple to subtract is `s`. This leaves
+/// `1 - s^2` of white noise, plus the noise of the head that the smooth motion absorbs: 4 degrees of freedom
+/// in a block of 40 frames.
 #[test]
 fn what_both_points_share_is_found_and_taken_out() {
     for (rate_hz, rho, share) in [(5000.0, 0.0, 0.6), (10_000.0, 0.6, 0.5), (10_000.0, 0.9, 0.8)] {
@@ -160,7 +162,7 @@ fn what_both_points_share_is_found_and_taken_out() {
     }
 }
 
-/// Variance of noise before and after something is taken from it.
+/// Variance of noise before and after `taken` is subtracted from it.
 fn variances(noise: &[f64], taken: &[Option<f64>]) -> [f64; 2] {
     let pairs: Vec<(f64, f64)> = noise.iter().zip(taken).filter_map(|(a, b)| Some((*a, (*b)?))).collect();
     let mean = |f: fn(&(f64, f64)) -> f64| pairs.iter().map(f).sum::<f64>() / pairs.len() as f64;

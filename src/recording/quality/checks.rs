@@ -6,37 +6,38 @@ use super::noise::FrameGaps;
 use crate::recording::{FrameGrid, Traces};
 use short_spectra::sampling::exposure_gain;
 
-/// Share of missing frames that is worth a caution. Least-squares spectra on true frame times stay accurate
-/// up to 40 %, but weak components are lost much earlier.
+/// Fraction of missing frames that calls for a caution. Least-squares spectra with the true frame times stay
+/// accurate up to 40 %, but weak components are lost much earlier.
 const MANY_MISSING: f64 = 0.2;
-/// Share of the recording that a single gap may take: a longer one may hold the whole stick phase of a
-/// stroke.
+/// Largest fraction of the recording that a single gap may cover: a longer gap may hide the whole stick phase
+/// of a stroke.
 const LONG_GAP: f64 = 0.05;
-/// Share of an amplitude that the exposure should pass at the highest usable frequency. A loss of a tenth
-/// exceeds the uncertainty of the scale.
+/// Smallest fraction of an amplitude that the exposure should pass at the highest usable frequency. A loss of
+/// a tenth exceeds the uncertainty of the scale.
 const EXPOSURE_PASSES: f64 = 0.9;
-/// Largest relative distance of a step from a whole pixel: scales are given to three digits.
+/// Largest relative difference between a step and a whole pixel: scales are given to three digits.
 const PIXEL_NEARNESS: f64 = 0.01;
 /// Confidence below which a position is doubtful: the default cut-off of DeepLabCut (`pcutoff`).
 const LOW_CONFIDENCE: f64 = 0.6;
-/// Share of doubtful positions that is worth a caution: more than stray outliers.
+/// Fraction of doubtful positions that calls for a caution: more than stray outliers.
 const MANY_DOUBTFUL: f64 = 0.01;
-/// Share of doubtful positions that is serious: most of the track is guessed.
+/// Fraction of doubtful positions that is serious: most of the track is guessed.
 const MOST_DOUBTFUL: f64 = 0.5;
 
 /// Rates at which video is played back, 1/s (film, PAL, NTSC and their doubles).
 const PLAYBACK_RATES_HZ: [f64; 8] =
     [24_000.0 / 1001.0, 24.0, 25.0, 30_000.0 / 1001.0, 30.0, 50.0, 60_000.0 / 1001.0, 60.0];
-/// Largest relative distance from such a rate: it covers rounded times and still separates 29.97 from 30.
+/// Largest relative difference from a playback rate: it covers rounded times and still separates 29.97 from
+/// 30.
 const PLAYBACK_NEARNESS: f64 = 1e-3;
 
-/// Whether `rate_hz` is a rate of playback: a time column of the video file has it instead of the recording
-/// rate.
+/// Whether `rate_hz` is a playback rate. The time column of a video file often has this rate instead of the
+/// recording rate.
 pub(crate) fn is_playback_rate(rate_hz: f64) -> bool {
     PLAYBACK_RATES_HZ.iter().any(|playback| (rate_hz / playback - 1.0).abs() <= PLAYBACK_NEARNESS)
 }
 
-/// Frames, rate, length, frequency band, and the frames without a deflection.
+/// Findings on frames, rate, length, frequency band, and the frames without a deflection.
 pub(super) fn check_grid(measured: &Quality) -> Vec<QualityFinding> {
     let Quality { frames, frame_rate_hz: rate_hz, duration_s, .. } = measured;
     let (count, (low_hz, high_hz)) = (*frames as f64, measured.band_hz());
@@ -71,7 +72,8 @@ fn check_deflection_gaps(measured: &Quality) -> Option<QualityFinding> {
     Some(gaps_finding(&gaps, frames, measured.longest_gap_at_s?, "no deflection in"))
 }
 
-/// Number and runs of missing frames; a caution where there are many or the longest run is long.
+/// Finding on the number and the runs of missing frames; a caution if there are many or if the longest run is
+/// long.
 fn gaps_finding(gaps: &FrameGaps, frames: usize, longest_at_s: f64, what: &str) -> QualityFinding {
     let share = gaps.missing as f64 / frames as f64;
     let FrameGaps { missing, runs, longest, .. } = gaps;
@@ -91,7 +93,8 @@ fn gaps_finding(gaps: &FrameGaps, frames: usize, longest_at_s: f64, what: &str) 
     QualityFinding::advise((Check::Gaps, severity), (*missing as f64, "frames"), words, advice)
 }
 
-/// Missing frames, noise and step of one column; only the name of a column that was never tracked.
+/// Findings on missing frames, noise and step of one column; for a column that was never tracked, only that
+/// it is absent.
 pub(super) fn check_track_column(
     column: &MeasuredColumn,
     grid: FrameGrid,
@@ -116,13 +119,13 @@ pub(super) fn check_track_column(
     found.map(|finding| finding.on_channel(column.name)).collect()
 }
 
-/// Channels that are written in steps coarser than their noise.
+/// Findings on channels that are written in steps coarser than their noise.
 pub(crate) fn check_position_steps(measured: &Quality, optics: &Optics) -> Vec<QualityFinding> {
     let check = |(name, quality)| Some(check_position_step(quality, optics)?.on_channel(name));
     measured.channels().into_iter().filter_map(check).collect()
 }
 
-/// A step that is coarser than the noise: then the step, not the tracking, limits the measurement.
+/// Finding on a step that is coarser than the noise; the step, not the tracking, then limits the measurement.
 fn check_position_step(channel: &ChannelQuality, optics: &Optics) -> Option<QualityFinding> {
     let step_m = channel.step_m.filter(|&step| channel.noise_m.is_some_and(|noise| noise < step))?;
     let whole = optics.metres_per_pixel.filter(|pixel| (step_m / pixel - 1.0).abs() < PIXEL_NEARNESS);
@@ -132,7 +135,7 @@ fn check_position_step(channel: &ChannelQuality, optics: &Optics) -> Option<Qual
     Some(QualityFinding::advise((Check::PositionStep, Severity::Caution), (step_m, "m"), words, advice))
 }
 
-/// Share of an amplitude that the exposure passes at the highest usable frequency.
+/// Finding on the fraction of an amplitude that the exposure passes at the highest usable frequency.
 pub(super) fn check_exposure(measured: &Quality) -> QualityFinding {
     let (_, high_hz) = measured.band_hz();
     let Some(exposure_s) = measured.exposure_s() else {
@@ -150,7 +153,7 @@ pub(super) fn check_exposure(measured: &Quality) -> QualityFinding {
     QualityFinding::advise((Check::Exposure, severity), (passes, ""), words, advice)
 }
 
-/// Positions with a low confidence of the tracker.
+/// Findings on positions in which the tracker has low confidence.
 pub(super) fn check_confidence(traces: &Traces) -> Vec<QualityFinding> {
     let points = [
         ("tip", &traces.tip_confidence, &traces.tip_x_m),

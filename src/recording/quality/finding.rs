@@ -3,20 +3,20 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How much a finding matters.
+/// Severity of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
     /// Worth knowing.
     Note,
-    /// Something may be wrong, or shows less than it seems.
+    /// Something may be wrong, or the recording shows less than it seems to show.
     Caution,
-    /// Frequencies, lengths or directions are probably wrong, or nothing can be shown.
+    /// Frequencies, lengths or directions are probably wrong, or the recording can show nothing.
     Serious,
 }
 
 impl Severity {
-    /// The word for it.
+    /// Name of the severity.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Note => "note",
@@ -28,7 +28,7 @@ impl Severity {
 
 macro_rules! checks {
     ($($(#[$doc:meta])+ $check:ident = $name:literal,)+) => {
-        /// What a finding is about.
+        /// Subject of a finding.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
         pub enum Check {
             $($(#[$doc])+ #[serde(rename = $name)] $check,)+
@@ -38,7 +38,7 @@ macro_rules! checks {
             /// Every check.
             pub const ALL: &[Self] = &[$(Self::$check),+];
 
-            /// Its name in files.
+            /// Name of the check in files.
             #[must_use]
             pub fn name(self) -> &'static str {
                 match self {
@@ -52,19 +52,19 @@ macro_rules! checks {
 checks! {
     /// Frames, rate and length.
     FrameGrid = "frame-grid",
-    /// Too few cycles of anything that the recording can show.
+    /// A recording too short for three cycles of any frequency that its rate can show.
     TooShort = "too-short",
     /// Lowest and highest frequency that the recording shows.
     Bandwidth = "bandwidth",
-    /// Frames without a deflection or without a channel.
+    /// Frames without a deflection or without a value of a channel.
     Gaps = "gaps",
     /// A channel without any value.
     Absent = "absent",
-    /// Frames that both tracks reach over.
+    /// Range of frames that both tracks cover.
     Overlap = "overlap",
-    /// A rate at which videos are played.
+    /// A frame rate at which videos are usually played.
     PlaybackRate = "playback-rate",
-    /// Frames that repeat the one before exactly.
+    /// Frames that exactly repeat the previous frame.
     FrozenFrames = "frozen-frames",
     /// Positions in steps coarser than their noise.
     PositionStep = "position-step",
@@ -76,19 +76,19 @@ checks! {
     LowConfidence = "low-confidence",
     /// Noise that falls towards the Nyquist frequency.
     PreFiltered = "pre-filtered",
-    /// What the exposure leaves of fast motion.
+    /// Attenuation of fast motion by the exposure.
     Exposure = "exposure",
-    /// A travel that is no wiper's.
+    /// Travel along the sweep; an implausible one reveals a wrong scale.
     Scale = "scale",
-    /// A tip above the head.
+    /// A tip above the head, which means that y points down.
     YDirection = "y-direction",
     /// A picture in which the glass is not level.
     Tilt = "tilt",
-    /// A path of the tip that is no straight line.
+    /// A path of the tip that is not a straight line.
     CurvedGlass = "curved-glass",
     /// Turns of the head.
     Reversals = "reversals",
-    /// An export that is no longer the one imported.
+    /// An export that has changed since the import.
     SourceChanged = "source-changed",
     /// Rate that the times of an export imply.
     ImpliedRate = "implied-rate",
@@ -98,72 +98,72 @@ checks! {
     FrameInterval = "frame-interval",
     /// Positions resampled to another rate.
     Resampled = "resampled",
-    /// A table that drops samples of fast cameras.
+    /// A table that loses samples of fast cameras.
     SamplesLost = "samples-lost",
     /// Numbers that a spreadsheet has rounded.
     SpreadsheetRounding = "spreadsheet-rounding",
-    /// Labels of pictures picked from a video.
+    /// Labels of single pictures that were picked from a video.
     PickedFrames = "picked-frames",
-    /// Named columns of a table that is no table of positions.
+    /// Named columns in a table that is not a table of positions.
     OtherTable = "other-table",
     /// A unit that the file contradicts.
     Unit = "unit",
-    /// Coordinates that look like another unit.
+    /// Coordinates that look like those in another unit.
     UnitSuspicion = "unit-suspicion",
     /// A direction of y that the format contradicts.
     YAxis = "y-axis",
-    /// Frames in a row at exactly (0, 0).
+    /// Consecutive frames at exactly (0, 0).
     ZeroRun = "zero-run",
     /// Frames at exactly (-1, -1).
     MinusOneRun = "minus-one-run",
     /// Positions that the format marks as lost.
     LostPoints = "lost-points",
-    /// Positions rejected for their confidence.
+    /// Positions rejected because of their low confidence.
     ConfidenceRejected = "confidence-rejected",
-    /// A point without a track or positions.
+    /// A point that has no track or no positions.
     Points = "points",
-    /// Tracks of one name.
+    /// Several tracks with the same name.
     TrackNames = "track-names",
     /// Tracks that split or merge.
     BranchingTracks = "branching-tracks",
-    /// Positions that their program filtered.
+    /// Positions that the tracking program filtered.
     Filtered = "filtered",
     /// Positions relative to a moving point.
     RelativePositions = "relative-positions",
-    /// A camera's record that does not fit the export.
+    /// A camera's record file that does not fit the export.
     CameraRecord = "camera-record",
 }
 
-/// One finding.
+/// A finding on the quality of a recording.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct QualityFinding {
-    /// The check that made it.
+    /// The check that made the finding.
     pub check: Check,
-    /// How much it matters.
+    /// Severity of the finding.
     pub severity: Severity,
-    /// The channel (`tip-x`, ...) that it concerns; absent where it is the whole recording.
+    /// The channel (`tip-x`, ...) that the finding concerns; absent if it concerns the whole recording.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub channel: Option<String>,
-    /// Its number.
+    /// The number that was found.
     pub value: f64,
     /// Unit of the number, empty for a count or a ratio.
     pub unit: String,
-    /// What was found, in words.
+    /// Description of what was found.
     pub found: String,
-    /// What to do, in words; empty where there is nothing to do.
+    /// Advice on what to do; empty if there is nothing to do.
     pub advice: String,
 }
 
 impl QualityFinding {
-    /// A finding on the whole recording without advice; the other parts are added by [`Self::on_channel`] and
-    /// [`Self::with_advice`].
+    /// A finding on the whole recording without advice; [`Self::on_channel`] and [`Self::with_advice`] add a
+    /// channel and advice.
     #[must_use]
     pub fn new(check: Check, severity: Severity, value: f64, unit: &str, found: String) -> Self {
         Self::advise((check, severity), (value, unit), found, "")
     }
 
-    /// A finding on the whole recording with advice, which is empty where there is nothing to do.
+    /// A finding on the whole recording with advice, which is empty if there is nothing to do.
     pub(super) fn advise(
         (check, severity): (Check, Severity),
         (value, unit): (f64, &str),
@@ -174,19 +174,19 @@ impl QualityFinding {
         Self { check, severity, channel: None, value, unit, found, advice }
     }
 
-    /// The same on one channel.
+    /// This finding on one channel.
     #[must_use]
     pub fn on_channel(self, channel: &str) -> Self {
         Self { channel: Some(channel.to_owned()), ..self }
     }
 
-    /// The same with what to do.
+    /// This finding with advice.
     #[must_use]
     pub fn with_advice(self, advice: &str) -> Self {
         Self { advice: advice.to_owned(), ..self }
     }
 
-    /// The finding as one line for reading.
+    /// The finding as one line of text.
     #[must_use]
     pub fn to_line(&self) -> String {
         let channel = self.channel.as_ref().map_or_else(String::new, |channel| format!("{channel}: "));

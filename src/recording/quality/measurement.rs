@@ -1,4 +1,4 @@
-//! A recording as measured: frames, rate, gaps, exposure, and the noise and step of each column.
+//! Measured properties of a recording: frames, rate, gaps, exposure, and the noise and step of each column.
 
 use super::noise::{FrameGaps, noise_floor, quantisation_step};
 use crate::recording::{Recording, Traces};
@@ -7,59 +7,59 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use short_spectra::sampling::{alias_hz, exposure_gain, half_power_hz};
 
-/// Fewest cycles in the recording that give a frequency.
+/// Minimum number of cycles in the recording from which a frequency can be found.
 pub(super) const FEWEST_CYCLES: f64 = 3.0;
-/// Share of the Nyquist frequency up to which a component is well separated from its alias.
+/// Fraction of the Nyquist frequency up to which a component is well separated from its alias.
 pub(super) const NYQUIST_SHARE: f64 = 0.8;
 
-/// A recording as measured.
+/// Measured properties of a recording.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Quality {
-    /// Frames of the grid, missing ones included.
+    /// Number of frames of the grid, including missing ones.
     pub frames: usize,
-    /// From the first to the last frame, s.
+    /// Time from the first to the last frame, s.
     pub duration_s: f64,
     /// Recording rate, 1/s.
     pub frame_rate_hz: f64,
-    /// Half the recording rate, or half the rate of the frames tracked where only every n-th was: what is
-    /// faster appears at a wrong, lower frequency.
+    /// Half the recording rate, or half the rate of the tracked frames if only every n-th frame was tracked.
+    /// A faster oscillation appears at a wrong, lower frequency.
     pub nyquist_hz: f64,
-    /// Frames in which tip and head do not both have an x, so that there is no deflection.
+    /// Number of frames in which tip and head do not both have an x, so that there is no deflection.
     pub missing_deflection_frames: usize,
-    /// Runs of such frames.
+    /// Number of runs of consecutive frames without a deflection.
     pub gaps: usize,
-    /// Length of the longest of them, frames.
+    /// Length of the longest of these runs, frames.
     pub longest_gap_frames: usize,
-    /// Where it starts, s.
+    /// Start of the longest of these runs, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub longest_gap_at_s: Option<f64>,
-    /// Frequency of which the exposure passes half the power, where the exposure is known, Hz.
+    /// Frequency at which the exposure passes half the power, Hz, if the exposure is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exposure_half_power_hz: Option<f64>,
-    /// Part of an amplitude at the Nyquist frequency that the exposure passes.
+    /// Fraction of an amplitude at the Nyquist frequency that the exposure passes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exposure_passes_at_nyquist: Option<f64>,
-    /// Lip tip along the sweep.
+    /// Position of the lip tip along the sweep.
     pub tip_x: ChannelQuality,
-    /// Lip tip upwards.
+    /// Height of the lip tip.
     pub tip_y: ChannelQuality,
-    /// Head along the sweep.
+    /// Position of the head along the sweep.
     pub head_x: ChannelQuality,
-    /// Head upwards.
+    /// Height of the head.
     pub head_y: ChannelQuality,
 }
 
-/// One column as measured.
+/// Measured properties of one column.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ChannelQuality {
-    /// Frames without a value.
+    /// Number of frames without a value.
     pub missing_frames: usize,
-    /// Standard deviation of the noise, m, by the scatter from frame to frame.
+    /// Standard deviation of the noise, m, from the scatter from frame to frame.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_m: Option<f64>,
-    /// Step in which the values are written, m, where they are.
+    /// Quantisation step of the values, m; absent where they have none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub step_m: Option<f64>,
 }
@@ -73,7 +73,7 @@ pub struct Optics {
     pub metres_per_pixel: Option<f64>,
 }
 
-/// Measures `recording`; `exposure_s` is the exposure of a frame, s, where known.
+/// Measures `recording`; `exposure_s` is the exposure of a frame, s, if known.
 #[must_use]
 pub fn measure_quality(recording: &Recording, exposure_s: Option<f64>) -> Quality {
     let (grid, traces) = (recording.grid(), recording.traces());
@@ -105,12 +105,13 @@ fn measure_channel(samples: &[Option<f64>]) -> ChannelQuality {
 
 impl Quality {
     /// Lowest and highest frequency that the recording shows well, Hz: three cycles in its duration, and 0.8
-    /// of the Nyquist frequency. A recording without such a band is too short for a spectrum.
+    /// of the Nyquist frequency. If the lowest exceeds the highest, the recording is too short for a
+    /// spectrum.
     pub(crate) fn band_hz(&self) -> (f64, f64) {
         (FEWEST_CYCLES / self.duration_s, NYQUIST_SHARE * self.nyquist_hz)
     }
 
-    /// Exposure of a frame, s, where known.
+    /// Exposure of a frame, s, if known.
     pub(super) fn exposure_s(&self) -> Option<f64> {
         self.exposure_half_power_hz.map(half_power_hz)
     }
@@ -120,7 +121,8 @@ impl Quality {
         [("tip-x", &self.tip_x), ("tip-y", &self.tip_y), ("head-x", &self.head_x), ("head-y", &self.head_y)]
     }
 
-    /// Noise of the deflection, m: that of tip and head together, each at least the rounding to its step.
+    /// Standard deviation of the noise of the deflection, m, from the noise of tip and head; each counts at
+    /// least with the rounding error of its step.
     pub(super) fn deflection_floor_m(&self) -> Option<f64> {
         let variance = |c: &ChannelQuality| {
             Some(math::powi(c.noise_m?, 2).max(math::powi(c.step_m.unwrap_or(0.0), 2) / 12.0))
@@ -145,27 +147,28 @@ pub(super) fn measured_columns<'a>(traces: &'a Traces, measured: &'a Quality) ->
     })
 }
 
-/// Title of the paper whose experiment found [`PUBLISHED_COMPONENTS_HZ`].
+/// Title of the paper whose experiment showed the [`PUBLISHED_COMPONENTS_HZ`].
 pub const PUBLISHED_TITLE: &str = "Investigation of the dynamics of the wiper blade around the reversal";
 /// The two components of the published experiment, with their names, Hz.
 pub const PUBLISHED_COMPONENTS_HZ: [(&str, f64); 2] =
     [("low", 78.4), ("high (printed as about 900 Hz)", 900.0)];
-/// Least share of an amplitude that counts as shown in full: a scale is rarely known better than to a tenth.
+/// Smallest fraction of an amplitude that counts as shown in full: a scale is rarely known to better than a
+/// tenth.
 const NEARLY_ALL: f64 = 0.9;
 
-/// How well a recording shows a component.
+/// Visibility of a component in a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Visibility {
-    /// Frequency and amplitude can be read.
+    /// Frequency and amplitude can be measured.
     Shown,
-    /// The frequency can be read; the exposure makes the amplitude smaller.
+    /// The frequency can be measured; the exposure makes the amplitude smaller.
     Attenuated,
-    /// Above 0.8 of the Nyquist frequency: it is close to its own alias.
+    /// The frequency is above 0.8 of the Nyquist frequency, close to its own alias.
     NearNyquist,
-    /// Above the Nyquist frequency: it appears at a wrong, lower frequency.
+    /// The frequency is above the Nyquist frequency: the component appears at a wrong, lower frequency.
     Aliased,
-    /// Fewer than three cycles in the recording.
+    /// Fewer than three cycles lie in the recording.
     TooFewCycles,
 }
 
@@ -174,18 +177,18 @@ pub enum Visibility {
 pub struct ComponentVisibility {
     /// Frequency of the component, Hz.
     pub frequency_hz: f64,
-    /// Whether it can be seen.
+    /// Visibility of the component.
     pub verdict: Visibility,
-    /// Frequency at which it appears, Hz; the same unless it is aliased.
+    /// Frequency at which the component appears, Hz; equal to its own frequency unless it is aliased.
     pub appears_at_hz: f64,
-    /// Cycles of it in the whole recording.
+    /// Number of its cycles in the whole recording.
     pub cycles: f64,
-    /// Part of its amplitude that the exposure passes; `None` where the exposure is not known.
+    /// Fraction of its amplitude that the exposure passes; `None` if the exposure is unknown.
     pub exposure_passes: Option<f64>,
 }
 
 impl Quality {
-    /// How well the recording shows a component of `frequency_hz`, a positive number.
+    /// Visibility of a component of `frequency_hz`, a positive number, in the recording.
     #[must_use]
     pub fn component_visibility(&self, frequency_hz: f64) -> ComponentVisibility {
         let cycles = frequency_hz * self.duration_s;

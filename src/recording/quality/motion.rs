@@ -1,4 +1,4 @@
-//! Checks of both points together: repeated frames, common frames, scale, direction of y, and the turns of
+//! Checks on both points together: repeated frames, common frames, scale, direction of y, and the turns of
 //! the head.
 
 use super::finding::{Check, QualityFinding, Severity};
@@ -7,35 +7,38 @@ use crate::recording::channel::{ReversalInstants, median_in_place};
 use crate::recording::{FrameGrid, Recording, Traces};
 use std::f64::consts::PI;
 
-/// Share of repeated frames that is serious: frequencies are wrong, not only a few samples.
+/// Fraction of repeated frames that is serious: frequencies are then wrong, not only a few samples.
 const MANY_REPEATED: f64 = 0.01;
-/// Tolerated repeats, in units of one more than the number that rounding is expected to cause.
+/// The tolerated number of repeats is this multiple of one plus the number that rounding is expected to
+/// cause.
 const BY_ROUNDING: f64 = 3.0;
-/// Expected number of repeats by rounding below which none is tolerated.
+/// No repeat is tolerated if rounding is expected to cause fewer repeats than this.
 const NO_REPEATS: f64 = 0.01;
 /// Probability of a repeat by rounding above which repeats are not judged: with noise below the step,
 /// positions repeat for many frames.
 const LIKELY_REPEAT: f64 = 1e-3;
-/// Least noise of a column, m: below a picometre lies the rounding of arithmetic on a point at rest.
+/// Smallest noise of a column that moves, m; below a picometre, the noise is rounding of a point at rest.
 const LEAST_NOISE_M: f64 = 1e-12;
-/// Share of frames at the ends with only one point that is worth a caution: more than a late start of a
-/// track.
+/// Fraction of frames at the ends with only one tracked point that calls for a caution: more than a late
+/// start of a track.
 const MANY_ALONE: f64 = 0.1;
-/// Largest travel in a view that still resolves the lip, m: at 1,000 pixels a lip of 5 mm is 10 pixels high.
+/// Largest travel in a view that still resolves the lip, m: with 1,000 pixels across, a lip of 5 mm is 10
+/// pixels high.
 const LARGEST_VIEW_M: f64 = 0.5;
-/// Travel beyond any wiper's sweep, m: the longest blades reach about 1.5 m along their arc.
+/// Travel beyond any wiper's sweep, m: the longest blades travel about 1.5 m along their arc.
 const LARGEST_SWEEP_M: f64 = 2.0;
-/// Travel below which nothing moved, m: five pixels of the usual 20 um.
+/// Travel below which nothing has moved, m: five pixels of the usual 20 um.
 const LEAST_TRAVEL_M: f64 = 1e-4;
-/// Most positions used for a travel; a stroke is smooth over a thousandth of it.
+/// Maximum number of positions from which a travel is measured; a stroke is smooth over a thousandth of its
+/// length.
 const MOST_POSITIONS: usize = 20_000;
-/// Share of positions at either end that a travel leaves out, because they may be outliers.
+/// Fraction of the positions at either end that a travel leaves out, because they may be outliers.
 const TRIMMED: f64 = 0.01;
-/// Least height of tip above head that is worth a caution, m: neck and lip are 5 to 10 mm high, and smaller
-/// heights may come from two origins.
+/// Smallest height of the tip above the head that calls for a caution, m: neck and lip are 5 to 10 mm high,
+/// and smaller heights may come from different origins of the two tracks.
 const LEAST_HEIGHT_M: f64 = 1e-3;
 
-/// Checks of both points together.
+/// Checks on both points together.
 pub(super) fn check_motion(recording: &Recording, measured: &Quality) -> Vec<QualityFinding> {
     let (traces, grid) = (recording.traces(), recording.grid());
     let found = [
@@ -47,7 +50,7 @@ pub(super) fn check_motion(recording: &Recording, measured: &Quality) -> Vec<Qua
     found.into_iter().flatten().collect()
 }
 
-/// Frames that repeat the previous one exactly, although noise should move every position.
+/// Finding on frames that exactly repeat the previous frame, although noise should move every position.
 fn check_repeated_frames(traces: &Traces, measured: &Quality) -> Option<QualityFinding> {
     let by_chance = repeat_probability(measured)?;
     let still = |&frame: &usize| {
@@ -75,9 +78,9 @@ fn check_repeated_frames(traces: &Traces, measured: &Quality) -> Option<QualityF
     Some(QualityFinding::advise((Check::FrozenFrames, severity), value, words, advice))
 }
 
-/// Probability that all columns repeat by chance. For a column with step `q` and noise `s` it is `q/(2
-/// sqrt(pi) s)`: the step times the density at zero of the difference of two values. `None` where noise does
-/// not move both points, or where a step hides it.
+/// Probability that all columns repeat by chance. For a column with step `q` and noise `s` it is
+/// `q/(2 sqrt(pi) s)`: the step times the density at zero of the difference of two values. `None` if noise
+/// does not move both points, or if repeats by chance are too likely to be judged.
 fn repeat_probability(measured: &Quality) -> Option<f64> {
     let moved = |channel: &ChannelQuality| channel.noise_m.is_some_and(|noise| noise > LEAST_NOISE_M);
     let unchanged = |channel: &ChannelQuality| {
@@ -88,12 +91,12 @@ fn repeat_probability(measured: &Quality) -> Option<f64> {
     (probability < LIKELY_REPEAT && moved(&measured.tip_x) && moved(&measured.head_x)).then_some(probability)
 }
 
-/// First and last frame of a column.
+/// First and last tracked frame of a column.
 fn tracked_span(samples: &[Option<f64>]) -> Option<(usize, usize)> {
     Some((samples.iter().position(Option::is_some)?, samples.iter().rposition(Option::is_some)?))
 }
 
-/// Range of frames that both tracks cover.
+/// Finding on the range of frames that both tracks cover.
 fn check_overlap(traces: &Traces, grid: FrameGrid) -> Option<QualityFinding> {
     let (tip, head) = (tracked_span(&traces.tip_x_m)?, tracked_span(&traces.head_x_m)?);
     let (first, last) = (tip.0.max(head.0), tip.1.min(head.1));
@@ -120,7 +123,7 @@ fn check_overlap(traces: &Traces, grid: FrameGrid) -> Option<QualityFinding> {
     Some(QualityFinding::advise((Check::Overlap, severity), (both as f64, "frames"), words, advice))
 }
 
-/// Travel of the point that moves more, m.
+/// Travel of the point that travels farther, m.
 fn largest_travel_m(traces: &Traces) -> Option<f64> {
     let travel = |samples: &[Option<f64>]| {
         let some = samples.iter().step_by(samples.len() / MOST_POSITIONS + 1);
@@ -133,7 +136,7 @@ fn largest_travel_m(traces: &Traces) -> Option<f64> {
     travels.into_iter().flatten().reduce(f64::max)
 }
 
-/// Travel along the sweep; one that no wiper makes comes from a wrong unit.
+/// Finding on the travel along the sweep; an implausible travel comes from a wrong unit.
 fn check_travel(traces: &Traces) -> Option<QualityFinding> {
     let travel_m = largest_travel_m(traces)?;
     let pixels = "check --scale: pixels may have been taken for millimetres";
@@ -157,7 +160,8 @@ pub(super) fn head_height_m(traces: &Traces) -> Option<f64> {
     median_in_place(&mut apart.step_by(traces.tip_y_m.len() / MOST_POSITIONS + 1).collect::<Vec<_>>())
 }
 
-/// Direction of y: the blade stands on its lip, so a tip above the head means that y points down.
+/// Finding on the direction of y: the blade stands on its lip, so a tip above the head means that y points
+/// down.
 fn check_head_above_tip(traces: &Traces) -> Option<QualityFinding> {
     let height_m = -head_height_m(traces)?;
     if height_m < LEAST_HEIGHT_M {
@@ -169,7 +173,7 @@ fn check_head_above_tip(traces: &Traces) -> Option<QualityFinding> {
     Some(QualityFinding::advise((Check::YDirection, Severity::Caution), (height_m, "m"), words, advice))
 }
 
-/// Number of turns of the head, after which windows can be named.
+/// Finding on the number of turns of the head; windows can be named after these turns.
 pub(super) fn check_turns(instants: &ReversalInstants) -> QualityFinding {
     let count = instants.reversals.len();
     let resting =

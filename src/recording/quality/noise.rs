@@ -1,23 +1,24 @@
-//! Measurements on one column: missing frames, noise, the step in which it is written.
+//! Measurements on one column: missing frames, noise, and the step of its values.
 
 use crate::recording::channel::median_in_place;
 
 /// Median absolute deviation of a normal distribution in units of its standard deviation.
 const MAD_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
-/// Variance of a third difference of white noise of unit variance: 1 + 9 + 9 + 1, the squared binomial
-/// weights.
+/// Variance of a third difference of white noise of unit variance: the sum of the squared binomial weights, 1
+/// + 9 + 9 + 1.
 const THIRD_DIFFERENCE_VARIANCE: f64 = 20.0;
-/// Fewest differences of an estimate: the median of fewer is uncertain.
+/// Minimum number of differences for an estimate: the median of fewer is uncertain.
 const FEWEST_DIFFERENCES: usize = 8;
-/// Remainder that counts as zero, relative to the largest position: the rounding of decimals.
+/// Remainder that counts as zero, relative to the largest position: the rounding of decimal numbers.
 const ROUNDING: f64 = 1e-10;
-/// Most steps that a difference may span: a larger multiple is a coincidence of many digits.
+/// Maximum number of steps that a difference may span: a larger number means that the common divisor is a
+/// coincidence of many digits.
 const MOST_STEPS: f64 = 20_000.0;
 
 /// Standard deviation of white noise on the samples, in their unit: the median absolute third difference of
-/// four neighbouring present frames over `0.6745 sqrt(20)`. A third difference removes motion up to a
-/// parabola. Oscillation within a few frames remains, so that the estimate is too high there; slow errors do
-/// not show.
+/// four consecutive present frames, divided by `0.6745 sqrt(20)`. A third difference removes motion up to a
+/// parabola. An oscillation within a few frames remains and makes the estimate too high; errors that change
+/// slowly do not contribute.
 #[must_use]
 pub fn noise_floor(samples: &[Option<f64>]) -> Option<f64> {
     let third = |w: &[Option<f64>]| match *w {
@@ -32,8 +33,8 @@ pub fn noise_floor(samples: &[Option<f64>]) -> Option<f64> {
     Some(median / (MAD_OF_NORMAL * THIRD_DIFFERENCE_VARIANCE.sqrt()))
 }
 
-/// Greatest common divisor of the differences between neighbouring frames, in the samples' unit: the step in
-/// which they are written. `None` where there is no such step.
+/// Quantisation step of the samples, in their unit: the greatest common divisor of the differences between
+/// neighbouring frames. `None` if there is no such step.
 #[must_use]
 pub fn quantisation_step(samples: &[Option<f64>]) -> Option<f64> {
     let rounding = ROUNDING * samples.iter().flatten().fold(0.0_f64, |most, v| most.max(v.abs()));
@@ -61,16 +62,16 @@ fn approximate_common_divisor(mut larger: f64, mut smaller: f64, rounding: f64) 
     larger
 }
 
-/// Runs of absent frames.
+/// Runs of missing frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct FrameGaps {
     pub missing: usize,
     pub runs: usize,
-    /// Length of the longest run, frames; the first of equal ones.
+    /// Length of the longest run, frames.
     pub longest: usize,
     pub longest_from: usize,
-    /// Greatest common divisor of the distances between present frames: n where every n-th frame was tracked,
-    /// 0 where fewer than two frames are present.
+    /// Greatest common divisor of the distances between present frames: n if every n-th frame was tracked, 0
+    /// if fewer than two frames are present.
     pub stride: usize,
 }
 
@@ -101,7 +102,8 @@ fn greatest_common_divisor(a: usize, b: usize) -> usize {
 mod tests {
     use super::*;
 
-    /// Third differences of (0, 1, 1, 0) repeated have the size 0, 2 or 4 in turn, so their median is known.
+    /// Third differences of (0, 1, 1, 0) repeated have the size 0, 2 or 4 in turn, so that their median is
+    /// known.
     #[test]
     fn the_noise_floor_is_the_median_third_difference_over_its_factor() {
         let samples: Vec<Option<f64>> = (0..40).map(|i| Some(f64::from(i % 2))).collect();

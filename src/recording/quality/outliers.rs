@@ -1,46 +1,51 @@
-//! Isolated points far from the prediction of their neighbours: the tracker jumps away for one frame and
+//! Isolated points far from the prediction by their neighbours: the tracker jumps away for one frame and
 //! comes back.
 //!
-//! A point is an outlier when all three conditions hold. They exclude fast chatter, and kinks, jumps and
-//! flips of the blade:
+//! A point is an outlier if all three conditions hold. The conditions exclude fast chatter, and kinks, jumps
+//! and flips of the blade:
 //! - its distance from the cubic through its four neighbours exceeds what noise and step explain;
 //! - it lies on the same side of two straight lines, through the two points before and the two points after
 //!   it (at a kink it lies on one of them), and both lines agree on its place (at a jump they do not);
 //! - the points around it are much closer to their own cubics (in chatter or strong noise they are not).
 //!
-//! A point with a missing frame within two frames of it is not judged.
+//! A point is not judged if a frame within two frames of it is missing.
 
 use super::finding::{Check, QualityFinding, Severity};
 use super::measurement::{ChannelQuality, MeasuredColumn, Optics};
 use crate::recording::FrameGrid;
 
-/// Weight of the two nearer neighbours in the cubic through four; the further two have -1.
+/// Weight of the two nearer neighbours in the cubic through four points; the two further ones have the weight
+/// -1.
 const NEARER: f64 = 4.0;
 /// Sum of the four weights.
 const WEIGHTS: f64 = 6.0;
-/// Standard deviation of a miss in white noise of standard deviation 1: `sqrt(1 + (16 + 16 + 1 + 1)/36)`.
+/// Standard deviation of the miss (the distance from the cubic) in white noise of standard deviation 1:
+/// `sqrt(1 + (16 + 16 + 1 + 1)/36)`.
 const MISS_SD: f64 = 1.394_433_377_556_792_8;
-/// Least miss in its standard deviations for white noise, which exceeds it in 2 of 1e9 points.
+/// Smallest miss of an outlier, in standard deviations of a miss; white noise exceeds it at 2 of 1e9 points.
 const BEYOND_NOISE: f64 = 6.0;
-/// Least miss in steps: flicker between neighbouring values is no outlier.
+/// Smallest miss of an outlier, in steps: flicker between adjacent values is not an outlier.
 const BEYOND_STEPS: f64 = 2.0;
-/// Least miss, m: a tenth of a pixel of the usual 20 um. No tracker is that accurate in every frame.
+/// Smallest miss of an outlier, m: a tenth of a pixel of the usual 20 um. No tracker is that accurate in
+/// every frame.
 const LEAST_MISS_M: f64 = 2e-6;
-/// Least miss in pixels, where the scale is known.
+/// Smallest miss of an outlier, in pixels, if the scale is known.
 const LEAST_MISS_PX: f64 = 0.1;
-/// Share of the miss that is the least distance from either line and the largest distance between the lines.
+/// An outlier is at least this fraction of its miss away from both lines, and the lines differ by at most
+/// this fraction plus noise.
 const BOTH_SIDES: f64 = 0.5;
 /// Three standard deviations of the difference of the two lines in white noise: `3 sqrt(2 (4 + 1))`.
 const LINES_SD: f64 = 9.5;
-/// Least ratio of its miss to the largest around it. The largest of six misses of white noise reaches 3
-/// standard deviations once in 60.
+/// Smallest ratio of an outlier's miss to the largest miss around it. The largest of six misses of white
+/// noise reaches 3 standard deviations once in 60 cases.
 const MORE_THAN_AROUND: f64 = 4.0;
-/// Distances, in frames, of the points around: near ones whose own cubic does not use the point.
+/// Distances, in frames, of the points around an outlier: the nearest points whose own cubic does not use it.
 const AROUND: std::ops::RangeInclusive<usize> = 3..=5;
-/// Share of outliers that is worth a caution: each is an impulse that raises the noise of a spectrum.
+/// Fraction of outliers that calls for a caution: each outlier is an impulse that raises the noise of a
+/// spectrum.
 const MANY_OUTLIERS: f64 = 1e-3;
 
-/// Frames of the outliers in a column, in order; `metres_per_pixel` where known.
+/// Frames of the outliers in a column, in order; `metres_per_pixel` is given if known.
 pub fn outlier_frames(
     samples: &[Option<f64>],
     channel: &ChannelQuality,
@@ -60,7 +65,7 @@ pub fn outlier_frames(
     isolated.map(|(frame, _)| frame).collect()
 }
 
-/// Distance of the middle of five frames from the cubic through the others.
+/// Distance of the middle one of five frames from the cubic through the others.
 fn distance_from_cubic(five: &[Option<f64>]) -> Option<f64> {
     match *five {
         [Some(a), Some(b), Some(c), Some(d), Some(e)] => Some(c - (NEARER * (b + d) - (a + e)) / WEIGHTS),
@@ -78,7 +83,7 @@ fn lies_off_both_lines(samples: &[Option<f64>], frame: usize, miss_m: f64, noise
     Some(off(before) && off(after) && agree)
 }
 
-/// Whether the cubics predict all points around well; false where none of them has a cubic.
+/// Whether the cubics predict all points around a frame well; false if no point around it has a cubic.
 fn is_calm_around(samples: &[Option<f64>], frame: usize, miss_m: f64) -> bool {
     let miss = |at: Option<usize>| distance_from_cubic(samples.get(at?.checked_sub(2)?..at? + 3)?);
     let around = AROUND.flat_map(|apart| [frame.checked_sub(apart), frame.checked_add(apart)]);
@@ -86,7 +91,7 @@ fn is_calm_around(samples: &[Option<f64>], frame: usize, miss_m: f64) -> bool {
     largest.is_some_and(|largest| miss_m.abs() > MORE_THAN_AROUND * largest)
 }
 
-/// The outliers of a column as a finding.
+/// Finding on the outliers of a column.
 pub(super) fn check_outliers(
     column: &MeasuredColumn,
     grid: FrameGrid,

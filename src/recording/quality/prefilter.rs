@@ -1,50 +1,53 @@
-//! Whether a trace was low-passed before it was exported: the spectrum of its noise then falls towards the
-//! Nyquist frequency.
+//! Detects whether a trace was low-pass filtered before its export: the spectrum of its noise then falls
+//! towards the Nyquist frequency.
 //!
-//! The power of short segments is averaged in bands of a third of an octave. Low-passed noise has a plateau
-//! of three bands with nearly equal power, which scatters over the segments as noise does. Above the plateau
-//! the power falls more steeply than that of a random walk and stays low up to the Nyquist frequency. White
-//! noise does not fall. Motion without noise has no plateau, or one with another scatter. A trace whose step
-//! is coarser than its noise is not judged.
+//! The power of short segments is averaged in bands of a third of an octave. Low-pass filtered noise has a
+//! plateau of three bands with nearly equal power, which scatters over the segments as noise does. Above the
+//! plateau, the power falls more steeply than that of a random walk and stays low up to the Nyquist
+//! frequency. The power of white noise does not fall. Motion without noise has no plateau, or a plateau with
+//! a different scatter. A trace whose step is coarser than its noise is not judged.
 
 use super::finding::{Check, QualityFinding, Severity};
 use super::measurement::{ChannelQuality, MeasuredColumn};
 use portable_math as math;
 use std::f64::consts::TAU;
 
-/// Frames of a segment: it resolves a plateau up to a sixth of the Nyquist frequency, and 32 segments fit
-/// into 2,112 frames.
+/// Number of frames of a segment: it resolves a plateau up to a sixth of the Nyquist frequency, and 32
+/// segments fit into 2,112 frames.
 const SEGMENT: usize = 128;
-/// Most missing frames of a segment, bridged by straight lines: 5 % change the power of a band by less than
-/// 0.5 dB.
+/// Maximum number of missing frames of a segment, which are bridged by straight lines: 5 % of missing frames
+/// change the power of a band by less than 0.5 dB.
 const MOST_BRIDGED: usize = 6;
-/// Fewest segments: they give the median power of a band to a fifth, enough to exclude a random walk.
+/// Minimum number of segments: the median power of a band is then known to 20 %, enough to exclude a random
+/// walk.
 const FEWEST_SEGMENTS: usize = 32;
-/// Most segments, spread over the recording: they give the median to 7 %.
+/// Maximum number of segments, spread over the recording: they give the median to 7 %.
 const MOST_SEGMENTS: usize = 256;
-/// Edges of the bands, bins: about a third of an octave and at least two bins wide. Motion and trend lie
-/// below the first.
+/// Edges of the bands, bins: a band is about a third of an octave and at least two bins wide. Motion and
+/// trend lie below the first edge.
 const EDGES: [usize; 12] = [3, 5, 7, 10, 13, 16, 20, 25, 32, 40, 50, 64];
-/// Bands of a plateau.
+/// Number of bands of a plateau.
 const PLATEAU: usize = 3;
-/// Largest power ratio within a plateau, 3 dB; over as many bands a random walk, 1/f^2, falls by 4 dB or
-/// more.
+/// Largest power ratio within a plateau, 3 dB. Over three bands, the power of a random walk, 1/f^2, falls by
+/// 4 dB or more.
 const FLAT: f64 = 2.0;
-/// Least ratio to the cut-off of the bands whose power must be low.
+/// The power must be low in all bands from this multiple of the cut-off frequency on.
 const ABOVE: f64 = 1.6;
-/// Largest power of those bands, as a share of the plateau's: 8 dB less, which a mean of three frames just
-/// reaches.
+/// Largest power in these bands, as a fraction of the power of the plateau: 8 dB less, which a mean of three
+/// frames just reaches.
 const FALLEN: f64 = 0.16;
-/// Least fall over the steepest octave, 10 dB: a random walk falls by 6 dB, a filter of second order by 12
-/// dB.
+/// Smallest ratio of power over the steepest octave, 10 dB: a random walk falls by 6 dB, a filter of second
+/// order by 12 dB.
 const STEEP: f64 = 10.0;
-/// Ratio of median to lower quartile of the power of noise in a bin. It is ln 2/ln(4/3) = 2.41; 32 segments
-/// give it within this range.
+/// Ratio of the median to the lower quartile of the power of noise in a bin. Its expected value is ln
+/// 2/ln(4/3) = 2.41; with 32 segments, it lies in this range.
 const NOISE_SCATTER: std::ops::RangeInclusive<f64> = 1.6..=3.8;
-/// Least power of a plateau relative to the largest squared position; below lie rounding errors.
+/// Smallest power of a plateau, as a fraction of the square of the largest position; a lower power is
+/// rounding error.
 const ROUNDING: f64 = 1e-26;
 
-/// Cut-off frequency of the low-pass filter that a trace went through, Hz; `None` where it shows none.
+/// Cut-off frequency of the low-pass filter that a trace went through, Hz; `None` if the trace shows no
+/// filter.
 pub(crate) fn cutoff_hz(samples: &[Option<f64>], frame_rate_hz: f64) -> Option<f64> {
     let bands = median_band_powers(samples)?;
     let largest = samples.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
@@ -64,8 +67,8 @@ fn first_band_from(bin: f64) -> usize {
     EDGES.iter().position(|&edge| edge as f64 >= bin).unwrap_or(EDGES.len()).min(EDGES.len() - 2)
 }
 
-/// Whether the power falls steeply from band `end` on, the first below half the plateau's level, and stays
-/// low.
+/// Whether the power falls steeply from band `end` on, the first band below half the plateau's level, and
+/// stays low.
 fn falls_steeply(bands: &[PrefilterBand], end: usize, level: f64) -> bool {
     let stays =
         bands[first_band_from(ABOVE * EDGES[end] as f64)..].iter().all(|band| band.power <= FALLEN * level);
@@ -80,12 +83,12 @@ fn is_plateau(bands: &[PrefilterBand]) -> bool {
     low > 0.0 && high <= FLAT * low && bands.iter().all(|band| NOISE_SCATTER.contains(&band.scatter))
 }
 
-/// Power between two bins, over all segments.
+/// Power between two bins, from all segments.
 struct PrefilterBand {
-    /// Median power per bin over the segments: kinks, outliers and chatter in fewer than half of them do not
-    /// change it.
+    /// Median power per bin over the segments; kinks, outliers and chatter in fewer than half of the segments
+    /// do not change it.
     power: f64,
-    /// Median over lower quartile.
+    /// Ratio of the median to the lower quartile of the power.
     scatter: f64,
 }
 
@@ -111,13 +114,13 @@ fn median_band_powers(samples: &[Option<f64>]) -> Option<Vec<PrefilterBand>> {
     Some(EDGES.windows(2).map(band).collect())
 }
 
-/// A segment minus its least-squares parabola, with a Hann window; `None` where too many frames are missing.
+/// A segment minus its least-squares parabola, with a Hann window; `None` if too many frames are missing.
 fn windowed_segment(samples: &[Option<f64>]) -> Option<Vec<f64>> {
     let mut values = interpolate_gaps(samples)?;
     let centre = (SEGMENT - 1) as f64 / 2.0;
     let place = |i: usize| (i as f64 - centre) / centre;
     let mean_square = (0..SEGMENT).map(|i| math::powi(place(i), 2)).sum::<f64>() / SEGMENT as f64;
-    // (orthogonal on the grid)
+    // (these shapes are orthogonal on the grid)
     let shapes: [&dyn Fn(usize) -> f64; 3] = [&|_| 1.0, &place, &|i| math::powi(place(i), 2) - mean_square];
     for shape in shapes {
         let (mut along, mut square) = (0.0, 0.0);
@@ -155,7 +158,7 @@ fn goertzel_power(values: &[f64], bin: usize) -> f64 {
     last * last + before * before - twice_cosine * last * before
 }
 
-/// A cut-off as a finding.
+/// Finding on a low-pass filter.
 pub(super) fn check_prefilter(column: &MeasuredColumn, frame_rate_hz: f64) -> Option<QualityFinding> {
     let ChannelQuality { step_m, noise_m, .. } = column.quality;
     if step_m.is_some_and(|step| noise_m.is_none_or(|noise| noise < step)) {

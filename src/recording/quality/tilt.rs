@@ -1,9 +1,9 @@
-//! Tilt of the camera, from the path of the tip: the tip stays on the glass, so in a level picture its height
-//! is the same all along the sweep, and the slope of height over place is the tilt.
+//! Tilt of the camera, from the path of the tip. The tip stays on the glass, so its height is constant along
+//! the sweep in a level picture; the slope of its height against its position along the sweep is the tilt.
 //!
-//! Each stroke has its own height, because the tracked point of the lip lies at another height when the blade
+//! Each stroke has its own height, because the tracked point of the lip has a different height when the blade
 //! leans to the other side. Frames in which the tip is off the glass do not count. A curved glass has no
-//! single slope: how much its slope varies along the path is part of the uncertainty.
+//! single slope; the variation of its slope along the path is part of the uncertainty.
 
 mod glass_line;
 
@@ -17,19 +17,20 @@ use glass_line::{GlassLine, TipPath};
 use portable_math as math;
 use serde::Serialize;
 
-/// Fewest frames with a height: fewer do not show how their errors are correlated.
+/// Minimum number of frames with a height: fewer do not show how their errors are correlated.
 const FEWEST_FRAMES: usize = 50;
-/// Least travel of the tip within a stroke, m: about the height of a blade. As the lip bends, its tracked
-/// point moves up and down by some 10 um, 0.1 degrees over this travel.
+/// Smallest travel of the tip within a stroke, m: about the height of a blade. As the lip bends, its tracked
+/// point moves up and down by some 10 um, which is 0.1 degrees over this travel.
 const LEAST_TRAVEL_M: f64 = 5e-3;
-/// Least share of the frames on one line: with fewer, the line is not the glass.
+/// Smallest fraction of the frames on one line: with fewer frames on it, the line is not the glass.
 const LEAST_ON_GLASS: f64 = 0.5;
-/// Least slope or curvature, in its standard deviations: chance reaches it in one level recording of 370.
+/// Smallest significant slope or curvature, in its standard deviations; chance exceeds it in one level
+/// recording of 370.
 const CLEAR_DEVIATIONS: f64 = 3.0;
-/// Least sag of a curved path, m: below it lies the rounding of a path without noise.
+/// Smallest sag of a curved path, m; a smaller one is rounding of a path without noise.
 const LEAST_SAG_M: f64 = 1e-9;
-/// Least tilt that matters, rad: 0.01 degrees shift the deflection of a blade 6 mm high by 1 um, a twentieth
-/// of the usual pixel.
+/// Smallest tilt that matters, rad: 0.01 degrees shift the deflection of a blade 6 mm high by 1 um, a
+/// twentieth of the usual pixel.
 const LEAST_TILT_RAD: f64 = 0.01 * std::f64::consts::PI / 180.0;
 
 /// Slope of the glass in the picture.
@@ -37,28 +38,28 @@ const LEAST_TILT_RAD: f64 = 0.01 * std::f64::consts::PI / 180.0;
 pub struct CameraTilt {
     /// Angle from the x axis to the glass, rad; positive where the glass rises towards positive x.
     pub angle_rad: f64,
-    /// Its standard deviation, rad: correlated errors, rounding, and the change of slope along a curved
-    /// glass.
+    /// Standard deviation of the angle, rad. It includes correlated errors, rounding, and the change of slope
+    /// along a curved glass.
     pub sd_rad: f64,
-    /// Curvature of the glass in the picture; absent where the path shows none.
+    /// Curvature of the glass in the picture; absent if the path shows none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub curvature: Option<Curvature>,
-    /// Mean place of the tip on the glass, x and y, m.
+    /// Mean position of the tip on the glass, x and y, m.
     pub centre_m: [f64; 2],
     /// Longest travel of the tip within a stroke, m.
     pub travel_m: f64,
-    /// Frames in which the tip lies on the glass, out of at most 100,000 that are used.
+    /// Number of frames in which the tip lies on the glass; at most 100,000 frames are used.
     pub frames: usize,
-    /// Frames in which the tip is off the glass.
+    /// Number of frames in which the tip is off the glass.
     pub frames_off_glass: usize,
 }
 
-/// How a curved glass bends.
+/// Curvature of the glass in the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Curvature {
-    /// Change of slope with place, 1/m; positive where the middle lies lower than the ends.
+    /// Change of slope with position along the sweep, 1/m; positive if the middle lies lower than the ends.
     pub per_m: f64,
-    /// Its standard deviation, 1/m.
+    /// Standard deviation of the curvature, 1/m.
     pub sd_per_m: f64,
     /// Standard deviation of the slope over the frames, rad.
     pub slope_sd_rad: f64,
@@ -67,10 +68,10 @@ pub struct Curvature {
 /// Why a recording shows no tilt.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TiltNotFound {
-    /// The tip has no height, or in too few frames.
+    /// The tip has a height in no or too few frames.
     #[error("the tip has x and y in {frames} frames, expected at least {FEWEST_FRAMES}")]
     TooFewFrames {
-        /// Frames with both.
+        /// Number of frames with both coordinates.
         frames: usize,
     },
     /// The tip hardly moves.
@@ -79,23 +80,24 @@ pub enum TiltNotFound {
         1e3 * LEAST_TRAVEL_M
     )]
     TooLittleTravel {
-        /// Its longest travel in a stroke, m.
+        /// Longest travel of the tip in a stroke, m.
         travel_m: f64,
     },
-    /// The places of the tip lie on no line.
+    /// The positions of the tip do not lie on a line.
     #[error("the tip lies on one line in {on_line} of {frames} frames, expected at least half of them")]
     NoLine {
-        /// Frames on the line.
+        /// Number of frames on the line.
         on_line: usize,
-        /// Frames with both coordinates.
+        /// Number of frames with both coordinates.
         frames: usize,
     },
 }
 
-/// Measures the tilt of the camera; `instants` are those of the recording and `measured` is its quality.
+/// Measures the tilt of the camera; `instants` and `measured` are the instants and the quality of the
+/// recording.
 ///
 /// # Errors
-/// [`TiltNotFound`]: why the recording shows none.
+/// [`TiltNotFound`] with the reason if the recording shows no tilt.
 pub fn measure_tilt(
     recording: &Recording,
     instants: &ReversalInstants,
@@ -124,18 +126,19 @@ pub fn measure_tilt(
     Ok(CameraTilt { angle_rad, sd_rad, curvature, centre_m, travel_m, frames: on_line, frames_off_glass })
 }
 
-/// Step in which the heights of the tip are written, m. Heights that never change show no step; the coarsest
-/// of the other columns serves instead.
+/// Step in which the heights of the tip are written, m. Heights that never change show no step; then the
+/// coarsest step of the other columns is taken.
 fn height_step_m(measured: &Quality) -> f64 {
     let tip_y = &measured.tip_y;
     let coarsest = || measured.channels().into_iter().filter_map(|(_, q)| q.step_m).fold(0.0, f64::max);
     tip_y.step_m.unwrap_or_else(|| if tip_y.noise_m == Some(0.0) { coarsest() } else { 0.0 })
 }
 
-/// Angle of a line, its standard deviation, both rad, and its curvature; `hidden_step_m` is the step of the
-/// heights where it exceeds their noise, else 0.
+/// Angle of a line and its standard deviation, both rad, and the curvature of the path; `hidden_step_m` is
+/// the step of the heights if it exceeds their noise, otherwise 0.
 fn angle_with_sd(path: &TipPath, line: &GlassLine, hidden_step_m: f64) -> (f64, f64, Option<Curvature>) {
-    // in the worst case the rounding error is the same in all frames: a whole stroke may lie within one step
+    // in the worst case, the rounding error is the same in all frames, because a whole stroke may lie within
+    // one step
     let rounding_m2 = path.points.len() as f64 * math::powi(hidden_step_m, 2) / 12.0;
     let variance_m2 = glass_line::long_run_variance(path, line) + rounding_m2;
     let curvature = significant_curvature(line, variance_m2);
@@ -159,7 +162,7 @@ impl CameraTilt {
     }
 }
 
-/// Findings on the tilt and the curvature of a recording, where they are significant.
+/// Findings on the tilt and the curvature of a recording, if they are significant.
 pub(in crate::recording::quality) fn check_tilt(
     recording: &Recording,
     measured: &Quality,
@@ -171,12 +174,12 @@ pub(in crate::recording::quality) fn check_tilt(
     [effect.tilt_finding(&tilt), effect.curvature_finding(&tilt)].into_iter().flatten().collect()
 }
 
-/// Effect of a tilt on the deflection: the head is above the tip, so rotation of the picture moves it along
-/// the sweep.
+/// Effect of a tilt on the deflection: a rotation of the picture moves the head, which is above the tip,
+/// along the sweep.
 struct TiltEffect {
     /// Height of the head above the tip, m.
     height_m: Option<f64>,
-    /// Noise of a deflection, m.
+    /// Standard deviation of the noise of the deflection, m.
     noise_m: Option<f64>,
 }
 
@@ -218,12 +221,12 @@ impl TiltEffect {
         Some(QualityFinding::advise(kind, (per_m, "1/m"), words, advice))
     }
 
-    /// Shift of a deflection, m.
+    /// Shift of the deflection, m.
     fn shift_m(&self, angle_rad: f64) -> Option<f64> {
         Some(self.height_m? * math::sin(angle_rad))
     }
 
-    /// A shift above the noise of a single frame is worth a caution.
+    /// Severity of a tilt: a shift above the noise of a single frame calls for a caution.
     fn severity(&self, angle_rad: f64) -> Severity {
         match (self.shift_m(angle_rad), self.noise_m) {
             (Some(shift), Some(noise)) if shift.abs() > noise => Severity::Caution,

@@ -1,4 +1,4 @@
-//! Reference run, and errors of other runs against it.
+//! Reference run, and the errors of other runs relative to it.
 
 use super::sampled_run::{SampledRun, comparison_grid};
 use super::transition_lists::TransitionDifference;
@@ -17,14 +17,14 @@ pub(crate) struct ReferenceRun<'a> {
     motion: SampledRun,
     spectral: ComponentReader,
     pub components: ComponentPair,
-    /// Second method at the same tolerance, to check the reference.
+    /// Method of a second run at the same tolerance, which checks the reference.
     pub checked_by: IntegrationMethod,
-    /// Worst difference of the transition times of both methods, s; `None` if their lists differ or are
-    /// empty.
+    /// Largest difference between the transition times of both methods, s; `None` if their lists of
+    /// transitions differ or are empty.
     pub apart_s: Option<f64>,
-    /// Whether both methods have the same transitions.
+    /// Whether both methods find the same transitions.
     pub lists_agree: bool,
-    /// Worst difference of the deflections of both methods, relative to the range of the deflection.
+    /// Largest difference between the deflections of both methods, relative to the range of the deflection.
     pub state_apart: f64,
 }
 
@@ -36,20 +36,20 @@ pub(crate) struct AccuracyRow {
     pub run: RunResult,
     /// Duration of the run, s; infinite until the caller sets it.
     pub wall_s: f64,
-    /// Difference of its transitions from the reference's.
+    /// Difference of the run's transitions from those of the reference.
     pub lists: TransitionDifference,
-    /// Error of the time of its end, s.
+    /// Error of the time at which the run ends, s.
     pub stop_error_s: f64,
-    /// Root mean square error of the deflection, relative to its range.
+    /// Root-mean-square error of the deflection, relative to its range.
     pub state_rms: f64,
-    /// Worst error of the deflection, relative to its range.
+    /// Largest error of the deflection, relative to its range.
     pub state_worst: f64,
-    /// Errors of the low and the high component, Hz; `None` unless both runs show it.
+    /// Errors of the low and the high component, Hz; `None` unless run and reference both show the component.
     pub components_hz: [Option<f64>; 2],
 }
 
 impl<'a> ReferenceRun<'a> {
-    /// Runs a scene by the default method and checks it against Runge-Kutta.
+    /// Runs a scene with the default method, and checks the result with a Runge-Kutta run.
     pub(crate) fn from_scene(scene: &'a Scene) -> Self {
         let reference = |method| {
             SampledRun::run_scene(scene, SolverOptions { method, ..SolverOptions::new(REFERENCE_TOLERANCE) })
@@ -77,7 +77,7 @@ impl<'a> ReferenceRun<'a> {
         &self.motion.run
     }
 
-    /// Whether an error of transition times exceeds the uncertainty of the reference.
+    /// Whether an error of the transition times exceeds the uncertainty of the reference.
     pub(crate) fn resolves_error(&self, error_s: f64) -> bool {
         self.lists_agree && self.apart_s.is_none_or(|apart| error_s > apart)
     }
@@ -106,28 +106,27 @@ impl<'a> ReferenceRun<'a> {
     }
 }
 
-// Low and high spectral component of a run, as in fits.
+// Low and high spectral component of a run, found as in fits.
 
-/// Index of the low component: the head on its spring, read from the head's drop.
+/// Index of the low component: the head on its spring, found in the head's drop.
 pub(crate) const LOW_COMPONENT: usize = 0;
-/// Index of the high component: the stick-slip cycle, read from the deflection.
+/// Index of the high component: the stick-slip cycle, found in the deflection.
 pub(crate) const HIGH_COMPONENT: usize = 1;
 
-/// Search bands of both components over the head's natural frequency. The low one was published at 1.5 and
-/// 3.9
-/// times that frequency, the high one at 40 to 80 times.
+/// Search bands of both components, relative to the head's natural frequency. Published values are 1.5 and
+/// 3.9 times that frequency for the low component, and 40 to 80 times for the high one.
 const BANDS_OVER_HEAD: [(f64, f64); 2] = [(1.0, 6.0), (6.0, 600.0)];
-/// Time from the release to the start of the window, s: vibration of the flip decays.
+/// Time from the release to the start of the window, s, in which the vibration of the flip decays.
 const AFTER_RELEASE_S: f64 = 0.01;
 
-/// The components of a run.
+/// The spectral components of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct ComponentPair {
-    /// Frequency of the low and the high component, Hz; `None` without a component.
+    /// Frequencies of the low and the high component, Hz; `None` for a component that was not found.
     pub hz: [Option<f64>; 2],
 }
 
-/// Reads the components of every run from the same frames, whatever the time of its own release.
+/// Finds the components of every run in the same frames, whenever the run's own release occurs.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ComponentReader {
     frames: Range<usize>,
@@ -136,7 +135,7 @@ pub(crate) struct ComponentReader {
 }
 
 impl ComponentReader {
-    /// The frames from the reference's release to its end; all frames without a release.
+    /// Uses the frames from the reference's release to its end, or all frames if there is no release.
     pub(crate) fn from_reference(scene: &Scene, reference: Option<&Recording>) -> Self {
         let from = WindowEnd::Found { anchor: InstantKind::Release, reversal: 1, offset_s: AFTER_RELEASE_S };
         let window = Window { from, to: WindowEnd::Open };

@@ -1,11 +1,11 @@
-//! A run, sampled at the times at which runs are compared.
+//! A run, sampled at the times at which the runs are compared.
 
 use crate::recording::{FrameGrid, Recording, Traces};
 use crate::simulate::outputs::{SampleObserver, Transitions};
 use crate::simulate::scene::Scene;
 use crate::simulate::{RunResult, SolverOptions, Transition, run_scene_with};
 
-/// Most samples of a comparison: longer runs have a lower sampling rate.
+/// Maximum number of samples of a comparison: a longer run has a lower sampling rate.
 const MOST_SAMPLES: f64 = 1e5;
 
 /// Transitions and samples of a run.
@@ -16,7 +16,7 @@ pub(super) struct SampledRun {
     pub head_drop_m: Vec<f64>,
 }
 
-/// Times at which runs are compared.
+/// Times at which the runs are compared.
 pub(super) fn comparison_grid(scene: &Scene) -> FrameGrid {
     let length = scene.run.stop_s - scene.start_s;
     let frame_rate_hz = scene.run.sample_rate_hz.min(MOST_SAMPLES / length);
@@ -38,7 +38,7 @@ impl SampledRun {
         Self { run, transitions: transitions.0, deflection_m, head_drop_m }
     }
 
-    /// Root mean square and worst difference of the deflection over the common samples of two runs,
+    /// Root-mean-square and largest difference of the deflection over the common samples of two runs,
     /// relative to the range of the reference.
     pub(crate) fn deflection_differences(reference: &Self, other: &Self) -> (f64, f64) {
         let deflections = reference.deflection_m.iter();

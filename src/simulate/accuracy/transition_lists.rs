@@ -2,21 +2,21 @@
 
 use crate::simulate::Transition;
 
-/// Difference of a list from the reference's.
+/// Difference of a list of transitions from that of the reference.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct TransitionDifference {
-    /// Transitions of the reference that the list lacks.
+    /// Number of transitions of the reference that the list lacks.
     pub missed: usize,
-    /// Transitions that the reference lacks.
+    /// Number of transitions of the list that the reference lacks.
     pub invented: usize,
-    /// Worst difference of times, s; `None` if the lists differ or are empty.
+    /// Largest difference between transition times, s; `None` if the lists differ or are empty.
     pub worst_s: Option<f64>,
 }
 
 impl TransitionDifference {
-    /// Compares two lists. They agree if they have the same changes of mode in the same order. Otherwise
-    /// transitions between the same modes pair if they are closer than half of the reference's median gap;
-    /// the others are missed or invented.
+    /// Compares two lists. The lists agree if they have the same changes of mode in the same order.
+    /// Otherwise, two transitions between the same modes form a pair if they are closer than half of the
+    /// reference's median gap; the other transitions are missed or invented.
     pub(crate) fn from_lists(reference: &[Transition], found: &[Transition]) -> Self {
         let same =
             reference.len() == found.len() && reference.iter().zip(found).all(|(a, b)| is_of_one_kind(a, b));
@@ -43,7 +43,7 @@ fn is_of_one_kind(a: &Transition, b: &Transition) -> bool {
     (a.from, a.to) == (b.from, b.to)
 }
 
-/// Number of pairs, with both lists in order of time.
+/// Number of pairs of transitions; both lists are in order of time.
 fn count_pairs(reference: &[Transition], found: &[Transition], apart_s: f64) -> usize {
     let (mut i, mut j, mut count) = (0, 0, 0);
     while let (Some(a), Some(b)) = (reference.get(i), found.get(j)) {

@@ -7,32 +7,32 @@ use portable_math as math;
 use serde::Serialize;
 use std::sync::Arc;
 
-/// Distance before a knot, in frames, at which an instant counts as the knot, so that no tiny piece
-/// remains. The jump of the third derivative moves the position in this time by 1e-18 of its effect over a
-/// frame.
+/// An instant that lies before a knot by less than this number of frames counts as the knot, so that no tiny
+/// piece remains. In this time, the jump of the third derivative moves the position by 1e-18 of its effect
+/// over a frame.
 const NEAR_FRAMES: f64 = 1e-6;
 
-/// Position of the head as cubics between knots, where only the third derivative jumps. The outermost cubics
-/// extend beyond the first and the last knot.
+/// Position of the head as cubics between knots; only the third derivative jumps at a knot. The outermost
+/// cubics extend beyond the first and the last knot.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HeadSpline {
     grid: FrameGrid,
     first_frame: usize,
     knots_s: Vec<f64>,
-    /// Coefficients of the position about the first knot of each piece, m/s^k, lowest first.
+    /// Taylor coefficients of the position about the first knot of each piece, m/s^k, in rising order.
     pieces: Vec<[f64; 4]>,
-    /// Piece of each frame from the first knot on.
+    /// Index of the piece of each frame, from the first knot on.
     piece_of_frame: Vec<usize>,
-    /// The smooth curve that the cubics follow, if any.
+    /// The smooth curve to which the cubics are fitted, if any.
     #[serde(skip)]
     curve: Option<Arc<SmoothingSpline>>,
 }
 
 impl HeadSpline {
-    /// A cubic spline through the values of a smooth curve at the frames `knots`.
+    /// Cubic spline through the values of a smooth curve at the frames `knots`.
     ///
-    /// The curve fits `points`, at least three rising frames of `grid` with positions in m, averaged in
-    /// blocks of `block` frames.
+    /// The curve is fitted to `points`, at least three frames of `grid` in rising order with positions in m,
+    /// averaged in blocks of `block` frames.
     pub(super) fn from_points(
         grid: &FrameGrid,
         points: &[(usize, f64)],
@@ -46,7 +46,7 @@ impl HeadSpline {
         Self { curve: Some(Arc::new(curve)), ..Self::interpolate_positions(grid, knots, &places, ends) }
     }
 
-    /// The cubic spline through positions, m, with second derivatives at the ends, m/frame^2.
+    /// Cubic spline through positions, m, with given second derivatives at the ends, m/frame^2.
     fn interpolate_positions(grid: &FrameGrid, frames: &[usize], positions: &[f64], ends: [f64; 2]) -> Self {
         let curvatures = solve_curvatures(frames, positions, ends);
         let knots_s: Vec<f64> = frames.iter().map(|&frame| grid.time_s(frame)).collect();
@@ -72,18 +72,18 @@ impl HeadSpline {
         Self { pieces, ..self.clone() }
     }
 
-    /// Number of coefficients of the smooth curve; 0 without one.
+    /// Number of coefficients of the smooth curve; 0 if there is no curve.
     pub(crate) fn coefficient_count(&self) -> usize {
         self.curve.as_ref().map_or(0, |curve| curve.coefficients.len())
     }
 
-    /// Derivatives of the position at a frame by the coefficients: index of the first nonzero one, and the
-    /// values from there.
+    /// Derivatives of the position at a frame with respect to the coefficients: index of the first nonzero
+    /// derivative, and the values from this index on.
     pub(crate) fn position_weights(&self, frame: usize) -> (usize, [f64; 6]) {
         self.curve.as_ref().map_or((0, [0.0; 6]), |curve| curve.position_weights(frame as f64))
     }
 
-    /// Multiplies a row of coefficients by their covariance, m^2, in place.
+    /// Multiplies a row vector of coefficients by their covariance, m^2, in place.
     pub(crate) fn multiply_covariance(&self, row: &mut [f64]) {
         if let Some(curve) = &self.curve {
             curve.multiply_covariance(row);
@@ -96,7 +96,7 @@ impl HeadSpline {
         [self.knots_s[0], self.knots_s[self.knots_s.len() - 1]]
     }
 
-    /// Whether the knots span a run.
+    /// Whether the knots cover the time of a run.
     pub(crate) fn covers(&self, start_s: f64, stop_s: f64) -> bool {
         let ([first, last], near_s) = (self.span_s(), NEAR_FRAMES / self.grid.frame_rate_hz);
         first - near_s <= start_s && stop_s <= last + near_s
@@ -114,7 +114,7 @@ impl HeadSpline {
         }
     }
 
-    /// Taylor coefficients of the velocity about `t` in its piece, m/s^k; higher ones are zero.
+    /// Taylor coefficients of the velocity about `t` in its piece, m/s^(k+1); higher coefficients are zero.
     #[inline]
     pub(super) fn velocity_series(&self, t: f64) -> [f64; 3] {
         let ([_, b, c, d], x) = self.piece_at(t);
@@ -128,7 +128,7 @@ impl HeadSpline {
         (next > t).then_some(next)
     }
 
-    /// Coefficients of the piece at `t`, and the time since its first knot, s.
+    /// Coefficients of the piece that contains `t`, and the time since its first knot, s.
     #[inline]
     fn piece_at(&self, t: f64) -> (&[f64; 4], f64) {
         let index = self.piece_index(t);
@@ -143,7 +143,7 @@ impl HeadSpline {
     }
 }
 
-/// Second derivatives of the cubic spline through positions, from those at the ends.
+/// Second derivatives at the knots of the cubic spline through positions, from those at the two ends.
 fn solve_curvatures(frames: &[usize], positions: &[f64], [first, last]: [f64; 2]) -> Vec<f64> {
     let h = |i: usize| (frames[i + 1] - frames[i]) as f64;
     let slope = |i: usize| (positions[i + 1] - positions[i]) / h(i);
@@ -181,7 +181,7 @@ mod tests {
         HeadSpline::from_points(&GRID, points, 1, &knots)
     }
 
-    /// A cubic is a spline of any number of pieces, gaps or not.
+    /// A cubic is reproduced by a spline with any number of pieces, with or without gaps.
     #[test]
     fn a_cubic_motion_is_reproduced() {
         let (p, v, a, j) = (0.02, -0.3, 4.0, 150.0);
@@ -205,8 +205,8 @@ mod tests {
         assert!(worst.iter().zip(bounds).all(|(worst, bound)| *worst < bound), "{worst:?}");
     }
 
-    /// A cubic B-spline with knots at frames and straight ends is the unique natural spline through its
-    /// points.
+    /// A cubic B-spline with knots at frames and zero curvature at its ends is the unique natural spline
+    /// through its points.
     #[test]
     fn unsmoothed_a_spline_on_the_frames_is_reproduced() {
         let bump = |t: f64| {

@@ -1,45 +1,45 @@
 //! A smooth curve through noisy points on a frame grid: a least-squares spline of degree 5.
 //!
-//! Generalised cross-validation chooses the number of pieces (Craven and Wahba 1979, *Numerische
-//! Mathematik* 31, 377). Degrees of freedom count 1.4-fold, so that noise does not add pieces (Kim and Gu
-//! 2004, *Journal of the Royal Statistical Society* B 66, 337). A crank moves the head smoothly over tenths
-//! of a second, so a few pieces average the noise of thousands of frames; a hand needs more pieces. A cubic
-//! smoothing spline left two to three times the position error on noisy cosines.
+//! Generalised cross-validation chooses the number of pieces (Craven and Wahba 1979, *Numerische Mathematik*
+//! 31, 377). Degrees of freedom count 1.4-fold, so that noise does not add pieces (Kim and Gu 2004, *Journal
+//! of the Royal Statistical Society* B 66, 337). A crank moves the head smoothly over tenths of a second, so
+//! that a few pieces average the noise of thousands of frames; motion by hand needs more pieces. A cubic
+//! smoothing spline has two to three times the position error on noisy cosines.
 //!
 //! Tracking noise is correlated over a few frames (vibration, sub-pixel bias), and cross-validation would
-//! take it for motion. Points are therefore averaged in blocks, and each block is compared with the same
-//! average of the curve. Times are in frames.
+//! mistake it for motion. Points are therefore averaged in blocks, and each block is compared with the
+//! average of the curve over the same frames. Times are in frames.
 
 use nalgebra::{DMatrix, DVector};
 use portable_math as math;
 
-/// Degree of the pieces.
+/// Degree of the polynomial pieces.
 const DEGREE: usize = 5;
-/// Number of B-splines that are nonzero in a piece.
+/// Number of B-splines that are nonzero in one piece.
 const SUPPORT: usize = DEGREE + 1;
-/// Number of B-splines that are nonzero in two pieces: a block may contain a knot.
+/// Number of B-splines that are nonzero in two adjacent pieces, which a block may span.
 const BLOCK_WIDTH: usize = SUPPORT + 1;
-/// Weight of the third differences of the coefficients relative to a block. It matters only in gaps that
-/// leave a piece without points.
+/// Weight of the third differences of the coefficients, relative to a block. The weight matters only if a gap
+/// leaves a piece without points.
 const BRIDGE: f64 = 1e-7;
-/// Factor on the degrees of freedom in cross-validation.
+/// Factor by which degrees of freedom are multiplied in cross-validation.
 const CAUTION: f64 = 1.4;
-/// Fewest blocks per piece.
+/// Minimum number of blocks per piece.
 const BLOCKS_A_PIECE: f64 = 2.0;
-/// Ratio of successive trial numbers of pieces.
+/// Ratio of each trial number of pieces to the previous one.
 const PIECE_RATIO: f64 = 1.25;
 
-/// A trend plus a spline with uniform knots over the span.
+/// A polynomial trend plus a spline with uniform knots over the span.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct SmoothingSpline {
     span: FrameSpan,
-    /// Polynomial over the whole span, lowest coefficient first; the spline is added to it.
+    /// Coefficients of the trend over the whole span, in rising order.
     trend: [f64; SUPPORT],
     pieces: usize,
     pub(super) coefficients: Vec<f64>,
-    /// Cholesky factor of the coefficients' information matrix for unit noise per frame.
+    /// Cholesky factor of the coefficients' information matrix for unit noise variance per frame.
     information: CholeskyFactor,
-    /// Noise variance of a frame from the scatter of the blocks, m^2.
+    /// Noise variance of a single frame, from the scatter of the blocks, m^2.
     variance_m2: f64,
 }
 
@@ -47,14 +47,15 @@ pub(super) struct SmoothingSpline {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct FrameSpan(f64, f64);
 
-/// Consecutive frames that are averaged.
+/// Consecutive frames whose positions are averaged.
 struct FrameBlock<'a> {
     frames: &'a [usize],
-    /// Mean position above the trend, m.
+    /// Mean of the positions minus the trend, m.
     mean: f64,
 }
 
-/// Fits positions, m, at three or more rising frames, averaged in blocks of `length` frames.
+/// Fits a curve to positions, m, at three or more frames in rising order, averaged in blocks of `length`
+/// frames.
 pub(super) fn fit_smoothing_spline(frames: &[usize], positions: &[f64], length: usize) -> SmoothingSpline {
     let span = FrameSpan(frames[0] as f64, frames[frames.len() - 1] as f64);
     let trend = fit_trend(frames, positions, span);
@@ -67,7 +68,7 @@ pub(super) fn fit_smoothing_spline(frames: &[usize], positions: &[f64], length: 
         .take_while(|pieces| *pieces <= most)
         .map(|pieces| SmoothingSpline::fit_pieces(span, trend, pieces, &blocks));
     let best = tried.min_by(|a, b| a.0.total_cmp(&b.0));
-    // the ladder always holds one piece
+    // the trial numbers of pieces always include one
     best.map_or_else(|| unreachable!("no curve"), |(_, curve)| curve)
 }
 
@@ -101,7 +102,7 @@ fn evaluate_polynomial(coefficients: &[f64], x: f64) -> f64 {
     coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c)
 }
 
-/// Least-squares polynomial through all points; few points lower its degree.
+/// Least-squares polynomial through all points; its degree is lower if there are few points.
 fn fit_trend(frames: &[usize], positions: &[f64], span: FrameSpan) -> [f64; SUPPORT] {
     let terms = SUPPORT.min(frames.len());
     let powers = DMatrix::from_fn(frames.len(), terms, |row, k| {
@@ -140,14 +141,14 @@ impl SmoothingSpline {
         self.pieces as f64 / (self.span.1 - self.span.0)
     }
 
-    /// Piece of a frame, and the position in it from 0 to 1.
+    /// Index of the piece of a frame, and the position in this piece from 0 to 1.
     fn piece_at(&self, frame: f64) -> (usize, f64) {
         let x = (frame - self.span.0) * self.per_frame();
         let piece = (x as usize).min(self.pieces - 1);
         (piece, x - piece as f64)
     }
 
-    /// Least-squares curve of this many pieces, and its cross-validation score.
+    /// Least-squares curve with this number of pieces, and its cross-validation score.
     fn fit_pieces(
         span: FrameSpan,
         trend: [f64; SUPPORT],
@@ -183,20 +184,21 @@ impl SmoothingSpline {
         (if left > 0.0 { squares / (left * left) } else { f64::INFINITY }, curve)
     }
 
-    /// Derivatives of the position at a frame by the coefficients: index of the first nonzero one, and the
-    /// values from there.
+    /// Derivatives of the position at a frame with respect to the coefficients: index of the first nonzero
+    /// derivative, and the values from this index on.
     pub(crate) fn position_weights(&self, frame: f64) -> (usize, [f64; SUPPORT]) {
         let (piece, x) = self.piece_at(frame);
         (piece, b_splines(x))
     }
 
-    /// Multiplies a row of coefficients by their covariance, m^2, in place.
+    /// Multiplies a row vector of coefficients by their covariance, m^2, in place.
     pub(crate) fn multiply_covariance(&self, row: &mut [f64]) {
         self.information.solve_in_place(row);
         row.iter_mut().for_each(|x| *x *= self.variance_m2);
     }
 
-    /// Mean of the B-splines over a block: index of the first nonzero one, and the values from there.
+    /// Means of the B-splines over a block: index of the first nonzero mean, and the values from this index
+    /// on.
     fn block_row(&self, block: &FrameBlock<'_>) -> (usize, [f64; BLOCK_WIDTH]) {
         let (from, _) = self.piece_at(block.frames[0] as f64);
         let mut row = [0.0; BLOCK_WIDTH];
@@ -209,7 +211,7 @@ impl SmoothingSpline {
     }
 }
 
-/// Scalar product over the shorter length.
+/// Scalar product; the excess elements of the longer vector are ignored.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
@@ -231,11 +233,11 @@ fn b_splines<const N: usize>(x: f64) -> [f64; N] {
     values
 }
 
-/// A symmetric positive definite band matrix: each column from the main diagonal down.
+/// A symmetric positive definite band matrix; each column is stored from the main diagonal down.
 struct BandedMatrix(Vec<[f64; BLOCK_WIDTH]>);
 
 impl BandedMatrix {
-    /// Adds `weight row^T row` with the first element of the row in column `from`.
+    /// Adds `weight row^T row`, where the first element of `row` belongs to column `from`.
     fn add_outer_product(&mut self, from: usize, row: &[f64], weight: f64) {
         for (a, left) in row.iter().enumerate().filter(|(_, left)| **left != 0.0) {
             for (b, right) in row[a..].iter().enumerate() {
@@ -260,7 +262,7 @@ impl BandedMatrix {
     }
 }
 
-/// Lower Cholesky factor of a band matrix, stored like it.
+/// Lower Cholesky factor of a band matrix, stored in the same way.
 #[derive(Debug, Clone, PartialEq)]
 struct CholeskyFactor(Vec<[f64; BLOCK_WIDTH]>);
 

@@ -13,7 +13,7 @@ use crate::simulate::{Impact, RunStatus, TransitionCause};
 use hybrid_ode::{HybridPhase, PhaseEndCause as Ended, PhaseStart};
 
 impl<W: RunWatcher> EventLoop<'_, W> {
-    /// Handles a normal force of zero.
+    /// Decides what follows when the normal force reaches zero.
     pub(super) fn lose_contact(&mut self, pose: &Pose, before: PendingTransition) -> NextPhase {
         self.lift_off(FlightState { pose: *pose, gap_m: 0.0, gap_rate_m_per_s: 0.0 }, before)
     }
@@ -24,7 +24,7 @@ impl<W: RunWatcher> EventLoop<'_, W> {
         }
         if let Some((from, cause)) = before {
             if cause.is_none() {
-                self.recent.note_event(self.t); // impacts are noted before
+                self.recent.note_event(self.t); // impacts have been noted already
             }
             self.record_transition(from, TipMode::Flight, cause.unwrap_or(TransitionCause::LiftOff));
         }
@@ -38,12 +38,13 @@ impl<W: RunWatcher> EventLoop<'_, W> {
         self.system.linkage.flight_accelerations(state, &d, &head, self.lean).gap_m_per_s2
     }
 
-    /// Order of the zero of the gap at lift-off: that of the largest term of its series over a short time.
-    /// It is 1 after a rebound, 2 after a jump of the forces, and 3 after the normal force passes zero,
-    /// where the gap's acceleration is zero except for errors. A rebound that falls back needs order 1
-    /// whatever the other terms; else a smaller positive term of lower order only widens the gap.
+    /// Order of the zero of the gap at lift-off: the order of the largest term of the gap's series over a
+    /// short time. The order is 1 after a rebound, 2 after a jump of the forces, and 3 after the normal force
+    /// passes zero, where the gap's acceleration is zero except for errors. A rebound that falls back has
+    /// order 1 whatever the other terms are; otherwise a smaller positive term of lower order only widens the
+    /// gap.
     pub(super) fn gap_order(&self, state: &FlightState) -> u8 {
-        /// The short time as a fraction of the shortest period.
+        /// Length of this short time, as a fraction of the shortest period.
         const SHARE: f64 = 1e-3;
         let time = SHARE * self.shortest_period_s;
         let phase = FlightPhase { system: self.system, lean: self.lean };
@@ -55,7 +56,8 @@ impl<W: RunWatcher> EventLoop<'_, W> {
         let [first, second, third] = [state.gap_rate_m_per_s, 0.5 * now * time, change * time / 6.0];
         match () {
             () if first > 0.0 && (now < 0.0 || first > second.max(third)) => 1,
-            // also for a negative third term: division by it would take a rising tip for a landing one
+            // order 2 also for a negative third term: division by that term would make a rising tip look like
+            // a landing one
             () if second.abs() > third => 2,
             () => 3,
         }
@@ -63,10 +65,10 @@ impl<W: RunWatcher> EventLoop<'_, W> {
 
     pub(super) fn integrate_flight(&mut self, state: &FlightState, zero_order: [u8; GUARDS]) -> NextPhase {
         let phase = FlightPhase { system: self.system, lean: self.lean };
-        /// Factor on the duration of a rebound, so that one step includes its end.
+        /// Factor on the expected duration of a rebound, so that the first step includes its end.
         const MARGIN: f64 = 1.25;
         let (started, rebound) = (self.t, self.rebound_s(state).map(|time| MARGIN * time));
-        // the step of a rebound is no guide for a flight that begins at zero acceleration of the gap
+        // the step of a rebound is a poor guess for a flight that begins with zero acceleration of the gap
         let (y, step) = (flight_state_vector(state), rebound.or(self.steps[2]));
         let start = PhaseStart { t: self.t, y, zero_order, step };
         let (watch, drive, stop) = (&mut *self.watch, &self.system.drive, self.scene.run.stop_s);
@@ -106,23 +108,23 @@ impl<W: RunWatcher> EventLoop<'_, W> {
         }
     }
 
-    /// Duration of a rebound at constant acceleration of the gap, `2 v_n / |gap''|`, s.
+    /// Expected duration of a rebound, `2 v_n / |gap''|`, s, for constant acceleration of the gap.
     fn rebound_s(&self, state: &FlightState) -> Option<f64> {
         let acceleration = self.gap_acceleration(self.t, state);
         (state.gap_m == 0.0 && state.gap_rate_m_per_s > 0.0 && acceleration < 0.0)
             .then(|| -2.0 * state.gap_rate_m_per_s / acceleration)
     }
 
-    /// Handles a gap that falls to zero.
+    /// Decides what follows when the gap falls to zero.
     fn land_tip(&mut self, state: &FlightState) -> NextPhase {
         self.recent.note_event(self.t);
-        // within the tolerance, a tip that grazes the glass may seem to leave it
+        // within the tolerance, a tip that grazes the glass may seem to move away from it
         let (normal, cause) = (state.gap_rate_m_per_s.min(0.0), TransitionCause::Landing);
         self.strike_glass(&state.pose, normal, ImpactOrigin::Collision, (TipMode::Flight, cause))
     }
 
-    /// Handles slip, or release into slip, without an admissible finite force: lift-off if the tip rises
-    /// without contact, otherwise an impact without collision.
+    /// Decides what follows when slip, or a release into slip, has no admissible finite force: lift-off if
+    /// the tip rises without contact, otherwise an impact without collision.
     pub(super) fn resolve_jam(&mut self, pose: &Pose, from: TipMode) -> NextPhase {
         if self.scene.jam == JamRule::Stop {
             return NextPhase::End(RunStatus::Jammed);
@@ -138,7 +140,7 @@ impl<W: RunWatcher> EventLoop<'_, W> {
         self.strike_glass(pose, 0.0, ImpactOrigin::Jam, (from, TransitionCause::JamImpact))
     }
 
-    /// Solves an impact and decides the next mode.
+    /// Computes an impact and decides the next mode.
     fn strike_glass(
         &mut self,
         pose: &Pose,
@@ -173,16 +175,18 @@ impl<W: RunWatcher> EventLoop<'_, W> {
         }
     }
 
-    /// The impact with the scene's restitution, or with none once its train of rebounds counts as over. The
-    /// rest of a train, of duration `T (1 + e + e^2 + ...)`, transmits the same impulse as contact in that
-    /// time, so closing it early moves the tip by at most the height of a rebound.
+    /// Computes the impact with the scene's restitution, or with zero restitution if its train of rebounds
+    /// counts as over. The remaining rebounds, of total duration `T (1 + e + e^2 + ...)`, transmit the same
+    /// impulse as contact in that time, so that closing the train early moves the tip by at most the height
+    /// of a rebound.
     fn rebound_or_close(&mut self, strike: TipStrike) -> Option<(FlightState, ImpactOutcome)> {
-        /// Fraction of the shortest period below which a rebound closes its train: ten times the limit of
-        /// chattering, so that the train closes first.
+        /// A rebound shorter than this fraction of the shortest period closes its train. The fraction is ten
+        /// times the limit of chattering, so that the train closes first.
         const RESOLUTION: f64 = 1e-5;
-        /// Fraction below which a rebound counts as short, and the number of consecutive short rebounds
-        /// that closes a train: near restitution 1 it might last for ever. A restitution of 0.99 needs 690
-        /// rebounds from `SHORT` to `RESOLUTION`.
+        /// A rebound shorter than this fraction of the shortest period counts as short, and the second number
+        /// is the maximum number of consecutive short rebounds in a train, which might never end for a
+        /// restitution near 1. With a restitution of 0.99, it takes 690 rebounds from `SHORT` to
+        /// `RESOLUTION`.
         const SHORT: f64 = 1e-2;
         const MOST_SHORT: u32 = 1000;
         let rebound = self.solve_strike(&strike)?;

@@ -1,4 +1,4 @@
-//! scene.toml as written: tables and types; values are checked later.
+//! Tables and types of scene.toml as written; the values are checked later.
 
 use super::contact::{ContactLossRule, JamRule, OutputTable};
 use crate::model::parameters::{PARAMETERS, ParameterRange};
@@ -11,7 +11,7 @@ use toml::Spanned;
 
 pub(super) type SceneNumbers = BTreeMap<String, Spanned<f64>>;
 
-/// A blade, its friction, the motion of its head, and what is computed.
+/// A blade, its friction, the motion of its head, and the run to compute.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(title = "scene.toml")]
@@ -23,33 +23,34 @@ pub(crate) struct SceneFile {
     /// Masses, lengths, stiffnesses and dampings, all for one length of blade.
     #[schemars(schema_with = "blade")]
     pub(super) blade: SceneNumbers,
-    /// What stiffens the neck beyond an angle; left out for a blade without a shoulder.
+    /// Shoulder that stiffens the neck beyond an angle; left out for a blade without a shoulder.
     #[schemars(schema_with = "shoulder")]
     #[serde(default)]
     pub(super) shoulder: Option<SceneNumbers>,
     /// Coefficient of friction `A exp(-B |v|) + C` between lip and glass.
     #[schemars(schema_with = "friction")]
     pub(super) friction: SceneNumbers,
-    /// How the head moves: a cosine, or as in a recording.
+    /// Motion of the head: a cosine, or that of the head in a recording.
     pub(super) drive: DriveFile,
-    /// What a loss of contact does.
+    /// What happens when contact is lost or the tip jams.
     #[serde(default)]
     pub(super) contact: ContactFile,
-    /// Where the run starts.
+    /// Start of the run: its time and the state of the blade.
     #[serde(default)]
     pub(super) start: StartFile,
-    /// How long it runs, and what is written.
+    /// How long the simulation runs, and which tables it writes.
     pub(super) run: RunFile,
 }
 
-/// How the head moves: `amplitude_m` and `frequency_hz`, or `recording`.
+/// Motion of the head: `amplitude_m` and `frequency_hz`, or `recording`.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct DriveFile {
-    /// Half the stroke of the head, m: it moves as `amplitude_m (1 - cos(2 pi frequency_hz (t - delay_s)))`.
+    /// Half the stroke of the head, m; the head moves as
+    /// `amplitude_m (1 - cos(2 pi frequency_hz (t - delay_s)))`.
     #[schemars(with = "Option<f64>")]
     pub(super) amplitude_m: Option<Spanned<f64>>,
-    /// Strokes there and back a second, Hz.
+    /// Frequency of the head's motion, Hz; a cycle is one stroke there and back.
     #[schemars(with = "Option<f64>")]
     pub(super) frequency_hz: Option<Spanned<f64>>,
     /// Time at which the head starts from one end of its stroke, s; 0 if left out.
@@ -60,7 +61,7 @@ pub(crate) struct DriveFile {
     pub(super) recording: Option<Spanned<String>>,
 }
 
-/// What a loss of contact does.
+/// What happens when contact is lost or the tip jams.
 #[derive(Deserialize, Default, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ContactFile {
@@ -70,7 +71,7 @@ pub(crate) struct ContactFile {
     /// What happens when the Painleve condition fails; "stop" if left out.
     #[serde(default)]
     pub(super) jam: JamRule,
-    /// Normal restitution of a landing, 0 to 1; 0 if left out.
+    /// Coefficient of restitution of a landing in the normal direction, 0 to 1; 0 if left out.
     #[schemars(with = "Option<f64>")]
     pub(super) restitution: Option<Spanned<f64>>,
 }
@@ -84,11 +85,11 @@ pub(crate) enum StartWord {
     Upright,
     /// In the equilibrium of steady slip at the head's speed.
     SteadySlide,
-    /// In the four angles and rates that are given.
+    /// In a state given by four angles and rates.
     State,
 }
 
-/// Where the run starts.
+/// Start of the run: its time and the state of the blade.
 #[derive(Deserialize, Default, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct StartFile {
@@ -98,27 +99,27 @@ pub(crate) struct StartFile {
     /// State at the start; "upright" if left out.
     #[serde(default)]
     pub(super) kind: StartWord,
-    /// Angle of the neck from the vertical, rad, with kind = "state".
+    /// Angle of the neck from the vertical, rad; only with kind = "state".
     pub(super) neck_angle_rad: Option<f64>,
-    /// Angle of the lip from the vertical, rad, with kind = "state".
+    /// Angle of the lip from the vertical, rad; only with kind = "state".
     pub(super) lip_angle_rad: Option<f64>,
-    /// Rate of the neck's angle, rad/s, with kind = "state".
+    /// Rate of the neck's angle, rad/s; only with kind = "state".
     pub(super) neck_rate_rad_per_s: Option<f64>,
-    /// Rate of the lip's angle, rad/s, with kind = "state".
+    /// Rate of the lip's angle, rad/s; only with kind = "state".
     pub(super) lip_rate_rad_per_s: Option<f64>,
 }
 
-/// How long the run is, and what is written.
+/// How long the simulation runs, and which tables it writes.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RunFile {
     /// End of the run, s.
     pub(super) stop_s: f64,
-    /// Rows of the tables a second, Hz.
+    /// Number of rows per second in the tables, Hz.
     pub(super) sample_rate_hz: f64,
-    /// Error of a step, relative; 1e-8 if left out.
+    /// Relative error allowed in a step; 1e-8 if left out.
     pub(super) relative_tolerance: Option<f64>,
-    /// Right-hand sides after which a run ends, so that none runs for ever.
+    /// Number of evaluations of the right-hand side after which a run is ended, so that every run ends.
     pub(super) most_evaluations: Option<u64>,
     /// Tables that `simulate` writes; all if left out.
     pub(super) outputs: Option<Vec<OutputTable>>,
@@ -136,7 +137,8 @@ fn friction(_: &mut SchemaGenerator) -> Schema {
     number_table_schema("friction")
 }
 
-/// Schema of a table of numbers, from the table of parameters. A quantity with two keys requires neither.
+/// Schema of a table of numbers, from the table of parameters. If a quantity has two keys, neither is
+/// required.
 fn number_table_schema(table: &str) -> Schema {
     let rows = || PARAMETERS.iter().filter_map(|row| Some((row.name.split_once('.')?, row)));
     let rows = || rows().filter(|((of, _), _)| *of == table);

@@ -1,4 +1,4 @@
-//! What ends a run, and which tables it writes.
+//! Rules for events that may end a run, and the tables that a run writes.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -7,10 +7,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ContactLossRule {
-    /// The run ends and says so.
+    /// The run ends and reports the loss of contact.
     #[default]
     Stop,
-    /// The tip flies and lands.
+    /// The tip flies and lands again.
     Fly,
 }
 
@@ -18,14 +18,14 @@ pub enum ContactLossRule {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum JamRule {
-    /// The run ends and says so.
+    /// The run ends and reports the jam.
     #[default]
     Stop,
-    /// An impact without collision.
+    /// The jam is resolved as an impact without collision.
     Impact,
 }
 
-/// What `simulate` writes.
+/// A table that `simulate` writes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum OutputTable {

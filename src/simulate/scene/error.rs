@@ -1,23 +1,23 @@
-//! Why a scene is refused.
+//! Reasons for which a scene is refused.
 
 use crate::toml_file::TomlError;
 
 /// Why a scene was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SceneError {
-    /// The file is not TOML of this format.
+    /// The file is not TOML, or not in this format.
     #[error(transparent)]
     Toml(#[from] TomlError),
-    /// A key is unknown, missing, doubled or out of range.
+    /// A key is unknown, missing, doubled or has a value out of range.
     #[error("{place}: key `{key}`: found {found}, expected {expected}; {advice}")]
     Key {
-        /// File, with the line where there is one.
+        /// File, and the line if there is one.
         place: String,
         /// Table and key.
         key: String,
-        /// What the file says.
+        /// What was found in the file.
         found: String,
-        /// What the key takes.
+        /// What was expected.
         expected: String,
         /// What to do.
         advice: String,
@@ -27,7 +27,7 @@ pub enum SceneError {
     Recording {
         /// File and line.
         place: String,
-        /// The recording's own refusal.
+        /// The message with which the recording was refused.
         problem: String,
     },
 }

@@ -33,14 +33,14 @@ pub(super) fn build_linkage(file: &str, values: &SceneValues, shoulder: bool) ->
     Ok(linkage)
 }
 
-/// Constants of the linkage; notation of [`crate::model`].
+/// Constants of the linkage, in the notation of [`crate::model`].
 pub(super) fn linkage_constants(values: &SceneValues, has_shoulder: bool) -> Linkage {
     let of = |quantity: Quantity| {
         let mut ways = PARAMETERS.iter().filter(|p| p.quantity == quantity);
         ways.find_map(|p| values.get(p.name).map(|&v| (p.name, v)))
     };
     let plain = |quantity: Quantity| of(quantity).map_or(0.0, |(_, v)| v);
-    // a value whose key has this ending is converted
+    // a value whose key has this ending is converted with `convert`
     let converted = |quantity: Quantity, ending: &str, convert: &dyn Fn(f64) -> f64| match of(quantity) {
         Some((name, value)) if name.ends_with(ending) => convert(value),
         other => other.map_or(0.0, |(_, v)| v),

@@ -26,7 +26,8 @@ impl SceneReader<'_> {
         numbers.try_for_each(|(key, value)| self.read_number(&format!("{table}.{key}"), Some(value)))
     }
 
-    /// Place and path of the recording that drives the head; `None` after reading the numbers of a cosine.
+    /// Place and path of the recording that drives the head. `None` for a cosine drive, whose numbers are
+    /// then read.
     pub(crate) fn read_drive(&mut self, written: &DriveFile) -> Result<Option<(String, String)>, SceneError> {
         let numbers = [("amplitude_m", &written.amplitude_m), ("frequency_hz", &written.frequency_hz)];
         let Some(recording) = &written.recording else {
@@ -90,8 +91,8 @@ pub(super) fn check_range(place: &str, parameter: &ModelParameter, value: f64) -
     Err(key_error(place, parameter.name, value, &expected, "correct the value"))
 }
 
-/// Refuses a scene that lacks a quantity without a default. Quantities of an absent shoulder or of a recorded
-/// drive are not needed.
+/// Refuses a scene that lacks a quantity without a default. The quantities of an absent shoulder or of a
+/// recorded drive are not required.
 pub(super) fn check_complete(
     file: &str,
     values: &BTreeMap<&'static str, f64>,

@@ -14,26 +14,28 @@ use serde::Serialize;
 pub struct RunSettings {
     /// End of the run, s.
     pub stop_s: f64,
-    /// Rows of the tables per second, Hz.
+    /// Number of rows per second in the tables, Hz.
     pub sample_rate_hz: f64,
     /// Relative tolerance of a step.
     pub relative_tolerance: f64,
-    /// Right-hand sides after which the run ends; `None` for [`MOST_EVALUATIONS`].
+    /// Number of evaluations of the right-hand side after which the run ends; `None` for
+    /// [`MOST_EVALUATIONS`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub most_evaluations: Option<u64>,
-    /// Tables to write.
+    /// Tables that are written.
     #[serde(skip)]
     pub outputs: Vec<OutputTable>,
 }
 
-/// Most samples of a run: no longer trace can be read ([`crate::recording::clock::MAX_FRAMES`]), and a
-/// mistyped rate or stop time must not fill the disk.
+/// Maximum number of samples of a run: a longer trace cannot be read
+/// ([`crate::recording::clock::MAX_FRAMES`]), and a mistyped rate or stop time must not fill the disk.
 const MOST_SAMPLES: f64 = crate::recording::clock::MAX_FRAMES;
-/// Default limit of right-hand sides: minutes of computing, more than any ordinary scene needs.
+/// Default limit on evaluations of the right-hand side: minutes of computing, more than any ordinary scene
+/// needs.
 pub const MOST_EVALUATIONS: u64 = 10_000_000_000;
-/// Largest limit of right-hand sides that a scene may set: a week of computing.
+/// Largest limit on evaluations that a scene may set: a week of computing.
 const LARGEST_EVALUATIONS: u64 = 10_000_000_000_000;
-/// Tolerances that double precision can meet.
+/// Range of tolerances that double precision can meet.
 const TOLERANCE_RANGE: (f64, f64) = (1e-13, 1e-2);
 const DEFAULT_TOLERANCE: f64 = 1e-8;
 
@@ -66,8 +68,8 @@ pub(super) fn check_run(file: &str, written: &RunFile, start_s: f64) -> Result<R
     Ok(RunSettings { stop_s, sample_rate_hz, relative_tolerance, most_evaluations, outputs })
 }
 
-/// Refuses a run whose work limit would end it long before the stop time. A radian of the fastest oscillation
-/// costs at least one right-hand side.
+/// Refuses a run that its work limit would end long before the stop time. Each radian of the fastest
+/// oscillation costs at least one evaluation of the right-hand side.
 pub(super) fn check_work_limit(
     file: &str,
     run: &RunSettings,
@@ -91,14 +93,14 @@ pub(super) fn check_work_limit(
 /// Refuses a relative tolerance that double precision cannot meet.
 ///
 /// # Errors
-/// Text with the admissible range.
+/// Message with the admissible range.
 pub fn check_tolerance(relative: f64) -> Result<(), String> {
     let (least, most) = TOLERANCE_RANGE;
     let holds = (least..=most).contains(&relative);
     holds.then_some(()).ok_or_else(|| format!("a number from {least:e} to {most:e}"))
 }
 
-/// State of the blade at the start.
+/// State of the blade at the start of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub enum StartKind {
     /// Upright and at rest.
@@ -107,7 +109,7 @@ pub enum StartKind {
     SteadySlide,
     /// In a given state.
     State(Pose),
-    /// In a given state off the glass; scene files cannot ask for it, tests with exact solutions do.
+    /// In a given state off the glass, for tests with exact solutions; scene files cannot ask for it.
     Airborne(FlightState),
 }
 
@@ -140,7 +142,7 @@ pub(super) fn check_start(file: &str, written: &StartFile) -> Result<(f64, Start
     Ok((written.time_s, kind))
 }
 
-/// Refuses a start in steady slip if the head rests or the blade has no such equilibrium.
+/// Refuses a start in steady slip if the head is at rest or if the blade has no such equilibrium.
 pub(super) fn check_steady_start(
     file: &str,
     start_s: f64,

@@ -1,4 +1,4 @@
-//! Propagates derivatives along a run, from piece to piece and through its transitions.
+//! Propagates derivatives along a run, from piece to piece and through transitions.
 
 use super::TangentObserver;
 use super::saltation::{FallingGuard, StrikeTangent};
@@ -25,16 +25,16 @@ use std::ops::ControlFlow;
 struct TriggeredGuard {
     /// Rate of the guard; `None` if derivatives are infinite or unknown.
     rate: Option<f64>,
-    /// Rates of the state there: `theta'`, `phi'`, `theta''`, `phi''`, `gap'`, `gap''`.
+    /// Rates of the state at the zero of the guard: `theta'`, `phi'`, `theta''`, `phi''`, `gap'`, `gap''`.
     rates: [f64; 6],
 }
 
-/// Position of the derivatives in the run.
+/// Status of the derivatives in the run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum TangentStatus {
-    /// At the end of the last piece.
+    /// Valid at the end of the last piece.
     Current,
-    /// At a transition time, before the next piece.
+    /// Moved to a transition time, before the next piece.
     AtTransition,
     /// Unknown from here on.
     Lost,
@@ -54,11 +54,11 @@ pub(super) struct TangentPropagator<'a, O> {
     stand: TangentStatus,
     fallen: Option<TriggeredGuard>,
     last: Option<(TipMode, ShoulderContact)>,
-    /// The last stretch of the derivatives.
+    /// The last stretch over which derivatives were propagated.
     place: Option<StretchPlace>,
     /// End of the last piece, s.
     end_s: f64,
-    /// Fraction of its terms below which the rate of a guard counts as grazing.
+    /// A guard grazes zero if its rate is below this fraction of the absolute terms of the rate.
     grazing: f64,
     d_time_s: Vec<f64>,
 }
@@ -71,8 +71,9 @@ impl<'a, O> TangentPropagator<'a, O> {
         room: &'a mut TangentWorkspace,
         [tolerance, accuracy]: [f64; 2],
     ) -> Self {
-        /// The rate of a guard has the error of the solution. Above this fraction of its terms, and this
-        /// multiple of the tolerance, derivatives of the transition time err by about a thousandth.
+        /// The rate of a guard has the error of the solution. If the rate exceeds this fraction of its terms,
+        /// and this multiple of the tolerance times its terms, derivatives of the transition time have errors
+        /// of about a thousandth.
         const GRAZING: f64 = 1e-6;
         const TOLERANCES: f64 = 1e3;
         let TangentWorkspace { blocks, works } = room;
@@ -98,7 +99,7 @@ impl<'a, O> TangentPropagator<'a, O> {
         let slides = scene.start == StartKind::SteadySlide;
         let pose = initial_pose(scene).filter(|_| slides);
         for (block, seed) in self.blocks.iter_with_seeds() {
-            // reset: a value of an earlier run may be NaN, and zero times NaN is NaN
+            // reset: a value of an earlier run may be NaN, and the product of zero and NaN is NaN
             *block = TangentBlock { state: seed.start, ..TangentBlock::default() };
             let Some(pose) = pose else { continue };
             let lean = shoulder_contact(&scene.linkage, pose.theta);
@@ -169,7 +170,7 @@ impl<O: TangentObserver> RunWatcher for TangentPropagator<'_, O> {
         if is_fresh {
             self.apply_transition();
         }
-        // a guard only grazed zero if the mode goes on
+        // a guard only grazed zero if the mode continues
         self.fallen = None;
         self.last = Some((piece.mode, lean));
         if self.stand != TangentStatus::Lost {
@@ -230,7 +231,7 @@ impl<O: TangentObserver> RunWatcher for TangentPropagator<'_, O> {
     fn watch_strike(&mut self, strike: &TipStrike) {
         let is_fall = self.fallen.is_some();
         self.apply_transition();
-        // a tip jams at a pole of its force or at the start of a run, both without a guard
+        // a tip jams at a pole of its force or at the start of a run; neither has a guard
         if !is_fall || strike.origin == ImpactOrigin::Jam || self.stand == TangentStatus::Lost {
             self.stand = TangentStatus::Lost;
             return;
@@ -268,7 +269,7 @@ impl<O: TangentObserver> RunWatcher for TangentPropagator<'_, O> {
 
 #[cfg(test)]
 impl TangentWorkspace {
-    /// A workspace as after a run with lost derivatives.
+    /// A workspace filled with NaN, as after a run with lost derivatives.
     pub(super) fn of_no_numbers(blocks: usize) -> Self {
         let blocks = std::iter::repeat_with(TangentBlock::of_no_numbers).take(blocks).collect();
         Self { blocks, works: StretchWorkspace::of_no_numbers() }

@@ -1,4 +1,4 @@
-//! Derivatives of guards, and of impacts by the state before them.
+//! Derivatives of guards, and of impacts with respect to the state before them.
 
 use super::seeds::{BlockSeed, DIFFERENCE_STEP, central_difference};
 use super::stretch::{SeriesReference, TangentStretch};
@@ -20,7 +20,7 @@ use hybrid_ode::WorkCounters;
 pub(super) struct FallingGuard<'a> {
     pub mode: TipMode,
     pub guard: usize,
-    /// Time of its zero, s after the start of the motion's series.
+    /// Time of the guard's zero, s after the start of the motion's series.
     pub x: f64,
     pub span: &'a TangentStretch<'a>,
 }
@@ -29,15 +29,15 @@ pub(super) struct FallingGuard<'a> {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct GuardSlope {
     pub rate: f64,
-    /// Sum of the absolute terms of the rate; a far smaller rate means that the guard grazes zero.
+    /// Sum of the absolute terms of the rate; if the rate is far smaller, the guard grazes zero.
     pub size: f64,
 }
 
-/// A term of a guard: quantity and factor.
+/// A term of a guard: a channel and its factor.
 type GuardTerm = (Channel, f64);
 
 impl FallingGuard<'_> {
-    /// Terms of the guard; none for a guard without derivative.
+    /// Terms of the guard; none for a guard without a derivative.
     fn guard_terms(&self) -> [Option<GuardTerm>; 2] {
         let TangentStretch { system, course, .. } = self.span;
         let limit = Some((Channel::NormalForce, system.linkage.friction.static_coefficient()));
@@ -57,7 +57,7 @@ impl FallingGuard<'_> {
         }
     }
 
-    /// Rate of the guard; `None` for a guard without derivative.
+    /// Rate of the guard; `None` for a guard without a derivative.
     pub(crate) fn guard_slope(&self) -> Option<GuardSlope> {
         let (terms, motion) = (self.guard_terms(), self.span.course.motion);
         terms[0]?;
@@ -81,7 +81,7 @@ impl FallingGuard<'_> {
         Some(slope)
     }
 
-    /// Sets the derivatives of the guard by all directions.
+    /// Sets the derivatives of the guard with respect to all directions.
     pub(crate) fn set_guard_derivatives(&self, blocks: &mut TangentBlocks<'_>) {
         let SeriesReference { motion, lean, .. } = self.span.course;
         let weights = ChannelWeights::at_time(self.x, motion.order);
@@ -98,7 +98,8 @@ impl FallingGuard<'_> {
             }
             let Some(own) = &seed.linkage else { continue };
             match terms[0] {
-                // off the shoulder both guards contain plus the contact angle, on it minus
+                // both guards contain the contact angle, with a plus sign off the shoulder and a minus sign
+                // on it
                 Some((Channel::NeckAngle, _)) if lean == ShoulderContact::Off => {
                     block.guard += own.contact_angle_rad
                 }
@@ -112,7 +113,7 @@ impl FallingGuard<'_> {
     }
 }
 
-/// Derivatives of a strike.
+/// Data from which the derivatives of a strike are computed.
 pub(super) struct StrikeTangent<'a> {
     pub system: &'a DrivenBlade,
     pub head: HeadMotion,
@@ -120,8 +121,9 @@ pub(super) struct StrikeTangent<'a> {
 }
 
 impl StrikeTangent<'_> {
-    /// Derivatives of the state after an impact from those before it, at the varied time of the strike.
-    /// `d_velocity` are those of the head's velocity there, m/s. `None` if they do not exist.
+    /// Derivatives of the state after an impact from those before the impact, at the varied time of the
+    /// strike. `d_velocity` contains the derivatives of the head's velocity at this time, m/s. `None` if the
+    /// derivatives do not exist.
     pub(super) fn state_after(
         &self,
         seed: &BlockSeed,
@@ -143,11 +145,11 @@ impl StrikeTangent<'_> {
         d_velocity: f64,
         lane: usize,
     ) -> Option<[f64; 3]> {
-        /// Tolerance of the compared impacts: far below their differences.
+        /// Tolerance of the impacts that are compared: far below their differences.
         const TOLERANCE: f64 = 1e-14;
         let TipStrike { pose, restitution, .. } = self.strike;
         let d = [before.angle[0], before.angle[1], before.rate[0], before.rate[1]].map(|row| row[lane]);
-        // a closed train of rebounds has no restitution
+        // an impact that closes a train of rebounds has no restitution
         let d_restitution = if restitution == 0.0 { 0.0 } else { seed.restitution[lane] };
         let d_normal = before.gap_rate[lane];
         let relative =
@@ -180,7 +182,7 @@ impl StrikeTangent<'_> {
         let Linkage { l1_m: l1, l2_m: l2, friction, .. } = self.system.linkage;
         let speed = before.normal.abs().max(before.tangential.abs());
         let along = l1 * d[2].abs() + l2 * d[3].abs() + d_velocity.abs();
-        // friction varies on the scale of its decay with speed
+        // friction changes appreciably over a speed of `1 / b`
         let scale = if friction.b_s_per_m > 0.0 { speed.min(1.0 / friction.b_s_per_m) } else { speed };
         let normal = if d_normal == 0.0 { 0.0 } else { (d_normal / before.normal).abs() };
         d[0].abs().max(d[1].abs()).max(along / scale).max(normal)

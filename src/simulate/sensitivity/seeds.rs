@@ -1,4 +1,5 @@
-//! Direct changes by each direction: constants of the linkage, motion of the head, initial state.
+//! Direct effects of each direction: on the constants of the linkage, the motion of the head and the initial
+//! state.
 
 use super::source::TangentSource;
 use crate::model::parameters::{ModelParameter, ParameterQuantity};
@@ -22,11 +23,11 @@ pub(super) struct DriveTangent {
 /// Directions that share a block of lanes.
 #[derive(Debug, Clone, Default)]
 pub(super) struct BlockSeed {
-    /// Sources of the directions with their factors.
+    /// Sources of the directions, each with its factor.
     pub changes: Vec<SourceFactor>,
-    /// Derivatives of the linkage's constants, if any changes.
+    /// Derivatives of the linkage's constants, if any constant changes.
     pub linkage: Option<Box<LinkageTangent>>,
-    /// Derivatives of the head's motion, if it changes.
+    /// Derivatives of the head's motion, if the motion changes.
     pub drive: Option<DriveTangent>,
     /// Derivatives of the initial state.
     pub start: StateTangent,
@@ -36,10 +37,10 @@ pub(super) struct BlockSeed {
     pub relative: LaneVector,
 }
 
-/// Share of a source in a direction.
+/// Factor of a source in a direction.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SourceFactor {
-    /// Index in [`TangentSeeds::sources`].
+    /// Index of the source in [`TangentSeeds::sources`].
     pub source: usize,
     pub lane: usize,
     pub factor: f64,
@@ -56,12 +57,12 @@ pub struct TangentSeeds {
 }
 
 impl TangentSeeds {
-    /// Resolves directions for a scene. Four directions cost as much as one.
+    /// Resolves directions for a scene. Up to four directions cost as much as one.
     ///
     /// # Errors
-    /// [`SceneError::Key`] for an unknown parameter or one of an absent part.
+    /// [`SceneError::Key`] for an unknown parameter, or for a parameter of an absent part.
     pub fn new(scene: &Scene, directions: &[TangentDirection]) -> Result<Self, SceneError> {
-        // a block without changes of constants costs less, so directions are sorted by kind
+        // a block in which no constant changes costs less, so directions are sorted by kind
         let mut order: Vec<usize> = (0..directions.len()).collect();
         order.sort_by_key(|&i| direction_group(&directions[i]));
         let mut seeds = Self {
@@ -89,7 +90,7 @@ impl TangentSeeds {
     }
 }
 
-/// Kind of a direction: parameter of the blade, of the drive, or initial state.
+/// Group of a direction: parameters of the blade, parameters of the drive, or initial state.
 fn direction_group(direction: &TangentDirection) -> u8 {
     match direction {
         TangentDirection::Parameter(name) if !name.starts_with("drive.") => 0,
@@ -129,7 +130,7 @@ impl BlockSeed {
         Ok(())
     }
 
-    /// Lists the sources of the directions and adds new ones to `sources`.
+    /// Lists the sources of the directions, and adds new sources to `sources`.
     fn list_changes(&mut self, sources: &mut Vec<TangentSource>) {
         let Self { changes, linkage, drive, .. } = self;
         for lane in 0..LANES {
@@ -151,7 +152,7 @@ impl BlockSeed {
         match parameter.quantity {
             ParameterQuantity::DriveAmplitude => self.drive_mut().scale[lane] = 1.0 / value,
             ParameterQuantity::DriveFrequency => {
-                // the cosine stretches about its own start
+                // a change of frequency stretches the cosine about its own start
                 self.drive_mut().stretch[lane] = 1.0 / value;
                 self.drive_mut().delay[lane] = scene.drive.delay_s() / value;
             }
@@ -169,7 +170,7 @@ impl BlockSeed {
     }
 }
 
-/// Scale of a parameter that is zero, from others of its kind.
+/// Scale of a parameter whose value is zero, from other constants with the same unit.
 fn scale_at_zero(parameter: &ModelParameter, linkage: &Linkage) -> f64 {
     match parameter.unit {
         "m" => linkage.l1_m.min(linkage.l2_m),
@@ -179,11 +180,11 @@ fn scale_at_zero(parameter: &ModelParameter, linkage: &Linkage) -> f64 {
     }
 }
 
-/// Direction of a derivative.
+/// Direction of a derivative, the quantity with respect to which it is taken.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum TangentDirection {
-    /// A parameter of the scene by name. Quantities that the scene derives from it (a stiffness from a
-    /// natural frequency) follow.
+    /// A parameter of the scene, by name. Quantities that the scene derives from this parameter (a stiffness
+    /// from a natural frequency) change with it.
     Parameter(String),
     /// Angle of the neck at the start, rad.
     NeckAngle,
@@ -193,9 +194,9 @@ pub enum TangentDirection {
     NeckRate,
     /// Angular rate of the lip at the start, rad/s.
     LipRate,
-    /// Factor on the head's motion, 1 in the scene.
+    /// Factor on the head's motion; 1 in the scene itself.
     DriveScale,
-    /// Delay of the head's motion, s, 0 in the scene.
+    /// Delay of the head's motion, s; 0 in the scene itself.
     DriveDelay,
 }
 
@@ -210,7 +211,7 @@ const NAMED_DIRECTIONS: [(TangentDirection, &str, &str); 6] = [
 ];
 
 impl TangentDirection {
-    /// Direction with a name of [`Self::other_names`], otherwise the parameter of that name.
+    /// Direction with this name among [`Self::other_names`], otherwise the parameter with this name.
     pub(crate) fn from_name(name: &str) -> Self {
         let other = NAMED_DIRECTIONS.iter().find(|(_, other, _)| *other == name);
         other.map_or_else(|| Self::Parameter(name.to_owned()), |(direction, ..)| direction.clone())
@@ -224,10 +225,10 @@ impl TangentDirection {
 
 // Derivatives of steady slip.
 
-/// Derivatives of both angles of steady slip from `J dq + dR = 0` with the moments `R(q, p)`; `None` at a
+/// Derivatives of both angles in steady slip, from `J dq + dR = 0` with the moments `R(q, p)`; `None` at a
 /// fold of the equilibrium.
 ///
-/// `d_speed` are the derivatives of the head's velocity, m/s.
+/// `d_speed` contains the derivatives of the head's velocity, m/s.
 pub(super) fn steady_slip_tangent(
     system: &DrivenBlade,
     seed: &BlockSeed,
@@ -264,8 +265,8 @@ pub(super) fn steady_slip_tangent(
     Some(moved)
 }
 
-/// Steps and weights of the six-point central difference of order 6 (Fornberg, Math. Comp. 51, 1988, table
-/// 1).
+/// Points and weights of the central difference of order 6, which uses six points (Fornberg, Math. Comp. 51,
+/// 1988, table 1).
 pub(super) const SIX_POINTS: [(f64, f64); 6] = [
     (-3.0, -1.0 / 60.0),
     (-2.0, 9.0 / 60.0),
@@ -275,11 +276,11 @@ pub(super) const SIX_POINTS: [(f64, f64); 6] = [
     (3.0, 1.0 / 60.0),
 ];
 
-/// Step relative to the scale of the function: truncation, its sixth power, is below rounding, and rounding
-/// over the step is 1e-13.
+/// Step relative to the scale of the function. The truncation error, the sixth power of the step, is below
+/// rounding, and the rounding error divided by the step is 1e-13.
 pub(super) const DIFFERENCE_STEP: f64 = 1e-3;
 
-/// Derivative of `f` at 0; `None` if `f` has no value at a step.
+/// Derivative of `f` at 0; `None` if `f` has no value at one of the points.
 pub(super) fn central_difference<const N: usize>(
     step: f64,
     mut f: impl FnMut(f64) -> Option<[f64; N]>,
@@ -297,8 +298,8 @@ mod tests {
     use super::*;
     use crate::model::tangent::LinkageConstant;
 
-    /// Rounding of a difference quotient must not count as a change of a constant, because each change costs
-    /// time.
+    /// A rounding error of a difference quotient must not count as a change of a constant, because each
+    /// change costs time.
     #[test]
     fn a_parameter_changes_only_the_constants_that_it_enters() {
         let text = include_str!("../../../data/scenes/actual-blade.toml");

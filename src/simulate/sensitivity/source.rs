@@ -1,4 +1,4 @@
-//! Sources of the directions: constants of the linkage and motions of the head.
+//! Sources of the directions: changes of the linkage's constants and of the head's motion.
 
 use super::stretch::SeriesReference;
 use crate::model::tangent::{
@@ -6,7 +6,7 @@ use crate::model::tangent::{
 };
 use crate::simulate::drive::Drive;
 
-/// An elementary change; directions are sums of these.
+/// An elementary change; a direction is a sum of such changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum TangentSource {
     Constant(LinkageConstant),
@@ -16,7 +16,7 @@ pub(super) enum TangentSource {
     HeadStretch,
 }
 
-/// Most sources: the constants of the linkage and the changes of the head's motion.
+/// Maximum number of sources: the constants of the linkage and the changes of the head's motion.
 pub(super) const MOST_SOURCES: usize = 24;
 
 /// Taylor polynomial of the head's motion about the start of a piece.
@@ -24,12 +24,13 @@ pub(super) const MOST_SOURCES: usize = 24;
 pub(super) struct HeadPolynomial<'a> {
     start_s: f64,
     position_m: f64,
-    /// Coefficients of the velocity, m/s^(k+1), up to the last nonzero one: a recorded head has few.
+    /// Coefficients of the velocity, m/s^(k+1), up to the last nonzero one; a recorded head has few
+    /// coefficients.
     velocity: &'a [f64],
 }
 
 impl<'a> HeadPolynomial<'a> {
-    /// The polynomial for these sources; `None` if they do not move the head.
+    /// The polynomial for these sources; `None` if none of the sources moves the head.
     pub(crate) fn from_drive(
         sources: &[TangentSource],
         drive: &Drive,
@@ -52,7 +53,7 @@ impl<'a> HeadPolynomial<'a> {
         LaneVector::splat(self.position_m) + sum * x
     }
 
-    /// Velocity, acceleration and jerk.
+    /// Velocity, acceleration and jerk of the head.
     fn motion_rates(&self, x: LaneVector) -> [LaneVector; 3] {
         let mut sums = [LaneVector::ZERO; 3];
         for (k, &v) in self.velocity.iter().enumerate().rev() {
@@ -81,7 +82,8 @@ impl<'a> HeadPolynomial<'a> {
         }
     }
 
-    /// Change of the head's position, velocity and acceleration by a source; `None` for a constant.
+    /// Changes of the head's position, velocity and acceleration by a source; `None` for a constant of the
+    /// linkage.
     fn motion_change(&self, source: TangentSource, x: LaneVector) -> Option<HeadMotionChange> {
         if let TangentSource::Constant(_) = source {
             return None;
@@ -104,7 +106,7 @@ impl TangentSource {
         }
     }
 
-    /// Whether the source moves head or tip at fixed angles.
+    /// Whether the source displaces head or tip at fixed angles.
     pub(crate) fn displaces_points(self, course: &SeriesReference<'_>) -> bool {
         match self {
             Self::Constant(constant) => course.displaces_points(constant),
@@ -112,7 +114,7 @@ impl TangentSource {
         }
     }
 
-    /// Forcing of the tangent equations by a unit of the source.
+    /// Forcing terms of a unit change by the source in the equations of the variation.
     #[inline(always)]
     pub(crate) fn forcing_terms(
         self,
@@ -128,7 +130,7 @@ impl TangentSource {
         }
     }
 
-    /// Displacement of head and tip by a unit of the source.
+    /// Displacements of head and tip by a unit change by the source.
     pub(crate) fn displacement_terms(
         self,
         course: &SeriesReference<'_>,

@@ -1,4 +1,4 @@
-//! Stretches of a piece over which derivatives are collocated, and their length.
+//! Stretches, parts of a piece over which derivatives are collocated, and the choice of their length.
 
 use super::source::{HeadPolynomial, TangentSource};
 use crate::model::series::ContactMode;
@@ -29,15 +29,15 @@ impl LaneNumber for LaneVector {
     }
 }
 
-/// Position and collocation rule of a stretch.
+/// Position of a stretch in the run, and its collocation rule.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct StretchPlace {
     /// Mode of contact and side of the shoulder.
     pub touch: ContactMode,
     pub lean: ShoulderContact,
-    /// Start of the piece's series, s.
+    /// Start of the series of the piece, s.
     pub start_s: f64,
-    /// Start of the stretch relative to it, s, and its length, s.
+    /// Start of the stretch relative to the start of the series, s, and length of the stretch, s.
     pub from: f64,
     pub length: f64,
     pub rule: &'static CollocationRule,
@@ -46,7 +46,7 @@ pub(super) struct StretchPlace {
 }
 
 impl StretchPlace {
-    /// A whole piece, without derivatives.
+    /// A stretch over a whole piece, for a piece without derivatives.
     pub(crate) fn whole_piece(touch: ContactMode, lean: ShoulderContact, start_s: f64, length: f64) -> Self {
         Self { touch, lean, start_s, from: 0.0, length, rule: collocation_rule(LEAST_NODES), rapid: 0.0 }
     }
@@ -81,7 +81,7 @@ impl<'a> TangentStretch<'a> {
         }
     }
 
-    /// Times of the nodes in groups of four, s after the start of the motion.
+    /// Times of the nodes in groups of four, s after the start of the series.
     pub(crate) fn node_chunks(&self) -> impl Iterator<Item = LaneVector> {
         let StretchPlace { from, length, rule, .. } = self.place;
         let chunks = rule.positions.as_chunks().0;
@@ -91,20 +91,20 @@ impl<'a> TangentStretch<'a> {
     }
 }
 
-/// Plans length and nodes of stretches.
+/// Plans the length and the number of nodes of stretches.
 #[derive(Debug, Clone)]
 pub(super) struct StretchPlanner {
-    /// Phase or decay of the fastest derivative that each number of nodes resolves, rad.
+    /// Largest phase or decay of the fastest derivative that each number of nodes resolves, rad.
     limits: [f64; MOST_NODES + 1],
-    /// Last rates in stick, slip and flight off the shoulder, then on it, 1/s.
+    /// Latest rates in stick, slip and flight, 1/s; first for a neck off the shoulder, then for one on it.
     rapid: [f64; 6],
 }
 
 impl StretchPlanner {
-    /// A planner for this relative tolerance; `fastest` is a first guess of the fastest rate, 1/s.
+    /// A planner for this relative tolerance; `fastest` is a first guess of the largest rate, 1/s.
     ///
-    /// For a sine over `z` radians, `s` nodes err by `z^(s + 2) s! / (4 s^2 (2 s)!)`: the first Legendre
-    /// polynomial missing in its second derivative, integrated twice.
+    /// For a sine over `z` radians, `s` nodes have the error `z^(s + 2) s! / (4 s^2 (2 s)!)`: the first
+    /// Legendre polynomial that the approximation of the second derivative lacks, integrated twice.
     pub(crate) fn new(relative: f64, fastest: f64) -> Self {
         let mut limits = [0.0; MOST_NODES + 1];
         let mut ratio = 1.0; // (2 s)! / s!
@@ -115,11 +115,11 @@ impl StretchPlanner {
         Self { limits, rapid: [fastest; 6] }
     }
 
-    /// Rule and length of the next stretch, s, at most `rest`.
+    /// Collocation rule and length, s, of the next stretch, which is at most `rest` long.
     pub(crate) fn plan(&self, course: &SeriesReference<'_>, rest: f64) -> (&'static CollocationRule, f64) {
-        /// Most stretches of a step, also for rates that are not finite.
+        /// Maximum number of stretches of a step, even if the rate is not finite.
         const MOST_PARTS: f64 = 1e3;
-        /// Factor on the last rate, which may have risen.
+        /// Factor on the latest rate, which may have risen since.
         const MARGIN: f64 = 1.1;
         let rapid = MARGIN * self.rapid[rate_index(course)];
         let parts = (rapid * rest / self.limits[MOST_NODES]).ceil().clamp(1.0, MOST_PARTS);
@@ -129,7 +129,7 @@ impl StretchPlanner {
         (collocation_rule(nodes), length)
     }
 
-    /// Records the rate of a stretch; returns whether its nodes resolve it.
+    /// Records the rate of a stretch; returns whether the nodes of the stretch resolve this rate.
     pub(crate) fn record_rate(
         &mut self,
         course: &SeriesReference<'_>,
@@ -155,8 +155,8 @@ fn rate_index(course: &SeriesReference<'_>) -> usize {
     touch + if course.lean == ShoulderContact::Off { 0 } else { 3 }
 }
 
-/// Bound of the rates of `m y'' + d y' + k y = 0`, 1/s: the root of `x^2 = x |m^-1 d| + |m^-1 k|`, with the
-/// largest eigenvalues in size as norms.
+/// Upper limit of the rates of `m y'' + d y' + k y = 0`, 1/s: the root of `x^2 = x |m^-1 d| + |m^-1 k|`,
+/// where the norm of a matrix is its largest eigenvalue in size.
 pub(super) fn bound_rate<const D: usize>(
     mass: &SquareMatrix<D>,
     damping: &SquareMatrix<D>,
@@ -169,7 +169,7 @@ pub(super) fn bound_rate<const D: usize>(
         if D == 1 {
             return columns[0][0].abs();
         }
-        // the gap in flight is slower than the links
+        // the gap in flight is left out, because it is slower than the links
         let half = 0.5 * (columns[0][0] + columns[1][1]);
         let determinant = columns[0][0] * columns[1][1] - columns[1][0] * columns[0][1];
         half.abs() + (half * half - determinant).abs().sqrt()

@@ -1,4 +1,4 @@
-//! Propagation of derivatives in blocks of directions over the stretches of a piece.
+//! Propagation of derivatives over the stretches of a piece, in blocks of directions.
 
 #![allow(clippy::needless_range_loop)] // indices as in the equations
 
@@ -12,19 +12,20 @@ use crate::simulate::mode::TipMode;
 use crate::simulate::phases::{DrivenBlade, TaylorMotion};
 use hybrid_ode::collocation::{CollocationEquations, CollocationStep, MOST_NODES, NodeArray};
 
-/// Derivatives by the directions of a block.
+/// Derivatives with respect to the directions of a block.
 #[derive(Debug, Default)]
 pub(super) struct TangentBlock {
-    /// Unknowns (sines of both angles, gap) at the start of the last stretch, and their rates.
+    /// Derivatives of the sines of both angles and of the gap (the unknowns) at the start of the last
+    /// stretch, and their rates.
     pub value: [LaneVector; 3],
     pub rate: [LaneVector; 3],
-    /// Position of the tip in stick, m.
+    /// Derivative of the tip's position in stick, m.
     pub place: LaneVector,
-    /// Second time derivatives of the unknowns at the nodes.
+    /// Second time derivatives of the unknowns at the nodes of the stretch.
     pub second: NodeArray<[LaneVector; 3]>,
-    /// State at the end of the last stretch, or at the transition time there.
+    /// Derivatives of the state at the end of the last stretch, or at the transition time there.
     pub state: StateTangent,
-    /// The guard that has fallen, and the transition time.
+    /// Derivatives of the guard that has fallen, and of the transition time.
     pub guard: LaneVector,
     pub time: LaneVector,
 }
@@ -43,11 +44,11 @@ pub(super) struct StretchWorkspace {
     slip: Box<StretchEquations<2>>,
     flight: Box<StretchEquations<3>>,
     instants: Vec<MotionSamples>,
-    /// Forcing by each source at the nodes.
+    /// Forcing terms of each source at the nodes.
     loads: Vec<NodeArray<[f64; 3]>>,
-    /// In stick: factors of the follower `y2`, in groups of four nodes.
+    /// Coefficients of the follower `y2` in stick, in groups of four nodes.
     held: Vec<[LaneVector; 3]>,
-    /// In stick: forcing by the position of the tip.
+    /// Forcing terms of the tip's position in stick.
     per_place: NodeArray<f64>,
 }
 
@@ -67,13 +68,13 @@ struct StretchEnds {
 }
 
 impl<'a> TangentBlocks<'a> {
-    /// Blocks with their seeds.
+    /// The blocks, each with its seed.
     pub(crate) fn iter_with_seeds(&mut self) -> impl Iterator<Item = (&mut TangentBlock, &BlockSeed)> {
         self.all.iter_mut().zip(&self.seeds.blocks)
     }
 
     /// Propagates the derivatives over the next stretch from `from` towards `to`, s after `start_s`. With
-    /// `is_fresh`, the derivative of the tip's velocity may be nonzero at the start of stick.
+    /// `is_fresh`, stick begins here, and the derivative of the tip's velocity may still be nonzero.
     pub(crate) fn propagate_stretch<'c>(
         &mut self,
         course: &SeriesReference<'c>,
@@ -102,7 +103,7 @@ impl<'a> TangentBlocks<'a> {
         StretchWorkspace: SelectEquations<D>,
         'a: 'c,
     {
-        /// Most plans of a stretch before its rates are accepted.
+        /// Maximum number of plans for a stretch before its rate is accepted.
         const MOST_LOOKS: usize = 4;
         let mut looks = 0;
         let span = loop {
@@ -188,7 +189,7 @@ impl StretchWorkspace {
         rates.into_iter().fold(0.0, f64::max)
     }
 
-    /// Computes the forcing by each source at the nodes.
+    /// Computes the forcing terms of each source at the nodes.
     fn compute_loads<const D: usize>(&mut self, span: &TangentStretch<'_>) {
         let (course, nodes) = (&span.course, span.place.rule.nodes);
         let (l1, l2) = (span.system.linkage.l1_m, span.system.linkage.l2_m);
@@ -213,7 +214,7 @@ impl StretchWorkspace {
         }
     }
 
-    /// Solves for the second derivatives of a block at the nodes.
+    /// Solves for the second derivatives of the unknowns of a block at the nodes.
     #[inline(always)]
     fn solve<const D: usize>(&mut self, span: &TangentStretch<'_>, block: &mut TangentBlock, seed: &BlockSeed)
     where
@@ -275,7 +276,8 @@ impl StretchEnds {
         Self { attitude, tip }
     }
 
-    /// Derivatives of the tip's position and velocity at fixed angles, at the start (0) or the end (1).
+    /// Derivatives of the tip's position and velocity at fixed angles, at the start (`end` 0) or the end
+    /// (`end` 1) of the stretch.
     fn tip_change(&self, seed: &BlockSeed, end: usize) -> [LaneVector; 2] {
         let mut rows = [LaneVector::ZERO; 2];
         if !self.tip.is_empty() {
@@ -289,7 +291,7 @@ impl StretchEnds {
     }
 }
 
-/// Change of the sines' rates by an impulse on the tip, per change of the tip's velocity.
+/// Changes of the rates of both sines by an impulse on the tip, per change of the tip's velocity.
 struct StickImpulse([f64; 2]);
 
 impl StickImpulse {
@@ -304,7 +306,7 @@ impl StickImpulse {
     }
 }
 
-/// Rates of angles, angular rates, gap and gap rate, at `x` s after the start of a motion; on the glass the
+/// Rates of angles, angular rates, gap and gap rate at `x` s after the start of a motion; on the glass, the
 /// gap is constant.
 pub(super) fn rates_after(motion: &TaylorMotion, mode: TipMode, x: f64) -> [f64; 6] {
     let mut rates = [0.0; 6];
@@ -327,7 +329,7 @@ pub(super) fn rates_after(motion: &TaylorMotion, mode: TipMode, x: f64) -> [f64;
 }
 
 impl StateTangent {
-    /// Adds the change of the state within the varied time.
+    /// Adds the change of the state in the change `time` of the instant.
     pub(super) fn shift_in_time(&mut self, rates: &[f64; 6], time: LaneVector) {
         let ([theta, phi], [theta_rate, phi_rate]) = (&mut self.angle, &mut self.rate);
         let rows = [theta, phi, theta_rate, phi_rate, &mut self.gap_m, &mut self.gap_rate];
@@ -341,7 +343,7 @@ impl StateTangent {
 }
 
 impl TangentBlock {
-    /// Sets the unknowns at the start of a stretch from the state.
+    /// Sets the unknowns at the start of a stretch from the derivatives of the state.
     fn start_stretch(
         &mut self,
         span: &TangentStretch<'_>,
@@ -367,7 +369,7 @@ impl TangentBlock {
         }
     }
 
-    /// Sets the state at the end of a stretch from the unknowns.
+    /// Sets the derivatives of the state at the end of a stretch from the unknowns.
     #[inline(always)]
     fn finish<const D: usize>(&mut self, span: &TangentStretch<'_>, ends: &StretchEnds, seed: &BlockSeed) {
         const END: usize = 1;

@@ -18,7 +18,7 @@ pub struct TangentSegment<'a> {
     pub end_s: f64,
     /// Mode of contact.
     pub mode: TipMode,
-    /// Whether derivatives are known: not after a guard that grazes zero or a tip that jams.
+    /// Whether the derivatives are known: they are not after a guard has grazed zero or the tip has jammed.
     pub is_known: bool,
     pub(super) piece: &'a SolutionSegment<'a>,
     pub(super) span: TangentStretch<'a>,
@@ -27,20 +27,21 @@ pub struct TangentSegment<'a> {
 }
 
 impl TangentSegment<'_> {
-    /// The model at a time within the piece.
+    /// State of the model at a time within the piece.
     #[must_use]
     pub fn sample_at(&self, t: f64) -> ModelSample {
         self.piece.sample_at(t)
     }
 
-    /// Weights for the value of a channel at a time within the piece.
+    /// Weights that give the value of a channel at a time within the piece.
     #[must_use]
     pub fn weights_at(&self, t: f64) -> ChannelWeights {
         ChannelWeights::at_time(t - self.span.place.start_s, self.span.course.motion.order)
     }
 
-    /// Weights for the integral of a channel between two times within the piece, s. A camera's mean is the
-    /// sum of these over the pieces in its exposure, divided by the exposure.
+    /// Weights that give the integral of a channel between two times within the piece, s. The mean over a
+    /// camera's exposure is the sum of these integrals over the pieces within the exposure, divided by the
+    /// exposure.
     #[must_use]
     pub fn weights_over(&self, from: f64, to: f64) -> ChannelWeights {
         let TangentStretch { place, course, .. } = &self.span;
@@ -48,7 +49,7 @@ impl TangentSegment<'_> {
         ChannelWeights::over_interval(place, interval, course.motion.order)
     }
 
-    /// Value or integral of a channel from the series of the piece.
+    /// Value or integral of a channel, from the series of the piece.
     #[must_use]
     pub fn channel_value(&self, channel: Channel, weights: &ChannelWeights) -> f64 {
         let (motion, start_s) = (self.span.course.motion, self.span.place.start_s);
@@ -76,7 +77,8 @@ impl TangentSegment<'_> {
         sum + weights.powers[0] * first
     }
 
-    /// Fills `out` with derivatives of the value or integral by each direction, in the order of the seeds.
+    /// Fills `out` with the derivatives of the value or integral with respect to each direction, in the order
+    /// of the seeds.
     pub fn channel_derivatives(&self, channel: Channel, weights: &ChannelWeights, out: &mut [f64]) {
         let sum = DerivativeSum::new(&self.span, channel, weights);
         let mut rows = [LaneVector::ZERO; MOST_BLOCKS];
@@ -103,18 +105,18 @@ impl TangentSegment<'_> {
     }
 }
 
-/// Weighted series of the integral with this rate, from zero.
+/// Weighted sum of the series of a quantity that starts at zero and has this rate.
 fn sum_integrated(weights: &ChannelWeights, rate: &[f64]) -> f64 {
     let terms = weights.powers[1..].iter().zip(rate).zip(&RECIPROCALS[1..]);
     terms.rev().fold(0.0, |sum, ((factor, rate), share)| sum + factor * (rate * share))
 }
 
-/// Blocks that are summed at a time.
+/// Maximum number of blocks that are summed at a time.
 const MOST_BLOCKS: usize = 64 / LANES;
 
-// Values and integrals as weighted sums over series and nodes.
+// Values and integrals as weighted sums over the coefficients of series and over nodes.
 
-/// Most parts of an integral; each uses the rule of four nodes.
+/// Maximum number of parts of an integral; each part uses the quadrature rule with four nodes.
 const MOST_PARTS: usize = 3;
 
 pub(super) const RECIPROCALS: [f64; SERIES_TERMS + 1] = {
@@ -127,14 +129,14 @@ pub(super) const RECIPROCALS: [f64; SERIES_TERMS + 1] = {
     shares
 };
 
-/// Four times, s after the start of the motion, with their weights.
+/// Four times, s after the start of the motion, and their weights.
 #[derive(Debug, Clone, Copy, Default)]
 struct QuadraturePart {
     x: LaneVector,
     weights: LaneVector,
 }
 
-/// Weights for a value at a time or for an integral over an interval.
+/// Weights that give a value at a time or an integral over an interval.
 #[derive(Debug, Clone)]
 pub struct ChannelWeights {
     /// Weights of the coefficients of the motion's series.
@@ -162,7 +164,7 @@ impl ChannelWeights {
     }
 
     pub(super) fn over_interval(place: &StretchPlace, [from, to]: [f64; 2], order: usize) -> Self {
-        /// Phase of the fastest derivative over which four nodes err by 1e-11, rad.
+        /// Phase of the fastest derivative over which four nodes have an error of 1e-11, rad.
         const RESOLVED: f64 = 0.6;
         let mut out = Self::empty();
         let mut powers = [from, to];
@@ -181,7 +183,7 @@ impl ChannelWeights {
         out
     }
 
-    /// Weighted sum of the terms of a series.
+    /// Weighted sum of the coefficients of a series.
     #[inline(always)]
     pub(super) fn sum_series(&self, order: usize, coefficient: impl Fn(usize) -> f64) -> f64 {
         let factors = self.powers[..=order].iter().enumerate().rev();
@@ -194,7 +196,7 @@ impl ChannelWeights {
     }
 }
 
-/// Derivative of a value or integral as a weighted sum over the unknowns of a block.
+/// Derivative of a value or integral, as a weighted sum of the unknowns of a block.
 pub(super) struct DerivativeSum {
     value: [f64; 3],
     rate: [f64; 3],
@@ -230,7 +232,7 @@ impl DerivativeSum {
             }
         }
         if sum.has_second {
-            // so far the weights are by polynomial degree
+            // so far each weight belongs to a polynomial degree; convert them to weights of nodes
             for second in &mut sum.second[..sum.unknowns] {
                 *second = span.place.rule.to_nodal(second);
             }
@@ -244,7 +246,7 @@ impl DerivativeSum {
             matches!(source, TangentSource::Constant(_)) && source.displaces_points(course)
         };
         let form = match channel {
-            // these forms need no attitude of the links
+            // these forms do not need the attitude of the links
             Channel::TipX => course.tip_position_form(),
             Channel::HeadX => course.head_position_form(),
             _ => {
@@ -257,7 +259,8 @@ impl DerivativeSum {
         self.add_displaced(span, part, &form, at.as_ref());
     }
 
-    /// Adds a form and its direct change by sources that move head or tip. Constants and rates need `at`.
+    /// Adds a linear form, and its direct change by sources that displace head or tip. Constants and rates
+    /// need `at`.
     fn add_displaced(
         &mut self,
         span: &TangentStretch<'_>,
@@ -331,7 +334,7 @@ impl DerivativeSum {
         }
     }
 
-    /// Derivatives by the directions of a block.
+    /// Derivatives with respect to the directions of a block.
     pub(crate) fn block_derivatives(&self, block: &TangentBlock, seed: &BlockSeed) -> LaneVector {
         let mut row = self.place * block.place;
         if self.has_second {

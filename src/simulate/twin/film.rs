@@ -1,10 +1,11 @@
 //! Films a finely sampled trace with a camera, for a fair comparison of simulated and measured traces.
 //!
-//! Between samples the trace is a quintic through the six nearest samples; its mean over the open shutter
-//! is exact. With [`LEAST_OVERSAMPLING`] samples per frame, a sine of half the frame rate errs by 0.12 % of
-//! its amplitude relative to the exact exposure sinc, one of a quarter of the frame rate by 0.002 %.
-//! Faster, aliased sines need 8 samples per cycle for 0.12 %. At the jumps of acceleration of stick-slip
-//! the error falls with the square of the sampling interval: 2 nm on the bundled blade at 20,000 samples/s.
+//! Between samples, the trace is a quintic through the six nearest samples; its mean over the open shutter is
+//! exact. With [`LEAST_OVERSAMPLING`] samples per frame, a sine of half the frame rate has an error of 0.12 %
+//! of its amplitude relative to the exact exposure sinc, and a sine of a quarter of the frame rate an error
+//! of 0.002 %. Faster, aliased sines need 8 samples per cycle for 0.12 %. At the jumps of acceleration in
+//! stick-slip, the error falls with the square of the sampling interval: 2 nm on the bundled blade at 20,000
+//! samples/s.
 
 use super::Camera;
 use crate::recording::channel::ReversalInstants;
@@ -16,7 +17,7 @@ use portable_math::StandardNormal;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Fewest samples of the fine trace per frame for the errors above.
+/// Minimum number of samples of the fine trace per frame that gives the errors above.
 pub const LEAST_OVERSAMPLING: f64 = 4.0;
 /// Nodes and weights of the three-point Gauss-Legendre rule on [0, 1], exact to degree 5 (Abramowitz and
 /// Stegun, table 25.4).
@@ -26,14 +27,14 @@ const GAUSS: [(f64, f64); 3] =
 /// Why a trace cannot be filmed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FilmError {
-    /// The camera cannot film.
+    /// A setting of the camera is out of range.
     #[error("camera: found {key} = {found}, expected {expected}; correct the value")]
     Camera {
-        /// Which key.
+        /// The key of the setting.
         key: &'static str,
-        /// Its value.
+        /// Value of the setting.
         found: f64,
-        /// What it takes.
+        /// What was expected.
         expected: &'static str,
     },
     /// The trace has too few samples between frames.
@@ -43,11 +44,11 @@ pub enum FilmError {
     TooCoarse {
         /// Name of the trace.
         trace: String,
-        /// Its rate, 1/s.
+        /// Sampling rate of the trace, 1/s.
         fine_hz: f64,
-        /// [`LEAST_OVERSAMPLING`] times the frame rate, 1/s.
+        /// Smallest sampling rate, [`LEAST_OVERSAMPLING`] times the frame rate, 1/s.
         least_hz: f64,
-        /// Rate of the camera, 1/s.
+        /// Frame rate of the camera, 1/s.
         frame_rate_hz: f64,
     },
     /// The trace has fewer samples than the interpolation needs.
@@ -57,7 +58,7 @@ pub enum FilmError {
     TooShort {
         /// Name of the trace.
         trace: String,
-        /// Number of its samples.
+        /// Number of samples of the trace.
         found: usize,
     },
     /// The first frame lies outside the trace.
@@ -67,11 +68,11 @@ pub enum FilmError {
     Outside {
         /// Name of the trace.
         trace: String,
-        /// Instant of the first frame, s.
+        /// Time of the first frame, s.
         found_s: f64,
-        /// First sample, s.
+        /// Time of the first sample, s.
         start_s: f64,
-        /// Last sample, s.
+        /// Time of the last sample, s.
         end_s: f64,
     },
     /// The frames are not a valid recording.
@@ -79,19 +80,20 @@ pub enum FilmError {
     Recording {
         /// Name of the trace.
         trace: String,
-        /// Why.
+        /// Why the frames are not a valid recording.
         error: RecordingError,
     },
 }
 
-/// Films the trace `fine` without noise from `start_s`, s on its clock, to its end.
+/// Films the trace `fine` without noise, from `start_s` (on the clock of the trace, s) to its end.
 ///
-/// The result is synthetic and keeps clock and name of the trace. A frame averages over the exposure around
-/// its instant; beyond the ends of the trace the shutter sees the outermost sample. A frame that needs a
-/// missing sample is missing. Without exposure, frames that fall on samples take them at any frame rate.
+/// The film is marked as synthetic and keeps the clock and the name of the trace. A frame averages over the
+/// exposure around its instant; past the ends of the trace, the shutter sees the outermost sample. A frame
+/// that needs a missing sample is missing. Without exposure, frames that fall on samples need no
+/// interpolation, so that the trace may have fewer samples per frame.
 ///
 /// # Errors
-/// [`FilmError`].
+/// [`FilmError`] if the camera, the trace or the start is unsuitable.
 pub fn film_trace(fine: &Recording, camera: &Camera, start_s: f64) -> Result<Recording, FilmError> {
     check_film_camera(camera)?;
     let grid = plan_frames(fine, camera, start_s)?;
@@ -109,7 +111,7 @@ pub fn film_trace(fine: &Recording, camera: &Camera, start_s: f64) -> Result<Rec
     synthetic_recording(fine, grid, coordinate_columns(fine).map(|(_, column)| seen(column)))
 }
 
-/// A synthetic recording with the name of `fine`; columns are tip x, tip y, head x, head y, m.
+/// A synthetic recording with the name of `fine`; the columns are tip x, tip y, head x and head y, m.
 fn synthetic_recording(
     fine: &Recording,
     grid: FrameGrid,
@@ -132,7 +134,8 @@ fn check_film_camera(camera: &Camera) -> Result<(), FilmError> {
     Err(FilmError::Camera { key, found, expected })
 }
 
-/// The camera's frames from `start_s` to the last sample; at most as many as samples.
+/// Times of the camera's frames from `start_s` to the last sample; there are at most as many frames as
+/// samples.
 fn plan_frames(fine: &Recording, camera: &Camera, start_s: f64) -> Result<FrameGrid, FilmError> {
     let (trace, grid) = (fine.name().to_owned(), fine.grid());
     let (fine_hz, end_s) = (grid.frame_rate_hz, grid.time_s(grid.frames - 1));
@@ -149,7 +152,7 @@ fn plan_frames(fine: &Recording, camera: &Camera, start_s: f64) -> Result<FrameG
     Ok(FrameGrid { start_s, frame_rate_hz, frames })
 }
 
-/// Position of the shutter on the fine trace, in samples.
+/// Times of the shutter on the fine trace, in samples.
 struct FrameShutter {
     first: f64,
     samples_per_frame: f64,
@@ -158,7 +161,7 @@ struct FrameShutter {
 }
 
 impl FrameShutter {
-    /// Refuses a trace too coarse or too short to interpolate, unless every frame falls on a sample.
+    /// Refuses a trace that is too coarse or too short to interpolate, unless every frame falls on a sample.
     fn check_sampling(&self, fine: &Recording, camera: &Camera, grid: &FrameGrid) -> Result<(), FilmError> {
         let trace = || fine.name().to_owned();
         if self.open == 0.0 && (0..grid.frames).all(|frame| frame_at(self.frame_centre(frame)).is_some()) {
@@ -177,7 +180,8 @@ impl FrameShutter {
         (self.first + frame as f64 * self.samples_per_frame).clamp(0.0, self.last)
     }
 
-    /// Mean of a column over the open shutter of a frame, by a rule that is exact between samples.
+    /// Mean of a column over the open shutter of a frame, by a rule that is exact for the quintics between
+    /// samples.
     fn frame_mean(&self, column: &[Option<f64>], frame: usize) -> Option<f64> {
         let centre = self.first + frame as f64 * self.samples_per_frame;
         if self.open == 0.0 {
@@ -204,7 +208,8 @@ impl FrameShutter {
     }
 }
 
-/// A column at position `at`, in samples: the sample itself, or the quintic through the six nearest ones.
+/// Value of a column at `at`, a time in samples: the sample itself, or the quintic through the six nearest
+/// samples.
 fn interpolate_column(column: &[Option<f64>], at: f64) -> Option<f64> {
     if let Some(sample) = frame_at(at) {
         return *column.get(sample)?;
@@ -215,28 +220,28 @@ fn interpolate_column(column: &[Option<f64>], at: f64) -> Option<f64> {
 
 // A film with the frames, noise and lost points of a given recording.
 
-/// Coordinates of a recording: tip x, tip y, head x, head y.
+/// Number of coordinates of a recording: tip x, tip y, head x, head y.
 const COORDINATES: usize = 4;
 
-/// Choice of the dropped frames.
+/// How the dropped frames were chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DropoutPattern {
-    /// The frames that the recording misses. Both clocks are aligned at the first turn of the head.
+    /// The frames that are missing in the recording; both clocks are aligned at the first turn of the head.
     SameFrames,
-    /// The same fraction, at random. One of the traces shows no turn of the head, so their clocks cannot be
-    /// aligned.
+    /// Frames chosen at random, as many as the recording misses: one of the traces shows no turn of the head
+    /// at which their clocks could be aligned.
     AtRandom,
 }
 
-/// A trace filmed like a recording.
+/// A film of a trace with the frame rate, noise and dropouts of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MatchedFilm {
-    /// The film on the clock of the fine trace; marked synthetic.
+    /// The film on the clock of the fine trace; marked as synthetic.
     pub recording: Recording,
-    /// Standard deviations of the white noise added to tip x, tip y, head x, head y, m; 0 for a column that
-    /// the recording lacks.
+    /// Standard deviations of the white noise that was added to tip x, tip y, head x and head y, m; 0 for a
+    /// column that the recording lacks.
     pub noise_m: [f64; COORDINATES],
-    /// Choice of the dropped frames.
+    /// How the dropped frames were chosen.
     pub dropouts: DropoutPattern,
 }
 
@@ -253,20 +258,21 @@ pub enum MatchedFilmError {
     NoNoise {
         /// Name of the recording.
         recording: String,
-        /// The column.
+        /// Name of the column.
         column: &'static str,
     },
 }
 
-/// Films `fine` at the frame rate of `like`, with its noise and its lost frames.
+/// Films `fine` at the frame rate of `like`, with the noise and the lost frames of `like`.
 ///
-/// [`noise_floor`] measures the white noise of each column of `like`; it overestimates noise if the column
-/// oscillates within a few frames. If both traces show a turn of the head, their clocks are aligned there,
-/// the film covers the frames of `like`, and it drops the same frames; otherwise it drops the same fraction
-/// at random. `seed` sets noise and random dropouts; dropouts do not change the noise.
+/// [`noise_floor`] measures the white noise of each column of `like`; the noise is overestimated if the
+/// column oscillates within a few frames. If both traces show a turn of the head, their clocks are aligned at
+/// this turn, and the film covers the frames of `like` and drops the same frames. Otherwise the film drops
+/// the same fraction of frames at random. `seed` determines noise and random dropouts; dropouts do not change
+/// the noise.
 ///
 /// # Errors
-/// [`MatchedFilmError`].
+/// [`MatchedFilmError`] if the trace cannot be filmed or the noise of a column cannot be measured.
 pub fn film_like_recording(
     fine: &Recording,
     like: &Recording,
@@ -307,7 +313,7 @@ fn measure_noises(like: &Recording) -> Result<[f64; COORDINATES], MatchedFilmErr
     Ok(noises)
 }
 
-/// Frames of a recording within the fine trace.
+/// The frames of a recording that lie within the fine trace.
 struct SharedFrames {
     /// Index of the first frame in the recording.
     first: usize,
@@ -316,7 +322,7 @@ struct SharedFrames {
     frames: usize,
 }
 
-/// Aligns both clocks at the first turn of the head.
+/// Aligns both clocks at the first turn of the head, and finds the frames that both traces share.
 fn align_recordings(fine: &Recording, like: &Recording) -> Option<SharedFrames> {
     let shift_s = ReversalInstants::first_turn_s(fine)? - ReversalInstants::first_turn_s(like)?;
     let (grid, on) = (like.grid(), fine.grid());
@@ -327,8 +333,8 @@ fn align_recordings(fine: &Recording, like: &Recording) -> Option<SharedFrames> 
     Some(SharedFrames { first, start_s: grid.time_s(first) + shift_s, frames })
 }
 
-/// The first `frames` frames of a film with noise and lost points. `first` is the index of the film's first
-/// frame in the columns `like`; `None` for random dropouts.
+/// The first `frames` frames of a film, with noise and lost points. `first` is the index of the first frame
+/// of the film in the columns `like`; `None` for random dropouts.
 fn track_frames(
     seen: &Recording,
     frames: usize,

@@ -1,4 +1,4 @@
-//! Specification of a twin, as written and as validated.
+//! Specification of a twin: the file as written, and the validated values.
 
 use super::{Camera, TrackingModel};
 use crate::simulate::scene::Scene;
@@ -9,7 +9,7 @@ use serde::Deserialize;
 /// Why a specification was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TwinSpecError {
-    /// The file is not TOML of this format.
+    /// The file is not TOML, or not in this format.
     #[error(transparent)]
     Toml(#[from] TomlError),
     /// A value is out of range.
@@ -19,14 +19,14 @@ pub enum TwinSpecError {
         file: String,
         /// Table and key.
         key: &'static str,
-        /// Value in the file.
+        /// Value that was found in the file.
         found: String,
-        /// What the key takes.
+        /// What was expected.
         expected: String,
     },
 }
 
-/// A validated specification.
+/// A validated specification of a twin.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TwinSpec {
     /// Title of pages and figures.
@@ -37,13 +37,13 @@ pub struct TwinSpec {
     pub camera: Camera,
     /// Scale, noise and dropouts.
     pub tracking: TrackingModel,
-    /// Recorded part of the scene's time, s; `None` for the whole run.
+    /// Part of the scene's time that is recorded, s; `None` for the whole run.
     pub window_s: Option<[f64; 2]>,
-    /// Whether a table in Tracker's layout is written too.
+    /// Whether a table in the layout of Tracker is written too.
     pub tracker_export: bool,
 }
 
-/// A synthetic recording: a scene seen by a camera.
+/// A synthetic recording: a scene filmed by a camera.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct TwinFile {
@@ -53,21 +53,21 @@ struct TwinFile {
     title: String,
     /// Scene that is filmed; relative to this file.
     scene: String,
-    /// Seed of the noise and of the lost frames, a whole number.
+    /// Seed of the random numbers for noise and lost frames, a whole number.
     seed: u64,
-    /// The camera and the tracking.
+    /// The camera and the errors of tracking.
     camera: TwinCameraFile,
-    /// Part of the run that is recorded; all if left out.
+    /// Part of the run that is recorded; the whole run if left out.
     window: Option<TwinWindowFile>,
-    /// Whether an export of a tracking program is written too.
+    /// Export in the layout of a tracking program that is written too; none if left out.
     export: Option<TwinExportFile>,
-    /// Written by the program into the specification that goes with a twin; not read back.
+    /// Written by the program into the specification that accompanies a twin; not read back.
     #[allow(dead_code)]
     #[schemars(with = "Option<serde_json::Map<String, serde_json::Value>>")]
     truth: Option<toml::Table>,
 }
 
-/// A camera and what tracking adds.
+/// A camera and the errors that tracking adds.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct TwinCameraFile {
@@ -81,7 +81,7 @@ struct TwinCameraFile {
     /// Standard deviation of a tracked coordinate, pixels; 0 if left out.
     #[serde(default)]
     noise_px: f64,
-    /// Share of the frames in which a point is lost; 0 if left out.
+    /// Fraction of the frames in which a point is lost; 0 if left out.
     #[serde(default)]
     dropout_fraction: f64,
 }
@@ -90,9 +90,9 @@ struct TwinCameraFile {
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct TwinWindowFile {
-    /// Its start, s.
+    /// Start of the part, s.
     start_s: f64,
-    /// Its end, s.
+    /// End of the part, s.
     stop_s: f64,
 }
 
@@ -100,7 +100,7 @@ struct TwinWindowFile {
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct TwinExportFile {
-    /// Whose layout it has.
+    /// Tracking program whose layout the export has.
     #[allow(dead_code)]
     layout: ExportLayout,
 }
@@ -111,8 +111,8 @@ enum ExportLayout {
     Tracker,
 }
 
-/// Most frames of a twin: 200 s at 10,000 frames/s, half a gigabyte. A mistyped rate must not fill the
-/// memory.
+/// Maximum number of frames of a twin: 200 s at 10,000 frames/s, half a gigabyte. A mistyped rate must not
+/// fill the memory.
 const MOST_FRAMES: f64 = 2e6;
 
 impl TwinSpec {
@@ -122,7 +122,7 @@ impl TwinSpec {
         toml_file::schema_of::<TwinFile>()
     }
 
-    /// Reads and validates a specification; error texts call it `file`.
+    /// Reads and validates a specification; error messages name the specification `file`.
     ///
     /// # Errors
     /// [`TwinSpecError`] with file, key, finding and admissible values.
@@ -160,10 +160,11 @@ impl TwinSpec {
         })
     }
 
-    /// The recorded part of a scene's time, s.
+    /// Part of the scene's time that is recorded, s.
     ///
     /// # Errors
-    /// [`TwinSpecError::Value`] if the window leaves the scene's run or holds too few or too many frames.
+    /// [`TwinSpecError::Value`] if the window is not within the scene's run or has too few or too many
+    /// frames.
     pub(crate) fn window_within(&self, file: &str, scene: &Scene) -> Result<[f64; 2], TwinSpecError> {
         let [start, stop] = self.window_s.unwrap_or([scene.start_s, scene.run.stop_s]);
         if start < scene.start_s || stop > scene.run.stop_s {

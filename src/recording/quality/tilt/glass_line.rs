@@ -1,36 +1,36 @@
-//! Least-squares fit of a line and a parabola to the path of the tip; each stroke has a height of its own.
+//! Least-squares fit of a line and a parabola to the path of the tip; each stroke has its own height.
 
 use crate::recording::Recording;
 use crate::recording::channel::{ReversalInstants, median_in_place};
 use portable_math as math;
 
-/// Least sum of squares of `q`, relative to the fourth power of the spread of the places: below it the places
-/// have only two values and show no curvature.
+/// Smallest sum of squares of `q`, relative to the fourth power of the spread of the positions. With a
+/// smaller sum, the positions have only two values and show no curvature.
 const LEAST_BEND: f64 = 1e-6;
 
 /// A curve `y = height(stroke) + slope x + bend q(x)`. The parabola `q` is `x^2` minus its projection on the
-/// line, so `slope` is the mean slope of a curved path.
+/// line, so that `slope` is the mean slope of a curved path.
 pub(super) struct GlassLine {
     pub slope: f64,
     pub bend_per_m: f64,
     pub centre_m: [f64; 2],
-    /// Standard deviation of the places, m.
+    /// Standard deviation of the positions along the sweep, m.
     pub x_sd_m: f64,
-    /// Sum of the squared distances from the mean place of each stroke, m^2. The variance of `slope` is that
-    /// of a height divided by this sum.
+    /// Sum of the squared distances of the positions from the mean of their stroke, m^2. The variance of
+    /// `slope` is the variance of a height divided by this sum.
     pub slope_information_m2: f64,
-    /// Sum of the squares of `q`, m^4, which likewise gives the variance of `bend`; zero where no curvature
-    /// shows.
+    /// Sum of the squares of `q`, m^4, which gives the variance of `bend` in the same way; zero if the path
+    /// shows no curvature.
     pub bend_information_m4: f64,
-    /// Which points the line is fitted through.
+    /// Marks the points through which the line is fitted.
     pub on_glass: Vec<bool>,
-    /// Height above the line, m, of every point; infinite in a stroke without a point on the glass.
+    /// Height of every point above the line, m; infinite in a stroke without a point on the glass.
     pub residuals_m: Vec<f64>,
     /// Number of fitted coefficients.
     pub fitted: usize,
 }
 
-/// A point relative to the mean of its stroke.
+/// A point relative to the mean point of its stroke.
 struct CentredPoint {
     x: f64,
     x2: f64,
@@ -47,7 +47,7 @@ struct StrokeSums {
 }
 
 impl GlassLine {
-    /// Fits the points for which `on_glass` is true; at least one.
+    /// Fits the points for which `on_glass` is true, of which there must be at least one.
     pub(super) fn fit_through(path: &TipPath, on_glass: Vec<bool>) -> Self {
         let used = || path.points.iter().zip(&on_glass).filter(|(_, on)| **on).map(|(point, _)| point);
         let count = used().count() as f64;
@@ -83,7 +83,8 @@ impl GlassLine {
     }
 }
 
-/// Means of the strokes about `centre_m`; infinite in a stroke without a point.
+/// Means of the points of each stroke, relative to `centre_m`; the mean height is infinite in a stroke
+/// without a point.
 fn stroke_means<'a>(
     strokes: usize,
     points: impl Iterator<Item = &'a TipPoint>,
@@ -106,25 +107,29 @@ fn stroke_means<'a>(
     sums
 }
 
-/// Number of blocks of frames for the first line: enough for a robust median slope, few enough for all pairs.
+/// Number of blocks of frames for the first line: enough for a robust median slope, few enough to use all
+/// pairs.
 const SLOPE_BLOCKS: usize = 64;
-/// Least distance of two blocks whose slope counts, as a share of the travel: noise dominates shorter ones.
+/// Smallest distance of two blocks whose slope is used, as a fraction of the travel: noise dominates shorter
+/// distances.
 const OUTLYING_PLACES: f64 = 0.25;
-/// Largest distance from the line of a tip on the glass, in standard deviations: chance exceeds it in 1 frame
+/// Largest distance from the line of a tip on the glass, in standard deviations; chance exceeds it in 1 frame
 /// of 16,000.
 const NEAR_DEVIATIONS: f64 = 4.0;
 /// Median of |x| of a standard normal variable.
 const NORMAL_MEDIAN: f64 = 0.674_489_75;
-/// Distance from the line that always counts as on the glass, m: the rounding of a trace without noise.
+/// A tip within this distance of the line always counts as on the glass, m: the rounding of a trace without
+/// noise.
 const LEAST_DISTANCE_M: f64 = 1e-9;
-/// Largest distance of a place beyond the travel, as a share of it; farther ones are outliers.
+/// Largest distance of a position outside the travel, as a fraction of the travel; positions farther out are
+/// outliers.
 const BEYOND_STEPS: f64 = 0.1;
-/// Most iterations; the frames on the glass rarely change after five.
+/// Maximum number of iterations; the frames on the glass rarely change after five.
 const MOST_REPETITIONS: usize = 30;
 
 /// Fits a line through the frames with the tip on the glass. The first line has the median slope between
-/// blocks of frames, which tolerates a quarter of wrong blocks. It is then fitted to the frames near it until
-/// these no longer change.
+/// blocks of frames, which tolerates a quarter of wrong blocks. The line is then fitted again to the frames
+/// near it, until these frames no longer change.
 pub(super) fn fit_glass_line(path: &TipPath, travel_m: f64, step_m: f64) -> GlassLine {
     let within = inliers_along_sweep(path);
     let first = distances_from_line(path, median_slope(path, travel_m));
@@ -139,7 +144,7 @@ pub(super) fn fit_glass_line(path: &TipPath, travel_m: f64, step_m: f64) -> Glas
     line
 }
 
-/// Marks the points that are no outliers along the sweep.
+/// Marks the points that are not outliers along the sweep.
 fn inliers_along_sweep(path: &TipPath) -> Vec<bool> {
     let mut sorted: Vec<f64> = path.points.iter().map(|point| point.x_m).collect();
     sorted.sort_unstable_by(f64::total_cmp);
@@ -149,14 +154,14 @@ fn inliers_along_sweep(path: &TipPath) -> Vec<bool> {
     path.points.iter().map(|p| p.x_m >= low - beyond && p.x_m <= high + beyond).collect()
 }
 
-/// Which points are as near the line as noise, or the step of the heights, explains.
+/// Marks the points that are as near to the line as noise, or the step of the heights, explains.
 fn points_near_line(distances_m: &[f64], within: &[bool], step_m: f64) -> Vec<bool> {
     let scale = median_or_zero(distances_m.iter().map(|distance| distance.abs())) / NORMAL_MEDIAN;
     let limit = (NEAR_DEVIATIONS * scale.max(step_m)).max(LEAST_DISTANCE_M);
     distances_m.iter().zip(within).map(|(distance, within)| *within && distance.abs() <= limit).collect()
 }
 
-/// Height of every point above a line of the given slope through the median of its stroke, m.
+/// Height of every point above a line of the given slope through the median point of its stroke, m.
 fn distances_from_line(path: &TipPath, slope: f64) -> Vec<f64> {
     path.points_by_stroke()
         .flat_map(|stroke| {
@@ -167,7 +172,7 @@ fn distances_from_line(path: &TipPath, slope: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Median slope between blocks of one stroke that lie far enough apart (Theil 1950, Sen 1968).
+/// Median slope between blocks of one stroke that are far enough apart (Theil 1950, Sen 1968).
 fn median_slope(path: &TipPath, travel_m: f64) -> f64 {
     let length = path.points.len().div_ceil(SLOPE_BLOCKS);
     let mut slopes = vec![];
@@ -183,22 +188,24 @@ fn median_slope(path: &TipPath, travel_m: f64) -> f64 {
     median_or_zero(slopes.into_iter())
 }
 
-/// Median; 0 without values.
+/// Median of the values; 0 without values.
 fn median_or_zero(values: impl Iterator<Item = f64>) -> f64 {
     median_in_place(&mut values.collect::<Vec<_>>()).unwrap_or(0.0)
 }
 
-/// Most frames that are used, every n-th of a longer recording: they give the angle far better than needed.
+/// Maximum number of frames; of a longer recording, only every n-th frame is used. They give the angle far
+/// better than needed.
 const MOST_FRAMES: usize = 100_000;
-/// Share of the places at either end that the travel of a stroke leaves out, because they may be outliers.
+/// Fraction of the positions at either end that the travel of a stroke leaves out, because they may be
+/// outliers.
 const TRIMMED: f64 = 0.01;
 
-/// The tip in a frame that has both its coordinates.
+/// The tip in a frame that has both of its coordinates.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TipPoint {
-    /// Index among the frames that are used.
+    /// Index of the frame among the frames that are used.
     pub frame: usize,
-    /// Index of its stroke: the number of turns before it.
+    /// Index of the stroke: the number of turns before it.
     pub stroke: usize,
     pub x_m: f64,
     pub y_m: f64,
@@ -206,7 +213,7 @@ pub(super) struct TipPoint {
 
 /// The path of the tip.
 pub(super) struct TipPath {
-    /// In order of frames.
+    /// Points of the path, in order of frames.
     pub points: Vec<TipPoint>,
     pub strokes: usize,
 }
@@ -227,18 +234,18 @@ impl TipPath {
         Self { points: points.collect(), strokes: turns_s.len() + 1 }
     }
 
-    /// The points for which `kept` holds.
+    /// The points for which `kept` is true.
     pub(super) fn select_points(&self, kept: &[bool]) -> Self {
         let points = self.points.iter().zip(kept).filter(|(_, kept)| **kept).map(|(point, _)| *point);
         Self { points: points.collect(), strokes: self.strokes }
     }
 
-    /// The points of each stroke that has any.
+    /// The points of each stroke that has points.
     pub(super) fn points_by_stroke(&self) -> impl Iterator<Item = &[TipPoint]> {
         self.points.chunk_by(|a, b| a.stroke == b.stroke)
     }
 
-    /// Longest travel within a stroke, m, without the outermost places.
+    /// Longest travel within a stroke, m, without the outermost positions.
     pub(super) fn travel_m(&self) -> f64 {
         self.points_by_stroke().map(stroke_travel_m).fold(0.0, f64::max)
     }
@@ -252,18 +259,18 @@ fn stroke_travel_m(stroke: &[TipPoint]) -> f64 {
     ends.map_or(0.0, |(low, high)| high - low)
 }
 
-/// Most values for the correlation of errors. Longer recordings are averaged in groups of frames, which keeps
-/// the slow errors that matter for a slope.
+/// Maximum number of values for the correlation of errors. Longer recordings are averaged in groups of
+/// frames, which preserves the slow errors that matter for a slope.
 const MOST_VALUES: usize = 20_000;
-/// Largest lag in the sum of correlations, in units of that sum: five correlation times (Sokal 1997). Longer
-/// lags add noise only.
+/// Largest lag in the sum of correlations, in units of that sum; the limit is five correlation times (Sokal
+/// 1997). Longer lags only add noise.
 const WINDOW: f64 = 2.5;
-/// Least share of the variance of the errors that is assumed to remain in the residuals of a fit. It would be
-/// lower for errors that are correlated over the whole recording.
+/// Smallest fraction of the variance of the errors that is assumed to remain in the residuals of a fit. For
+/// errors that are correlated over the whole recording, the computed fraction would be smaller.
 const LEAST_LEFT: f64 = 0.1;
 
 /// Long-run variance of the heights about the line, m^2: the variance of a frame times the number of frames
-/// over which errors are correlated. A sum of `n` errors has `n` times this variance.
+/// over which errors are correlated. The variance of a sum of `n` errors is `n` times this variance.
 pub(super) fn long_run_variance(path: &TipPath, line: &GlassLine) -> f64 {
     let group = path.points.len().div_ceil(MOST_VALUES);
     let values = group_averages(path, line, group);
@@ -273,12 +280,13 @@ pub(super) fn long_run_variance(path: &TipPath, line: &GlassLine) -> f64 {
         return 0.0;
     }
     let (alike, lags) = correlated_values(&values, variance);
-    // each fitted coefficient reduces every covariance
+    // each fitted coefficient reduces the covariance at every lag
     let taken = line.fitted as f64 * (1 + 2 * lags) as f64 / present;
     group as f64 * variance * alike / (1.0 - taken).max(LEAST_LEFT)
 }
 
-/// Residuals of the frames on the glass, averaged over groups of frames; `None` where a group has none.
+/// Residuals of the frames on the glass, averaged over groups of frames; `None` for a group without such
+/// frames.
 fn group_averages(path: &TipPath, line: &GlassLine, group: usize) -> Vec<Option<f64>> {
     let first = path.points.first().map_or(0, |point| point.frame);
     let last = path.points.last().map_or(0, |point| point.frame);
@@ -294,7 +302,7 @@ fn group_averages(path: &TipPath, line: &GlassLine, group: usize) -> Vec<Option<
 }
 
 /// Number of values over which errors are correlated, at least 1: one plus twice the sum of the correlations.
-/// With the largest lag of that sum, [`WINDOW`] times as many.
+/// The second number is the largest lag in that sum, [`WINDOW`] times the first.
 fn correlated_values(values: &[Option<f64>], variance: f64) -> (f64, usize) {
     let (mut alike, mut lags) = (1.0, 0);
     for lag in 1..values.len() / 2 {
@@ -307,7 +315,7 @@ fn correlated_values(values: &[Option<f64>], variance: f64) -> (f64, usize) {
     (alike.max(1.0), lags)
 }
 
-/// Mean product of the values a lag apart; zero without such a pair.
+/// Mean product of two values that are `lag` apart; zero without such a pair.
 fn lag_covariance(values: &[Option<f64>], lag: usize) -> f64 {
     let products = values.iter().zip(&values[lag..]).filter_map(|(a, b)| Some((*a)? * (*b)?));
     let (sum, pairs) = products.fold((0.0, 0_usize), |(sum, pairs), product| (sum + product, pairs + 1));
