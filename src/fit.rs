@@ -1,12 +1,12 @@
-//! Fitting a scene's parameters to recordings or to published components.
+//! Fits the parameters of a scene to recordings or to published numbers.
 //!
 //! A [`job::Job`] lists free parameters with their bounds, and targets under one or several conditions:
 //! components (frequencies) and other features. Targets are measured on the recordings or given in the job.
 //!
-//! A fit has three steps. It assesses which parameters the features can determine ([`identifiability`]),
-//! searches the unit box for the lowest cost with clouds of points and local searches ([`search`]), and
-//! computes intervals at the best point by profiles and twins ([`uncertainty`]). All evaluations are
-//! written to a journal from which the fit can be resumed.
+//! A fit of features has three steps. It assesses which parameters the features can determine
+//! ([`identifiability`]), searches the unit box for the lowest cost with clouds of points and local searches
+//! ([`search`]), and computes intervals at the best point by profiles and twins ([`uncertainty`]). All
+//! evaluations are written to a journal from which the fit can be resumed.
 
 pub mod advice;
 pub mod bootstrap;
@@ -47,15 +47,15 @@ pub use problem::{MeasuredRecording, Problem, ProblemError};
 pub use run::{fit_features, job_warnings};
 pub use targets::measure_targets;
 
-/// A fit that cannot run or continue.
+/// Reason why a fit cannot start or continue.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FitError {
     /// The number of recordings differs from that of the job.
     #[error("found {found} recordings, expected the {expected} of the job")]
     Recordings {
-        /// Recordings given.
+        /// Number of recordings given.
         found: usize,
-        /// Recordings in the job.
+        /// Number of recordings in the job.
         expected: usize,
     },
     /// A feature cannot be measured on a recording.
@@ -91,16 +91,16 @@ pub enum FitError {
         /// Reason.
         problem: String,
     },
-    /// The features cannot determine anything, or a scene refuses a value.
+    /// The job cannot be fitted: the features determine nothing, or a scene refuses a value, for example.
     #[error("this job cannot be fitted: {why}")]
     CannotBeFitted {
         /// Reason and advice.
         why: String,
     },
-    /// No evaluation was allowed.
+    /// The fit was allowed no evaluation.
     #[error("found an allowance of {allowed} evaluations, expected at least 1; raise --max-evaluations")]
     NoEvaluation {
-        /// Evaluations allowed.
+        /// Number of evaluations allowed.
         allowed: usize,
     },
 }

@@ -1,7 +1,8 @@
-//! Advice on additional measurements: features that change along the combinations that a job leaves open.
+//! Advice on additional measurements: features that change with the parameter combinations that a
+//! job leaves undetermined.
 //!
-//! The candidates are read from runs of the model around one probe. A feature is worth measuring if it
-//! changes by more than its own 95 % interval when a parameter combination crosses the box.
+//! Candidate features are computed from runs of the model around one probe. A candidate is worth measuring if
+//! it changes by more than its own 95 % interval when an undetermined combination crosses the box.
 
 use super::identifiability::ProbeEvaluation;
 use super::job::{FitTarget, Job};
@@ -12,25 +13,25 @@ use crate::recording::Recording;
 use crate::recording::channel::{Channel, Window};
 use portable_math as math;
 
-/// Relative standard deviation of a careful measurement of a mean or an instant.
+/// Relative standard deviation of a careful measurement of a mean deflection or a time interval.
 const CAREFUL_SD_RELATIVE: f64 = 0.01;
-/// Relative standard deviation of a careful measurement of an amplitude or a damping.
+/// Relative standard deviation of a careful measurement of an amplitude, a damping or a frequency range.
 const ROUGH_SD_RELATIVE: f64 = 0.05;
-/// Head speeds at which the mean deflection is tried, as fractions of the largest one.
+/// Head speeds at which the mean deflection is a candidate, as fractions of the largest head speed.
 const SPEED_SHARES: [f64; 3] = [0.25, 0.5, 0.8];
-/// Frames over which the head's speed is taken.
+/// Number of frames over which the head's speed is averaged.
 const SPEED_FRAMES: usize = 20;
-/// Segments of a drifting cycle: fine enough for a change within a tenth of a second.
+/// Segments in which a drifting frequency is measured, s: fine enough for a change within 0.1 s.
 const SEGMENT_S: f64 = 0.02;
 
-/// A feature that a job might ask for.
+/// A feature that could be added to the job.
 struct CandidateFeature {
     description: String,
     sd_relative: f64,
     feature: Feature,
 }
 
-/// One sentence for each direction that is open at a probe.
+/// One sentence for each parameter combination that is undetermined at a probe.
 pub(crate) fn advise_measurements(
     job: &Job,
     model: &dyn Model,
@@ -63,8 +64,8 @@ pub(crate) fn advise_measurements(
     sentences
 }
 
-/// Change of each candidate across the box along each parameter, in standard deviations; zero where the model
-/// does not have it.
+/// Change of each candidate feature across the box along each parameter, in standard deviations of the
+/// candidate; zero where the model does not show it.
 fn candidate_sensitivities(
     candidates: &[CandidateFeature],
     job: &Job,
@@ -122,7 +123,7 @@ fn candidate_features(job: &Job, model: &dyn Model, values: &[f64]) -> Vec<Candi
 const INTERVALS: [ReversalInterval; 3] =
     [ReversalInterval::ReleaseAfterReversal, ReversalInterval::StickDuration, ReversalInterval::FlipDuration];
 
-/// Mean deflections, which measure the friction at a speed.
+/// Mean deflections: they show the friction at each speed.
 fn quasi_static_readings(fastest_m_per_s: Option<f64>) -> Vec<(Reading, String)> {
     let mut found = Vec::new();
     for part in ["before", "after"] {
@@ -137,7 +138,7 @@ fn quasi_static_readings(fastest_m_per_s: Option<f64>) -> Vec<(Reading, String)>
     found
 }
 
-/// Amplitude, damping and range in the bands of the components.
+/// Amplitude, damping and frequency range in the bands of the components.
 fn spectral_readings(aims: &[FitTarget], condition: usize) -> Vec<(Reading, String)> {
     let bands: Vec<(&FeatureBand, &str)> = aims
         .iter()

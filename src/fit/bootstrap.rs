@@ -1,10 +1,10 @@
-//! Parametric bootstrap: twins of the best model, measured as the recording was, fitted again from the best
-//! point (Efron and Tibshirani, An Introduction to the Bootstrap, 1993, chapter 6).
+//! Parametric bootstrap: twins of the best model are measured like the recording and fitted again from the
+//! best point (Efron and Tibshirani, An Introduction to the Bootstrap, 1993, chapter 6).
 //!
-//! In addition to the stated deviations it contains the joint effect of noise, lost frames and starting state
-//! on the features of this blade. The cameras of each twin are drawn from their priors. A refit takes damped
-//! Gauss-Newton steps from the best point with the Jacobian there, corrected by Broyden's rule. The spread is
-//! taken about the best point, so that it includes the bias.
+//! In addition to the stated deviations, the spread of the refits contains the joint effect of noise, lost
+//! frames and starting state on the features of this blade. The camera errors of each twin are drawn from
+//! their priors. A refit takes damped Gauss-Newton steps from the best point with the Jacobian there,
+//! corrected by Broyden's rule. The spread is taken about the best point, so that it includes the bias.
 
 use super::camera_calibration::draw_camera_errors;
 use super::evaluation::{Evaluation, EvaluationStage, Observed};
@@ -16,11 +16,13 @@ use nalgebra::DMatrix;
 use portable_math as math;
 use rayon::prelude::*;
 
-/// Gauss-Newton steps of a refit: twins differ by a few deviations, where the linear model nearly holds.
+/// Number of Gauss-Newton steps of a refit: twins differ by a few deviations, where the linear
+/// model nearly holds.
 const REFIT_STEPS: usize = 3;
-/// Damping of a refit: a prior of one length of the box, negligible for any informative direction.
+/// Damping of a refit, equal to a prior with a standard deviation of the length of the box: negligible in
+/// any informative direction.
 const REFIT_DAMPING: f64 = 1.0;
-/// Fewest twins that give a spread.
+/// Minimum number of twins for a spread.
 pub(crate) const MIN_TWINS: usize = 8;
 
 /// Result of the refits.
@@ -28,14 +30,14 @@ pub(crate) const MIN_TWINS: usize = 8;
 pub(crate) struct Bootstrap {
     /// Best points of the refits in the unit box, one per twin.
     pub refits: Vec<Vec<f64>>,
-    /// Standard deviation of each feature over the twins, in its own unit; `None` where fewer than two have
-    /// it.
+    /// Standard deviation of each feature over the twins, in its own unit; `None` for a feature that fewer
+    /// than two twins show.
     pub feature_sd: Vec<Option<f64>>,
 }
 
 impl Bootstrap {
-    /// Root mean square distance of the refits from the best point along a coordinate; `None` with too few
-    /// twins.
+    /// Root mean square distance of the refits from the best point along a coordinate; `None` with fewer
+    /// than [`MIN_TWINS`] refits.
     pub(crate) fn refit_spread(&self, axis: usize, best: f64) -> Option<f64> {
         let places: Vec<f64> = self.refits.iter().filter_map(|unit| unit.get(axis).copied()).collect();
         let mean_square = places.iter().map(|u| math::powi(u - best, 2)).sum::<f64>() / places.len() as f64;
@@ -43,10 +45,10 @@ impl Bootstrap {
     }
 }
 
-/// Makes and fits `twins` twins of `best`; the Jacobian is that at `best`.
+/// Simulates `twins` twins of `best` and fits each again; `jacobian` is the one at `best`.
 ///
 /// # Errors
-/// [`StopReason`] when the evaluations are used up or may not go on.
+/// [`StopReason`] when the evaluations are used up or the fit must stop.
 pub(crate) fn bootstrap_refits(
     ledger: &mut Ledger,
     best: &Evaluation,

@@ -1,19 +1,19 @@
-//! Bounds as one invertible transform: physical value, unit box, real line.
+//! Bounds of a parameter as one invertible transform between physical value, unit interval and real line.
 //!
-//! Clouds of points search the unit box. A search without bounds uses the real line with
-//! `u = (1 + sin z) / 2`, the transform of MINUIT (James and Roos, Comput. Phys. Commun. 10 (1975) 343): it
-//! reaches both bounds at finite `z` and cannot leave the box.
+//! Clouds of points search the unit box. A search without bounds uses the real line with `u = (1 + sin z) /
+//! 2`, the transform of MINUIT (James and Roos, Comput. Phys. Commun. 10 (1975) 343): it reaches both bounds
+//! at finite `z`, and no `z` lies outside the box.
 
 use portable_math as math;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
 
-/// How a parameter's range is divided.
+/// Scale on which the range of a parameter is divided.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum BoundsSpacing {
-    /// Equal ratios take equal lengths; both bounds above 0.
+    /// Equal ratios take equal lengths; both bounds must be above 0.
     Log,
     /// Equal differences take equal lengths.
     Linear,
@@ -25,12 +25,12 @@ pub enum BoundsError {
     /// A bound is infinite or not a number.
     #[error("`{key}`: found {found}, expected a finite number")]
     NotFinite {
-        /// `lower` or `upper`.
+        /// Key of the bound: `lower` or `upper`.
         key: &'static str,
-        /// Its value.
+        /// Value of the bound.
         found: f64,
     },
-    /// The bounds cross or touch, or lie so close that no number fits between.
+    /// The bounds cross or are equal, or lie so close that no number fits between them.
     #[error(
         "`lower` = {lower} and `upper` = {upper}: expected lower < upper; exchange or widen them, or fix the parameter in the scene"
     )]
@@ -40,7 +40,7 @@ pub enum BoundsError {
         /// Upper bound as written.
         upper: f64,
     },
-    /// A logarithmic range must lie above zero.
+    /// A logarithmic range has a lower bound that is not above zero.
     #[error(
         "`lower` = {lower}: expected a number above 0 because `scale` is \"log\"; raise the bound or use scale = \"linear\""
     )]
@@ -90,12 +90,11 @@ impl Bounds {
         self.upper
     }
 
-    /// Spacing along the unit interval.
     pub(crate) fn spacing(&self) -> BoundsSpacing {
         self.spacing
     }
 
-    /// Coordinate of `value` in the unit interval; values outside the bounds are clamped.
+    /// Coordinate of `value` in the unit interval; a value outside the bounds is clamped.
     pub(crate) fn unit_coordinate(&self, value: f64) -> f64 {
         let value = value.clamp(self.lower, self.upper);
         let along = match self.spacing {
@@ -105,7 +104,7 @@ impl Bounds {
         clamp_unit(along / self.scaled_length())
     }
 
-    /// Value at `unit`, which is clamped to 0 to 1; the ends give the bounds exactly.
+    /// Value at the coordinate `unit`, which is clamped to 0 to 1; 0 and 1 give the bounds exactly.
     pub(crate) fn value_at_unit(&self, unit: f64) -> f64 {
         let unit = clamp_unit(unit);
         if unit == 0.0 {
@@ -159,7 +158,7 @@ pub(crate) fn unit_to_line(unit: f64) -> f64 {
     math::asin(2.0 * clamp_unit(unit) - 1.0)
 }
 
-/// Maps a real number to the unit interval, `u = (1 + sin z) / 2`; exact at -pi/2 and pi/2.
+/// Maps a real number to the unit interval, `u = (1 + sin z) / 2`; exact at `z` = -pi/2 and pi/2.
 pub(crate) fn line_to_unit(line: f64) -> f64 {
     if line.abs() == FRAC_PI_2 {
         return if line > 0.0 { 1.0 } else { 0.0 };
@@ -170,9 +169,9 @@ pub(crate) fn line_to_unit(line: f64) -> f64 {
 /// A free parameter in a search: its range and its prior.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SearchAxis {
-    /// Its range.
+    /// Range of the parameter.
     pub bounds: Bounds,
-    /// Its prior.
+    /// Prior of the parameter, if any.
     pub prior: Option<Prior>,
 }
 
@@ -182,17 +181,17 @@ impl From<Bounds> for SearchAxis {
     }
 }
 
-/// A normal distribution of a parameter, or of its logarithm.
+/// Normal distribution of a parameter or of its logarithm.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub enum Prior {
-    /// Of the parameter, in its own SI unit.
+    /// Normal distribution of the parameter, in its own SI unit.
     Linear {
         /// Mean.
         mean: f64,
         /// Standard deviation.
         sd: f64,
     },
-    /// Of its natural logarithm (a parameter with a logarithmic scale).
+    /// Normal distribution of the natural logarithm of the parameter, whose scale is then logarithmic.
     Log {
         /// Mean of the logarithm of the parameter in its SI unit.
         mean_ln: f64,
@@ -202,7 +201,7 @@ pub enum Prior {
 }
 
 impl Prior {
-    /// Distance of a value, in the parameter's SI unit, from the mean, in standard deviations.
+    /// Distance of `value`, in the parameter's SI unit, from the mean of the prior, in standard deviations.
     pub(crate) fn residual(&self, value: f64) -> f64 {
         match *self {
             Self::Linear { mean, sd } => (value - mean) / sd,
@@ -224,7 +223,7 @@ mod tests {
             for bounds in [log, linear] {
                 assert!((bounds.unit_coordinate(bounds.value_at_unit(unit)) - unit).abs() < 1e-14, "{unit}");
             }
-            // near the ends u = (1 + sin z)/2 is quadratic in z: half the digits of z, all the digits of u
+            // near the ends, u = (1 + sin z) / 2 is quadratic in z: z keeps half of its digits, u all of them
             assert!((line_to_unit(unit_to_line(unit)) - unit).abs() < 1e-15, "{unit}");
         }
     }

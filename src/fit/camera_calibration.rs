@@ -1,11 +1,11 @@
 //! Calibration errors of cameras and their effect on features.
 //!
-//! A camera measures a deflection `d` as `(1 + scale) d + offset`: its scale is known to half a percent,
-//! and a marker is never exactly on the hinge. Both numbers are unknowns with priors, common to all
-//! features of a recording. Their effect does not need a run of the model, so they are no search
-//! parameters: at every point of the search they minimise the cost (`CameraFit::estimate`), and the
-//! Jacobian is projected onto the complement of their derivatives (variable projection, Golub and Pereyra,
-//! SIAM J. Numer. Anal. 10 (1973) 413, in the form of Kaufman, BIT 15 (1975) 49).
+//! A camera measures a deflection `d` as `(1 + scale) d + offset`: its scale is known to half a percent, and
+//! a marker is never exactly on the hinge. Both numbers are unknowns with priors, common to all features of a
+//! recording. Their effect does not need a run of the model, so they are no search parameters. At every point
+//! of the search, `CameraFit::estimate` chooses the values that minimise the cost, and the Jacobian is
+//! projected onto the complement of their derivatives (variable projection, Golub and Pereyra, SIAM J. Numer.
+//! Anal. 10 (1973) 413, in the form of Kaufman, BIT 15 (1975) 49).
 
 use super::evaluation::{Observation, Observed};
 use super::objective::{LOSS_KNEE, residual, robust_loss, total_sd};
@@ -18,33 +18,35 @@ use portable_math::StandardNormal;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Most Gauss-Newton steps: three reach rounding from a few deviations away, and a dozen from afar.
+/// Maximum number of Gauss-Newton steps. Three reach rounding errors from a few deviations away, a dozen
+/// from far away.
 const MAX_STEPS: usize = 60;
-/// Most halvings of a step that raises the cost.
+/// Maximum number of halvings of a step that raises the cost.
 const MAX_HALVINGS: usize = 12;
-/// Length of the last step, in prior deviations.
+/// Length of a step, in prior standard deviations, below which the descent ends.
 const MIN_STEP: f64 = 1e-12;
-/// Distance between the seeds of two cameras, so that they never share random numbers between twins.
+/// Distance between the seeds of two cameras, so that no two draws use the same random numbers.
 const CAMERA_SEEDS: u64 = 1 << 40;
 /// Variance of a uniform variable in the unit interval.
 const BOX_VARIANCE: f64 = 1.0 / 12.0;
 
-/// An estimated number of a camera.
+/// Estimated scale or offset of a camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CameraEstimate {
-    /// Number of the condition whose camera it is, from 0.
+    /// Index of the condition to which the camera belongs, from 0.
     pub condition: usize,
-    /// Its name in a result.
+    /// Name of the number in a result.
     pub name: &'static str,
     /// Standard deviation of its prior, whose mean is 0.
     pub prior_sd: f64,
     /// Best value, in the unit of its name.
     pub estimate: f64,
-    /// Half of its 95 % interval by the linear model, in the same unit; `None` where there is no such model.
+    /// Half width of the 95 % interval by the linear model, in the same unit; `None` without a linear model.
     pub half_95: Option<f64>,
 }
 
-/// The camera of a condition: standard deviations of scale and offset, and their values in these units.
+/// The camera of a condition: standard deviations of scale and offset, and their values in units
+/// of these deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct ConditionCamera {
     condition: usize,
@@ -58,16 +60,16 @@ impl ConditionCamera {
     }
 }
 
-/// Names of a camera's numbers.
+/// Names of the two numbers of a camera.
 const CAMERA_NUMBER_NAMES: [&str; 2] = ["scale_relative", "offset_x_m"];
 
-/// The cameras of the targets, with the numbers that minimise the cost of the features.
+/// The cameras of the targets, with the scales and offsets that minimise the cost of the features.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct CameraFit(Vec<ConditionCamera>);
 
 impl CameraFit {
-    /// Estimates the cameras of `targets` from features in the same order. A camera without features has the
-    /// means of its priors.
+    /// Estimates the cameras of `targets`; `features` are in the same order. Numbers of a camera without
+    /// features are the means of their priors.
     pub(crate) fn estimate(targets: &[TargetValue], features: &[Observed]) -> Self {
         let mut cameras: Vec<ConditionCamera> = Vec::new();
         for calibration in targets.iter().filter_map(|target| target.calibration) {
@@ -89,23 +91,23 @@ impl CameraFit {
         Self(cameras)
     }
 
-    /// Number of estimated scales and offsets.
+    /// Number of estimated scales and offsets of all cameras.
     pub(crate) fn count_unknowns(&self) -> usize {
         self.free_numbers().count()
     }
 
-    /// Estimated numbers, as cameras with the index of the number.
+    /// All estimated numbers: the camera and the index of the number, 0 for the scale and 1 for the offset.
     fn free_numbers(&self) -> impl Iterator<Item = (&ConditionCamera, usize)> {
         let all = self.0.iter().flat_map(|camera| [0, 1].map(|k| (camera, k)));
         all.filter(|(camera, k)| camera.sds[*k] > 0.0)
     }
 
-    /// Residuals of the priors, one per unknown, in standard deviations.
+    /// Residuals of the priors of the estimated numbers, in standard deviations.
     pub(crate) fn prior_residuals(&self) -> impl Iterator<Item = f64> {
         self.free_numbers().map(|(camera, k)| camera.place[k])
     }
 
-    /// A feature with the errors of its camera.
+    /// The observation as the camera shows it, with its errors.
     pub(crate) fn apply(&self, target: &TargetValue, observation: &Observation) -> Observation {
         let Some(calibration) = target.calibration else { return *observation };
         let camera = self.0.iter().find(|camera| camera.condition == calibration.condition);
@@ -114,13 +116,13 @@ impl CameraFit {
         Observation { value: camera.map_or(observation.value, apply), ..*observation }
     }
 
-    /// The value of a feature with the errors of its camera.
+    /// Value of a feature as the camera shows it, with its errors.
     pub(crate) fn apply_to_value(&self, target: &TargetValue, observed: &Observed) -> Option<f64> {
         observed.observation().map(|observation| self.apply(target, observation).value)
     }
 
     /// Projects the columns of `jacobian` onto the complement of the derivatives by the camera unknowns, with
-    /// the weights of the cost. The first rows are the features, the last rows the camera unknowns.
+    /// the weights of the cost. Its first rows are the features, its last rows the camera unknowns.
     pub(crate) fn project_jacobian(
         &self,
         jacobian: DMatrix<f64>,
@@ -138,8 +140,8 @@ impl CameraFit {
         jacobian - own * followed
     }
 
-    /// The estimated numbers, with intervals by the linear model; `jacobian` has the rows of
-    /// [`Self::project_jacobian`].
+    /// The estimated numbers, with 95 % intervals by the linear model. The rows of `jacobian` are
+    /// as in [`Self::project_jacobian`].
     pub(crate) fn estimates(
         &self,
         jacobian: Option<&DMatrix<f64>>,
@@ -157,8 +159,8 @@ impl CameraFit {
         self.free_numbers().enumerate().map(estimate).collect()
     }
 
-    /// Standard deviations of the unknowns in units of their priors, marginal over the parameters. These have
-    /// the variance of the unit box as a prior.
+    /// Standard deviations of the camera unknowns in units of their priors, marginal over the parameters.
+    /// Each parameter has a prior with the variance of the unit box.
     fn standard_deviations(
         &self,
         jacobian: &DMatrix<f64>,
@@ -180,7 +182,8 @@ impl CameraFit {
         Some((jacobian.ncols()..all.ncols()).map(|at| covariance[(at, at)].sqrt()).collect())
     }
 
-    /// Derivatives of `rows` residuals by the unknowns in units of their priors, and the weights of the rows.
+    /// Derivatives of `rows` residuals by the camera unknowns in units of their priors, and the weights
+    /// of the rows.
     fn jacobian(
         &self,
         rows: usize,
@@ -231,16 +234,16 @@ fn weight_rows(matrix: &DMatrix<f64>, weights: &[f64]) -> DMatrix<f64> {
     weighted
 }
 
-/// Weight of a squared residual that corresponds to [`robust_loss`].
+/// Weight of a squared residual in the normal equations: the derivative of [`robust_loss`] by that square.
 fn robust_weight(residual: f64) -> f64 {
     math::powi(LOSS_KNEE / residual.abs().max(LOSS_KNEE), 2)
 }
 
-/// A target with its calibration and the feature of the model.
+/// A target, its calibration, and the feature of the model.
 type TargetObservation<'a> = (&'a TargetValue, TargetCalibration, Observation);
 
-/// Residual of a feature with the camera numbers at `place`, and its derivatives by them, in prior
-/// deviations.
+/// Residual of a feature for the camera numbers `place`, in prior standard deviations, and its derivatives
+/// by these numbers.
 fn linearize_residual(
     (target, calibration, observation): &TargetObservation,
     place: [f64; 2],
@@ -251,7 +254,7 @@ fn linearize_residual(
     let distance = target.distance(value);
     let sd = total_sd(observation, target);
     let per_metre = match target.measure {
-        // a clamped distance is constant
+        // a clamped distance has no slope
         _ if distance.abs() >= math::ln(MAX_RATIO) => 0.0,
         ValueComparison::Log => 1.0 / value,
         ValueComparison::Linear { scale } => 1.0 / scale,
@@ -260,9 +263,9 @@ fn linearize_residual(
     (distance / sd, [0, 1].map(|k| slopes[k] * sds[k] * per_metre / sd))
 }
 
-/// Camera numbers, in prior deviations, that minimise the cost of the features. The cost grows
-/// logarithmically far from the target and may have two minima, so that the descent starts from the prior
-/// mean and from the least-squares solution.
+/// Camera numbers, in prior standard deviations, that minimise the cost of the features. Far from the target
+/// the cost grows only logarithmically and may have two minima, so the descent starts from the prior means
+/// and from the least-squares solution.
 fn minimize_camera_cost(pairs: &[TargetObservation]) -> [f64; 2] {
     let cost = |place: &[f64; 2]| camera_cost(pairs, *place, robust_loss);
     let squares = gauss_newton_descent(pairs, [0.0; 2], |r| r * r, |_| 1.0);
@@ -271,7 +274,7 @@ fn minimize_camera_cost(pairs: &[TargetObservation]) -> [f64; 2] {
     if cost(&far) < cost(&near) { far } else { near }
 }
 
-/// Cost of a camera's features and of its priors.
+/// Cost of the features of a camera and of the priors of its numbers.
 fn camera_cost(pairs: &[TargetObservation], place: [f64; 2], cost: fn(f64) -> f64) -> f64 {
     let of = |pair| {
         let residual = linearize_residual(pair, place).0;
@@ -280,7 +283,7 @@ fn camera_cost(pairs: &[TargetObservation], place: [f64; 2], cost: fn(f64) -> f6
     pairs.iter().map(of).sum::<f64>() + place.into_iter().map(cost).sum::<f64>()
 }
 
-/// Gauss-Newton steps with weights, each halved until the cost falls.
+/// Weighted Gauss-Newton steps, each halved until the cost falls.
 fn gauss_newton_descent(
     pairs: &[TargetObservation],
     start: [f64; 2],

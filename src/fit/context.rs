@@ -1,29 +1,29 @@
-//! What a fit of features is computed from.
+//! Inputs of a fit of features besides the problem itself.
 
 use crate::checkpoint::format_header_line;
 use crate::fit::FitError;
 use crate::fit::feature_checkpoint::{EvaluationRecord, FeatureCheckpoint, FeatureHeader};
 
-/// The run of a fit: its problem, its allowance and the journal that it continues.
+/// Fingerprint, allowance and journal of one run of a fit.
 #[derive(Debug, Clone, Default)]
 pub struct FitContext<'a> {
     /// Fingerprint of the problem, from `checkpoint::fingerprint`.
     pub fingerprint: &'a str,
     /// Version of the program.
     pub version: &'a str,
-    /// Most evaluations of this run, replayed ones included; `None` for what the job allows.
+    /// Maximum number of evaluations of this run, including replayed ones; `None` for the budgets of the job.
     pub max_evaluations: Option<usize>,
     /// The journal to continue, with the name of its file for error messages.
     pub resume: Option<(&'a str, &'a FeatureCheckpoint)>,
 }
 
 impl<'a> FitContext<'a> {
-    /// Evaluations of the journal that is resumed.
+    /// Evaluations stored in the journal that is resumed.
     pub(super) fn stored_records(&self) -> &'a [EvaluationRecord] {
         self.resume.map_or(&[][..], |(_, journal)| &journal.records)
     }
 
-    /// Text before the first new line: the header, unless a journal is resumed.
+    /// Text that precedes the first new line of the journal: the header, or nothing if a journal is resumed.
     pub(super) fn opening_lines(&self, header: &FeatureHeader) -> String {
         self.resume.map_or_else(|| format_header_line(header), |_| String::new())
     }

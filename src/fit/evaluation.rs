@@ -8,38 +8,38 @@ use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::fmt;
 
-/// The value of a feature of the model.
+/// A feature of the model at one point.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Observation {
-    /// Its value, in the feature's own SI unit; finite.
+    /// Value of the feature, in its own SI unit; finite.
     #[serde(with = "exact")]
     pub value: f64,
     /// Standard deviation over the starting states, in the same unit; 0 for a single state.
     #[serde(with = "exact")]
     pub spread: f64,
-    /// Level of the strongest peak of the band above the assigned one, dB; 0 where that is the strongest,
-    /// and for features without peaks.
+    /// Level of the strongest peak of the band relative to the assigned peak, dB; 0 if the assigned peak is
+    /// the strongest, and for features without peaks.
     #[serde(with = "exact")]
     pub below_db: f64,
 }
 
-/// A feature of a model run.
+/// A feature of a model run: its value, or the reason why it has none.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Observed {
-    /// Its value.
+    /// The feature has a value.
     Value(Observation),
-    /// Why there is none.
+    /// The feature has no value, for this reason.
     Missing(String),
 }
 
 impl Observed {
-    /// The value of a single run; a frequency is that of the strongest peak.
+    /// Observation of a single run, without spread; if it is a frequency, that of the strongest peak.
     #[must_use]
     pub fn from_value(value: f64) -> Self {
         Self::Value(Observation { value, spread: 0.0, below_db: 0.0 })
     }
 
-    /// What was observed, if anything.
+    /// The observation, if the feature has a value.
     pub(crate) fn observation(&self) -> Option<&Observation> {
         match self {
             Self::Value(observation) => Some(observation),
@@ -62,25 +62,25 @@ pub struct Evaluation {
     pub values: Vec<f64>,
     /// Cost, finite and not negative.
     pub cost: f64,
-    /// Cost of the first stage: without the features of the last stage, and with deviations of at least
-    /// `FIRST_STAGE_SD_RELATIVE`.
+    /// Cost in the first stage: without the features that count in the last stage only, and with deviations
+    /// of at least `FIRST_STAGE_SD_RELATIVE`.
     pub global_cost: f64,
     /// Features in the order of the targets; empty when the run failed.
     pub features: Vec<Observed>,
-    /// Why the run failed, if it did.
+    /// Reason why the run failed, if it did.
     pub failure: Option<RunFailure>,
 }
 
-/// An evaluation without its costs, which also depend on the scatter that a search estimates.
+/// An evaluation without its costs, because these also depend on the scatter that a search estimates.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EvaluationOutcome {
-    /// Place in the unit box, one coordinate a parameter.
+    /// Point in the unit box, one coordinate per parameter.
     pub unit: Vec<f64>,
     /// Parameter values in job order, in their SI units.
     pub values: Vec<f64>,
     /// Features in the order of the targets; empty when the run failed.
     pub features: Vec<Observed>,
-    /// Why the run failed, if it did.
+    /// Reason why the run failed, if it did.
     pub failure: Option<RunFailure>,
 }
 
@@ -91,20 +91,20 @@ impl From<Evaluation> for EvaluationOutcome {
     }
 }
 
-/// Reason for which a run gave no features; failures are counted by reason.
+/// Reason why a run gave no features; failures are counted by reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FailureReason {
     /// The run ended before its stop time.
     Ended(RunStatus),
     /// The scene refuses the parameters.
     Refused,
-    /// A link leans too far.
+    /// Neck or lip leans farther from the vertical than the job allows.
     Tilt,
     /// The motion is not finite.
     NotFinite,
     /// A feature is not a number.
     NotANumber,
-    /// The model gave another number of features than the job has.
+    /// The number of features differs from that of the job.
     FeatureCount,
     /// The model panicked.
     Panic,
@@ -127,7 +127,7 @@ impl FailureReason {
         Self::Panic,
     ];
 
-    /// The word in files, such as `contact-lost`.
+    /// Name of the reason in files, such as `contact-lost`.
     pub(crate) fn as_str(self) -> &'static str {
         match self {
             Self::Ended(status) => status.name(),
@@ -147,7 +147,7 @@ impl fmt::Display for FailureReason {
     }
 }
 
-/// Ordered by word: counts in files are in alphabetical order.
+/// Ordered by name, so that counts in files are in alphabetical order.
 impl Ord for FailureReason {
     fn cmp(&self, other: &Self) -> Ordering {
         self.as_str().cmp(other.as_str())
@@ -182,9 +182,9 @@ impl<'de> Deserialize<'de> for FailureReason {
 #[serde(deny_unknown_fields)]
 #[error("{reason}: {message}")]
 pub struct RunFailure {
-    /// Why.
+    /// Kind of failure.
     pub reason: FailureReason,
-    /// What happened, in words.
+    /// Description of the failure.
     pub message: String,
     /// Fraction of the run that was completed, 0 to 1.
     #[serde(with = "exact")]
@@ -192,7 +192,7 @@ pub struct RunFailure {
 }
 
 impl RunFailure {
-    /// A failure after the given part of the run.
+    /// A failure after the fraction `progress` of the run.
     #[must_use]
     pub fn new(reason: FailureReason, message: impl Into<String>, progress: f64) -> Self {
         let progress = if progress.is_finite() { progress.clamp(0.0, 1.0) } else { 0.0 };
@@ -204,24 +204,24 @@ impl RunFailure {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum EvaluationStage {
-    /// Probes of the identifiability, before the search.
+    /// Probes for the identifiability, before the search.
     Gate,
     /// Clouds of points over the whole box.
     Global,
     /// Local searches from the best points.
     Local,
-    /// Differences around the best point.
+    /// Finite differences around the best point.
     Sensitivity,
-    /// Profiles along a parameter, minimised over the others.
+    /// Profiles along a parameter: the cost is minimised over the other parameters.
     Profile,
-    /// Refits to twins of the best model.
+    /// Fits to twins of the best model.
     Bootstrap,
     /// Searches outside the interval of an identified parameter.
     Elsewhere,
 }
 
 impl EvaluationStage {
-    /// The word in files and on a terminal.
+    /// Name of the stage in files and on a terminal.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Gate => "gate",

@@ -1,4 +1,4 @@
-//! Evaluations of a fit in a journal.
+//! Journal of a fit of features: one evaluation per line.
 
 use super::FitError;
 use super::bounds::{Bounds, BoundsSpacing, Prior, SearchAxis};
@@ -13,7 +13,7 @@ use crate::feature::{LengthCalibration, ValueComparison};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// The journal of a fit.
+/// The journal of a fit of features.
 pub type FeatureCheckpoint = checkpoint::CheckpointFile<EvaluationRecord>;
 pub(crate) type FeatureHeader = checkpoint::CheckpointHeader<FeatureHeaderBody>;
 
@@ -26,7 +26,7 @@ pub struct EvaluationRecord {
     pub outcome: EvaluationOutcome,
 }
 
-/// Bits of the coordinates of a point of the unit box, as a key for look-up.
+/// Bits of the coordinates of a point in the unit box, as a key for look-up.
 pub(crate) fn point_key(unit: &[f64]) -> Vec<u64> {
     unit.iter().map(|u| u.to_bits()).collect()
 }
@@ -41,7 +41,7 @@ impl CheckpointRecord for EvaluationRecord {
         point_key(&self.outcome.unit)
     }
 
-    /// The values are not stored: they follow from the point in the unit box.
+    /// Parameter values are not stored: they follow from the point in the unit box.
     fn to_row(&self, at: usize) -> EvaluationRow {
         let EvaluationOutcome { unit, features, failure, .. } = &self.outcome;
         EvaluationRow {
@@ -62,7 +62,7 @@ impl CheckpointRecord for EvaluationRecord {
         Ok(Self { stage: row.stage, outcome: row.into_outcome(body) })
     }
 
-    /// Compares outcomes only: another search may evaluate a point in another stage.
+    /// Compares the outcomes only, because another search may evaluate the same point in another stage.
     fn difference(&self, other: &Self) -> Option<[String; 2]> {
         first_difference(&self.outcome, &other.outcome)
     }
@@ -142,7 +142,7 @@ impl FeatureValueRow {
     }
 }
 
-// The header of the journal: the meaning of the numbers in its lines, and the targets.
+// Header of the journal: the meaning of the numbers in its lines, and the targets.
 
 /// The part of the header that is specific to a fit of features.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -164,7 +164,7 @@ pub struct HeaderParameter {
     pub name: String,
     /// Unit as shown; `1` for a plain number.
     pub unit: String,
-    /// Its range, which maps coordinates to values, and its prior.
+    /// Range of the parameter, which maps coordinates to values, and its prior.
     pub axis: SearchAxis,
 }
 
@@ -176,7 +176,7 @@ pub struct HeaderFeature {
     pub name: String,
     /// Unit in files; `1` for a plain number.
     pub unit: String,
-    /// Its target and deviation.
+    /// Target value and its standard deviation.
     pub target: TargetValue,
 }
 
@@ -192,7 +192,7 @@ struct ParameterRow {
     prior: Option<PriorRow>,
 }
 
-/// Prior of the parameter, or of its logarithm on a logarithmic scale.
+/// Prior of the parameter or, on a logarithmic scale, of its logarithm.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PriorRow {
@@ -232,12 +232,12 @@ struct FeatureRow {
     unit: String,
     target: ExactNumber,
     sd: ExactNumber,
-    /// Scale of differences; missing where ratios are compared.
+    /// Scale of differences; absent where ratios are compared.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     large_difference: Option<ExactNumber>,
-    /// Whether it counts in the last stage only.
+    /// Whether the feature counts in the last stage only.
     last_stage: bool,
-    /// Calibration errors of its camera, where it depends on them.
+    /// Calibration errors of the camera, if the feature depends on them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     camera: Option<CameraRow>,
 }
@@ -246,11 +246,11 @@ struct FeatureRow {
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CameraRow {
-    /// Counted from 1, as in a job.
+    /// Number of the condition, counted from 1 as in a job.
     condition: usize,
     scale_sd: ExactNumber,
     offset_sd_m: ExactNumber,
-    /// Noise floor that is added to a size in quadrature; missing for a position.
+    /// Noise floor that is added to a size in quadrature; absent for a position.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     floor_m: Option<ExactNumber>,
 }
@@ -306,7 +306,7 @@ impl From<FeatureRow> for HeaderFeature {
     }
 }
 
-/// Describes the first difference between two outcomes at one point.
+/// Describes the first difference between two outcomes at the same point.
 pub(super) fn first_difference(one: &EvaluationOutcome, other: &EvaluationOutcome) -> Option<[String; 2]> {
     let both = [one, other];
     if one.values != other.values {
@@ -340,9 +340,9 @@ fn describe_observed(observed: &Observed) -> String {
     }
 }
 
-// A resumed fit repeats some evaluations of its journal and refuses a journal that differs.
+// A resumed fit repeats some evaluations of its journal and refuses the journal if they differ.
 
-/// Repeats a sample of the evaluations of the resumed journal and compares all bits.
+/// Repeats a sample of the evaluations of the resumed journal and compares every bit.
 pub(super) fn recheck_sample(objective: &Objective, context: &FitContext, seed: u64) -> Result<(), FitError> {
     let Some((file, journal)) = context.resume else { return Ok(()) };
     let records = journal.records.len();
@@ -352,7 +352,7 @@ pub(super) fn recheck_sample(objective: &Objective, context: &FitContext, seed: 
     Ok(checked.into_iter().collect::<Result<(), _>>()?)
 }
 
-/// Repeats the evaluation at a point, if the resumed journal has it.
+/// Repeats the evaluation at a point, if the resumed journal contains it.
 pub(super) fn recheck_at(objective: &Objective, context: &FitContext, unit: &[f64]) -> Result<(), FitError> {
     let Some((file, journal)) = context.resume else { return Ok(()) };
     let place = journal.records.iter().position(|entry| point_key(&entry.outcome.unit) == point_key(unit));

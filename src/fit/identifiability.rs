@@ -1,9 +1,9 @@
-//! Identifiability before the search: which parameters the features can determine at their noise, probed at a
-//! few points of the box.
+//! Identifiability before the search: which parameters the features can determine at their noise, assessed at
+//! a few points of the box (probes).
 //!
-//! At each probe the model is differentiated by finite differences along every parameter. A fit is refused
-//! only if the model has no features anywhere, or if no parameter changes any feature. Everything else is a
-//! note.
+//! At each probe the model is differentiated along every parameter by finite differences. A fit is refused
+//! only if the model fails at all probes, if it shows no feature at any of them, or if no parameter changes
+//! any feature. All other findings are notes.
 
 use super::FitError;
 use super::evaluation::{Evaluation, EvaluationStage, Observed, map_names};
@@ -18,22 +18,23 @@ use std::collections::BTreeMap;
 
 /// Number of probes: the middle of the box and points of a Halton sequence around it.
 pub(crate) const PROBE_COUNT: usize = 5;
-/// Fraction of the box, about its middle, in which the probes lie: the model rarely runs in the corners.
+/// Fraction of each side of the box, about its middle, in which the probes lie: near its corners the
+/// model rarely runs.
 const INNER_BOX: f64 = 0.7;
 
-/// Result of one probe.
+/// Result at one probe.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Probe {
-    /// Parameter values, in SI.
+    /// Parameter values, in SI units.
     pub values: BTreeMap<String, f64>,
     /// Failure of the model, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
-    /// Number of features that the model has.
+    /// Number of features that the model shows.
     pub features_seen: usize,
     /// Number of informative directions.
     pub rank: usize,
-    /// Largest singular value over the smallest; `None` where one is zero.
+    /// Ratio of the largest to the smallest singular value; `None` if it is infinite.
     pub condition: Option<f64>,
     /// Parameters that the features determine.
     pub determines: Vec<String>,
@@ -44,14 +45,15 @@ pub struct Probe {
 pub struct Identifiability {
     /// The probes.
     pub probes: Vec<Probe>,
-    /// Combinations of parameters that are determined or left open at the probe nearest to the targets.
+    /// Combinations of parameters that are determined or left undetermined at the probe nearest
+    /// to the targets.
     pub combinations: Vec<ParameterCombination>,
-    /// Scatter of each modelled feature between neighbouring points, in its unit: the median over the
-    /// probes. It is added to the deviation of the target, because a search cannot resolve less.
+    /// Scatter of each feature of the model between neighbouring points, in its unit: the median over the
+    /// probes. It is added to the deviation of the target, because a search cannot resolve a smaller change.
     pub scatter: Vec<f64>,
-    /// Sentences for the reader.
+    /// Remarks for the reader, one sentence each.
     pub notes: Vec<String>,
-    /// Sentences on what to measure in addition.
+    /// Advice on additional measurements, one sentence each.
     pub advice: Vec<String>,
 }
 
@@ -60,14 +62,14 @@ pub struct Identifiability {
 pub(crate) struct ProbeEvaluation {
     pub centre: Evaluation,
     pub directions: SingularDirections,
-    /// Scatter of each feature there.
+    /// Scatter of each feature at the probe.
     scatter: Vec<Option<f64>>,
 }
 
-/// Probes the box; `None` if the evaluations are used up or may not go on.
+/// Evaluates the probes; `None` if the evaluations are used up or the fit must stop.
 ///
 /// # Errors
-/// [`FitError::CannotBeFitted`].
+/// [`FitError::CannotBeFitted`] if the model fails, shows no feature, or does not react to any parameter.
 pub(crate) fn assess_identifiability(
     ledger: &mut Ledger,
     names: &[String],
@@ -128,7 +130,8 @@ fn summarize_probe(probed: &ProbeEvaluation, names: &[String]) -> Probe {
     }
 }
 
-/// The middle of the box, then a Halton sequence (Halton, Numer. Math. 2 (1960) 84).
+/// Coordinates of probe `at`: the middle of the box, then a Halton sequence (Halton, Numer. Math.
+/// 2 (1960) 84).
 fn probe_point(at: usize, dimensions: usize) -> Vec<f64> {
     let coordinate = |axis: usize| {
         let share = if at == 0 { 0.5 } else { radical_inverse(at, nth_prime(axis)) };
@@ -137,7 +140,7 @@ fn probe_point(at: usize, dimensions: usize) -> Vec<f64> {
     (0..dimensions).map(coordinate).collect()
 }
 
-/// Radical inverse (van der Corput).
+/// Radical inverse of `number` in `base` (van der Corput).
 fn radical_inverse(number: usize, base: usize) -> f64 {
     let (mut rest, mut weight, mut sum) = (number, 1.0, 0.0);
     while rest > 0 {
@@ -179,13 +182,13 @@ fn no_features_seen(ledger: &Ledger, probed: &ProbeEvaluation) -> String {
     )
 }
 
-/// The median; zero of nothing.
+/// Median of the values; zero if there are none.
 fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// Features whose own scatter exceeds the deviation of their target.
+/// A note for each feature whose scatter in the model exceeds the deviation of its target.
 fn rough_notes(targets: &[TargetValue], scatter: &Vec<f64>) -> Vec<String> {
     let rough = targets.iter().zip(scatter).filter(|(target, scatter)| **scatter > target.sd);
     let note = |(target, scatter): (&TargetValue, &f64)| {

@@ -1,6 +1,6 @@
-//! job.toml: what is fitted to what, checked completely before anything runs. Every key: `docs/fits.md`.
+//! Reads job.toml and checks it completely before anything runs. `docs/fits.md` describes every key.
 
-/// Returns from a check because of a key; the problem is formatted as by [`format!`].
+/// Returns from a check with a refusal of `$key`; the problem is formatted as by [`format!`].
 macro_rules! refuse {
     ($key:expr, $($problem:tt)+) => {
         return $crate::toml_file::refuse_key($key, std::fmt::format(format_args!($($problem)+)))
@@ -28,21 +28,21 @@ pub(crate) use settings::{Ensemble, IntervalSettings};
 pub use targets::{FitTarget, TargetSource, TargetStage};
 pub(crate) use traces::{CameraPriorSds, TraceChannel, TraceTarget};
 
-/// Name of a condition, what it sets, and whether it is held out.
+/// Name of a condition, the values that it sets, and whether it is held out.
 type ConditionIdentity<'a> = (&'a str, &'a [(String, f64)], bool);
 
-/// The part of a job that decides the cost of a point.
+/// The part of a job on which the cost of a point depends.
 #[derive(Serialize)]
 pub(super) struct JobIdentity<'a> {
     conditions: Vec<ConditionIdentity<'a>>,
     camera: Option<Camera>,
     parameters: &'a [FreeParameter],
-    /// Left out where constants are exact: the fingerprint of a job without them stays the same.
+    /// Omitted where constants are exact, so that a job without freed constants keeps its fingerprint.
     #[serde(skip_serializing_if = "Constants::is_none")]
     constants: &'a Constants,
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     traces: &'a [TraceTarget],
-    /// Cameras on which a fitted feature depends, with the numbers of their conditions.
+    /// Cameras on which a fitted feature depends, with the indices of their conditions.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     cameras: Vec<(usize, FeatureCamera)>,
     aims: &'a [FitTarget],
@@ -55,13 +55,13 @@ pub(super) struct JobIdentity<'a> {
 pub struct Job {
     /// Title for pages and figures.
     pub title: String,
-    /// Conditions with a recording first, then those without one, in the order of the file; at least one.
+    /// Conditions with a recording, then those without one, each in the order of the file; at least one.
     pub conditions: Vec<JobCondition>,
-    /// Camera of the conditions without a recording.
+    /// Camera of the conditions that have no recording.
     pub camera: Option<Camera>,
     /// Free parameters.
     pub parameters: Vec<FreeParameter>,
-    /// Constants that are freed within priors.
+    /// Constants that are free within priors.
     pub constants: Constants,
     /// Fitted traces in the order of the file; empty in a job on features.
     pub traces: Vec<TraceTarget>,
@@ -71,7 +71,7 @@ pub struct Job {
     pub search: SearchSettings,
     /// Ensemble of starting states over which features are averaged.
     pub ensemble: Ensemble,
-    /// Largest plausible tilt of the blade from the vertical, rad; `None` for any.
+    /// Largest plausible tilt of neck and lip from the vertical, rad; `None` for no limit.
     pub largest_tilt_rad: Option<f64>,
     /// Settings of the intervals.
     pub intervals: IntervalSettings,
@@ -86,10 +86,10 @@ impl Job {
         Self::parse_with_names(file, text, &crate::model::parameters::parameter_names())
     }
 
-    /// As [`Self::parse`], for a model whose parameters have the names `known`.
+    /// Like [`Self::parse`], for a model whose parameters have the names `known`.
     ///
     /// # Errors
-    /// As `parse_toml`.
+    /// [`JobError`] at the first problem.
     pub fn parse_with_names(file: &str, text: &str, known: &[&str]) -> Result<Self, JobError> {
         let written: as_written::JobFile = parse_toml(file, text)?;
         check_format(file, written.format)?;
@@ -105,18 +105,18 @@ impl Job {
         toml_file::schema_of::<as_written::JobFile>()
     }
 
-    /// Ranges and priors of the free parameters in order.
+    /// Ranges and priors of the free parameters, in job order.
     pub(crate) fn search_axes(&self) -> Vec<SearchAxis> {
         self.parameters.iter().map(FreeParameter::search_axis).collect()
     }
 
-    /// Names of the free parameters in order.
+    /// Names of the free parameters, in job order.
     #[must_use]
     pub fn parameter_names(&self) -> Vec<String> {
         self.parameters.iter().map(|p| p.name.clone()).collect()
     }
 
-    /// Features of the targets, in their order.
+    /// Features of the targets, in the same order.
     #[must_use]
     pub fn features(&self) -> Vec<Feature> {
         self.targets.iter().map(|aim| aim.feature.clone()).collect()
@@ -127,8 +127,8 @@ impl Job {
         self.conditions.iter().filter_map(|condition| condition.recording.as_deref())
     }
 
-    /// What decides the cost of a point. Title, seed, budgets, interval settings and file paths do not: a fit
-    /// can continue with a larger budget.
+    /// The part of the job on which the cost of a point depends. Title, seed, budgets, interval settings and
+    /// file paths are excluded, so that a fit can continue with a larger budget.
     pub(super) fn identity(&self) -> JobIdentity<'_> {
         JobIdentity {
             conditions: self.conditions.iter().map(|c| (&*c.name, &*c.set, c.held_out)).collect(),
@@ -143,7 +143,7 @@ impl Job {
         }
     }
 
-    /// Cameras on which a fitted feature depends, with the numbers of their conditions.
+    /// Cameras on which a fitted feature depends, with the indices of their conditions.
     fn used_cameras(&self) -> Vec<(usize, FeatureCamera)> {
         let used = |at: usize| {
             let mut aims = self.targets.iter().filter(|aim| aim.feature.condition == at && !aim.held_out);
@@ -153,8 +153,8 @@ impl Job {
         cameras.filter(|(at, _)| used(*at)).collect()
     }
 
-    /// How the target of an aim depends on the uncertain calibration of its camera. `None` for a feature that
-    /// is not a length, for a target that the job gives with its own deviation, and in a job with traces.
+    /// Dependence of a target on the uncertain calibration of its camera. `None` for a feature that is not a
+    /// length, for a target that the job gives with its own deviation, and in a job with traces.
     pub(crate) fn target_calibration(&self, aim: &FitTarget) -> Option<TargetCalibration> {
         let measured = matches!(aim.source, TargetSource::Measured { .. }) && self.traces.is_empty();
         let condition = aim.feature.condition;
@@ -204,9 +204,9 @@ pub enum JobError {
     Value {
         /// File as named by the user.
         file: String,
-        /// The key with its entry.
+        /// The key, preceded by the name of its entry.
         key: String,
-        /// What was found, what was expected, and what to do.
+        /// Value found, value expected, and advice.
         problem: String,
     },
 }

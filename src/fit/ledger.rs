@@ -1,4 +1,4 @@
-//! The ledger of a run makes every evaluation once, in parallel where possible, and records them in an order
+//! Ledger of a run: it makes every evaluation once, in parallel where possible, and records them in an order
 //! that does not depend on the number of threads.
 
 use super::evaluation::{Evaluation, EvaluationStage, FailureReason};
@@ -12,7 +12,7 @@ use std::ops::ControlFlow;
 /// Progress of a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FitProgress {
-    /// Purpose of the last evaluations.
+    /// Purpose of the latest evaluations.
     pub stage: EvaluationStage,
     /// Evaluations so far, replayed ones included.
     pub evaluations: usize,
@@ -22,10 +22,10 @@ pub struct FitProgress {
     pub best_cost: f64,
 }
 
-/// Called after every evaluation; `Break` ends the search with the result so far.
+/// Called after every evaluation; `Break` ends the search with the result found so far.
 pub(crate) type OnProgress<'a> = dyn FnMut(&FitProgress) -> ControlFlow<()> + Send + 'a;
 
-/// Reason for which no more evaluations are made.
+/// Reason why no more evaluations are made.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum StopReason {
     /// The evaluations allowed are used up.
@@ -49,13 +49,13 @@ pub struct Ledger<'a> {
     best: Option<Evaluation>,
     limit: usize,
     stop: Option<StopReason>,
-    /// Evaluations that are not yet written; `None` when they are written at once.
+    /// Evaluations that are held back from the journal; `None` when they are written at once.
     held_lines: Option<Vec<(EvaluationStage, usize)>>,
 }
 
 impl<'a> Ledger<'a> {
-    /// A ledger that replays the evaluations of `journaled`; `limit` is the largest number of evaluations of
-    /// this run.
+    /// A ledger that replays the evaluations of a journal. `limit` is the maximum number of evaluations
+    /// of this run.
     #[must_use]
     pub fn new(
         objective: &'a Objective<'a>,
@@ -83,11 +83,11 @@ impl<'a> Ledger<'a> {
         }
     }
 
-    /// The evaluations at `points` of the unit box, in their order. Points of this run are not evaluated
-    /// again.
+    /// Evaluations at `points` of the unit box, in the order of the points. A point that this run has already
+    /// evaluated is not evaluated again.
     ///
     /// # Errors
-    /// [`StopReason`] if some could not be made; the others are kept.
+    /// [`StopReason`] if some evaluations could not be made; those that were made are kept.
     pub(crate) fn evaluate_points(
         &mut self,
         stage: EvaluationStage,
@@ -97,7 +97,7 @@ impl<'a> Ledger<'a> {
             return Err(stop.clone());
         }
         let (new, complete) = self.new_points(points);
-        // recorded in chunks, in the order of the points, so that little is lost when the program is killed
+        // recorded in chunks, in the order of the points, so that little is lost if the program is killed
         for chunk in new.chunks(2 * rayon::current_num_threads()) {
             let (objective, replay) = (self.objective, &self.replay);
             let make = |point: &Vec<f64>| match replay.get(&point_key(point)) {
@@ -119,7 +119,7 @@ impl<'a> Ledger<'a> {
         Ok(points.iter().filter_map(|point| self.find_evaluation(point)).collect())
     }
 
-    /// Holds new lines back until [`Self::release_lines`], so that a refused job leaves no journal.
+    /// Holds new lines back until [`Self::release_lines`], so that a refused job leaves no journal behind.
     pub(crate) fn hold_lines(&mut self) {
         self.held_lines = Some(Vec::new());
     }
@@ -127,7 +127,7 @@ impl<'a> Ledger<'a> {
     /// Writes `opening`, then the lines that were held back.
     ///
     /// # Errors
-    /// The reason for which the journal cannot be written.
+    /// The reason why the journal cannot be written.
     pub(crate) fn release_lines(&mut self, opening: &str) -> Result<(), String> {
         let held = self.held_lines.take().unwrap_or_default();
         let entries: Vec<_> =
@@ -136,7 +136,6 @@ impl<'a> Ledger<'a> {
         if lines.is_empty() { Ok(()) } else { self.journal.append(&lines) }
     }
 
-    /// The next lines of the journal.
     fn format_lines(&mut self, entries: impl Iterator<Item = (EvaluationStage, Evaluation)>) -> String {
         let mut text = String::new();
         for (stage, evaluation) in entries {
@@ -146,8 +145,8 @@ impl<'a> Ledger<'a> {
         text
     }
 
-    /// Writes new evaluations in one call, which waits for the disk once. They are counted and reported only
-    /// afterwards.
+    /// Writes new evaluations in one call, so that it waits for the disk only once. The evaluations are
+    /// counted and reported after they are written.
     fn write_lines(&mut self, stage: EvaluationStage, made: &[(Evaluation, bool)]) -> Result<(), StopReason> {
         if let Some(held) = &mut self.held_lines {
             let places = made.iter().zip(self.evaluations.len()..).filter(|((_, replayed), _)| !replayed);
@@ -162,7 +161,7 @@ impl<'a> Ledger<'a> {
         self.journal.append(&lines).map_err(|problem| self.stop.insert(StopReason::Journal(problem)).clone())
     }
 
-    /// Replaces the objective by another one of the same model and features, and updates all costs.
+    /// Replaces the objective by one with the same model and features, and updates all costs.
     pub(crate) fn change_objective(&mut self, objective: &'a Objective<'a>) {
         self.objective = objective;
         let known = self.evaluations.iter_mut().chain(self.replay.values_mut());
@@ -178,39 +177,39 @@ impl<'a> Ledger<'a> {
         self.objective
     }
 
-    /// Evaluations of this run in order.
+    /// Evaluations of this run, in order.
     #[must_use]
     pub fn run_evaluations(&self) -> &[Evaluation] {
         &self.evaluations
     }
 
-    /// The known evaluation of lowest cost, the earliest among equals.
+    /// The evaluation of lowest cost; of several with equal cost, the earliest.
     #[must_use]
     pub fn best_evaluation(&self) -> Option<&Evaluation> {
         self.best.as_ref()
     }
 
-    /// Evaluations that this run may still make.
+    /// Number of evaluations that this run may still make.
     pub(crate) fn remaining_evaluations(&self) -> usize {
         self.limit.saturating_sub(self.evaluations.len())
     }
 
-    /// The number of evaluations of this run, at most.
+    /// Maximum number of evaluations of this run.
     pub(crate) fn evaluation_limit(&self) -> usize {
         self.limit
     }
 
-    /// Changes the number of evaluations of this run.
+    /// Sets the maximum number of evaluations of this run.
     pub(crate) fn set_limit(&mut self, limit: usize) {
         self.limit = limit;
     }
 
-    /// The reason other than the budget for which nothing more can be evaluated.
+    /// Reason other than the budget why nothing more can be evaluated.
     pub(crate) fn stop_reason(&self) -> Option<&StopReason> {
         self.stop.as_ref()
     }
 
-    /// Failed evaluations of this run, counted by reason.
+    /// Number of failed evaluations of this run by reason.
     #[must_use]
     pub fn count_failures(&self) -> BTreeMap<FailureReason, usize> {
         let mut counts = BTreeMap::new();
@@ -220,8 +219,8 @@ impl<'a> Ledger<'a> {
         counts
     }
 
-    /// The points that this run has not evaluated, without repetitions and within the budget, and whether
-    /// these are all of them.
+    /// The points that still have to be evaluated, without repetitions and within the budget, and whether the
+    /// budget covers all of them.
     fn new_points(&self, points: &[Vec<f64>]) -> (Vec<Vec<f64>>, bool) {
         let mut new: Vec<Vec<f64>> = Vec::new();
         for point in points.iter().filter(|point| self.find_evaluation(point).is_none()) {
@@ -234,7 +233,7 @@ impl<'a> Ledger<'a> {
         (new, complete)
     }
 
-    /// Counts and reports an evaluation that was written.
+    /// Counts an evaluation, after it was written, and reports the progress.
     fn count_evaluation(&mut self, stage: EvaluationStage, evaluation: Evaluation, replayed: bool) {
         self.replayed += usize::from(replayed);
         self.places.insert(point_key(&evaluation.unit), self.evaluations.len());
@@ -250,7 +249,7 @@ impl<'a> Ledger<'a> {
         }
     }
 
-    /// The evaluation of this run at a point.
+    /// The evaluation that this run made at a point.
     pub(crate) fn find_evaluation(&self, point: &[f64]) -> Option<&Evaluation> {
         self.places.get(&point_key(point)).and_then(|at| self.evaluations.get(*at))
     }

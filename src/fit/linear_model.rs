@@ -2,8 +2,8 @@
 //!
 //! Rows of the Jacobian are the features in the order of the targets, then the priors, then the camera
 //! unknowns (`CameraFit`), each in standard deviations; columns are the parameters. Slopes are central
-//! differences with `DIFFERENCE_STEP`, which is wide enough to average over the scatter of features of
-//! sampled traces.
+//! differences with the step `DIFFERENCE_STEP`, which is wide enough to average over the scatter of features
+//! that are measured on sampled traces.
 
 use super::bounds::{Prior, SearchAxis, clamp_unit};
 use super::camera_calibration::{CameraEstimate, CameraFit};
@@ -16,13 +16,13 @@ use portable_math as math;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Step of the differences in the unit box: about 2 % of a parameter whose bounds are a decade apart.
+/// Step of the differences in the unit box: about 2 % of a parameter whose bounds are one decade apart.
 pub(crate) const DIFFERENCE_STEP: f64 = 0.01;
 /// Longest step in the unit box for which the linear model is trusted.
 const MAX_STEP: f64 = 0.2;
 
-/// The points that [`FeatureSlopes::from_differences`] needs: for each parameter one step below and one above
-/// `unit`, clamped to the box.
+/// The points that [`FeatureSlopes::from_differences`] needs: for each parameter, one step below and one step
+/// above `unit`, clamped to the box.
 pub(crate) fn difference_points(unit: &[f64]) -> Vec<Vec<f64>> {
     let moved = |axis: usize, step: f64| {
         unit.iter().enumerate().map(|(at, u)| if at == axis { clamp_unit(u + step) } else { *u }).collect()
@@ -30,8 +30,8 @@ pub(crate) fn difference_points(unit: &[f64]) -> Vec<Vec<f64>> {
     (0..unit.len()).flat_map(|axis| [moved(axis, -DIFFERENCE_STEP), moved(axis, DIFFERENCE_STEP)]).collect()
 }
 
-/// `d distance / d u` of every feature with its camera errors, one row per feature. `None` where the
-/// feature is missing on both sides, or at the point and on one side.
+/// `d distance / d u` of every feature as its camera shows it, one row per feature. `None` where the feature
+/// is missing on both sides, or at the point and on one side.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FeatureSlopes(pub Vec<Vec<Option<f64>>>);
 
@@ -66,9 +66,9 @@ fn feature_slope(target: &TargetValue, below: (f64, f64), above: (f64, f64)) -> 
     (width > 0.0 && change.is_finite()).then(|| change / width)
 }
 
-/// Scatter of each feature about a straight line through the points next to a centre, as a standard
-/// deviation in its own unit: `f(+) + f(-) - 2 f(0)` of independent values has six times their variance.
-/// `None` where the feature is missing at one of the points.
+/// Scatter of each feature about a straight line through neighbouring points, as a standard deviation in its
+/// own unit: the variance of `f(+) + f(-) - 2 f(0)` of independent values is six times that of one value.
+/// `None` where the feature is missing at the centre, or on a side of every pair.
 pub(crate) fn feature_scatter(
     targets: &[TargetValue],
     centre: &Evaluation,
@@ -90,12 +90,12 @@ pub(crate) fn feature_scatter(
     targets.iter().enumerate().map(of).collect()
 }
 
-/// Residuals of an evaluation; `None` where a feature is missing.
+/// Residuals of an evaluation against the targets of the objective; `None` where a feature is missing.
 pub(crate) fn residuals(objective: &Objective, evaluation: &Evaluation) -> Vec<Option<f64>> {
     residuals_against(objective.axes(), objective.targets(), evaluation)
 }
 
-/// Residuals against other targets; `None` also where a target is NaN.
+/// Residuals against the given targets; `None` where a feature is missing or its target is NaN.
 pub(crate) fn residuals_against(
     axes: &[SearchAxis],
     targets: &[TargetValue],
@@ -110,7 +110,8 @@ pub(crate) fn residuals_against(
     features.chain(priors).chain(cameras.prior_residuals().map(Some)).collect()
 }
 
-/// `d r / d u` at a point, with the cameras re-estimated at every point; zero where it is unknown.
+/// Jacobian `d r / d u` with the camera numbers re-estimated along each step; entries with unknown
+/// slope are zero.
 pub(crate) fn jacobian(objective: &Objective, centre: &Evaluation, slopes: &FeatureSlopes) -> DMatrix<f64> {
     let (targets, features) = (objective.targets(), &centre.features);
     let cameras = CameraFit::estimate(targets, features);
@@ -118,7 +119,7 @@ pub(crate) fn jacobian(objective: &Objective, centre: &Evaluation, slopes: &Feat
     cameras.project_jacobian(held, targets, features)
 }
 
-/// Camera estimates at a point, with intervals if `slopes` are given.
+/// Estimates of the cameras at a point, with intervals if `slopes` are given.
 pub(crate) fn camera_estimates(
     objective: &Objective,
     centre: &Evaluation,
@@ -130,7 +131,7 @@ pub(crate) fn camera_estimates(
     cameras.estimates(held.as_ref(), targets, features)
 }
 
-/// `d r / d u` with the camera numbers of the point.
+/// Jacobian `d r / d u` with the camera numbers held at their values at the point.
 fn jacobian_with_cameras_held(
     objective: &Objective,
     centre: &Evaluation,
@@ -156,8 +157,8 @@ fn jacobian_with_cameras_held(
     DMatrix::from_fn(rows.len(), columns, |row, column| rows[row][column])
 }
 
-/// Broyden's update of the Jacobian after a step: the model then reproduces the change of the residuals
-/// (Math. Comput. 19 (1965) 577).
+/// Broyden's update of the Jacobian after a step: the linear model then reproduces the change of the
+/// residuals (Math. Comput. 19 (1965) 577).
 pub(crate) fn broyden_update(
     jacobian: &mut DMatrix<f64>,
     before: &[Option<f64>],
@@ -178,8 +179,8 @@ pub(crate) fn broyden_update(
     }
 }
 
-/// Damped Gauss-Newton step: `(J^T W J + damping) d = -J^T W r` with the weights `min(1, LOSS_KNEE /
-/// |r|)^2` of the cost (Levenberg, Quart. Appl. Math. 2 (1944) 164), shortened to [`MAX_STEP`]. The
+/// Damped Gauss-Newton step `d` with `(J^T W J + damping) d = -J^T W r` and the weights `W = min(1, LOSS_KNEE
+/// / |r|)^2` of the cost (Levenberg, Quart. Appl. Math. 2 (1944) 164), shortened to [`MAX_STEP`]. The
 /// coordinate `held` does not change.
 pub(crate) fn damped_step(
     jacobian: &DMatrix<f64>,
@@ -207,29 +208,30 @@ pub(crate) fn damped_step(
     longest.is_finite().then(|| solution.iter().map(|d| d * shorten).collect())
 }
 
-/// The point one step away, inside the box.
+/// The point one step away, clamped to the box.
 pub(crate) fn step_in_box(unit: &[f64], step: &[f64]) -> Vec<f64> {
     unit.iter().zip(step).map(|(u, d)| clamp_unit(u + d)).collect()
 }
 
-// Rank, condition, deviations, correlations and combinations by the linear model.
+// Rank, condition number, deviations, correlations and combinations from the linear model.
 //
-// `J = d r / d u` is in standard deviations of the features per length of the unit box. A singular direction
-// is informative if its 95 % interval fits into the box; the information matrix `J^T J` is inverted on those
-// directions only.
+// The Jacobian `J = d r / d u` is in standard deviations per length of the unit box. A singular direction is
+// informative if its 95 % interval fits into the box. The information matrix `J^T J` is inverted on the
+// informative directions only.
 
-/// Half-width of a 95 % interval in standard deviations of a normal variable.
+/// Half width of a 95 % interval, in standard deviations of a normal variable.
 pub(crate) const Z_95: f64 = 1.96;
 /// Rise in cost at the ends of a 95 % interval (chi-squared with one degree of freedom).
 pub(crate) const CHI_SQUARED_95: f64 = 3.84;
-/// Smallest singular value, per length of the box, of an informative direction: its 95 % interval is as wide
-/// as the box.
+/// Smallest singular value of an informative direction, per length of the box: its 95 % interval is then as
+/// wide as the box.
 pub(crate) const MIN_INFORMATIVE: f64 = 2.0 * Z_95;
-/// Singular values below this fraction of the largest one are rounding errors.
+/// Fraction of the largest singular value below which a singular value is a rounding error.
 pub(crate) const ROUNDING_SHARE: f64 = 1e-9;
-/// Fraction (squared cosine) of uninformative directions in a parameter above which it is not determined.
+/// A parameter is not determined if the uninformative directions contain more than this fraction of
+/// it (squared cosine).
 pub(crate) const OPEN_SHARE: f64 = 0.01;
-/// Exponents below this fraction of the largest one of a combination are left out.
+/// Exponents below this fraction of the largest exponent of a combination are left out.
 const MIN_NAMED_EXPONENT: f64 = 0.05;
 
 /// Singular directions of a Jacobian in the space of the parameters.
@@ -241,19 +243,20 @@ pub(crate) struct SingularDirections {
     pub rank: usize,
 }
 
-/// A product of powers of the parameters that the features determine or leave open.
+/// A product of powers of the parameters that the features determine or leave undetermined.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ParameterCombination {
-    /// Exponents by parameter; the largest is 1, those below 0.05 are left out.
+    /// Exponents by parameter name; the largest is 1, and those below 0.05 are left out.
     pub exponents: BTreeMap<String, f64>,
-    /// Standard deviation of its logarithm; for an open combination the one that the box allows.
+    /// Standard deviation of the logarithm of the product; for an undetermined combination, the one that
+    /// the box allows.
     pub sd_relative: f64,
-    /// Whether the features determine it.
+    /// Whether the features determine the combination.
     pub determined: bool,
 }
 
 impl ParameterCombination {
-    /// The product in words, such as `friction.c friction.a^0.31`.
+    /// The product as text, such as `friction.c friction.a^0.31`.
     pub(crate) fn describe(&self) -> String {
         let mut factors: Vec<(&String, f64)> = self.exponents.iter().map(|(name, e)| (name, *e)).collect();
         factors.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
@@ -268,7 +271,7 @@ impl SingularDirections {
     /// Singular directions of a Jacobian with one column per parameter.
     pub(crate) fn from_jacobian(jacobian: &DMatrix<f64>) -> Self {
         let columns = jacobian.ncols();
-        // rows of zeros add no information and complete the set of directions
+        // rows of zeros add no information; with them the decomposition yields all directions
         let padded = jacobian.clone().resize_vertically(jacobian.nrows().max(columns), 0.0);
         let svd = padded.svd(false, true);
         let rows = svd.v_t.iter().flat_map(|v_t| v_t.row_iter());
@@ -281,7 +284,8 @@ impl SingularDirections {
         Self { all, rank }
     }
 
-    /// Largest singular value over the smallest; infinite where one is zero.
+    /// Ratio of the largest to the smallest singular value; infinite if the smallest is zero or
+    /// a rounding error.
     pub(crate) fn condition_number(&self) -> f64 {
         match (self.all.first(), self.all.last()) {
             (Some((largest, _)), Some((smallest, _))) if *smallest > ROUNDING_SHARE * largest => {
@@ -291,7 +295,8 @@ impl SingularDirections {
         }
     }
 
-    /// Standard deviation of a coordinate by the informative directions, and its fraction in the other ones.
+    /// Standard deviation of a coordinate from the informative directions, and the fraction of the coordinate
+    /// in the uninformative ones.
     pub(crate) fn coordinate_sd(&self, axis: usize) -> (f64, f64) {
         let component = |direction: &Vec<f64>| math::powi(direction.get(axis).copied().unwrap_or(0.0), 2);
         let (known, open) = self.all.split_at(self.rank);
@@ -305,7 +310,7 @@ impl SingularDirections {
         self.coordinate_sd(axis).1 < OPEN_SHARE
     }
 
-    /// Directions that the features leave open.
+    /// Directions that the features leave undetermined.
     pub(crate) fn open_directions(&self) -> Vec<&[f64]> {
         self.all.iter().skip(self.rank).map(|(_, direction)| direction.as_slice()).collect()
     }
@@ -322,8 +327,8 @@ impl SingularDirections {
         Some((covariance / (self.coordinate_sd(a).0 * self.coordinate_sd(b).0)).clamp(-1.0, 1.0))
     }
 
-    /// Products of powers at the point `unit` that are determined, the most precise first, and those that are
-    /// left open.
+    /// Products of powers at the point `unit`: the determined ones, the most precise first, then
+    /// the undetermined ones.
     pub(crate) fn combinations(
         &self,
         names: &[String],
@@ -334,8 +339,8 @@ impl SingularDirections {
             axes.iter().zip(unit).map(|(axis, u)| axis.bounds.log_slope(*u).unwrap_or(0.0)).collect();
         let one = |(rank, (value, direction)): (usize, &(f64, Vec<f64>))| {
             let determined = rank < self.rank;
-            // a determined sum d_i u_i has exponents d_i / slope_i; along an open direction ln p_i changes by
-            // d_i slope_i
+            // a determined sum of d_i u_i has the exponents d_i / slope_i; along an undetermined direction ln
+            // p_i changes by d_i slope_i
             let exponent = |(d, slope): (&f64, &f64)| {
                 let determines = if *slope == 0.0 { 0.0 } else { d / slope };
                 if determined { determines } else { d * slope }
@@ -373,7 +378,7 @@ mod tests {
         ]
     }
 
-    /// `r = ln(p^a q^b) / sd` as rows of the Jacobian in the unit box.
+    /// Jacobian rows of `r = ln(p^a q^b) / sd` in the unit box, for each `(a, b, sd)`.
     fn rows(of: &[(f64, f64, f64)]) -> DMatrix<f64> {
         let (lp, lq) = (100.0_f64.ln(), 10.0_f64.ln());
         DMatrix::from_fn(of.len(), 2, |row, column| {
@@ -389,7 +394,7 @@ mod tests {
         let combinations = found.combinations(&names(), &axes(), &[0.5, 0.5]);
         assert_eq!(combinations[0].describe(), "p q^0.50");
         assert!(combinations[0].determined && (combinations[0].sd_relative - 0.01).abs() < 1e-12);
-        // p q^0.5 stays the same where ln q = -2 ln p
+        // along ln q = -2 ln p the product p q^0.5 is constant
         let open = &combinations[1];
         assert!(
             !open.determined && (open.exponents["p"] / open.exponents["q"] + 0.5).abs() < 1e-9,

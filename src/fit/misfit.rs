@@ -1,9 +1,9 @@
-//! Tests whether the model explains the trace of a recording. The verdict precedes all other results of a
-//! fit.
+//! Tests whether the model explains the traces of the recordings. This verdict precedes all other results
+//! of a fit.
 //!
 //! The parameters of a wrong model have narrow intervals too. Evidence against a model is a residual above
-//! the noise, a residual that grows with the length of the segments, or a segment that fits worse than
-//! noise allows; in a fit of features also a camera or a constant that is far from its prior.
+//! the noise, a residual that grows with the length of the segments, or a segment that fits worse than noise
+//! allows. In every fit, a camera or a constant that is far from its prior is evidence too.
 
 use super::result::NuisanceResult;
 use crate::text::format_trimmed;
@@ -11,18 +11,18 @@ use portable_math as math;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 
-/// Relative standard deviation of the measured noise. Over clean recordings of another camera model, chi2 per
-/// degree of freedom has twice this scatter about 1.
+/// Relative standard deviation of the measured noise. In clean recordings of another camera model, chi2 per
+/// degree of freedom scatters about 1 by twice this value.
 const NOISE_SD_RELATIVE: f64 = 0.04;
-/// Largest relative growth of chi2 per degree of freedom from the shortest to the longest segments, beyond
-/// its scatter. A wrong damping gives 0.05 to 0.13, a right model less than 0.02.
+/// Allowed relative growth of chi2 per degree of freedom from the shortest to the longest segments, in
+/// addition to its scatter. A wrong damping makes it grow by 0.05 to 0.13, a right model by less than 0.02.
 const MAX_GROWTH: f64 = 0.03;
-/// Standard deviations of a two-sided 95 % interval.
+/// Half width of a two-sided 95 % interval, in standard deviations of a normal variable.
 const Z_95: f64 = 1.96;
-/// Largest distance of a nuisance from its prior, in standard deviations. With twenty nuisances, one of a
-/// hundred fits of a right model exceeds it.
+/// Largest distance of a nuisance parameter from its prior, in standard deviations. With twenty nuisance
+/// parameters, one in a hundred fits of a right model exceeds it.
 const MAX_PRIOR_DISTANCE_SD: f64 = 3.5;
-/// Digits of a ratio in a sentence.
+/// Number of digits of a ratio in a sentence.
 const DIGITS: usize = 3;
 
 /// How well the model explains the traces.
@@ -34,26 +34,27 @@ pub struct TraceMisfit {
     pub reasons: Vec<String>,
     /// Residuals and noise, one entry per recording and channel.
     pub channels: Vec<ChannelMisfit>,
-    /// The stages, the shortest segments first.
+    /// Fit of each stage, in the order of the stages: the shortest segments first.
     pub stages: Vec<StageMisfit>,
 }
 
-/// Residuals of a channel of a recording, with the segments of the last stage.
+/// Residuals of one channel of a recording, with the segments of the last stage.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ChannelMisfit {
     /// Name of the recording in the job.
     pub recording: String,
-    /// Channel in the job.
+    /// Name of the channel in the job.
     pub channel: String,
-    /// Frames that were compared.
+    /// Number of frames that were compared.
     pub frames: usize,
-    /// Frames with data outside all segments, before the tip slides for the first time.
+    /// Number of tracked frames that were not compared, such as those before the tip slides for
+    /// the first time.
     pub frames_left_out: usize,
     /// Root mean square of measured minus model, m.
     pub residual_rms_m: f64,
     /// Standard deviation of the noise, m.
     pub noise_m: f64,
-    /// Sum of squared residuals in units of the noise over the degrees of freedom.
+    /// Ratio of the sum of squared residuals, in units of the noise, to the degrees of freedom.
     pub chi2_per_dof: f64,
     /// Autocorrelation of the residuals at a lag of one frame; `None` without neighbouring frames.
     pub autocorrelation_1: Option<f64>,
@@ -61,30 +62,30 @@ pub struct ChannelMisfit {
     pub worst: Vec<WorstSegment>,
 }
 
-/// A segment that fits badly.
+/// A segment with a large misfit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct WorstSegment {
-    /// Time of its first frame, s.
+    /// Time of its first compared frame, s.
     pub start_s: f64,
-    /// Time of the frame after its last one, s.
+    /// Time of the frame after its last compared frame, s.
     pub end_s: f64,
-    /// Sum of squared residuals in units of the noise over the degrees of freedom.
+    /// Ratio of the sum of squared residuals, in units of the noise, to the degrees of freedom.
     pub chi2_per_dof: f64,
 }
 
-/// A stage of the fit: how well segments of one length fit, and what the estimates were.
+/// One stage of a trace fit: the misfit of segments of one length, and the estimates.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct StageMisfit {
     /// Length of the segments, s.
     pub segment_s: f64,
-    /// Number of segments of all recordings.
+    /// Number of segments in all recordings.
     pub segments: usize,
-    /// Segments with a misfit that noise does not explain.
+    /// Number of segments with a misfit that noise does not explain.
     pub bad_segments: usize,
     /// Degrees of freedom: number of data minus number of unknowns.
     pub dof: usize,
-    /// Sum of squared residuals in units of the noise over the degrees of freedom; infinite (`null` in a
-    /// file) if a run of the model fails.
+    /// Ratio of the sum of squared residuals, in units of the noise, to the degrees of freedom; infinite
+    /// (`null` in a file) if a run of the model fails.
     #[serde(deserialize_with = "or_infinite")]
     pub chi2_per_dof: f64,
     /// Parameters at the end of the stage, in SI units.
@@ -97,14 +98,14 @@ fn or_infinite<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Err
 }
 
 impl StageMisfit {
-    /// Standard deviation of chi2 per degree of freedom of white noise of known size.
+    /// Standard deviation of chi2 per degree of freedom for white noise of known size.
     fn chi2_sd(&self) -> f64 {
         (2.0 / self.dof.max(1) as f64).sqrt()
     }
 }
 
 impl TraceMisfit {
-    /// Judges the model by the residuals of all channels and stages, and by the nuisances.
+    /// Judges the model by the residuals of all channels and stages, and by the nuisance parameters.
     pub(crate) fn judge(
         channels: Vec<ChannelMisfit>,
         stages: Vec<StageMisfit>,
@@ -122,7 +123,7 @@ impl TraceMisfit {
         Self { explained: reasons.is_empty(), reasons, channels, stages }
     }
 
-    /// The first sentence on the fit.
+    /// The first sentence of a report on the fit.
     pub(crate) fn headline(&self) -> String {
         let chi2 = self.stages.last().map_or(f64::NAN, |stage| stage.chi2_per_dof);
         if self.explained {
@@ -135,7 +136,7 @@ impl TraceMisfit {
     }
 }
 
-/// The first sentence on a fit with evidence against the model.
+/// The first sentence of a report on a fit with evidence against the model.
 pub(crate) fn unexplained_headline(reasons: &[String]) -> String {
     format!("The model does not explain the recording: {}", reasons.join("; "))
 }
@@ -145,27 +146,27 @@ pub(crate) fn far_from_priors(nuisances: &[NuisanceResult]) -> Vec<String> {
     nuisances.iter().filter_map(far_from_prior).collect()
 }
 
-/// No segment was compared.
+/// Evidence: no segment was compared.
 fn no_segment_compared(stages: &[StageMisfit]) -> Option<String> {
     let compared = stages.last().is_some_and(|stage| stage.segments > 0);
     (!compared).then(|| "no segment of it could be started".to_owned())
 }
 
-/// A channel without compared frames.
+/// Evidence: a channel without compared frames.
 fn unseen_channel(channels: &[ChannelMisfit]) -> Option<String> {
     let unseen = channels.iter().find(|channel| channel.frames == 0)?;
     let (recording, channel) = (&unseen.recording, &unseen.channel);
     Some(format!("no segment of {channel} in `{recording}` could be started"))
 }
 
-/// Segments in a wrong state, or with a motion that the model does not have.
+/// Evidence: segments in a wrong state, or with a motion that the model does not have.
 fn bad_segments(stages: &[StageMisfit]) -> Option<String> {
     let last = stages.last().filter(|stage| stage.bad_segments > 0)?;
     let (bad, all) = (last.bad_segments, last.segments);
     Some(format!("{bad} of {all} segments fit worse than noise ever does"))
 }
 
-/// Residuals above the noise, including its uncertainty.
+/// Evidence: residuals above the noise, whose uncertainty is taken into account.
 fn misfit_above_noise(stages: &[StageMisfit]) -> Option<String> {
     let last = stages.last()?;
     let most = 1.0 + Z_95 * math::hypot(2.0 * NOISE_SD_RELATIVE, last.chi2_sd());
@@ -176,7 +177,8 @@ fn misfit_above_noise(stages: &[StageMisfit]) -> Option<String> {
     })
 }
 
-/// A misfit that grows with the segment length: the error of a wrong model accumulates over a run.
+/// Evidence: a misfit that grows with the segment length, because the error of a wrong model accumulates
+/// in a run.
 fn misfit_growth(stages: &[StageMisfit]) -> Option<String> {
     let [first, .., last] = stages else { return None };
     let most = first.chi2_per_dof * (1.0 + MAX_GROWTH + Z_95 * math::hypot(first.chi2_sd(), last.chi2_sd()));
@@ -191,7 +193,7 @@ fn misfit_growth(stages: &[StageMisfit]) -> Option<String> {
     })
 }
 
-/// A constant or a camera that is far from its prior: a wrong model distorts all free numbers.
+/// Evidence: a constant or a camera far from its prior, because a wrong model distorts all free numbers.
 fn far_from_prior(found: &NuisanceResult) -> Option<String> {
     let apart = (found.estimate - found.prior) / found.prior_sd;
     (apart.abs() > MAX_PRIOR_DISTANCE_SD).then(|| {

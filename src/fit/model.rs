@@ -8,26 +8,27 @@ use crate::recording::Recording;
 use portable_math as math;
 use rayon::prelude::*;
 
-/// Features of a model at parameter values. The objective knows a model by this trait only.
+/// Features of a model as a function of its parameters. The objective knows a model only by this trait.
 pub trait FeaturePredictor: Sync {
-    /// One entry a target, in their order; `values` are the free parameters in job order, in their SI units.
+    /// The features, one per target in the same order; `values` are the free parameters in job order,
+    /// in SI units.
     ///
     /// # Errors
     /// [`RunFailure`] when the run ended before anything could be observed.
     fn predict_features(&self, values: &[f64]) -> Result<Vec<Observed>, RunFailure>;
 
-    /// The features of one simulated measurement of that model, with the noise, lost points and starting
-    /// state of draw number `draw`.
+    /// Features of one simulated measurement of this model, with the noise, lost points and starting state of
+    /// draw number `draw`.
     ///
     /// # Errors
     /// As [`Self::predict_features`].
     fn simulate_twin(&self, values: &[f64], draw: u64) -> Result<Vec<Observed>, RunFailure>;
 }
 
-/// One of the equally likely runs and recordings of a model.
+/// Random choices of one simulated recording: starting state, noise and lost frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Draw {
-    /// Starting state; 0 is the scene's own.
+    /// Number of the starting state; 0 is that of the scene itself.
     pub member: u64,
     /// Seed of the tracking noise; every evaluation of a search uses 0.
     pub noise: u64,
@@ -35,20 +36,20 @@ pub struct Draw {
     pub dropouts: bool,
 }
 
-/// A model that is seen through cameras.
+/// A model whose runs are recorded by cameras.
 pub trait Model: Sync {
-    /// The recording of a condition of the job, counted from 0, by its camera; `values` are the free
-    /// parameters in job order, in their SI units.
+    /// Simulated recording of a condition of the job, counted from 0, by its camera. `values` are the free
+    /// parameters in job order, in SI units.
     ///
     /// # Errors
     /// [`RunFailure`] when the run ended before anything could be observed.
     fn record_condition(&self, values: &[f64], condition: usize, draw: Draw)
     -> Result<Recording, RunFailure>;
 
-    /// The recording of a run with another start.
+    /// Simulated recording of a run with another start.
     ///
     /// # Errors
-    /// As [`Self::record_condition`]; also if the model has no other start.
+    /// As [`Self::record_condition`]; also if the model cannot start otherwise.
     fn record_restarted(
         &self,
         values: &[f64],
@@ -60,32 +61,32 @@ pub trait Model: Sync {
         Err(RunFailure::new(FailureReason::Refused, "this model knows no other start", 0.0))
     }
 
-    /// Time constant with which an error of the start decays, s; `None` where it is unknown.
+    /// Time constant with which an error of the starting state decays, s; `None` where it is unknown.
     fn decay_s(&self, values: &[f64], condition: usize) -> Option<f64> {
         let _ = (values, condition);
         None
     }
 
-    /// Longest time by which a run may start earlier, s.
+    /// Longest time by which the start of a run can be advanced, s.
     fn max_lead_s(&self, condition: usize) -> f64 {
         let _ = condition;
         f64::INFINITY
     }
 }
 
-/// A start other than that of the scene.
+/// A start that differs from that of the scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Restart {
-    /// Earlier by this time, s; the recording starts at the same instant.
+    /// The run starts earlier by this time, s; the recording starts at the same instant.
     Earlier(f64),
-    /// With angles that are larger by this fraction.
+    /// The run starts with angles that are larger by this fraction.
     Moved(f64),
 }
 
 /// The features of a model's recordings, averaged over its starting states.
 pub(crate) struct ModelFeatures<'a> {
     model: &'a dyn Model,
-    /// Their conditions are indices into `conditions`.
+    /// Features; the condition of each is an index into `conditions`.
     features: Vec<Feature>,
     targets: Vec<f64>,
     conditions: Vec<usize>,
@@ -93,8 +94,8 @@ pub(crate) struct ModelFeatures<'a> {
 }
 
 impl<'a> ModelFeatures<'a> {
-    /// Features with the target values to which peaks are assigned, averaged over `members` starting states
-    /// (at least 1). Conditions without features are not simulated.
+    /// Features of `model`, averaged over `members` starting states (at least 1). Peaks are assigned to the
+    /// target values `targets`. Conditions without features are not simulated.
     pub(crate) fn new(model: &'a dyn Model, features: &[Feature], targets: Vec<f64>, members: usize) -> Self {
         let mut conditions: Vec<usize> = features.iter().map(|feature| feature.condition).collect();
         conditions.sort_unstable();
@@ -112,7 +113,7 @@ impl<'a> ModelFeatures<'a> {
         }
     }
 
-    /// The same for the features of fitted targets.
+    /// Like [`Self::new`], for the features of fitted targets.
     pub(crate) fn for_targets(
         model: &'a dyn Model,
         aims: &[FitTarget],
@@ -123,7 +124,7 @@ impl<'a> ModelFeatures<'a> {
         Self::new(model, &features, targets.iter().map(|target| target.value).collect(), members)
     }
 
-    /// Every feature of one draw.
+    /// All features of one draw.
     ///
     /// # Errors
     /// [`RunFailure`] of the first condition that fails.
@@ -153,7 +154,7 @@ impl FeaturePredictor for ModelFeatures<'_> {
     }
 
     fn simulate_twin(&self, values: &[f64], draw: u64) -> Result<Vec<Observed>, RunFailure> {
-        // a twin starts in none of the states that the fit averages over
+        // the starting state of a twin is none of those over which the fit averages
         let member = if self.members > 1 { self.members as u64 + draw } else { 0 };
         let read = self.read_features(values, Draw { member, noise: draw, dropouts: true })?;
         Ok(read.into_iter().map(observe_reading).collect())
@@ -169,7 +170,7 @@ fn observe_reading(read: Result<FeatureValue, MissingValue>) -> Observed {
     }
 }
 
-/// Mean and spread of a feature over the starting states; missing where at most half of them show it.
+/// Mean and spread of a feature over the starting states; missing if no more than half of the states show it.
 fn average_runs(runs: &[Vec<Result<FeatureValue, MissingValue>>], at: usize, feature: &Feature) -> Observed {
     let shown: Vec<&FeatureValue> = runs.iter().filter_map(|run| run.get(at)?.as_ref().ok()).collect();
     if 2 * shown.len() <= runs.len() {
@@ -182,7 +183,7 @@ fn average_runs(runs: &[Vec<Result<FeatureValue, MissingValue>>], at: usize, fea
     let count = shown.len() as f64;
     let below_db = shown.iter().map(|read| read.below_db).sum::<f64>() / count;
     let values = shown.iter().map(|read| read.value);
-    // average logarithms where residuals are logarithms and all values have one sign
+    // logarithms are averaged where residuals are logarithms and all values have the same sign
     let log = feature.reading.comparison() == ValueComparison::Log
         && (shown.iter().all(|read| read.value > 0.0) || shown.iter().all(|read| read.value < 0.0));
     let taken: Vec<f64> = if log { values.map(|v| math::ln(v.abs())).collect() } else { values.collect() };
@@ -202,8 +203,8 @@ mod tests {
     use crate::recording::channel::Window;
     use crate::recording::{FrameGrid, Traces};
 
-    /// A blade whose deflection is the parameter times a factor of the starting state; conditions differ by
-    /// their number; member 3 fails.
+    /// A blade whose deflection is the parameter times a factor that depends on the starting state, plus a
+    /// part that depends on the condition; member 3 fails.
     struct Still;
 
     const FACTORS: [f64; 4] = [1.0, 1.2, 0.8, 1.0];

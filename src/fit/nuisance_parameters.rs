@@ -1,27 +1,27 @@
 //! Constants of the scenes that a trace fit frees within priors, and the common scale of masses and forces,
-//! which no motion shows.
+//! which no motion reveals.
 
 use super::job::{Constants, FreeParameter, Job, NuisanceParameter, is_same_quantity};
 use crate::model::parameters::{ModelParameter, ParameterQuantity, ParameterRange, find_parameter};
 use crate::simulate::scene::Scene;
 use portable_math as math;
 
-/// Range of a freed constant on either side of its value, in standard deviations of its prior.
+/// Half width of the range of a freed constant, in standard deviations of its prior.
 const RANGE_SD: f64 = 5.0;
 
 /// A constant that is freed, with its prior.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FreedConstant {
-    /// Key of the scene with its table.
+    /// Key of the scene, with its table.
     pub name: String,
-    /// The scene's value, in its SI unit.
+    /// Value in the scene, in its SI unit.
     pub value: f64,
-    /// Standard deviation of its logarithm.
+    /// Standard deviation of the prior of its logarithm.
     pub sd_relative: f64,
 }
 
 impl FreedConstant {
-    /// Lowest and highest value that it may take, in its SI unit.
+    /// Lowest and highest value that the constant may have, in its SI unit.
     pub(crate) fn range(&self) -> [f64; 2] {
         let factor = math::exp(RANGE_SD * self.sd_relative);
         let [low, high] = [self.value / factor, self.value * factor];
@@ -32,8 +32,8 @@ impl FreedConstant {
     }
 }
 
-/// Constants or parameters that cannot be freed as the job asks: what was found, what was expected, what to
-/// do.
+/// Constants or parameters that cannot be freed as the job asks; the text gives what was found, what was
+/// expected, and advice.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{0}")]
 pub struct NuisanceError(String);
@@ -78,8 +78,8 @@ fn free_listed_constant(
     Ok(FreedConstant { name: name.clone(), value, sd_relative: *sd_relative })
 }
 
-/// All constants that are measured to percents, in the form in which the first scene writes them, where all
-/// scenes have the same value.
+/// All constants that are measured to a few percent and have the same value in all scenes, under the names
+/// that the first scene uses.
 fn free_all_constants(sd_relative: f64, job: &Job, scenes: &[Scene]) -> Vec<FreedConstant> {
     let Some((scene, others)) = scenes.split_first() else { return Vec::new() };
     let is_set = |name: &str| {
@@ -94,8 +94,8 @@ fn free_all_constants(sd_relative: f64, job: &Job, scenes: &[Scene]) -> Vec<Free
     scene.written_values().filter(is_freed).map(freed).collect()
 }
 
-/// Whether a parameter is a constant with an error of percents. Lengths and centres of mass are exact,
-/// friction is sought, and drive and restitution belong to the experiment.
+/// Whether a parameter is a constant that is known to a few percent. Lengths and centres of mass count as
+/// exact, friction is estimated, and drive and restitution belong to the experiment.
 fn is_constant(parameter: &ModelParameter) -> bool {
     use ParameterQuantity as Q;
     let exact = [Q::NeckLength, Q::LipLength, Q::NeckCentre, Q::LipCentre, Q::Restitution];
@@ -103,14 +103,14 @@ fn is_constant(parameter: &ModelParameter) -> bool {
     !exact.contains(&parameter.quantity) && !sought.contains(&parameter.quantity)
 }
 
-/// Refuses a job in which every parameter with a unit of mass or force is free and has no prior.
+/// Refuses a job in which all parameters whose unit contains a mass are free and have no prior.
 ///
 /// # Errors
 /// [`NuisanceError`] with the names of the parameters.
 pub(crate) fn check_scaling(job: &Job, scenes: &[Scene]) -> Result<(), NuisanceError> {
-    // a fixed value or a prior fixes the scale
+    // a fixed value or a prior determines the scale
     let is_held = |(name, _): (&str, f64)| match find_free_parameter(job, name) {
-        // the form of the job decides: a stiffness written as a frequency has no unit of mass
+        // the form in the job decides: a stiffness that is written as a frequency has no unit of mass
         Some(free) => has_mass(&free.name) && free.prior.is_some(),
         None => has_mass(name),
     };
@@ -125,7 +125,7 @@ pub(crate) fn check_scaling(job: &Job, scenes: &[Scene]) -> Result<(), NuisanceE
     )))
 }
 
-/// The free parameter of this quantity, whatever its form in the job.
+/// The free parameter for the same quantity as `name`, in whatever form the job writes it.
 fn find_free_parameter<'a>(job: &'a Job, name: &str) -> Option<&'a FreeParameter> {
     job.parameters.iter().find(|free| is_same_quantity(&free.name, name))
 }

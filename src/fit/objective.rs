@@ -1,19 +1,20 @@
 //! The cost of a point of the unit box. Every failure of the model becomes a reason and a finite cost.
 //!
-//! The cost is twice the negative log-likelihood, up to a constant that makes it zero where all targets are
-//! met: `sum [ rho(r) + 2 ln(s / sd) + (d / 6 dB)^2 ] + sum of the priors`.
+//! The cost is twice the negative log-likelihood, up to a constant that makes it zero if all targets are met:
+//! `sum [ rho(r) + 2 ln(s / s0) + (d / 6 dB)^2 ] + sum of the priors`.
 //!
-//! - The residual of a feature is `r = ln(model / target) / s`, or `(model - target) / s` where the sign may
-//!   change.
-//! - `s^2 = sd^2 + scatter^2 + spread^2` combines the deviation of the target, the scatter of a rough model
-//!   value between neighbouring parameters, and the spread over the starting states. The term `2 ln(s / sd)`
-//!   penalises the spread; without it a fit would prefer points with uncertain features.
-//! - `rho` (`robust_loss`) is `r^2` up to `LOSS_KNEE` and logarithmic beyond it, so that a missing peak does
+//! - The residual of a feature is `r = ln(model / target) / s`, or `(model - target) / s` if its
+//!   sign may change.
+//! - `s^2 = sd^2 + scatter^2 + spread^2` combines the deviation of the target, the scatter of a rough
+//!   model between neighbouring parameters, and the spread over the starting states; `s0` is `s`
+//!   without the spread. The term `2 ln(s / s0)` penalises the spread: without it a fit would prefer
+//!   points with uncertain features.
+//! - `rho` (`robust_loss`) is `r^2` up to `LOSS_KNEE` and logarithmic above it, so that a missing peak does
 //!   not dominate the cost. A missing feature costs as much as one that is wrong by a factor of `MAX_RATIO`.
-//! - `d` is the level of the strongest peak above the assigned one. With it the cost is continuous when
-//!   another peak is assigned.
+//! - `d` is the level of the strongest peak relative to the assigned peak. This term keeps the cost
+//!   continuous where the assignment changes to another peak.
 //!
-//! A failing run costs at least as much as a run without any feature, and less the longer it lasts.
+//! A failing run costs at least as much as a run without any feature; the longer it lasts, the less it costs.
 
 use super::bounds::SearchAxis;
 use super::camera_calibration::CameraFit;
@@ -26,7 +27,7 @@ use portable_math as math;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Residual, in standard deviations, above which the cost grows logarithmically. Measurement errors stay
-/// below 3, so that only a wrong model is affected.
+/// below 3, so the limit matters only for a wrong model.
 pub(crate) const LOSS_KNEE: f64 = 3.0;
 
 /// The cost function of a fit: bounds, targets and model.
@@ -37,8 +38,8 @@ pub struct Objective<'a> {
 }
 
 impl<'a> Objective<'a> {
-    /// One axis per free parameter and one target per feature. Targets are finite, not zero where
-    /// logarithms are compared, and have a standard deviation above zero.
+    /// Creates the objective from one axis per free parameter and one target per feature. Targets must be
+    /// finite, not zero where logarithms are compared, and have a standard deviation above zero.
     #[must_use]
     pub fn new(axes: Vec<SearchAxis>, targets: Vec<TargetValue>, model: &'a dyn FeaturePredictor) -> Self {
         Self { axes, targets, model }
@@ -64,7 +65,7 @@ impl<'a> Objective<'a> {
         self.evaluate_at(unit.to_vec(), self.values(unit))
     }
 
-    /// Evaluates the model at parameter values, without their point in the unit box.
+    /// Evaluates the model at parameter values; the evaluation has no point in the unit box.
     pub(crate) fn evaluate_values(&self, values: Vec<f64>) -> Evaluation {
         self.evaluate_at(Vec::new(), values)
     }
@@ -73,7 +74,7 @@ impl<'a> Objective<'a> {
         let predicted = catch_panic(|| self.model.predict_features(&values));
         let (features, failure) = match predicted.and_then(|features| self.check_features(features)) {
             Ok(features) => (features, None),
-            // a model may give a progress outside of 0 to 1
+            // a model may report a progress outside 0 to 1
             Err(RunFailure { reason, message, progress }) => {
                 (Vec::new(), Some(RunFailure::new(reason, message, progress)))
             }
@@ -81,7 +82,7 @@ impl<'a> Objective<'a> {
         self.add_costs(EvaluationOutcome { unit, values, features, failure })
     }
 
-    /// Adds the costs, which follow from features or failure and from the values.
+    /// Adds the costs, which follow from the parameter values and from the features or the failure.
     pub(crate) fn add_costs(&self, outcome: EvaluationOutcome) -> Evaluation {
         let EvaluationOutcome { unit, values, features, failure } = outcome;
         let priors: f64 = prior_residuals(&self.axes, &values)
@@ -98,7 +99,7 @@ impl<'a> Objective<'a> {
         Evaluation { unit, values, cost, global_cost, features, failure }
     }
 
-    /// The objective with the scatter of each feature, in its unit.
+    /// The same objective with the given scatter of each feature, in the feature's unit.
     pub(crate) fn with_feature_scatter(&self, scatter: &[f64]) -> Self {
         let targets = self.targets.iter().zip(scatter);
         let targets = targets.map(|(target, scatter)| TargetValue { scatter: *scatter, ..target.clone() });
@@ -114,12 +115,12 @@ impl<'a> Objective<'a> {
             .and_then(|features| self.check_features(features))
     }
 
-    /// Number of camera unknowns, which are estimated at every point.
+    /// Number of camera unknowns; they are estimated at every point of the search.
     pub(crate) fn count_camera_unknowns(&self) -> usize {
         CameraFit::estimate(&self.targets, &[]).count_unknowns()
     }
 
-    /// Refuses a wrong number of features, and numbers that are not finite.
+    /// Refuses a wrong number of features, and values that are not finite.
     fn check_features(&self, features: Vec<Observed>) -> Result<Vec<Observed>, RunFailure> {
         let (found, expected) = (features.len(), self.targets.len());
         if found != expected {
@@ -144,7 +145,7 @@ pub(crate) fn prior_residuals(axes: &[SearchAxis], values: &[f64]) -> impl Itera
     axes.iter().zip(values).filter_map(|(axis, value)| Some(axis.prior.as_ref()?.residual(*value)))
 }
 
-/// Cost of the features with the priors of their cameras, and the cost if all features were missing.
+/// Cost of the features and of the priors of their cameras, and the cost if all features were missing.
 fn feature_costs(targets: &[TargetValue], features: &[Observed]) -> (f64, f64) {
     let cameras = CameraFit::estimate(targets, features);
     let one = |(at, target): (usize, &TargetValue)| {
@@ -157,7 +158,7 @@ fn feature_costs(targets: &[TargetValue], features: &[Observed]) -> (f64, f64) {
     (shown + cameras.prior_residuals().map(robust_loss).sum::<f64>(), farthest)
 }
 
-/// Targets of the first stage, with the features that belong to them.
+/// Targets that count in the first stage, and their features.
 fn first_stage_targets(targets: &[TargetValue], features: &[Observed]) -> (Vec<TargetValue>, Vec<Observed>) {
     let kept = targets.iter().enumerate().filter_map(|(at, target)| Some((at, target.first_stage_target()?)));
     let with = |(at, target): (usize, TargetValue)| (target, features.get(at).cloned());
@@ -165,15 +166,15 @@ fn first_stage_targets(targets: &[TargetValue], features: &[Observed]) -> (Vec<T
     (targets, features.into_iter().flatten().collect())
 }
 
-/// Largest residual of a prior, so that costs stay finite.
+/// Largest residual of a prior; the limit keeps costs finite.
 const MAX_PRIOR_RESIDUAL: f64 = 1e6;
 
-/// Distance over its standard deviation, the spread over starting states included.
+/// Ratio of the distance of a feature from its target to [`total_sd`].
 pub(crate) fn residual(observation: &Observation, target: &TargetValue) -> f64 {
     target.distance(observation.value) / total_sd(observation, target)
 }
 
-/// Standard deviation of the distance: of the target and over starting states.
+/// Standard deviation of the distance, from that of the target and from the spread over starting states.
 pub(crate) fn total_sd(observation: &Observation, target: &TargetValue) -> f64 {
     math::hypot(target.relative_sd(), observation.spread / target.reference_size())
 }
@@ -199,7 +200,7 @@ pub(crate) fn robust_loss(residual: f64) -> f64 {
     }
 }
 
-/// The outcome, or a panic as a failure.
+/// The result of `run`; a panic becomes a failure.
 fn catch_panic<T>(run: impl FnOnce() -> Result<T, RunFailure>) -> Result<T, RunFailure> {
     catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|payload| {
         let message = panic_message(payload.as_ref());
@@ -300,7 +301,7 @@ mod tests {
 
     #[test]
     fn a_spread_over_starting_states_counts_as_a_likelihood_says() {
-        // s^2 = 0.01^2 + 0.03^2: the residual shrinks, and 2 ln(s / sd) = ln 10 is paid
+        // s^2 = 0.01^2 + 0.03^2: the residual shrinks, and the cost rises by 2 ln(s / sd) = ln 10
         let wide = Observation { value: 80.0 * 0.05_f64.exp(), spread: 2.4, below_db: 0.0 };
         assert!((feature_cost(&wide, &low()) - (0.05_f64.powi(2) / 1e-3 + 10.0_f64.ln())).abs() < 1e-9);
         let useless = Observation { value: 1e-9, spread: 1e9, below_db: 0.0 };

@@ -1,10 +1,10 @@
 //! The posterior density of a job's unknowns, for external samplers and optimisers.
 //!
-//! `ln p(x) = ln p(data | x) + ln p(x)`, up to a constant of the data. Every unknown has a range. Its prior
-//! is flat along its coordinate (its logarithm, or itself), or normal and truncated to the range. The
-//! likelihood of a job on features is `-cost / 2` without the terms of the priors ([`super::objective`]).
-//! That of a job on traces is `-chi^2 / 2`, minimised over the starting states of the segments
-//! (`fit_states_at`).
+//! `ln p(x | data) = ln p(data | x) + ln p(x)`, up to a constant that depends only on the data. Every unknown
+//! has a range and a coordinate: its value or the logarithm of its value. Its prior along the coordinate is
+//! flat, or normal and truncated to the range. The likelihood of a job on features is `-cost / 2` without the
+//! terms of the priors ([`super::objective`]). The likelihood of a job on traces is `-chi^2 / 2`, minimised
+//! over the starting states of the segments (`fit_states_at`).
 
 use super::FitError;
 use super::bounds::{BoundsSpacing, Prior, SearchAxis};
@@ -20,16 +20,16 @@ use crate::feature::Feature;
 use portable_math as math;
 use std::f64::consts::{LN_2, SQRT_2, TAU};
 
-/// An unknown: its range and its prior along a coordinate, which is its logarithm or itself.
+/// An unknown with its range and its prior, along a coordinate: its value or the logarithm of its value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PosteriorParameter {
-    /// Key of the scene with its table, or recording and quantity of a camera.
+    /// Key of the scene, with its table; or name of the recording and key of its camera's error.
     pub name: String,
-    /// Least and greatest value, in its SI unit.
+    /// Smallest and largest value, in its SI unit.
     pub bounds: [f64; 2],
-    /// Whether the coordinate is the logarithm.
+    /// Whether the coordinate is the logarithm of the value.
     pub is_log: bool,
-    /// Mean and standard deviation of a normal prior along the coordinate.
+    /// Mean and standard deviation of a normal prior along the coordinate; `None` for a flat prior.
     pub prior: Option<[f64; 2]>,
 }
 
@@ -49,7 +49,7 @@ impl Posterior {
     /// The posterior of a problem on features or on traces, without its held-out targets.
     ///
     /// # Errors
-    /// [`FitError`] where a target cannot be measured, or a head that drives a model is not tracked.
+    /// [`FitError`] if a target cannot be measured, or if the head that drives a model is not tracked.
     pub fn new(problem: Problem) -> Result<Self, FitError> {
         if let Some(model) = problem.trace_model() {
             let model = model.map_err(|error| FitError::CannotBeFitted { why: error.to_string() })?;
@@ -75,25 +75,26 @@ impl Posterior {
         &self.problem
     }
 
-    /// The unknowns, in the order of every point.
+    /// The unknowns, in the order of the values of a point.
     #[must_use]
     pub fn unknowns(&self) -> &[PosteriorParameter] {
         &self.unknowns
     }
 
-    /// The values at a point of the unit box. Uniform points are mapped to samples of the prior.
+    /// Values of the unknowns at a point of the unit box. Uniformly distributed points become samples
+    /// of the prior.
     #[must_use]
     pub fn prior_transform(&self, unit: &[f64]) -> Vec<f64> {
         self.unknowns.iter().zip(unit).map(|(unknown, u)| unknown.quantile(*u)).collect()
     }
 
-    /// Logarithm of the prior density, by the values; minus infinity beyond a bound.
+    /// Logarithm of the prior density with respect to the values; minus infinity outside the bounds.
     #[must_use]
     pub fn log_prior(&self, values: &[f64]) -> f64 {
         self.unknowns.iter().zip(values).map(|(unknown, value)| unknown.log_density(*value)).sum()
     }
 
-    /// Logarithm of the likelihood up to a constant; minus infinity where the model does not run.
+    /// Logarithm of the likelihood, up to a constant; minus infinity where the model does not run.
     #[must_use]
     pub fn log_likelihood(&self, values: &[f64]) -> f64 {
         match &self.data {
@@ -112,16 +113,16 @@ impl Posterior {
         }
     }
 
-    /// Logarithm of the posterior density up to a constant; the model runs only within the bounds.
+    /// Logarithm of the posterior density, up to a constant; outside the bounds the model is not run.
     #[must_use]
     pub fn log_density(&self, values: &[f64]) -> f64 {
         let prior = self.log_prior(values);
         if prior == f64::NEG_INFINITY { prior } else { prior + self.log_likelihood(values) }
     }
 
-    /// Residuals (model minus data) in standard deviations: one per feature in the order of the job, or one
-    /// per fitted frame of the traces, recording by recording, tip before head. `None` where the model has
-    /// no value.
+    /// Residuals (model minus data) in standard deviations: one per feature in the order of the job, or
+    /// one per fitted frame of the traces, recording by recording, tip before head. `None` where the model
+    /// has no value.
     #[must_use]
     pub fn residuals(&self, values: &[f64]) -> Vec<Option<f64>> {
         match &self.data {
@@ -173,7 +174,7 @@ impl PosteriorParameter {
         if self.is_log { math::ln(value) } else { value }
     }
 
-    /// Ends of the range in standard deviations from the prior's mean.
+    /// Ends of the range as distances from the mean of the prior, in standard deviations.
     fn standardized_bounds(&self, [mean, sd]: [f64; 2]) -> [f64; 2] {
         self.bounds.map(|end| (self.coordinate(end) - mean) / sd)
     }
@@ -185,7 +186,7 @@ impl PosteriorParameter {
             Some(prior) => {
                 let ends = self.standardized_bounds(prior);
                 let all = normal_probability(ends[0], ends[1]);
-                // integrate from the nearer end: neither tail is lost to rounding
+                // the integral starts from the nearer end, so that rounding does not spoil either tail
                 let below = |x: f64| match unit < 0.5 {
                     true => normal_probability(ends[0], x) - unit * all,
                     false => (1.0 - unit) * all - normal_probability(x, ends[1]),
@@ -197,13 +198,13 @@ impl PosteriorParameter {
         value.clamp(self.bounds[0], self.bounds[1])
     }
 
-    /// Logarithm of the prior density by the value.
+    /// Logarithm of the prior density with respect to the value.
     fn log_density(&self, value: f64) -> f64 {
         let [low, high] = self.bounds;
         if !(low..=high).contains(&value) {
             return f64::NEG_INFINITY;
         }
-        // Jacobian of the coordinate by the value
+        // logarithm of the derivative of the coordinate by the value
         let slope = if self.is_log { -math::ln(value) } else { 0.0 };
         let along = match self.prior {
             None => -math::ln(self.coordinate(high) - self.coordinate(low)),
@@ -218,15 +219,15 @@ impl PosteriorParameter {
     }
 }
 
-/// Probability of a standard normal variable between two limits; accurate in both tails.
+/// Probability that a standard normal variable lies between two limits; accurate in both tails.
 fn normal_probability(from: f64, to: f64) -> f64 {
     let above = |x: f64| math::erfc(x / SQRT_2) / 2.0;
     if from > 0.0 { above(from) - above(to) } else { above(-to) - above(-from) }
 }
 
-/// Root of a rising function by bisection to rounding.
+/// Root of an increasing function by bisection, to rounding accuracy.
 fn bisect_root(of: impl Fn(f64) -> f64, [mut low, mut high]: [f64; 2]) -> f64 {
-    // beyond 38 deviations the normal density underflows to zero
+    // more than 38 deviations from the mean the normal density underflows to zero
     (low, high) = (low.max(-38.0), high.min(38.0));
     let halvings = (f64::MANTISSA_DIGITS as f64 + math::ln((high - low).max(2.0)) / LN_2) as usize;
     for _ in 0..halvings {
@@ -244,7 +245,7 @@ mod tests {
         PosteriorParameter { name: String::new(), bounds, is_log, prior }
     }
 
-    /// The transform is the inverse of the integral of the density: differences of the one are the other.
+    /// The transform inverts the integral of the density, so its slope is the reciprocal of the density.
     #[test]
     fn uniform_places_have_the_prior_for_density() {
         let kinds = [
@@ -252,7 +253,7 @@ mod tests {
             unknown([0.1, 10.0], true, None),
             unknown([-1.0, 2.0], false, Some([0.5, 0.7])),
             unknown([0.1, 10.0], true, Some([0.3, 0.5])),
-            unknown([5.0, 9.0], false, Some([0.0, 1.0])), // the tail alone
+            unknown([5.0, 9.0], false, Some([0.0, 1.0])), // only the tail
             unknown([-20.0, 20.0], false, Some([0.0, 1.0])),
         ];
         for of in kinds {

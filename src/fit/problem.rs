@@ -27,16 +27,16 @@ use serde::Serialize;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-/// Most frames of a run of the model. Each thread holds one run, and a million frames take 0.1 GB; a mistyped
-/// rate must not fill the memory.
+/// Maximum number of frames of a model run. Each thread holds one run, and a million frames take 0.1 GB, so a
+/// mistyped frame rate must not fill the memory.
 const MOST_FRAMES: f64 = 1e6;
 
-/// A recording with its exposure, which the frames do not contain.
+/// A recording with its exposure time, which the recording itself does not contain.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeasuredRecording {
     /// The recording.
     pub recording: Recording,
-    /// Exposure time, s; `None` where it is unknown, which is treated as zero.
+    /// Exposure time, s; `None` if unknown, which is treated as zero.
     pub exposure_s: Option<f64>,
 }
 
@@ -49,34 +49,34 @@ impl From<Recording> for MeasuredRecording {
 /// A job that does not match its scenes and recordings.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ProblemError {
-    /// The job has another number of conditions.
+    /// The number of scenes differs from the number of conditions of the job.
     #[error("found {found} scenes, expected {expected}, one for each recording and condition of the job")]
     Scenes {
-        /// Scenes given.
+        /// Number of scenes given.
         found: usize,
-        /// Conditions of the job.
+        /// Number of conditions of the job.
         expected: usize,
     },
-    /// The job has another number of recordings.
+    /// The number of recordings differs from that of the job.
     #[error("found {found} recordings, expected the {expected} of the job")]
     Recordings {
-        /// Recordings given.
+        /// Number of recordings given.
         found: usize,
-        /// Recordings of the job.
+        /// Number of recordings of the job.
         expected: usize,
     },
     /// A scene refuses its drive, a value or a bound, or its run has too few or too many frames.
     #[error("{place}: {problem}")]
     Scene {
-        /// The condition or bound.
+        /// Name of the condition, or of the parameter and bound.
         place: String,
-        /// What was found, what was expected, and what to do.
+        /// Value found, value expected, and advice.
         problem: String,
     },
-    /// A trace does not go with its recording.
+    /// A trace cannot be fitted to its recording.
     #[error(transparent)]
     Trace(#[from] TraceError),
-    /// Constants or parameters cannot be freed as the job wants it.
+    /// Constants or parameters cannot be freed as the job asks.
     #[error(transparent)]
     Constants(#[from] NuisanceError),
 }
@@ -93,11 +93,11 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// Combines a job with its scenes, one per condition ([`Job::conditions`]), and its recordings, one per
-    /// condition that has a recording, both in the order of the job.
+    /// Combines a job with its scenes and its recordings: one scene per condition ([`Job::conditions`]), and
+    /// one recording per condition that has one, both in the order of the job.
     ///
-    /// The values that a condition sets replace those of its scene. Both bounds of every free parameter
-    /// have to be valid in every scene.
+    /// The values that a condition sets replace those of its scene. Every scene must accept both bounds of
+    /// every free parameter.
     ///
     /// # Errors
     /// [`ProblemError`] for the first mismatch.
@@ -157,7 +157,7 @@ impl Problem {
         &self.model
     }
 
-    /// The recordings by condition; `None` where a condition has none.
+    /// The recordings by condition; `None` for a condition without a recording.
     pub(crate) fn recordings(&self) -> &[Option<Recording>] {
         &self.recordings
     }
@@ -167,7 +167,7 @@ impl Problem {
         &self.traces
     }
 
-    /// Segment length of each stage of a trace fit, s, rising.
+    /// Segment length of each stage of a trace fit, s, in ascending order.
     #[must_use]
     pub fn segment_s(&self) -> &[f64] {
         &self.segment_s
@@ -181,7 +181,7 @@ impl Problem {
     /// The model of the fitted traces; `None` in a job on features.
     ///
     /// # Errors
-    /// [`HeadMotionError`] where the head that drives a model is not tracked.
+    /// [`HeadMotionError`] if the head that drives a model is not tracked.
     pub fn trace_model(&self) -> Option<Result<TraceModel, HeadMotionError>> {
         if self.traces.is_empty() {
             return None;
@@ -195,15 +195,15 @@ impl Problem {
         Some(TraceModel::new(&sources, &self.job.parameters, &self.constants))
     }
 
-    /// SHA-256 of everything that decides the cost of a point, from `fingerprint`: the values of job, scenes
-    /// and recordings, and the version of the program. Title, seed, budgets and intervals do not count: a fit
-    /// can continue with a larger budget.
+    /// SHA-256 of everything on which the cost of a point depends, from `fingerprint`: the values of job,
+    /// scenes and recordings, and the version of the program. Title, seed, budgets and intervals are
+    /// excluded, so that a fit can continue with a larger budget.
     #[must_use]
     pub fn fingerprint(&self) -> &str {
         &self.fingerprint
     }
 
-    /// The context of a fit from the start within the budgets of the job.
+    /// The context of a new fit within the budgets of the job.
     #[must_use]
     pub fn new_context(&self) -> FitContext<'_> {
         let version = env!("CARGO_PKG_VERSION");
@@ -218,7 +218,7 @@ impl Problem {
         self.fit_with(&self.new_context(), &mut NullSink, &mut |_: &FitProgress| ControlFlow::Continue(()))
     }
 
-    /// Fits with at most `evaluations` of the model, without a journal.
+    /// Fits the job with at most `evaluations` evaluations of the model, without a journal.
     ///
     /// # Errors
     /// As [`fit_features`].
@@ -249,8 +249,8 @@ impl Problem {
     }
 }
 
-/// The scene of condition `at` with its drive and its own values. Both bounds of every free parameter have to
-/// be valid in it.
+/// The scene of condition `at` with its drive and the values that the condition sets. The scene must accept
+/// both bounds of every free parameter.
 fn check_scene(
     job: &Job,
     at: usize,
@@ -298,7 +298,7 @@ fn check_frames(
     Err(ProblemError::Scene { place: format!("`{condition}`"), problem })
 }
 
-/// Camera and tracking noise of a recording, or the job's own camera without noise.
+/// Camera and tracking noise of a recording; without a recording, the camera of the job without noise.
 fn recording_instrument(job: &Job, measured: Option<&MeasuredRecording>) -> Instrument {
     let Some(MeasuredRecording { recording, exposure_s }) = measured else {
         let camera = job.camera.unwrap_or(Camera { frame_rate_hz: 0.0, exposure_s: 0.0 });
@@ -307,13 +307,13 @@ fn recording_instrument(job: &Job, measured: Option<&MeasuredRecording>) -> Inst
     let frame_rate_hz = recording.grid().frame_rate_hz;
     let camera = Camera { frame_rate_hz, exposure_s: exposure_s.unwrap_or(0.0) };
     let quality = measure_quality(recording, *exposure_s);
-    // the deflection is missing where either point is lost, and points are lost independently
+    // the deflection is missing where either point is lost, and the two points are lost independently
     let dropout_fraction = 0.5 * quality.missing_deflection_frames as f64 / quality.frames.max(1) as f64;
-    // the head moves most smoothly: its noise estimate is the best
+    // the head moves most smoothly, so its noise is measured best
     Instrument { camera, noise_m: quality.head_x.noise_m.unwrap_or(0.0), dropout_fraction }
 }
 
-/// What decides the cost of a point.
+/// Everything on which the cost of a point depends.
 #[derive(Serialize)]
 struct ProblemIdentity<'a> {
     version: &'static str,
@@ -330,15 +330,15 @@ struct RecordingIdentity<'a> {
     synthetic: bool,
 }
 
-// Whole runs with the fitted constants. A trace that drives its own head starts in the fitted state of its
-// first segment.
+// Whole runs with the fitted constants. Where the recorded head drives the model, a run starts in the fitted
+// state of the first good segment.
 
 impl Problem {
-    /// The model with the fitted constants and starting states of a result. In a fit of features it is the
+    /// The model with the fitted constants and starting states of a result. In a fit of features this is the
     /// model of the problem.
     ///
     /// # Errors
-    /// [`FitError::CannotBeFitted`] when a scene refuses what was fitted.
+    /// [`FitError::CannotBeFitted`] if a scene refuses a fitted value.
     pub fn fitted_model(&self, result: &FitResult) -> Result<SceneModel, FitError> {
         let conditions = self.model().conditions().iter().enumerate();
         let whole = conditions.map(|(at, condition)| {
@@ -348,7 +348,7 @@ impl Problem {
         Ok(self.model().with_conditions(whole.collect::<Result<_, FitError>>()?))
     }
 
-    /// The scene of condition `at` with the fitted constants, its drive and its start.
+    /// The scene of condition `at` for a whole run, with the fitted constants, drive and start.
     fn whole_scene(&self, at: usize, scene: &Scene, result: &FitResult) -> Result<Scene, FitError> {
         let refused = |why: String| FitError::CannotBeFitted { why };
         let mut scene = scene.clone();
@@ -377,7 +377,7 @@ impl Problem {
         Ok(scene)
     }
 
-    /// Compares whole runs of the fitted model with the job's components and features.
+    /// Compares whole runs of the fitted model with the components and features of the job.
     pub(super) fn compare_with_targets(
         &self,
         result: &FitResult,
@@ -436,7 +436,7 @@ mod tests {
         assert_eq!(refused(vec![scene], vec![]), ProblemError::Recordings { found: 0, expected: 1 });
     }
 
-    /// The job on the recording's trace, with more keys.
+    /// The job with the trace of its recording, with further keys at the top and in the trace.
     fn traced_job(top: &str, trace: &str) -> String {
         let parameters =
             JOB.split("[[parameter]]").skip(1).map(|p| p.split("\n[").next().unwrap_or_default());

@@ -1,15 +1,15 @@
-//! Profile likelihood: along each parameter, the lowest cost that the others can still reach.
+//! Profile likelihood: the lowest cost along each parameter, minimised over the other parameters.
 //!
-//! From the best point one walker goes up and another down each parameter. At every place it minimises the
-//! cost over the other parameters, first by the linear model and then by damped Gauss-Newton steps
-//! corrected by Broyden's rule, until the cost has risen by more than the threshold or the range ends
-//! (Venzon and Moolgavkar, Appl. Stat. 37 (1988) 87; Raue et al., Bioinformatics 25 (2009) 1923). All
-//! walkers step together: their evaluations run in parallel, in an order that does not depend on the number
-//! of threads.
+//! From the best point one walker goes up and another goes down along each parameter. At every place a walker
+//! minimises the cost over the other parameters, first by the linear model and then by damped Gauss-Newton
+//! steps corrected by Broyden's rule. It ends when the cost has risen by more than the threshold or when the
+//! range ends (Venzon and Moolgavkar, Appl. Stat. 37 (1988) 87; Raue et al., Bioinformatics 25 (2009) 1923).
+//! All walkers step together: their evaluations run in parallel, in an order that does not depend on the
+//! number of threads.
 //!
-//! A cost of features is rough, and values behind a ridge may be as good. A walker therefore also tries the
-//! best known point near each place, probes behind the crossing that it finds, and continues from the
-//! farthest evaluated point within the threshold.
+//! The cost of features is rough, and values behind a ridge of the cost may fit equally well. A walker
+//! therefore also tries the best known point near each place, probes the cost behind the crossing that it
+//! finds, and continues from the farthest evaluated point within the threshold.
 
 use super::bounds::clamp_unit;
 use super::evaluation::{Evaluation, EvaluationStage};
@@ -20,51 +20,55 @@ use super::objective::Objective;
 use nalgebra::DMatrix;
 use portable_math as math;
 
-/// Dampings of the inner steps: nearly undamped, and short.
+/// Dampings of the inner steps: the first hardly damps, the second makes short steps.
 const DAMPINGS: [f64; 2] = [1.0, 3e2];
-/// Inner steps at a place. A few suffice: the linear model starts them near the minimum.
+/// Number of inner steps at a place. A few suffice, because the linear model starts them near the minimum.
 const INNER_STEPS: usize = 3;
 /// Gain in cost below which the inner minimisation ends: a fiftieth of the threshold.
 const FOLLOWED_GAIN: f64 = 0.08;
-/// Most places of a walker: with a poor linear model it takes about eight, and each probe behind a crossing
-/// is one more.
+/// Maximum number of places of a walker. With a poor linear model a walker needs about eight places, and each
+/// probe behind a crossing is one more.
 const MAX_PLACES: usize = 20;
-/// Probes behind a crossing, in units of its distance from the best point. The cost has to exceed the
-/// threshold there too, so that a ridge of a quarter of an interval does not end the walk.
+/// Distances of the probes behind a crossing, in units of the distance of the crossing from the best point.
+/// The cost must exceed the threshold there too, so that a ridge as wide as a quarter of the interval does
+/// not end the walk.
 const PROBE_FACTORS: [f64; 2] = [1.25, 1.6];
-/// Largest distance along the coordinate, in the unit box, of a known point from which a place is started.
+/// Largest distance of a known point, along the coordinate in the unit box, from a place at which
+/// it is tried.
 const NEAR_COORDINATE: f64 = 0.01;
-/// How often walkers continue from a point behind the crossings that they have found.
+/// Number of times that walkers may continue from a point behind their crossings.
 const MAX_RESUMPTIONS: usize = 3;
-/// First step as a fraction of the distance at which the linear model crosses the threshold.
+/// Length of the first step, as a fraction of the distance at which the linear model crosses the threshold.
 const FIRST_STEP_SHARE: f64 = 0.6;
 /// Shortest and longest first step in the unit box.
 const FIRST_STEP_RANGE: (f64, f64) = (0.003, 0.25);
-/// Factor on the root of the threshold at which a step aims, so that the next place brackets the crossing.
+/// A step aims at this multiple of the root of the threshold, so that the next place brackets the crossing.
 const OVERSHOOT: f64 = 1.1;
-/// Ratio of the root of the rise at the outer end of a bracket to that of the threshold below which the
-/// bracket is narrow enough.
+/// A bracket is narrow enough if the root of the rise at its outer end is at most this multiple of the root
+/// of the threshold.
 const NARROW_BRACKET: f64 = 1.35;
-/// Distance from a bound, in the unit box, below which a point is at the bound: the resolution of a search.
+/// Distance from a bound, in the unit box, within which a point counts as at the bound: the resolution
+/// of a search.
 pub(crate) const AT_BOUND: f64 = 1e-3;
-/// Largest growth of a step.
+/// Largest factor by which a step may exceed the step before.
 const MAX_STEP_GROWTH: f64 = 3.0;
 
 /// The profile of one parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ProfileLikelihood {
-    /// Coordinate in the unit interval and lowest cost there, rising, with the best point.
+    /// Coordinates in the unit interval, rising, with the lowest cost at each; includes the best point.
     pub points: Vec<(f64, f64)>,
-    /// Lower crossing of the threshold; `None` if there is none within the range, or if another parameter
-    /// is at its bound there.
+    /// Lower crossing of the threshold; `None` if the range has none, or if another parameter is at its bound
+    /// at the crossing.
     pub lower: Option<f64>,
     pub upper: Option<f64>,
 }
 
-/// Profiles of all parameters from `best` and the Jacobian there; `rise` in cost bounds an interval.
+/// Profiles of all parameters from `best`, whose Jacobian is `jacobian`. An interval ends where the cost has
+/// risen by `rise`.
 ///
 /// # Errors
-/// [`StopReason`] when the evaluations are used up or may not go on.
+/// [`StopReason`] when the evaluations are used up or the fit must stop.
 pub(crate) fn profile_parameters(
     ledger: &mut Ledger,
     best: &Evaluation,
@@ -93,8 +97,8 @@ fn walk_to_ends(ledger: &mut Ledger, walkers: &mut [ProfileWalker]) -> Result<()
     Ok(())
 }
 
-/// Lets walkers continue from the farthest points within the threshold behind their crossings; returns
-/// whether any of them does.
+/// Lets walkers continue from the farthest points within the threshold that lie behind their crossings;
+/// returns whether any walker does.
 fn resume_walkers(ledger: &mut Ledger, walkers: &mut [ProfileWalker]) -> Result<bool, StopReason> {
     let farther: Vec<Option<Evaluation>> =
         walkers.iter().map(|walker| walker.farthest_within_threshold(ledger)).collect();
@@ -158,37 +162,37 @@ impl ProfilePoint {
     }
 }
 
-/// Walks in one direction along one parameter.
+/// Walks along one parameter in one direction.
 struct ProfileWalker {
     axis: usize,
     sign: f64,
-    /// Root of the rise in cost that bounds the interval.
+    /// Square root of the rise in cost that ends the interval.
     most_root: f64,
     start: (f64, f64),
     start_unit: Vec<f64>,
-    /// Last place within the threshold, from which the next one starts.
+    /// Last place within the threshold; the next step starts from it.
     base: ProfilePoint,
     /// Linear model of the residuals.
     model: DMatrix<f64>,
-    /// Coordinate of the present place, and the best point there.
+    /// Coordinate of the current place; the best point there is in `here`.
     at: f64,
     here: Option<ProfilePoint>,
-    /// Best known point near that coordinate.
+    /// Best known point near the current place, moved onto its coordinate.
     near: Option<Vec<f64>>,
-    /// Whether the inner minimisation has ended.
+    /// Whether the inner minimisation at the current place has ended.
     followed: bool,
     next_step: f64,
-    /// Nearest place beyond the threshold, with the root of its rise.
+    /// Nearest place above the threshold, with the square root of its rise in cost.
     outside: Option<(f64, f64)>,
-    /// Crossing that was found, and the number of probes behind it.
+    /// Crossing found, and number of probes already made behind it.
     crossing: Option<(f64, usize)>,
-    /// Whether another parameter is at its bound at the crossing: the bounds end the interval, not the
-    /// features.
+    /// Whether another parameter is at its bound at the crossing. If so, the bounds end the interval rather
+    /// than the features.
     pinned: bool,
     places: Vec<(f64, f64)>,
-    /// Number of places left.
+    /// Number of places that the walker may still visit.
     left: usize,
-    /// The crossing; `Some(None)` when the range ended first.
+    /// Result of the walk once it has ended: the crossing, or `Some(None)` if there is none.
     end: Option<Option<f64>>,
 }
 
@@ -229,7 +233,7 @@ impl ProfileWalker {
         }
     }
 
-    /// Goes to the next place, or ends where the range does.
+    /// Goes to the next place; ends the walk at the end of the range.
     fn advance(&mut self) {
         if self.end.is_some() {
             return;
@@ -246,7 +250,7 @@ impl ProfileWalker {
         self.base.evaluation.unit.get(self.axis).copied().unwrap_or(self.at)
     }
 
-    /// Points to evaluate next; empty when the place is finished.
+    /// Points to evaluate next; empty when the minimisation at the place has ended.
     fn proposed_points(&self) -> Vec<Vec<f64>> {
         if self.end.is_some() || self.followed {
             return Vec::new();
@@ -258,7 +262,7 @@ impl ProfileWalker {
         steps.map(|d| step_in_box(&here.evaluation.unit, &d)).collect()
     }
 
-    /// Best known point near the coordinate, moved onto it.
+    /// Best known point near the current place, moved onto its coordinate.
     fn nearest_known_point(&self, ledger: &Ledger) -> Option<Vec<f64>> {
         let near =
             |e: &&Evaluation| e.unit.get(self.axis).is_some_and(|u| (u - self.at).abs() <= NEAR_COORDINATE);
@@ -282,7 +286,7 @@ impl ProfileWalker {
         (along(farthest) > FIRST_STEP_RANGE.0 / 2.0).then(|| farthest.clone())
     }
 
-    /// Continues from a place within the threshold.
+    /// Continues the walk from a point within the threshold.
     fn resume_from(&mut self, base: ProfilePoint, model: DMatrix<f64>) {
         self.next_step = first_step(&SingularDirections::from_jacobian(&model), self.axis, self.most_root);
         (self.base, self.model) = (base, model);
@@ -290,8 +294,8 @@ impl ProfileWalker {
         self.left = MAX_PLACES;
     }
 
-    /// Starting points at a place: the other parameters unchanged, moved by the linear model, and from the
-    /// best known point.
+    /// Starting points at a place: the base point with the other parameters unchanged, the base point with
+    /// the other parameters moved by the linear model, and the best known point nearby.
     fn first_points(&self) -> Vec<Vec<f64>> {
         let change = self.at - self.base_coordinate();
         let kept = self.move_onto_coordinate(&self.base.evaluation.unit);
@@ -303,7 +307,7 @@ impl ProfileWalker {
         [Some(kept), followed, self.near.clone()].into_iter().flatten().collect()
     }
 
-    /// Keeps the best point of a place.
+    /// Keeps the best point found at the current place.
     fn keep_best(&mut self, found: impl Iterator<Item = ProfilePoint>) {
         let Some(best) = found.min_by(|a, b| a.evaluation.cost.total_cmp(&b.evaluation.cost)) else { return };
         let known = self.here.as_ref().map_or(f64::INFINITY, |here| here.evaluation.cost);
@@ -320,7 +324,7 @@ impl ProfileWalker {
         self.here = Some(best);
     }
 
-    /// Records the place and chooses the next one.
+    /// Records the place and chooses the next.
     fn finish_place(&mut self) {
         let (None, Some(here)) = (self.end, self.here.take()) else { return };
         self.places.push((self.at, here.evaluation.cost));
@@ -351,7 +355,7 @@ impl ProfileWalker {
         self.next_step = (self.start.0 + factor * (crossing - self.start.0) - self.base_coordinate()).abs();
     }
 
-    /// Whether another parameter is at a bound at which it is not at the best point.
+    /// Whether another parameter is at a bound, but was not at a bound at the best point.
     fn pins_another_parameter(&self, unit: &[f64]) -> bool {
         let bound = |u: &f64| !(AT_BOUND..=1.0 - AT_BOUND).contains(u);
         let mut pairs = unit.iter().zip(&self.start_unit).enumerate();
@@ -389,8 +393,8 @@ impl ProfileWalker {
         self.refine_bracket(base, self.at, root);
     }
 
-    /// Interpolates the crossing between the base (within the threshold) and `place` (beyond it), or
-    /// chooses the next place between them.
+    /// Interpolates the crossing between the base (within the threshold) and `place` (above it), or chooses
+    /// the next place between them.
     fn refine_bracket(&mut self, base_root: f64, place: f64, root: f64) {
         let base = self.base_coordinate();
         let share = ((self.most_root - base_root) / (root - base_root)).clamp(0.0, 1.0);

@@ -14,22 +14,22 @@ pub(super) use assembly::{FitFindings, ModelledTargets, camera_nuisance_results,
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// How a fit ended.
+/// Outcome of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FitStatus {
-    /// A restart of the search did not lower the cost.
+    /// The search was completed: further steps from the best point gained nothing.
     Converged,
-    /// The allowed evaluations were used up first.
+    /// The allowed evaluations were used up before the search was completed.
     BudgetExhausted,
     /// The fit was stopped from outside and can be resumed.
     Interrupted,
-    /// The model failed at every evaluated point.
+    /// The model failed at every evaluated point, or a trace fit did not complete its last stage.
     Failed,
 }
 
 impl FitStatus {
-    /// The word in files and summaries.
+    /// Name of the status in files and summaries.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Converged => "converged",
@@ -40,28 +40,29 @@ impl FitStatus {
     }
 }
 
-/// One parameter, in its own SI unit.
+/// Result for one parameter, in its own SI unit.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ParameterResult {
     /// Best value.
     pub estimate: f64,
-    /// Lower end of the 95 % interval, the widest of the intervals below; `None` where it is open.
+    /// Lower end of the 95 % interval, which covers all intervals below; `None` where it is open.
     pub lower_95: Option<f64>,
-    /// Upper end of the 95 % interval, the widest of the intervals below; `None` where it is open.
+    /// Upper end of the 95 % interval, which covers all intervals below; `None` where it is open.
     pub upper_95: Option<f64>,
     /// Verdict on the interval.
     pub verdict: ParameterVerdict,
-    /// Interval by the linear model at the estimates, if it determines the parameter.
+    /// Interval by the linear model at the estimates, if it determines the parameter; in a trace fit, the
+    /// interval from curvature, scatter of the segments and profile.
     pub linear_95: Option<[f64; 2]>,
-    /// Lower and upper crossing of the threshold by the profile of the cost; `None` where there is none
-    /// within the bounds.
+    /// Lower and upper crossing of the threshold by the profile of the cost; `None` where the profile does
+    /// not cross it within the bounds.
     pub profile_95: [Option<f64>; 2],
-    /// Interval by refits to twins of the best model.
+    /// Interval from refits to twins of the best model.
     pub bootstrap_95: Option<[f64; 2]>,
-    /// Values along the parameter, and the cost there minimised over the other parameters.
+    /// Values of the parameter, with the cost at each minimised over the other parameters.
     pub profile: Vec<(f64, f64)>,
-    /// Reasons for which it is not identified, one sentence each. A fit of features lists only those that its
-    /// numbers do not show.
+    /// Reasons why the parameter is not identified, one sentence each. A fit of features lists only reasons
+    /// that do not follow from the other numbers of the result.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub reasons: Vec<String>,
 }
@@ -73,65 +74,66 @@ impl ParameterResult {
     }
 }
 
-/// A nuisance: a number of a camera or a constant of the scene that is estimated with the parameters.
+/// Nuisance parameter: a number of a camera, or a constant of the scene, that is estimated
+/// with the parameters.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NuisanceResult {
-    /// The recording whose camera it belongs to; `None` for a constant of the scene.
+    /// Recording that the camera filmed; `None` for a constant of the scene.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recording: Option<String>,
-    /// Key of the scene, or `tilt_rad`, `scale_relative`, `offset_x_m`, `offset_drop_m`, `clock_s` of a
-    /// camera.
+    /// Key of the scene, or one of `tilt_rad`, `scale_relative`, `offset_x_m`, `offset_drop_m`, `clock_s` and
+    /// the drifts of a camera.
     pub name: String,
     /// Mean of its prior.
     pub prior: f64,
-    /// Standard deviation of its prior, in its own unit.
+    /// Standard deviation of its prior, in the unit of its name.
     pub prior_sd: f64,
     /// Best value, in the unit of its name.
     pub estimate: f64,
-    /// Lower end of the 95 % interval; `None` where there is none.
+    /// Lower end of the 95 % interval; `None` if unknown.
     pub lower_95: Option<f64>,
-    /// Upper end of the 95 % interval; `None` where there is none.
+    /// Upper end of the 95 % interval; `None` if unknown.
     pub upper_95: Option<f64>,
 }
 
-/// Fitted starting state of a whole run of a trace's model.
+/// Fitted starting state for a whole run of the model of a trace.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StartState {
     /// Name of the recording in the job.
     pub recording: String,
-    /// Time on the drive's clock, s.
+    /// Time of the start on the clock of the drive, s.
     pub time_s: f64,
     /// Angle of the neck, rad.
     pub neck_angle_rad: f64,
     /// Angle of the lip, rad.
     pub lip_angle_rad: f64,
-    /// Rate of the neck, rad/s.
+    /// Angular velocity of the neck, rad/s.
     pub neck_rate_rad_per_s: f64,
-    /// Rate of the lip, rad/s.
+    /// Angular velocity of the lip, rad/s.
     pub lip_rate_rad_per_s: f64,
 }
 
-/// The peak that would be assigned to a component next.
+/// The second choice among the peaks for a component.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RunnerUpPeak {
     /// Its frequency, Hz.
     pub frequency_hz: f64,
-    /// Level of the strongest peak of the band above it, dB.
+    /// Level of the strongest peak of the band relative to this peak, dB.
     pub below_db: f64,
 }
 
-/// A local search: one step of the waterfall plot.
+/// Result of one local search, a step of the waterfall plot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LocalOptimum {
-    /// Cost where it started.
+    /// Cost at its start.
     pub start_cost: f64,
-    /// Cost where it ended.
+    /// Cost at its end.
     pub cost: f64,
     /// Number of its evaluations.
     pub evaluations: usize,
-    /// Parameter values where it ended.
+    /// Parameter values at its end.
     pub values: BTreeMap<String, f64>,
-    /// Failure of the model there, if any.
+    /// Failure of the model at its end, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
 }
@@ -143,9 +145,9 @@ pub struct ComponentResult {
     pub name: String,
     /// Measured or published frequency, Hz.
     pub target_hz: f64,
-    /// Its standard deviation, Hz.
+    /// Standard deviation of the target, Hz.
     pub target_sd_hz: f64,
-    /// Frequency of the model, Hz; `None` if it has no such component.
+    /// Frequency of the model, Hz; `None` if the model does not show the component.
     pub model_hz: Option<f64>,
     /// `model / target - 1`.
     pub relative_error: Option<f64>,
@@ -153,23 +155,24 @@ pub struct ComponentResult {
     pub tolerance_relative: f64,
     /// Whether the relative error is within the tolerance.
     pub pass: bool,
-    /// Scatter of the model's frequency between neighbouring points, Hz; it is added to the target's
-    /// deviation.
+    /// Scatter of the model's frequency between neighbouring points, Hz; it is added to the deviation
+    /// of the target.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model_scatter_hz: Option<f64>,
     /// Standard deviation of the model's frequency over its starting states, Hz.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model_spread_hz: Option<f64>,
-    /// Level of the strongest peak of the band above the model's peak, dB; 0 where that is the strongest.
+    /// Level of the strongest peak of the band relative to the model's peak, dB; 0 if the model's peak
+    /// is the strongest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub below_db: Option<f64>,
-    /// The model's peak that would be assigned next.
+    /// The peak of the model that is the second choice for the component.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub runner_up: Option<RunnerUpPeak>,
-    /// Standard deviation over twins of the best model, Hz.
+    /// Standard deviation of the frequency over twins of the best model, Hz.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub twin_sd_hz: Option<f64>,
-    /// Why the model has no value.
+    /// Reason why the model has no value, if it has none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub missing: Option<String>,
 }
@@ -185,40 +188,40 @@ pub struct FeatureResult {
     pub unit: String,
     /// Measured or published value.
     pub target: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the target.
     pub target_sd: f64,
-    /// Value of the model; `None` if it has none.
+    /// Value of the model; `None` if the model has no value.
     pub model: Option<f64>,
-    /// The model's value with the estimated camera errors; `None` where there are none.
+    /// Value of the model with the estimated camera errors; `None` if there are no camera errors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model_seen: Option<f64>,
     /// `model_seen / target - 1`, or `model / target - 1` without camera errors.
     pub relative_error: Option<f64>,
-    /// Whether that value is within the 95 % interval of the target. For a held-out feature the interval
-    /// includes the calibration errors of its camera.
+    /// Whether `model_seen`, or else `model`, is within the 95 % interval of the target. For a held-out
+    /// feature the interval includes the calibration errors of its camera.
     pub pass: bool,
-    /// Scatter of the model's value between neighbouring points; it is added to the target's deviation.
+    /// Scatter of the model's value between neighbouring points; it is added to the deviation of the target.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model_scatter: Option<f64>,
     /// Standard deviation of the model's value over its starting states.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model_spread: Option<f64>,
-    /// Standard deviation over twins of the best model.
+    /// Standard deviation of the feature over twins of the best model.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub twin_sd: Option<f64>,
-    /// Why the model has no value.
+    /// Reason why the model has no value, if it has none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub missing: Option<String>,
 }
 
 impl FeatureResult {
-    /// The model's value, with camera errors where they are estimated.
+    /// Value of the model, with camera errors if they are estimated.
     pub(crate) fn value_seen(&self) -> Option<f64> {
         self.model_seen.or(self.model)
     }
 }
 
-/// Evaluations of the model.
+/// Counts of evaluations of the model, or of iterates in a trace fit.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct EvaluationCounts {
     /// Number of evaluations, including replayed ones.
@@ -232,17 +235,17 @@ pub struct EvaluationCounts {
 pub struct FitResult {
     /// Title of the job.
     pub title: String,
-    /// How it ended.
+    /// Outcome of the fit.
     pub status: FitStatus,
     /// How well the model explains the traces; `None` in a fit of features alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub misfit: Option<TraceMisfit>,
-    /// Parameters by their key of the scene with its table.
+    /// Results of the parameters, by key of the scene with its table.
     pub parameters: BTreeMap<String, ParameterResult>,
-    /// Estimated camera numbers and freed constants.
+    /// Estimated numbers of cameras and freed constants.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub nuisances: Vec<NuisanceResult>,
-    /// Starting states of whole runs of the traces' models.
+    /// Fitted starting states for whole runs of the models of the traces.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub starts: Vec<StartState>,
     /// Components in job order.
@@ -253,13 +256,14 @@ pub struct FitResult {
     pub held_out: Vec<FeatureResult>,
     /// Number of informative directions in the space of the parameters.
     pub rank: usize,
-    /// Largest singular value of the sensitivities over the smallest; `None` where one is zero.
+    /// Ratio of the largest to the smallest singular value of the sensitivities; `None` if it is infinite.
     pub condition: Option<f64>,
-    /// Products of powers of the parameters that the features determine or leave open.
+    /// Products of powers of the parameters that the features determine or leave undetermined.
     pub combinations: Vec<ParameterCombination>,
     /// Correlations of the estimates by the linear model, for the parameters that it determines.
     pub correlations: BTreeMap<String, BTreeMap<String, f64>>,
-    /// Cost at the estimates: the sum of the robust losses of all residuals.
+    /// Cost at the estimates: of the features as defined in `fit::objective`; of the segments and priors in
+    /// a trace fit.
     pub cost: f64,
     /// Rise in cost at the ends of a 95 % interval.
     pub threshold: f64,
@@ -267,16 +271,16 @@ pub struct FitResult {
     pub twins: usize,
     /// Identifiability before the search.
     pub gate: Identifiability,
-    /// Ends of the local searches in ascending order of cost.
+    /// Results of the local searches in ascending order of cost.
     pub waterfall: Vec<LocalOptimum>,
     /// `d ln feature / d ln parameter` at the estimates, by feature and parameter; `None` where it is
     /// undefined.
     pub sensitivities: BTreeMap<String, BTreeMap<String, Option<f64>>>,
     /// Evaluations of the model.
     pub evaluations: EvaluationCounts,
-    /// Whether a fitted recording is synthetic.
+    /// Whether any fitted recording is synthetic.
     pub synthetic: bool,
-    /// Sentences for the reader.
+    /// Remarks for the reader, one sentence each.
     pub notes: Vec<String>,
     /// Seed of the search.
     pub seed: u64,
@@ -286,18 +290,18 @@ pub struct FitResult {
     pub version: String,
 }
 
-/// A file that is not a valid result.
+/// Error of a file that is not a valid result.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{file}: not the result of a fit: {problem}; run `wiperlab fit` again")]
 pub struct ResultError {
     /// File as named by the user.
     pub file: String,
-    /// What was found, with line and column.
+    /// Description of the problem, with line and column.
     pub problem: String,
 }
 
 impl FitResult {
-    /// The text of `result.json`. Keys have a fixed order; the last one is the hash of the text.
+    /// The text of `result.json`. Keys have a fixed order; the last key is the hash of the text.
     #[must_use]
     pub fn to_json(&self) -> String {
         // serialisation cannot fail: keys are strings, and numbers that are not finite become `null`
@@ -315,7 +319,7 @@ impl FitResult {
         Ok(result)
     }
 
-    /// Estimates of the job's parameters, in their order.
+    /// Estimates of the parameters, in job order.
     pub(crate) fn parameter_estimates(&self, job: &Job) -> Vec<f64> {
         let estimate = |p: &FreeParameter| self.parameters.get(&p.name).map_or(f64::NAN, |p| p.estimate);
         job.parameters.iter().map(estimate).collect()
@@ -327,8 +331,8 @@ impl FitResult {
         self.components.iter().all(|component| component.pass)
     }
 
-    /// Whether the model explains the recordings. In a fit of features, a camera far from its prior is
-    /// evidence against the model.
+    /// Whether the model explains the recordings. In a fit of features, a camera that is far from its prior
+    /// is evidence against the model.
     #[must_use]
     pub fn explains_recordings(&self) -> bool {
         match &self.misfit {
@@ -343,18 +347,18 @@ impl FitResult {
 /// Last key of the file.
 const HASH_KEY: &str = "\n  \"sha256\": \"";
 const HASH_DIGITS: usize = 64;
-/// Digits of a hash in an error message.
+/// Number of digits of a hash in an error message.
 const SHORT_HASH_DIGITS: usize = 12;
 
-/// Appends the hash of a pretty-printed JSON object as its last key: the SHA-256 of the whole text with
-/// zeros in place of the digits of the hash.
+/// Appends the hash of a pretty-printed JSON object as its last key. The hash is the SHA-256 of the whole
+/// text with zeros in place of its digits.
 pub(super) fn append_hash(object: &str) -> String {
     let open = object.trim_end().trim_end_matches('}').trim_end();
     let with = |digits: &str| format!("{open},{HASH_KEY}{digits}\"\n}}\n");
     with(&text_sha256(with(&"0".repeat(HASH_DIGITS))))
 }
 
-/// Checks the hash that a text carries.
+/// Checks a text against the hash that it contains.
 ///
 /// # Errors
 /// A description of the mismatch.

@@ -1,9 +1,9 @@
 //! Checks a stored result against its job, recordings and model with one evaluation of the model.
 //!
 //! The values of the model are computed again from the stored estimates. Targets, relative errors, passes,
-//! the cost and the verdicts are computed from the stored numbers. Intervals, sensitivities and the record
-//! of the search would need the whole fit: they are only checked for consistency, and the hash of the file
-//! reveals a changed digit.
+//! the cost and the verdicts are computed again from the stored numbers. Intervals, sensitivities and the
+//! record of the search would need the whole fit; they are only checked for consistency, and the hash of the
+//! file reveals any changed digit.
 
 use super::FitError;
 use super::evaluation::{Evaluation, Observation, Observed};
@@ -22,13 +22,13 @@ use super::uncertainty::stored_verdicts;
 use crate::recording::Recording;
 use serde_json::Value;
 
-/// Largest relative difference between a stored and a recomputed number. Without AVX2 and FMA, numbers of the
-/// committed reports change by up to 4e-11; on one machine they are equal. Features are measured to 1e-3 at
-/// best.
+/// Largest relative difference between a stored and a recomputed number. On a processor without AVX2 and FMA,
+/// the numbers of the committed reports change by up to 4e-11; on the same machine they are equal. Features
+/// are measured to 1e-3 at best.
 const RELATIVE_TOLERANCE: f64 = 1e-6;
-/// Absolute differences below this are rounding errors of numbers near zero.
+/// Absolute differences below this value are rounding errors of numbers near zero.
 const ABSOLUTE_TOLERANCE: f64 = 1e-12;
-/// Most differences that a refusal names.
+/// Maximum number of differences that a refusal lists.
 const MOST_NAMED: usize = 8;
 
 impl Problem {
@@ -58,7 +58,7 @@ impl Problem {
         Ok(found)
     }
 
-    /// The result with all values replaced that follow from its estimates and other numbers.
+    /// The result with every value recomputed that follows from its estimates and other numbers.
     fn recompute_result(&self, stored: &FitResult) -> Result<FitResult, FitError> {
         let job = self.job();
         let mut again = stored.clone();
@@ -79,7 +79,7 @@ impl Problem {
         Ok(again)
     }
 
-    /// Recomputes the whole runs of the fitted model, and the judgement on the stored residuals.
+    /// Recomputes whole runs of the fitted model, and the verdict on the stored residuals.
     fn recompute_traces(
         &self,
         stored: &FitResult,
@@ -126,7 +126,7 @@ impl Problem {
         Ok(())
     }
 
-    /// Numbers of a result that contradict each other.
+    /// Describes numbers of a result that contradict each other.
     fn find_contradictions(&self, stored: &FitResult) -> Vec<String> {
         let job = self.job();
         let mut found: Vec<String> = (job.parameters.iter())
@@ -146,7 +146,7 @@ impl Problem {
 }
 
 impl FitResult {
-    /// Takes the values of the model, and errors and passes of the stored values.
+    /// Takes model values from `model`, and errors, passes and camera-corrected values from `stored`.
     fn replace_model_values(&mut self, model: ModelledTargets, stored: ModelledTargets) {
         let component = |(model, stored): (ComponentResult, ComponentResult)| ComponentResult {
             relative_error: stored.relative_error,
@@ -194,7 +194,7 @@ impl StoredFeature {
     }
 }
 
-/// The evaluation with the stored values in place of the model's.
+/// The evaluation of the model with the stored values in place of the computed ones.
 fn evaluation_as_stored(model: &Evaluation, rows: &[StoredFeature]) -> Evaluation {
     let one = |(shown, row): (&Observed, &StoredFeature)| match (row.value, shown) {
         (Some(value), shown) => {
@@ -207,8 +207,8 @@ fn evaluation_as_stored(model: &Evaluation, rows: &[StoredFeature]) -> Evaluatio
     Evaluation { features: model.features.iter().zip(rows).map(one).collect(), ..model.clone() }
 }
 
-/// Contradictions of an interval. It has to contain the estimate and the partial intervals that it is the
-/// widest of, and to lie within the bounds; an unfinished search has no interval.
+/// Contradictions of the interval of a parameter. It must contain the estimate and the intervals by the
+/// single methods, and lie within the bounds. An unfinished search has no interval.
 fn interval_contradictions(free: &FreeParameter, p: &ParameterResult, status: FitStatus) -> Vec<String> {
     let said = |key: &str, found: f64, expected: String| {
         format!("parameters.{}.{key}: found {found}, expected {expected}", free.name)
@@ -238,7 +238,7 @@ fn interval_contradictions(free: &FreeParameter, p: &ParameterResult, status: Fi
     found
 }
 
-/// Describes a nuisance whose interval does not contain its estimate.
+/// Describes a nuisance parameter whose interval does not contain its estimate.
 fn outside_own_interval(n: &NuisanceResult) -> Option<String> {
     let ends = [n.lower_95.map(|lower| n.estimate - lower), n.upper_95.map(|upper| upper - n.estimate)];
     let beside = ends.into_iter().flatten().any(|reach| reach < -RELATIVE_TOLERANCE * n.estimate.abs());
@@ -252,7 +252,7 @@ fn outside_own_interval(n: &NuisanceResult) -> Option<String> {
     })
 }
 
-/// Adds every leaf that differs, with its key.
+/// Adds every leaf value that differs, with its key.
 fn collect_differences(key: &str, stored: &Value, again: &Value, found: &mut Vec<String>) {
     match (stored, again) {
         (Value::Object(a), Value::Object(b)) => {

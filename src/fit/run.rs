@@ -1,4 +1,4 @@
-//! One run of a fit, from the targets to the result.
+//! Fit of features, from the targets to the result.
 
 use super::advice::advise_measurements;
 use super::evaluation::Evaluation;
@@ -28,24 +28,25 @@ use crate::recording::Recording;
 use std::cell::OnceCell;
 use std::slice;
 
-/// Warnings about a job before anything runs, one sentence each.
+/// Warnings about a job before the fit starts, one sentence each.
 #[must_use]
 pub fn job_warnings(job: &Job) -> Vec<String> {
     if !job.traces.is_empty() {
-        return Vec::new(); // every frame counts
+        return Vec::new(); // a trace fit uses every frame
     }
     uncertainty::count_warning(job.targets.len(), None, job.parameters.len()).into_iter().collect()
 }
 
-/// Fits the job's parameters. `measured` has an entry per condition, `None` where it has no recording;
-/// `model` gives the recordings of the model at parameter values.
+/// Fits the parameters of a job on features. `measured` has one entry per condition, `None` for a condition
+/// without a recording; `model` gives the recordings of the model as a function of the parameters.
 ///
 /// Every new evaluation is written to `journal` as a line and reported to `on_progress`. A new journal starts
-/// with a header, and nothing is written before the identifiability is assessed. The result depends only on
-/// the fingerprint and the allowance of the context: not on the number of threads, and not on interruptions.
+/// with a header; nothing is written before the identifiability is assessed. The result depends only on the
+/// fingerprint and the allowance of the context, not on the number of threads or on interruptions.
 ///
 /// # Errors
-/// [`FitError`]. A search that stops early or does not converge gives a result with that status.
+/// [`FitError`]. A search that stops early or does not converge is no error; the status of the
+/// result says so.
 pub fn fit_features(
     job: &Job,
     measured: &[Option<Recording>],
@@ -119,7 +120,7 @@ pub fn fit_features(
     Ok(findings.into_result(&ledger, &best_reads))
 }
 
-/// Assesses the identifiability; the assessment is empty where the evaluations ran out.
+/// Assesses the identifiability; the assessment is empty if the evaluations ran out.
 fn check_identifiability(
     ledger: &mut Ledger,
     job: &Job,
@@ -132,7 +133,7 @@ fn check_identifiability(
     Ok(Identifiability { advice: advise_measurements(job, model, &nearest, &gate.combinations), ..gate })
 }
 
-/// Adds the doubts that follow from the weighing and from the other local searches.
+/// Adds the doubts that follow from the misfit and from the ends of the other local searches.
 fn add_reservations(
     mut found: FitUncertainty,
     weighed: Option<&FeatureWeights>,
@@ -146,10 +147,10 @@ fn add_reservations(
             weighed.inflation
         ));
     }
-    // the last descent polished the best point and is no search of its own
+    // the last descent only polished the best point and is not a search of its own
     let others = searched.descents.split_last().map_or(&[][..], |(_, others)| others);
     let ends: Vec<Evaluation> = others.iter().map(|descent| descent.end.clone()).collect();
-    // optima are compared with the stated deviations, not with those that a misfit has inflated
+    // optima are compared by the stated deviations, without the inflation by the misfit
     let plain = ledger.objective().with_feature_scatter(&weighed.roughness);
     found.with_search_doubts(searched.termination == SearchTermination::Converged, &plain, &ends)
 }
@@ -163,7 +164,7 @@ fn fit_status(ledger: &Ledger, best: &Evaluation, ended: &SearchTermination) -> 
     }
 }
 
-/// Predictions of the best model for the features that are held out.
+/// Predictions of the best model for the held-out targets.
 pub(super) fn predict_held_out(
     held: &[(FitTarget, TargetValue)],
     model: &dyn Model,
@@ -182,13 +183,14 @@ pub(super) fn predict_held_out(
     held.iter().map(predicted).collect()
 }
 
-/// Features of the best model with the peaks that were not assigned.
+/// Features of the best model, with the peaks that were not assigned; `None` for a missing feature.
 pub(super) fn read_best_model(seen: &ModelFeatures, values: &[f64]) -> Vec<Option<FeatureValue>> {
     let read = seen.read_features(values, Draw::default()).unwrap_or_default();
     read.into_iter().map(Result::ok).collect()
 }
 
-/// Evaluations of the search: the allowance less those of the sensitivities, unless it is too small for both.
+/// Number of evaluations for the search: the allowance minus those for the sensitivities, or the whole
+/// allowance if it is too small for both.
 fn search_allowance(allowed: usize, parameters: usize) -> usize {
     let sensitivities = 2 * parameters;
     if allowed >= 2 * sensitivities { allowed - sensitivities } else { allowed }

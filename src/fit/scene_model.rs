@@ -1,4 +1,4 @@
-//! The model of a fit: scenes with some parameters replaced, each seen through the camera of its recording.
+//! The model of a fit: scenes with some parameters replaced, each recorded by the camera of its recording.
 
 use super::evaluation::{FailureReason, RunFailure};
 use super::model::{Draw, Model, Restart};
@@ -18,17 +18,17 @@ use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
 
-/// Most evaluations of the right-hand side in a run: a hundred times the cost of a reversal, a few seconds.
+/// Maximum number of evaluations of the right-hand side in a run: a hundred times the cost of a reversal,
+/// a few seconds.
 const MAX_EVALUATIONS: u64 = 20_000_000;
 
-/// Relative tolerance of the model's runs. Features are measured to 1e-3, and the transitions at 1e-6 are
-/// those at 1e-8.
+/// Relative tolerance of the model's runs. Features are measured to 1e-3, and a run has the same transitions
+/// at 1e-6 as at 1e-8.
 const TOLERANCE: f64 = 1e-6;
-/// Reference angle of a spread of starting states where the blade starts upright, rad: a blade in use leans
-/// by
-/// 0.1 to 1 rad.
+/// Angle that scales the spread of the starting states of a blade that starts upright, rad. A blade in use
+/// leans by 0.1 to 1 rad.
 const REFERENCE_LEAN_RAD: f64 = 0.1;
-/// Distance between the seeds of two conditions, so that they never share noise.
+/// Distance between the seeds of two conditions, so that they never have the same noise.
 const CONDITION_SEEDS: u64 = 1 << 32;
 
 /// The camera of a recording and the noise of its tracking.
@@ -36,32 +36,32 @@ const CONDITION_SEEDS: u64 = 1 << 32;
 pub struct Instrument {
     /// The camera.
     pub camera: Camera,
-    /// Standard deviation of a tracked coordinate, m. It is added to the model too, because noise biases
+    /// Standard deviation of a tracked coordinate, m. The noise is added to the model too, because it biases
     /// features such as the time of release or the power in a band.
     pub noise_m: f64,
-    /// Fraction of frames in which a point is lost; only twins lose points.
+    /// Fraction of the frames in which a point is lost; points are lost only in twins.
     pub dropout_fraction: f64,
 }
 
-/// A scene with its camera.
+/// A scene and the camera that records it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelCondition {
     /// The scene, with the values that the condition sets.
     pub scene: Scene,
-    /// Camera and tracking noise.
+    /// The camera and its tracking noise.
     pub instrument: Instrument,
 }
 
-/// Spread of the starting states, and limits of plausible motion.
+/// Spread of the starting states, and largest plausible tilt.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PlausibilityLimits {
     /// Relative spread of the starting states.
     pub spread: f64,
-    /// Largest angle of a link from the vertical, rad; `None` for any.
+    /// Largest angle of neck or lip from the vertical, rad; `None` for no limit.
     pub largest_tilt_rad: Option<f64>,
 }
 
-/// Scenes whose named parameters a fit may change.
+/// A model of scenes in which a fit changes named parameters.
 pub struct SceneModel {
     conditions: Vec<ModelCondition>,
     names: Vec<String>,
@@ -69,13 +69,13 @@ pub struct SceneModel {
 }
 
 impl SceneModel {
-    /// A model of these conditions; `names` are the free parameters in job order.
+    /// A model of `conditions`; `names` are the free parameters in job order.
     #[must_use]
     pub fn new(conditions: Vec<ModelCondition>, names: Vec<String>, plausible: PlausibilityLimits) -> Self {
         Self { conditions, names, plausible }
     }
 
-    /// A model with other conditions.
+    /// The same model with other conditions.
     pub(super) fn with_conditions(&self, conditions: Vec<ModelCondition>) -> Self {
         Self { conditions, names: self.names.clone(), plausible: self.plausible }
     }
@@ -84,7 +84,7 @@ impl SceneModel {
         &self.conditions
     }
 
-    /// The scene of a condition with these values of the free parameters.
+    /// The scene of a condition with the given values of the free parameters.
     ///
     /// # Errors
     /// [`RunFailure`] if the scene refuses a value.
@@ -95,11 +95,11 @@ impl SceneModel {
         scene.map_err(|error| RunFailure::new(FailureReason::Refused, error.to_string(), 0.0))
     }
 
-    /// The recording of a scene by the camera of a condition, at the tolerance of the scene, without tracking
-    /// noise and whatever the end of the run; `observer` follows the run.
+    /// Recording of a scene by the camera of a condition, at the tolerance of the scene and without tracking
+    /// noise, even if the run ends early; `observer` follows the run.
     ///
     /// # Errors
-    /// [`RunFailure`] when fewer than two frames were taken.
+    /// [`RunFailure`] if fewer than two frames were recorded.
     pub(crate) fn record_scene(
         &self,
         scene: &Scene,
@@ -120,7 +120,7 @@ impl SceneModel {
         })
     }
 
-    /// The recording of a completed run from `from_s` on, without tracking noise.
+    /// Recording of a run from `from_s` on, without tracking noise; the run must reach its stop time.
     fn record_completed_run(
         &self,
         scene: &Scene,
@@ -146,7 +146,7 @@ impl SceneModel {
         Ok(seen.recording)
     }
 
-    /// The recording of a completed run with tracking noise.
+    /// Recording of a run from `from_s` on, with tracking noise; the run must reach its stop time.
     fn record_with_noise(
         &self,
         scene: &Scene,
@@ -164,7 +164,7 @@ impl SceneModel {
             .map_err(|error| RunFailure::new(FailureReason::NotFinite, error.to_string(), 1.0))
     }
 
-    /// The scene with the starting state of ensemble member `member`.
+    /// The scene with the starting state of number `member` of the ensemble; 0 is the scene's own.
     fn draw_start(&self, mut scene: Scene, member: u64) -> Scene {
         if member == 0 || self.plausible.spread == 0.0 {
             return scene;
@@ -236,14 +236,14 @@ impl Model for SceneModel {
     fn max_lead_s(&self, condition: usize) -> f64 {
         match self.conditions.get(condition).map(|condition| &condition.scene) {
             Some(Scene { drive: Drive::Recorded(head), start_s, .. }) => start_s - head.span_s()[0],
-            // a start in the air or in a given pose has a fixed time
+            // the time of a start in the air or in a given pose is fixed
             Some(Scene { start: StartKind::Airborne(_) | StartKind::State(_), .. }) => 0.0,
             _ => f64::INFINITY,
         }
     }
 }
 
-/// The pose in which a scene starts; `None` in the air.
+/// The pose in which a scene starts; `None` for a start in the air.
 fn start_pose(scene: &Scene) -> Option<Pose> {
     match scene.start {
         StartKind::SteadySlide => {
@@ -265,7 +265,7 @@ fn view_failure(scene: &Scene, error: &TwinViewError) -> RunFailure {
     }
 }
 
-/// Fraction of the run up to a time.
+/// Fraction of the run that is completed at a time.
 fn run_progress(scene: &Scene, time_s: f64) -> f64 {
     (time_s - scene.start_s) / (scene.run.stop_s - scene.start_s)
 }
@@ -287,7 +287,7 @@ fn check_tilt(scene: &Scene, tilt: &LargestTilt, largest_rad: f64) -> Result<(),
     let message = format!(
         "a link leans by {found:.1} degrees at {at_s} s, more than the {allowed:.1} that are plausible"
     );
-    // the cost falls towards the limit
+    // the cost falls as the tilt approaches its limit
     let progress = run_progress(scene, scene.run.stop_s) * largest_rad / tilt.largest_rad;
     Err(RunFailure::new(FailureReason::Tilt, message, progress))
 }

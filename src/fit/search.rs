@@ -1,9 +1,9 @@
 //! The search in the unit box: CMA-ES populations, then a local search from each of the best distinct points,
-//! then a polish of the best point until it gains nothing.
+//! then a polish of the best point until it gains nothing more.
 //!
-//! Covariance matrix adaptation and damped Gauss-Newton steps are implemented here; the simplex is argmin's
-//! (`simplex.rs`). The ledger keeps budgets, the best point and every failure, so the solvers never see
-//! errors or costs that are not numbers.
+//! Covariance matrix adaptation and damped Gauss-Newton steps are implemented here; the simplex is that of
+//! argmin (`simplex.rs`). The ledger keeps budgets, the best point and every failure, so the solvers never
+//! see errors or costs that are not numbers.
 
 pub(crate) mod costs;
 mod excluded_region_search;
@@ -45,22 +45,22 @@ pub fn search_minimum(
     SearchOutcome { termination, descents }
 }
 
-/// Default number of generations without a gain after which a population ends.
+/// Default number of generations without sufficient gain after which a population ends.
 pub const STAGNANT_GENERATIONS: usize = 20;
 
-/// Budgets and rules of a search.
+/// Budgets and stopping rules of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SearchSettings {
     /// Seed of the populations.
     pub seed: u64,
-    /// Evaluations of the global stage.
+    /// Number of evaluations for the global stage.
     pub global_evaluations: usize,
-    /// Evaluations of the local stage.
+    /// Number of evaluations for the local stage.
     pub local_evaluations: usize,
-    /// Points of a population.
+    /// Number of points in a population.
     pub particles: usize,
-    /// Generations without a gain after which a population ends.
+    /// Number of generations without sufficient gain after which a population ends.
     pub stagnation_generations: usize,
-    /// Number of points from which a local search starts.
+    /// Number of points from which local searches start.
     pub starts: usize,
 }

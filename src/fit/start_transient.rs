@@ -1,6 +1,6 @@
-//! Checks whether the transient of the start affects the features.
+//! Checks whether the transient after the start affects the features.
 //!
-//! A scene starts from a guess, such as the equilibrium of steady slip. The error of the guess rings down
+//! A scene starts from a guessed state, such as the equilibrium of steady slip. The error of the guess decays
 //! with the slowest mode of blade and head, and biases a feature whose window begins too early. The best
 //! model is therefore run again from another start, and its features are compared with those of the fit.
 
@@ -11,17 +11,18 @@ use super::target_value::TargetValue;
 use crate::feature::Feature;
 use crate::recording::Recording;
 
-/// Shift of a feature by another start, in standard deviations, above which a note is written: half of a 95 %
-/// interval.
+/// Shift of a feature between two starts, in standard deviations, above which a note is written: half of the
+/// half width of a 95 % interval.
 const MIN_VISIBLE_SHIFT_SD: f64 = 1.0;
-/// Shift of a feature, in standard deviations, below which the start has decayed.
+/// Shift of a feature, in standard deviations, up to which the error of the start counts as decayed.
 const MAX_FORGOTTEN_SHIFT_SD: f64 = 0.3;
-/// Largest lead of a start, in decay times: after five of them 1 % of an error is left.
+/// Longest time by which a start is advanced, in decay times; after five of them less than 1 % of
+/// an error remains.
 const MAX_LEAD_DECAYS: usize = 5;
-/// Relative change of the starting angles where a start cannot be earlier.
+/// Relative change of the starting angles if the start cannot be advanced.
 const ANGLE_CHANGE: f64 = 0.05;
 
-/// A model whose runs have another start.
+/// A model whose runs start differently.
 struct RestartedModel<'a> {
     model: &'a dyn Model,
     restart: Restart,
@@ -55,8 +56,8 @@ impl ConditionFeatures<'_> {
         ModelFeatures::new(model, &self.features, targets, self.members).predict_features(self.values).ok()
     }
 
-    /// The feature with the largest difference between two readings, and that difference in its standard
-    /// deviations. A feature that is missing from a reading is skipped.
+    /// The feature with the largest difference between two runs, and that difference in standard deviations
+    /// of the feature. A feature that is missing from a run is skipped.
     fn largest_difference(&self, one: &[Observed], other: &[Observed]) -> Option<(&str, f64)> {
         let pairs = self.targets.iter().zip(one).zip(other);
         let differences = pairs.filter_map(|((target, one), other)| {
@@ -67,8 +68,8 @@ impl ConditionFeatures<'_> {
     }
 }
 
-/// A sentence for each condition whose features depend on the start of its scene. `targets` have the
-/// deviations of the end of the fit; `names` are those of the conditions.
+/// A sentence for each condition whose features depend on the start of its scene. `targets` have the standard
+/// deviations at the end of the fit; `names` are the names of the conditions.
 pub(super) fn start_notes(
     model: &dyn Model,
     names: &[String],
@@ -137,7 +138,8 @@ mod tests {
 
     const SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
 
-    /// What is said of a job with the mean deflection over a window to 0.5 %, at the scene's own values.
+    /// Notes on a job whose only target is the mean deflection over `window`, known to 0.5 %, at the values
+    /// of the scene.
     fn said(start: &str, window: &str) -> Vec<String> {
         let text = SCENE.replace("time_s = 0.56\nkind = \"steady-slide\"", start);
         assert_ne!(text, SCENE);

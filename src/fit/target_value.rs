@@ -3,12 +3,12 @@
 use crate::feature::{LengthCalibration, ValueComparison};
 use portable_math as math;
 
-/// Ratio of model and target beyond which a residual no longer grows. Two decades are more than a physical
-/// feature spans, so that any value costs less than a missing one.
+/// Ratio of model to target beyond which the residual no longer grows. No physical feature spans two decades,
+/// so any value of it costs less than a missing feature.
 pub(crate) const MAX_RATIO: f64 = 100.0;
 
-/// Least relative standard deviation in the first stage. Far from the targets all features are many
-/// deviations off, and the most precise ones would dominate the cost.
+/// Smallest relative standard deviation in the first stage. Far from the targets all features are many
+/// deviations off, and the most precise ones would otherwise dominate the cost.
 pub(crate) const FIRST_STAGE_SD_RELATIVE: f64 = 0.05;
 
 /// The target value of a feature, with its standard deviation.
@@ -16,28 +16,30 @@ pub(crate) const FIRST_STAGE_SD_RELATIVE: f64 = 0.05;
 pub struct TargetValue {
     /// Name of the component or feature.
     pub name: String,
-    /// Target, in the feature's own SI unit; not zero where it is measured by logarithms.
+    /// Target value, in the feature's own SI unit; not zero if values are compared by logarithms.
     pub value: f64,
-    /// Its standard deviation, in the same unit; above zero.
+    /// Standard deviation of the target, in the same unit; above zero.
     pub sd: f64,
-    /// Scatter of the model's value between neighbouring parameters, in the same unit; 0 where it is smooth.
+    /// Scatter of the model's value between neighbouring parameter values, in the same unit; 0 if the
+    /// model is smooth.
     pub scatter: f64,
-    /// How a residual is taken.
+    /// Whether model and target are compared by the logarithm of their ratio or by their difference.
     pub measure: ValueComparison,
-    /// Whether it counts in the last stage alone.
+    /// Whether the target counts in the last stage only.
     pub last: bool,
-    /// Calibration errors of the camera that measured it, where the value depends on them.
+    /// Calibration errors of the camera that measured the target, if the value depends on them.
     pub calibration: Option<TargetCalibration>,
 }
 
 impl TargetValue {
-    /// Standard deviation of a distance, including the model's scatter, in units of [`Self::reference_size`].
+    /// Standard deviation of a distance, including the scatter of the model, in units of
+    /// [`Self::reference_size`].
     pub(crate) fn relative_sd(&self) -> f64 {
         math::hypot(self.sd, self.scatter) / self.reference_size()
     }
 
-    /// Distance of a value from the target in units of [`Self::reference_size`], clamped to the logarithm of
-    /// [`MAX_RATIO`].
+    /// Distance of `value` from the target in units of [`Self::reference_size`], limited to the logarithm of
+    /// [`MAX_RATIO`] in size.
     pub(crate) fn distance(&self, value: f64) -> f64 {
         let most = math::ln(MAX_RATIO);
         match self.measure {
@@ -49,8 +51,7 @@ impl TargetValue {
         }
     }
 
-    /// Distance between two values, in the units of [`Self::distance`]; zero where the logarithm is
-    /// undefined.
+    /// Distance between two values, in the units of [`Self::distance`]; zero if the logarithm is undefined.
     pub(crate) fn distance_between(&self, value: f64, from: f64) -> f64 {
         match self.measure {
             ValueComparison::Log => {
@@ -60,14 +61,15 @@ impl TargetValue {
         }
     }
 
-    /// The target of the first stage, with a deviation of at least [`FIRST_STAGE_SD_RELATIVE`]; `None` if it
+    /// The target in the first stage, with a deviation of at least [`FIRST_STAGE_SD_RELATIVE`]; `None` if it
     /// counts in the last stage only.
     pub(super) fn first_stage_target(&self) -> Option<Self> {
         let sd = self.sd.max(FIRST_STAGE_SD_RELATIVE * self.reference_size());
         (!self.last).then(|| Self { sd, ..self.clone() })
     }
 
-    /// Unit of distances, in the feature's own unit: the size of the target, or the scale of its differences.
+    /// Unit of distances, in the feature's own unit: the size of the target, or the difference that
+    /// counts as large.
     pub(crate) fn reference_size(&self) -> f64 {
         match self.measure {
             ValueComparison::Log => self.value.abs(),
@@ -76,21 +78,22 @@ impl TargetValue {
     }
 }
 
-/// How a value depends on the calibration errors of its camera: `(1 + scale) value + offset`.
+/// Dependence of a value on the calibration errors of its camera; a position becomes `(1 + scale)
+/// value + offset`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TargetCalibration {
-    /// Number of the condition whose camera it is, from 0.
+    /// Index of the condition to which the camera belongs, from 0.
     pub condition: usize,
-    /// Standard deviation of the scale, relative; 0 where it is held.
+    /// Relative standard deviation of the scale; 0 if the scale is fixed.
     pub scale_sd: f64,
-    /// Standard deviation of the offset, m; 0 where it is held.
+    /// Standard deviation of the offset, m; 0 if the offset is fixed.
     pub offset_sd_m: f64,
     /// Kind of length, which decides how scale and offset act on it.
     pub length: LengthCalibration,
 }
 
 impl TargetCalibration {
-    /// The value with the errors `[scale, offset]`, m.
+    /// The value, m, as a camera with the errors `[scale, offset]` shows it.
     pub(crate) fn apply(&self, value: f64, [scale, offset_m]: [f64; 2]) -> f64 {
         match self.length {
             LengthCalibration::Position => (1.0 + scale) * value + offset_m,
@@ -101,7 +104,7 @@ impl TargetCalibration {
         }
     }
 
-    /// Its derivatives by scale and offset, m.
+    /// Derivatives of the shown value by scale and by offset (m).
     pub(crate) fn derivatives(&self, value: f64, [scale, offset_m]: [f64; 2]) -> [f64; 2] {
         match self.length {
             LengthCalibration::Position => [value, 1.0],
@@ -112,13 +115,13 @@ impl TargetCalibration {
         }
     }
 
-    /// Standard deviation of a value by the calibration errors, m.
+    /// Standard deviation of a value due to the calibration errors, m.
     pub(crate) fn sd_m(&self, value: f64) -> f64 {
         let [by_scale, by_offset] = self.derivatives(value, [0.0; 2]);
         math::hypot(self.scale_sd * by_scale, self.offset_sd_m * by_offset)
     }
 
-    /// Standard deviations of scale and offset; the latter is 0 where the value does not depend on an offset.
+    /// Standard deviations of scale and offset; that of the offset is 0 if the value does not depend on it.
     pub(crate) fn standard_deviations(&self) -> [f64; 2] {
         match self.length {
             LengthCalibration::Position => [self.scale_sd, self.offset_sd_m],

@@ -1,5 +1,5 @@
-//! Targets of a job: given in it, or measured on its recordings with the deviation that their own noise
-//! leaves.
+//! Targets of a job: given in the job, or measured on its recordings with the deviation that results
+//! from their noise.
 
 use super::FitError;
 use super::job::{FitTarget, Job, TargetSource, TargetStage};
@@ -11,18 +11,20 @@ use crate::simulate::twin::{TrackingModel, add_tracking_noise};
 use portable_math as math;
 
 /// Number of copies of a recording with additional noise from which the deviation of a feature is estimated:
-/// a standard deviation of 12 values is good to a fifth.
+/// a standard deviation of 12 values is accurate to a fifth.
 const NOISE_COPIES: u64 = 12;
-/// Least relative deviation of a measured value: neither features of sampled traces nor the model are better.
+/// Smallest relative deviation of a measured value: neither features of sampled traces nor the model
+/// are more precise.
 const MIN_SD_RELATIVE: f64 = 1e-3;
 
-/// Targets of a job in its order; `measured` has an entry per condition, `None` where it has no recording.
+/// Targets in the order of the job; `measured` has one entry per condition, `None` for a condition
+/// without a recording.
 ///
 /// A deviation that the job does not state is the scatter of the feature over copies of the recording with
 /// additional tracking noise of the same size.
 ///
 /// # Errors
-/// [`FitError::Recordings`], or [`FitError::NotMeasurable`] naming the recording and the feature.
+/// [`FitError::Recordings`], or [`FitError::NotMeasurable`] with the names of the recording and the feature.
 pub fn measure_targets(job: &Job, measured: &[Option<Recording>]) -> Result<Vec<TargetValue>, FitError> {
     let expected = job.conditions.len();
     if measured.len() != expected
@@ -45,7 +47,7 @@ pub fn measure_targets(job: &Job, measured: &[Option<Recording>]) -> Result<Vec<
     job.targets.iter().zip(read).zip(scatter).map(target).collect()
 }
 
-/// Fitted targets and their values, and the targets that are held out.
+/// The fitted entries of the job, their target values, and the held-out entries with theirs.
 pub(super) fn split_held_out(
     job: &Job,
     all: Vec<TargetValue>,
@@ -85,8 +87,8 @@ fn measure_target(
     Ok(TargetValue { name, value, sd, scatter: 0.0, measure, last, calibration: None })
 }
 
-/// Standard deviation of each feature over noisier copies of the recordings; `None` where no more than half
-/// of them have it.
+/// Standard deviation of each feature over noisier copies of the recordings; `None` if at most half of the
+/// copies show the feature.
 fn copy_scatter(features: &[Feature], measured: &[Option<Recording>]) -> Vec<Option<f64>> {
     let noise = |m: &Option<Recording>| measure_quality(m.as_ref()?, None).head_x.noise_m;
     let noise_m: Vec<f64> = measured.iter().map(|m| noise(m).unwrap_or(0.0)).collect();
@@ -105,7 +107,7 @@ fn copy_scatter(features: &[Feature], measured: &[Option<Recording>]) -> Vec<Opt
     (0..features.len()).map(|at| standard_deviation(&values(at).collect::<Vec<f64>>())).collect()
 }
 
-/// Reads every feature of the conditions with a recording; those of the others are missing.
+/// Computes all features on the recordings; features of conditions without a recording are missing.
 fn read_recorded_features(
     features: &[Feature],
     measured: &[Option<Recording>],
@@ -128,5 +130,3 @@ fn not_measurable_error(aim: &FitTarget, measured: &[Option<Recording>], problem
     let recording = recording.map_or("the recording", Recording::name).to_owned();
     FitError::NotMeasurable { recording, name: aim.feature.name.clone(), problem }
 }
-
-// Target values and distances from them.

@@ -1,10 +1,10 @@
 //! Fit of whole traces in segments (multiple shooting, Bock 1981).
 //!
-//! A long run of a stick-slip model is so sensitive that the misfit of its trace has tens of minima. With a
-//! restart from the recorded state every few milliseconds it has one. The starting state of each segment is
-//! eliminated (variable projection, Golub and Pereyra 1973), so an outer Levenberg-Marquardt step moves
-//! only the parameters and the unknowns of the camera. Segments grow from stage to stage; a new stage
-//! starts on the motion that the previous one fitted.
+//! A long run of a stick-slip model is so sensitive that the misfit of its trace has tens of minima. If the
+//! model restarts from the recorded state every few milliseconds, the misfit has one minimum. The starting
+//! state of each segment is eliminated (variable projection, Golub and Pereyra 1973), so an outer
+//! Levenberg-Marquardt step moves only the parameters and the unknowns of the cameras. Segments grow longer
+//! from stage to stage; each new stage starts on the motion that the previous one fitted.
 
 mod assessment;
 pub(crate) mod build;

@@ -1,4 +1,4 @@
-//! Iterates of a trace fit in a journal. A line has every bit that the next iterate depends on.
+//! Journal of a trace fit: one iterate per line, with every bit on which the next iterate depends.
 
 use super::trace::{CameraUnknown, Iterate, SegmentState, TraceUnknown, UnknownKind};
 use crate::checkpoint;
@@ -11,12 +11,13 @@ use serde::{Deserialize, Serialize};
 pub(crate) type TraceCheckpoint = checkpoint::CheckpointFile<IterateRecord>;
 pub(crate) type TraceHeader = checkpoint::CheckpointHeader<TraceHeaderBody>;
 
-/// One iterate of one chain in a journal.
+/// One iterate of one chain.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct IterateRecord {
-    /// Number of its chain: a start, from 0, or a [`UncertaintyRun`](super::trace::UncertaintyRun).
+    /// Number of its chain: that of a start, counted from 0, or of an
+    /// [`UncertaintyRun`](super::trace::UncertaintyRun).
     pub start: usize,
-    /// Number of the iterate in its chain, from 0. Each follows from the one before.
+    /// Number of the iterate in its chain, from 0. Each iterate follows from the previous one.
     pub step: usize,
     pub iterate: Iterate,
 }
@@ -70,7 +71,7 @@ impl CheckpointRecord for IterateRecord {
         Ok(Self { start, step, iterate })
     }
 
-    /// The first number that differs.
+    /// Describes the first number that differs.
     fn difference(&self, other: &Self) -> Option<[String; 2]> {
         let [one, two] = [&self.iterate, &other.iterate];
         if one == two {
@@ -101,7 +102,7 @@ impl CheckpointRecord for IterateRecord {
     }
 }
 
-/// The line of an iterate.
+/// An iterate as a line of the journal.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct IterateRow {
@@ -139,7 +140,7 @@ impl IterateRow {
     }
 }
 
-/// A segment in a line.
+/// A segment in a line of the journal.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct SegmentRow {
@@ -149,7 +150,7 @@ struct SegmentRow {
     start: [ExactNumber; 4],
     shown: [ExactNumber; 4],
     data: usize,
-    /// Absent where the model's run fails.
+    /// Absent if the run of the model fails.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     chi2: Option<ExactNumber>,
 }
@@ -170,7 +171,7 @@ impl SegmentRow {
     }
 }
 
-/// Body of the header of a trace fit.
+/// The part of the header that is specific to a trace fit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct TraceHeaderBody {
@@ -192,7 +193,7 @@ pub(crate) struct HeaderCoordinate {
     pub name: String,
     /// Unit of its value.
     pub unit: String,
-    /// Length of a unit of the coordinate; absent where the coordinate is the logarithm of the value.
+    /// Value that corresponds to a coordinate of 1; absent if the coordinate is the logarithm of the value.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub per_unit: Option<ExactNumber>,
     /// Range of the coordinate.
@@ -203,7 +204,7 @@ pub(crate) struct HeaderCoordinate {
 }
 
 impl HeaderCoordinate {
-    /// The header's entry of an unknown; `recordings` are the names of the recordings.
+    /// The header entry of an unknown; `recordings` are the names of the recordings.
     pub(crate) fn from_unknown(unknown: &TraceUnknown, recordings: &[String]) -> Self {
         let (name, unit) = match &unknown.kind {
             UnknownKind::Parameter { name, .. } => {
@@ -224,13 +225,13 @@ impl HeaderCoordinate {
         }
     }
 
-    /// The value at a coordinate, in its unit.
+    /// The value at `coordinate`, in the unit of the unknown.
     pub(crate) fn value(&self, coordinate: f64) -> f64 {
         self.per_unit.map_or_else(|| math::exp(coordinate), |unit| coordinate * unit.0)
     }
 }
 
-/// Key of a camera's unknown in files, and its unit.
+/// Key in files, and unit, of an unknown of a camera.
 pub(super) fn camera_unknown_key(what: CameraUnknown) -> [&'static str; 2] {
     match what {
         CameraUnknown::OffsetX => ["offset_x_m", "m"],

@@ -7,19 +7,19 @@ use crate::simulate::drive::smooth_head_motion;
 use crate::simulate::scene::Scene;
 use std::ops::Range;
 
-/// Default lengths of segments by stage, s. The first is short enough to converge from the middle of the
-/// bounds; the last is the longest to which starting states carry over safely.
+/// Default segment lengths of the stages, s. The first is short enough for convergence from the middle of the
+/// bounds; the last is the longest for which the fitted motion reliably gives starting states.
 pub(crate) const DEFAULT_SEGMENT_S: [f64; 3] = [0.004, 0.008, 0.016];
-/// Frame rate below which one more stage has segments of [`EXTRA_SEGMENT_S`], because the bias of short
-/// segments is larger with few frames.
+/// Frame rate below which a further stage with segments of [`EXTRA_SEGMENT_S`] is added, because short
+/// segments with few frames bias the estimates more.
 const SLOW_HZ: f64 = 4_000.0;
 const EXTRA_SEGMENT_S: f64 = 0.032;
-/// Fewest frames of a segment: its starting state takes four degrees of freedom.
+/// Minimum number of frames in a segment: its starting state takes four degrees of freedom.
 pub(crate) const MIN_SEGMENT_FRAMES: usize = 8;
-/// Fewest frames with data of a fitted channel: slightly more than one segment.
+/// Minimum number of frames in which a fitted channel must be tracked: slightly more than one segment.
 const MIN_TRACKED_FRAMES: usize = 10;
 
-/// A trace of the job, completed from its recording.
+/// A trace of the job, with its channels and frames resolved for its recording.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct TraceData {
     /// Index of its condition.
@@ -28,7 +28,7 @@ pub(crate) struct TraceData {
     pub channels: Vec<TraceChannel>,
     /// Fitted frames.
     pub frames: Range<usize>,
-    /// Standard deviation of a tracked coordinate, m, where the job gives it.
+    /// Standard deviation of a tracked coordinate, m, if the job gives it.
     pub noise_m: Option<f64>,
     /// Source of the head's motion in the model.
     pub head: HeadSource,
@@ -36,22 +36,22 @@ pub(crate) struct TraceData {
     pub camera: CameraPriorSds,
 }
 
-/// Why a trace cannot be fitted to its recording.
+/// Reason why a trace cannot be fitted to its recording.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("trace {number}, `{key}`: {problem}")]
 pub struct TraceError {
     /// Number of the trace, from 1.
     pub number: usize,
-    /// Key of the job at fault.
+    /// Key of the job that has to be changed.
     pub key: &'static str,
-    /// What was found, what was expected and what to do.
+    /// Value found, value expected, and advice.
     pub problem: String,
 }
 
-/// Key of the job and problem of a [`TraceError`].
+/// Key of the job, and description of the problem, for a [`TraceError`].
 type TraceRefusal = (&'static str, String);
 
-/// The traces of a job with their recordings, and the segment lengths of each stage, s.
+/// The traces of a job matched with their recordings, and the segment length of each stage, s.
 ///
 /// # Errors
 /// [`TraceError`] at the first trace that cannot be fitted.
@@ -126,7 +126,8 @@ fn fitted_channels(
     Err(("channels", problem))
 }
 
-/// The job's choice; without one, the recorded head where it is tracked.
+/// Source of the head's motion: the one that the job names; otherwise the recorded head if it is tracked,
+/// else the scene.
 fn head_source(aim: &TraceTarget, recording: &Recording) -> Result<HeadSource, TraceRefusal> {
     match (aim.head, smooth_head_motion(recording)) {
         (Some(HeadSource::Recording), Err(error)) => {
@@ -149,7 +150,7 @@ fn check_drive(job: &Job, head: HeadSource) -> Result<(), TraceRefusal> {
     Err(("drive", problem))
 }
 
-/// Refuses a scene's drive whose times have nothing in common with the fitted frames.
+/// Refuses a scene whose run does not overlap with the fitted frames, if the scene drives the head.
 fn check_span(scene: &Scene, one: &TraceData, recording: &Recording) -> Result<(), TraceRefusal> {
     let grid = recording.grid();
     let [first_s, last_s] = [one.frames.start, one.frames.end - 1].map(|frame| grid.time_s(frame));
@@ -164,7 +165,7 @@ fn check_span(scene: &Scene, one: &TraceData, recording: &Recording) -> Result<(
     Err(("drive", problem))
 }
 
-/// The stages whose segments a recording can hold. Stages that the job gives must all be possible.
+/// The stages whose segments fit into the recording. Stages that the job gives must all be possible.
 fn possible_stages(
     aim: &TraceTarget,
     trace: &TraceData,

@@ -1,7 +1,7 @@
-//! The ledger of a trace fit: every iterate is computed once, and written before it is counted.
+//! Ledger of a trace fit: every iterate is computed once, and written to the journal before it is counted.
 //!
-//! An iterate depends on nothing but the one before, so a search that was killed continues with the same
-//! bits. It loses at most the iterates that were being computed.
+//! An iterate depends only on the previous one, so a search that was killed continues with the same bits. It
+//! loses only the iterates that were being computed.
 
 use super::FitError;
 use super::evaluation::EvaluationStage;
@@ -15,22 +15,22 @@ use std::ops::ControlFlow;
 /// Progress of a trace fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct TraceProgress {
-    /// Number of the chain: a start, or a [`UncertaintyRun`].
+    /// Number of the chain: of a start, or of an [`UncertaintyRun`].
     pub start: usize,
-    /// Iterates of all chains so far, including those from the journal.
+    /// Number of iterates of all chains so far, including those from the journal.
     pub iterates: usize,
-    /// Iterates from the journal.
+    /// Number of iterates from the journal.
     pub replayed: usize,
     /// Index of the stage.
     pub stage: usize,
-    /// Cost of the last iterate.
+    /// Cost of the latest iterate.
     pub cost: f64,
-    /// Segments that fit worse than noise explains.
+    /// Number of segments that fit worse than noise explains.
     pub bad_segments: usize,
     pub segments: usize,
 }
 
-/// An iterate counts as an evaluation.
+/// Each iterate counts as one evaluation.
 impl From<TraceProgress> for FitProgress {
     fn from(now: TraceProgress) -> Self {
         let stage = match UncertaintyRun::from_chain_number(now.start) {
@@ -42,15 +42,15 @@ impl From<TraceProgress> for FitProgress {
     }
 }
 
-/// Called with every iterate; `Break` ends the fit with the result so far.
+/// Called after every iterate; `Break` ends the fit with the result found so far.
 pub(crate) type OnIterate<'a> = dyn FnMut(&TraceProgress) -> ControlFlow<()> + Send + 'a;
 
-/// Why a search stopped.
+/// Reason why a search stopped.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum TraceStopReason {
     /// The callback asked to stop.
     Interrupted,
-    /// The limit of iterates is reached.
+    /// The maximum number of iterates is reached.
     Budget,
     /// The journal cannot be written, for this reason.
     Journal(String),
@@ -60,13 +60,13 @@ pub(crate) enum TraceStopReason {
 pub(crate) struct TraceLedger<'a> {
     journal: &'a mut dyn CheckpointSink,
     on_iterate: &'a mut OnIterate<'a>,
-    /// Iterates of the journal that is resumed.
+    /// Iterates of the journal that is resumed, by chain and number.
     known: HashMap<(usize, usize), Iterate>,
     /// Number of records in the journal.
     lines: usize,
-    /// The header line of a new journal, until it is written.
+    /// Header line of a new journal, until it is written.
     opening: Option<String>,
-    /// Number of iterates by chain.
+    /// Number of iterates of each chain.
     counts: BTreeMap<usize, usize>,
     replayed: usize,
     most: usize,
@@ -74,8 +74,8 @@ pub(crate) struct TraceLedger<'a> {
 }
 
 impl<'a> TraceLedger<'a> {
-    /// A ledger that continues a journal, or begins one with this header. `most` is the limit of iterates,
-    /// including those from the journal.
+    /// A ledger that continues the journal `resume`, or begins a new one with `header`. `most` is the maximum
+    /// number of iterates, including those from the journal.
     ///
     /// # Errors
     /// [`FitError`] when the journal belongs to another fit.
@@ -105,12 +105,12 @@ impl<'a> TraceLedger<'a> {
         self.counts.values().sum()
     }
 
-    /// Number of iterates of one start.
+    /// Number of iterates of one chain.
     pub(crate) fn count_start_iterates(&self, start: usize) -> usize {
         self.counts.get(&start).copied().unwrap_or(0)
     }
 
-    /// Why the search stopped; `None` while it runs.
+    /// Reason why the search stopped; `None` while it runs.
     pub(crate) fn stop_reason(&self) -> Option<&TraceStopReason> {
         self.stopped.as_ref()
     }
@@ -165,9 +165,9 @@ impl Checkpoint for TraceLedger<'_> {
     }
 }
 
-/// Recomputes some iterates of a journal, each from the one before, and compares every bit, because a resumed
-/// search must not start from iterates that the model does not give. `next` computes the first iterate of a
-/// chain, or the one after another.
+/// Recomputes some iterates of a journal, each from the previous one, and compares every bit: a resumed
+/// search must not start from iterates that the model does not reproduce. `next` computes the first iterate
+/// of a chain, or the one that follows a given iterate.
 ///
 /// # Errors
 /// [`FitError::Journal`] with the line that differs.
@@ -179,7 +179,7 @@ pub(crate) fn recheck_iterates(
     let records = &journal.records;
     let places: HashMap<(usize, usize), &Iterate> =
         records.iter().map(|step| ((step.start, step.step), &step.iterate)).collect();
-    // a longer journal draws another sample
+    // a longer journal gives another sample
     let seed = journal.header.body.seed.wrapping_add(records.len() as u64);
     for place in sample_records(records.len(), seed) {
         let stored = &records[place];
@@ -187,7 +187,7 @@ pub(crate) fn recheck_iterates(
         let again = match before {
             None => next(stored.start, None),
             Some(Some(before)) => next(stored.start, Some(before)),
-            Some(None) => continue, // (the journal lacks the iterate before)
+            Some(None) => continue, // (the journal lacks the previous iterate)
         };
         if let Some(iterate) = again {
             journal.check_recomputed(file, place, &IterateRecord { iterate, ..stored.clone() })?;

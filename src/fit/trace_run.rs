@@ -1,4 +1,4 @@
-//! A trace fit from the journal to the result.
+//! Fit of traces, from the journal to the result.
 
 use super::FitError;
 use super::identifiability::Identifiability;
@@ -26,14 +26,14 @@ use crate::recording::Recording;
 use std::collections::{BTreeMap, BTreeSet};
 
 impl Problem {
-    /// Fits the traces of the job in at most `most` iterates (`None`: no limit), and calls `on_iterate` with
-    /// each. `resume` is a journal to continue from, with its file name for error messages.
+    /// Fits the traces of the job in at most `most` iterates (`None`: no limit), and calls `on_iterate` after
+    /// each. `resume` is a journal to continue, with its file name for error messages.
     ///
     /// The result depends neither on the number of threads nor on interruptions.
     ///
     /// # Errors
-    /// [`FitError`]. A search that stops early or does not converge is not an error but a status of the
-    /// result.
+    /// [`FitError`]. A search that stops early or does not converge is no error; the status of the
+    /// result says so.
     pub(crate) fn fit_traces(
         &self,
         resume: Option<(&str, &TraceCheckpoint)>,
@@ -57,7 +57,7 @@ impl Problem {
         let mut ledger = TraceLedger::new(&header, resume, most, journal, on_iterate)?;
         if let Some((file, found)) = resume {
             recheck_iterates(file, found, |chain, before| match before {
-                // the end from which this run starts is not known yet
+                // the best end, from which this run starts, is not known yet
                 _ if UncertaintyRun::from_chain_number(chain).is_some() => None,
                 None => first_iterate(&model, &settings, &start_point(&model, seed, chain)),
                 Some(before) => next_iterate(&model, &settings, before),
@@ -104,20 +104,20 @@ fn cannot_be_fitted(why: &str) -> FitError {
     FitError::CannotBeFitted { why: why.to_owned() }
 }
 
-/// Reason of a fit without any iterate.
+/// Reason given for a fit without any iterate.
 const NO_SEGMENT_STARTED: &str = "no segment of the traces could be started: the model runs nowhere within the bounds, or \
                           the tip slides in too few frames; look at the recording with `wiperlab inspect`";
 
-// The result of a trace search.
+// Result of a trace search.
 
-/// Number of worst segments listed per channel.
+/// Number of worst segments that are listed per channel.
 const WORST_SEGMENTS: usize = 5;
 
-/// Doubt about a fit with one segment length: only longer segments would reveal a bias.
+/// Doubt about a fit with segments of one length: only longer segments would reveal a bias.
 const ONE_LENGTH_NOTE: &str = "segments of one length alone were fitted, and whether longer ones agree is not known: give \
                           `segment_s` two lengths at least";
 
-/// The outcome of a trace search with its problem.
+/// The outcome of a trace search, with the problem and the model.
 struct TraceFindings<'a, 'l> {
     problem: &'a Problem,
     model: &'a TraceModel,
@@ -126,7 +126,7 @@ struct TraceFindings<'a, 'l> {
 }
 
 impl TraceFindings<'_, '_> {
-    /// The result without the comparison of whole runs; `None` where no search made an iterate.
+    /// The result without the comparison of whole runs; `None` if no start has an iterate.
     fn into_result(self) -> Option<FitResult> {
         let job = self.problem.job();
         let best = self.searched.descents.get(self.searched.best)?;
@@ -201,7 +201,7 @@ impl TraceFindings<'_, '_> {
         end: &Iterate,
         misfit: &TraceMisfit,
     ) -> ParameterResult {
-        // the transform of the coordinate may round beyond a bound
+        // the transform of the coordinate may overshoot a bound by a rounding error
         let estimate = self.model.unknowns.0[at].value(end.point[at]);
         let mut found = ParameterResult {
             estimate: estimate.clamp(free.bounds.lower(), free.bounds.upper()),
@@ -260,7 +260,7 @@ impl TraceFindings<'_, '_> {
         all.map(nuisance).collect()
     }
 
-    /// The starting state of the first good segment of every recording.
+    /// The starting state of the first good segment of each recording.
     fn start_states(&self, end: &Iterate) -> Vec<StartState> {
         let start = |(film, shoot): (usize, &TraceRecording)| {
             let fits = |s: &&SegmentState| s.recording == film && s.chi2.is_finite() && !s.is_bad();
@@ -284,7 +284,7 @@ impl TraceFindings<'_, '_> {
     fn trace_misfit(&self, best: &TraceDescent, end: &Iterate, nuisances: &[NuisanceResult]) -> TraceMisfit {
         let found = segment_residuals(self.model, end);
         let mut channels: BTreeMap<(usize, bool), Vec<&SegmentResiduals>> = BTreeMap::new();
-        // a recording without residuals has its rows too
+        // a recording without residuals also gets an entry for each channel
         for (film, trace) in self.problem.traces().iter().enumerate() {
             for channel in &trace.channels {
                 channels.insert((film, *channel == TraceChannel::HeadDrop), Vec::new());
@@ -292,11 +292,11 @@ impl TraceFindings<'_, '_> {
         }
         found.iter().for_each(|r| channels.entry((r.recording, r.is_drop)).or_default().push(r));
         let ((chi2, dof), data) = (chi2_per_dof(end), end.count_data());
-        // the degrees of freedom are spread evenly over the data; chi2 is NaN where a run fails
+        // degrees of freedom per datum, the same for all data; chi2 is NaN if a run fails
         let share = if chi2.is_nan() || data == 0 { 1.0 } else { dof as f64 / data as f64 };
         let rows = channels.iter();
         let rows = rows.map(|(channel, parts)| self.channel_misfit(*channel, parts, share)).collect();
-        // the run with shorter segments from the best end replaces their stage of the search
+        // this stage of the search is replaced by the run with shorter segments from the best end
         let known = self.searched.assessment.as_ref().and_then(|known| known.shorter.as_ref());
         let shorter = |stage: usize| known.filter(|iterate| iterate.stage == stage);
         let stages =
@@ -358,7 +358,7 @@ impl TraceFindings<'_, '_> {
         }
     }
 
-    /// The end of every start, the best first.
+    /// The end of each start, the best first.
     fn sorted_optima(&self) -> Vec<LocalOptimum> {
         let stages = self.problem.segment_s().len();
         let optimum = |descent: &TraceDescent| {
@@ -400,9 +400,9 @@ impl TraceFindings<'_, '_> {
     }
 }
 
-/// Verdict on a parameter; one with a doubt is not identified.
+/// Verdict on a parameter; a parameter with any doubt is not identified.
 pub(super) fn trace_verdict(free: &FreeParameter, found: &ParameterResult) -> ParameterVerdict {
-    /// Distance from a bound, relative to the range, up to which a value counts as at the bound.
+    /// Distance from a bound, relative to the range, within which a value counts as at the bound.
     const NEAR: f64 = 1e-6;
     let place = free.bounds.unit_coordinate(found.estimate);
     match (found.lower_95, found.upper_95) {
@@ -423,7 +423,7 @@ fn correlation_table(names: &[String], known: &TraceAssessment) -> BTreeMap<Stri
     names.iter().enumerate().map(|(i, name)| (name.clone(), row(i))).collect()
 }
 
-/// Correlation of the whitened residuals of neighbouring frames.
+/// Autocorrelation of the whitened residuals at a lag of one frame.
 fn residual_autocorrelation(parts: &[&SegmentResiduals]) -> Option<f64> {
     let (mut product, mut pairs, mut square, mut count) = (0.0, 0usize, 0.0, 0usize);
     for part in parts {

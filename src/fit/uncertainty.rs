@@ -1,8 +1,9 @@
-//! Uncertainty of the parameters at the best point: intervals, verdicts, correlations, combinations.
+//! Uncertainty of the parameters at the best point: intervals, verdicts, correlations and combinations.
 //!
-//! An interval is the widest of three: the profile likelihood ([`super::profile`]), refits to twins of the
-//! best model ([`super::bootstrap`]), and the range of all evaluated points whose cost is within the
-//! threshold. Without a profile the linear model at the best point takes its place.
+//! The interval of a parameter covers three others: that of the profile likelihood ([`super::profile`]),
+//! that of refits to twins of the best model ([`super::bootstrap`]), and the range of all evaluated points
+//! whose cost is within the threshold. If there is no profile, the interval of the linear model at the best
+//! point replaces it.
 
 mod rivals;
 mod verdicts;
@@ -27,28 +28,28 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use verdicts::{best_excluded_gain, check_best_point, is_at_bound, withdraw_all, withdraw_correlated};
 
-/// How often the assessment starts again from a better point that a profile has found.
+/// Number of times that the assessment may start again from a better point.
 const MAX_RESTARTS: usize = 2;
 
-/// What is known of a parameter.
+/// Verdict on a parameter: whether the fit identifies it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ParameterVerdict {
-    /// Its interval lies within the bounds.
+    /// The features determine it, and its interval lies within the bounds.
     Identified,
-    /// Its interval reaches below the lower bound: only an upper limit is known.
+    /// Its interval reaches the lower bound, so only an upper limit is known.
     OpenBelow,
-    /// Its interval reaches above the upper bound: only a lower limit is known.
+    /// Its interval reaches the upper bound, so only a lower limit is known.
     OpenAbove,
-    /// The features do not determine it alone.
+    /// The features do not determine it, or something else casts doubt on its interval.
     #[default]
     NotIdentified,
-    /// The best value is a bound: the optimum may lie outside.
+    /// The best value is at a bound, so the optimum may lie outside.
     AtBound,
 }
 
 impl ParameterVerdict {
-    /// The word in files and summaries.
+    /// Name of the verdict in files and summaries.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -62,42 +63,45 @@ impl ParameterVerdict {
 }
 
 impl ParameterResult {
-    /// Calls it not identified, for a reason.
+    /// Changes the verdict to not identified and adds a reason.
     fn withdraw_verdict(&mut self, reason: String) {
         self.verdict = ParameterVerdict::NotIdentified;
         self.reasons.push(reason);
     }
 }
 
-/// Everything found at the best point.
+/// Assessment of the best point.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct FitUncertainty {
     pub best: Evaluation,
-    /// One per parameter, in job order.
+    /// Results of the parameters, in job order.
     pub intervals: Vec<ParameterResult>,
     /// Number of informative directions.
     pub rank: usize,
-    /// Largest singular value over the smallest; infinite where one is zero.
+    /// Ratio of the largest to the smallest singular value; infinite if the smallest is zero or
+    /// a rounding error.
     pub condition: f64,
-    /// Features that change by more than their own 95 % interval over the box.
+    /// Number of features and priors whose linear change across the search box exceeds the width of their own
+    /// 95 % interval.
     pub informative_features: usize,
-    /// `d ln feature / d ln parameter`, features by parameters; `None` where either is missing or zero.
+    /// `d ln feature / d ln parameter`, features by parameters; `None` if the feature is missing or the
+    /// parameter is zero.
     pub sensitivities: Vec<Vec<Option<f64>>>,
-    /// Correlation matrix of the estimates by the linear model.
+    /// Correlation matrix of the estimates by the linear model; `None` where a parameter is not determined.
     pub correlations: Vec<Vec<Option<f64>>>,
-    /// Combinations that are determined or left open.
+    /// Combinations of parameters that are determined or left undetermined.
     pub combinations: Vec<ParameterCombination>,
-    /// Calibration of the cameras at the best point.
+    /// Estimated calibration errors of the cameras at the best point.
     pub cameras: Vec<CameraEstimate>,
     /// Standard deviation of each feature over twins of the best model, in its own unit.
     pub twin_sd: Vec<Option<f64>>,
-    /// Twins that were fitted again.
+    /// Number of twins that were fitted again.
     pub twins: usize,
-    /// Sentences for the reader.
+    /// Remarks for the reader, one sentence each.
     pub notes: Vec<String>,
 }
 
-/// Warns of fewer informative features than parameters, before a search or after it (with its `rank`).
+/// Warns if there are fewer informative features than parameters. `rank` is known only after a search.
 pub(crate) fn count_warning(features: usize, rank: Option<usize>, parameters: usize) -> Option<String> {
     let known = rank.map_or(features, |rank| rank.min(features));
     if known >= parameters {
@@ -115,8 +119,8 @@ pub(crate) fn count_warning(features: usize, rank: Option<usize>, parameters: us
     ))
 }
 
-/// Assesses the ledger's best point; `None` when the ledger is empty. If a profile finds a better point, that
-/// point is polished with at most `polishing` evaluations and assessed instead.
+/// Assesses the best point of the ledger; `None` if the ledger is empty. If a profile finds a better point,
+/// that point is polished with at most `polishing` evaluations and assessed instead.
 pub(crate) fn assess_best(
     ledger: &mut Ledger,
     names: &[String],
@@ -135,7 +139,7 @@ pub(crate) fn assess_best(
     assess_once(ledger, names, settings)
 }
 
-/// Polishes the best point with at most `evaluations` more.
+/// Polishes the best point with at most `evaluations` further evaluations.
 fn polish_within(ledger: &mut Ledger, evaluations: usize) {
     let limit = ledger.evaluation_limit();
     ledger.set_limit(limit.min(ledger.run_evaluations().len().saturating_add(evaluations)));
@@ -178,7 +182,7 @@ fn keep_or_note<T>(found: Option<Result<T, StopReason>>, what: &str, notes: &mut
     found.ok()
 }
 
-/// The assessment of a point whose neighbours could not be evaluated.
+/// The result for a point whose neighbours could not be evaluated.
 pub(crate) fn unassessed_point(objective: &Objective, best: &Evaluation, why: &str) -> FitUncertainty {
     let open = |estimate: &f64| ParameterResult { estimate: *estimate, ..ParameterResult::default() };
     FitUncertainty {
@@ -193,7 +197,7 @@ pub(crate) fn unassessed_point(objective: &Objective, best: &Evaluation, why: &s
 
 impl FitUncertainty {
     /// Withholds all intervals if the search did not converge, or if no other local search reached the best
-    /// point; `ends` are the ends of the other searches.
+    /// point; `ends` are the ends of the other local searches.
     pub(crate) fn with_search_doubts(
         self,
         converged: bool,
@@ -210,7 +214,7 @@ impl FitUncertainty {
         }
     }
 
-    /// Withdraws the verdict of every identified parameter if there is an objection to the model.
+    /// Withdraws the verdict of every identified parameter if there is evidence `why` against the model.
     pub(crate) fn with_model_objection(mut self, why: Option<String>) -> Self {
         if let Some(why) = why {
             let known = self.intervals.iter_mut().filter(|i| i.verdict == ParameterVerdict::Identified);
@@ -232,7 +236,7 @@ impl FitUncertainty {
 const SEARCH_UNFINISHED: &str = "the search was still gaining when its evaluations were used up, or was interrupted: there is a better point, so nothing is called identified; \
     raise local_evaluations in [search], or --max-evaluations, and go on with --resume";
 
-/// Evidence in addition to the linear model.
+/// Intervals by other methods than the linear model.
 struct IntervalEvidence {
     profiles: Option<Vec<ProfileLikelihood>>,
     twins: Option<Bootstrap>,
@@ -314,7 +318,7 @@ impl LocalAssessment {
         let [below, above] = twins.unwrap_or([unit, unit]);
         let value =
             |u: f64| ledger.objective().axes().get(axis).map_or(f64::NAN, |a| a.bounds.value_at_unit(u));
-        // an interval that reaches a bound is open: nothing beyond the bound was tried
+        // an interval that reaches a bound is open, because nothing outside the bound was tried
         let inside = |u: f64| (AT_BOUND..=1.0 - AT_BOUND).contains(&u).then(|| value(u));
         let lower_95 = lower.and_then(|u| inside(u.min(least).min(below)));
         let upper_95 = upper.and_then(|u| inside(u.max(most).max(above)));
@@ -339,7 +343,7 @@ impl LocalAssessment {
 }
 
 /// The verdict on an interval. A parameter that the features do not determine near the best point is not
-/// identified, even where failing runs close its interval.
+/// identified, even if failing runs close its interval.
 fn interval_verdict(unit: f64, lower: Option<f64>, upper: Option<f64>, determined: bool) -> ParameterVerdict {
     match (lower, upper) {
         (None, None) => ParameterVerdict::NotIdentified,
@@ -351,8 +355,8 @@ fn interval_verdict(unit: f64, lower: Option<f64>, upper: Option<f64>, determine
     }
 }
 
-/// Student's 97.5 % point over the normal one, to first order in one over the number of twins (Abramowitz and
-/// Stegun, 26.7.5).
+/// Ratio of the 97.5 % quantile of Student's t to that of the normal distribution, to first order in 1 /
+/// `twins` (Abramowitz and Stegun, 26.7.5).
 fn student_factor(twins: usize) -> f64 {
     1.0 + (Z_95 * Z_95 + 1.0) / (4.0 * twins.max(1) as f64)
 }
@@ -370,7 +374,7 @@ fn log_sensitivities(
     slopes.0.iter().map(row).collect()
 }
 
-/// Steps at which the model failed.
+/// A note for each parameter with a step of the differences at which the model failed.
 fn failed_step_notes(names: &[String], around: &[Evaluation]) -> Vec<String> {
     let failed = |axis: usize| around.iter().skip(2 * axis).take(2).find_map(|e| e.failure.as_ref());
     let note = |(axis, name): (usize, &String)| {

@@ -1,4 +1,4 @@
-//! job.toml as people write it: types and keys only, nothing checked against anything else.
+//! job.toml as people write it: types and keys only; values are not checked against each other.
 
 use crate::feature::{Keys, define_entry, with_reading_keys};
 use crate::fit::bounds::BoundsSpacing;
@@ -10,7 +10,7 @@ use serde::de::{Error, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 use std::fmt;
 
-/// What is fitted to what.
+/// A fit: the scene, its free parameters, and the recordings or published numbers that the model must meet.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(title = "job.toml")]
@@ -19,49 +19,49 @@ pub(crate) struct JobFile {
     pub format: u32,
     /// Title for pages and figures.
     pub title: String,
-    /// Scene that gives all values that the job does not; relative to this file.
+    /// Path of the scene that gives all values that the job does not; relative to this file.
     pub scene: String,
     /// Seed of the search, a whole number.
     pub seed: u64,
-    /// Starting states over which the model is averaged.
+    /// Starting states over which the features of the model are averaged.
     pub ensemble: Option<JobEnsembleTable>,
     /// Recordings that are fitted.
     #[serde(default)]
     pub recording: Vec<JobRecordingTable>,
-    /// Operating conditions with published numbers only.
+    /// Operating conditions without a recording.
     #[serde(default)]
     pub condition: Vec<JobConditionTable>,
-    /// Camera of a condition without a recording.
+    /// Camera of the conditions without a recording.
     pub camera: Option<Camera>,
     /// Free parameters.
     #[serde(default)]
     pub parameter: Vec<JobParameterTable>,
-    /// Constants of the scene that are freed within priors, with [[trace]]: "3 %", or a list.
+    /// Constants of the scene that are free within priors, in a job with [[trace]]: "3 %" for all, or a list.
     pub nuisance: Option<JobNuisanceEntry>,
-    /// Recordings whose frames are fitted.
+    /// Recordings of which every frame is fitted.
     #[serde(default)]
     pub trace: Vec<JobTraceTable>,
-    /// Which runs count.
+    /// Limits of plausible runs.
     pub plausible: Option<JobPlausibleTable>,
     /// Frequencies that the model must meet.
     #[serde(default)]
     pub component: Vec<JobComponentTable>,
-    /// Other features that the model must meet.
+    /// Other features that the model must meet, one entry each.
     #[serde(default)]
     pub feature: Vec<Feature>,
     /// Budgets of a search on features.
     pub search: Option<JobSearchTable>,
-    /// How intervals are found.
+    /// Methods for the intervals.
     pub intervals: Option<JobIntervalsTable>,
 }
 
-/// Starting states over which the model is averaged.
+/// Starting states over which the features of the model are averaged.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct JobEnsembleTable {
     /// Number of starting states, 1 to 64; 1 if left out.
     pub members: Option<usize>,
-    /// Their relative spread, above 0 and at most 1; 0.1 if left out.
+    /// Relative spread of the starting states, above 0 and at most 1; 0.1 if left out.
     pub spread: Option<f64>,
 }
 
@@ -69,39 +69,39 @@ pub(crate) struct JobEnsembleTable {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct JobRecordingTable {
-    /// Different from every other; "recording N" if left out.
+    /// Name of the recording, different from every other; "recording N" if left out.
     pub name: Option<String>,
     /// Folder of the recording, or its trace.csv; relative to this file.
     pub path: String,
-    /// Its own scene; that of the job if left out.
+    /// Path of the scene of this recording; that of the job if left out.
     pub scene: Option<String>,
-    /// "scene" for the drive of the scene, "recording" for its own head, which then replaces [drive] and the
-    /// times of the run; "scene" if left out.
+    /// Drive of the model: "scene" for that of the scene; "recording" for the recorded head, which then
+    /// replaces [drive] and the times of the run; "scene" if left out.
     pub drive: Option<String>,
-    /// Operating condition: values of the scene by parameter name, SI.
+    /// Operating condition: values that replace those of the scene, by parameter name, SI.
     #[serde(default)]
     #[schemars(with = "serde_json::Map<String, serde_json::Value>")]
     pub set: toml::Table,
-    /// Predict it, do not fit it; false if left out.
+    /// Whether its features are only predicted, not fitted; false if left out.
     #[serde(default)]
     pub held_out: bool,
-    /// "exact", or what is not known of the camera; only without [[trace]].
+    /// "exact", or a table of the camera's uncertain calibration; only without [[trace]].
     pub camera: Option<RecordingCamera>,
 }
 
-/// An operating condition with published numbers only.
+/// An operating condition without a recording, for which only published numbers are known.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct JobConditionTable {
-    /// Different from every other.
+    /// Name of the condition, different from every other.
     pub name: String,
-    /// Its own scene; that of the job if left out.
+    /// Path of the scene of this condition; that of the job if left out.
     pub scene: Option<String>,
-    /// Values of the scene by parameter name, SI.
+    /// Values that replace those of the scene, by parameter name, SI.
     #[serde(default)]
     #[schemars(with = "serde_json::Map<String, serde_json::Value>")]
     pub set: toml::Table,
-    /// Predict it, do not fit it; false if left out.
+    /// Whether its features are only predicted, not fitted; false if left out.
     #[serde(default)]
     pub held_out: bool,
 }
@@ -116,29 +116,29 @@ pub(crate) struct JobParameterTable {
     pub lower: f64,
     /// Upper bound, SI.
     pub upper: f64,
-    /// How the search moves along it.
+    /// Scale on which the search moves, "log" or "linear".
     pub scale: BoundsSpacing,
-    /// What is known beforehand; nothing if left out.
+    /// Prior knowledge of the parameter; none if left out.
     pub prior: Option<JobPriorTable>,
 }
 
-/// What is known of a parameter beforehand.
+/// Prior knowledge of a parameter: a normal distribution.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct JobPriorTable {
-    /// Mean, within the bounds, SI.
+    /// Mean of the prior, within the bounds, SI.
     pub mean: f64,
-    /// Standard deviation in the unit of the parameter.
+    /// Standard deviation of the prior, in the unit of the parameter.
     pub sd: Option<f64>,
-    /// Standard deviation relative to the mean, in place of sd.
+    /// Standard deviation relative to the mean, instead of sd.
     pub sd_relative: Option<f64>,
 }
 
-/// Which runs count.
+/// Limits of plausible runs.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct JobPlausibleTable {
-    /// A run in which neck or lip leans farther from the vertical fails, degrees.
+    /// Largest angle of neck and lip from the vertical, degrees; a run that exceeds it fails.
     pub largest_tilt_deg: Option<f64>,
 }
 
@@ -146,38 +146,38 @@ pub(crate) struct JobPlausibleTable {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct JobComponentTable {
-    /// Different from every other component and feature.
+    /// Name of the component, different from every other component and feature.
     pub name: String,
-    /// "deflection", "head-drop", "tip-x" or "head-x".
+    /// Channel, one of "deflection", "head-drop", "tip-x" and "head-x".
     pub channel: String,
-    /// Frames from which it is read, as of `wiperlab spectrum`.
+    /// Frames in which the frequency is measured, as for `wiperlab spectrum`.
     pub window: String,
-    /// Lowest and highest frequency, Hz.
+    /// Lowest and highest frequency of the band, Hz.
     pub band_hz: NumberPair,
-    /// What is removed first; "cubic" if left out.
+    /// Trend that is removed first; "cubic" if left out.
     pub detrend: Option<String>,
     /// Published target, Hz; measured on the recording if left out.
     pub target_hz: Option<f64>,
-    /// Its standard deviation, or the least one of a measured target, Hz.
+    /// Standard deviation of the published target, or smallest one of a measured target, Hz.
     pub target_sd_hz: Option<f64>,
     /// Largest relative error that passes; 0.02 if left out.
     pub tolerance_relative: Option<f64>,
-    /// Name or number of the recording; 1 if left out.
+    /// Name or number of the recording or condition; 1 if left out.
     pub recording: Option<ConditionReference>,
 }
 
 with_reading_keys!(define_entry {
     "A feature that the model must meet."
     Feature {
-        /// Different from every other component and feature; the kind if left out.
+        /// Name of the feature, different from every other component and feature; the kind if left out.
         name: Option<String>,
-        /// Least deviation as a fraction of the measured value.
+        /// Smallest standard deviation, as a fraction of the measured value.
         sd_relative: Option<f64>,
-        /// A published value, SI.
+        /// Published target, SI; measured on the recording if left out.
         target: Option<f64>,
-        /// Its standard deviation, SI.
+        /// Standard deviation of the published target, SI.
         target_sd: Option<f64>,
-        /// Name or number of the recording; 1 if left out.
+        /// Name or number of the recording or condition; 1 if left out.
         recording: Option<ConditionReference>,
     }
 });
@@ -198,25 +198,25 @@ impl JobComponentTable {
 #[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct JobSearchTable {
-    /// Evaluations of the first stage.
+    /// Number of evaluations of the first stage.
     pub global_evaluations: Option<usize>,
-    /// Evaluations of the second stage.
+    /// Number of evaluations of the second stage.
     pub local_evaluations: Option<usize>,
-    /// Points in a cloud; 24 if left out.
+    /// Number of points in a cloud; 24 if left out.
     pub particles: Option<usize>,
-    /// Generations without progress after which a cloud stops; 20 if left out.
+    /// Number of generations without progress after which a cloud stops; 20 if left out.
     pub stagnation_generations: Option<usize>,
-    /// Points from which a local search starts, 1 to 64; 6 if left out.
+    /// Number of points from which local searches start, 1 to 64; 6 if left out.
     pub starts: Option<usize>,
 }
 
-/// How intervals are found.
+/// Methods for the intervals.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct JobIntervalsTable {
-    /// Intervals from profiles of the cost; true if left out.
+    /// Whether intervals from profiles of the cost are computed; true if left out.
     pub profile: Option<bool>,
-    /// Fits to twins of the best model, 0 to 1000.
+    /// Number of fits to twins of the best model, 0 to 1000; if left out, 40, or 0 with [[trace]].
     pub bootstrap: Option<usize>,
 }
 
@@ -226,38 +226,40 @@ pub(crate) struct JobIntervalsTable {
 pub(crate) struct JobTraceTable {
     /// Name or number of the recording; 1 if left out.
     pub recording: Option<ConditionReference>,
-    /// "tip-x", "head-drop" or "deflection"; what it has of the first two if left out.
+    /// Fitted channels: "tip-x", "head-drop" or "deflection"; if left out, the first two where the
+    /// recording has them.
     pub channels: Option<Vec<String>>,
-    /// Lengths of the segments of each stage, rising, s.
+    /// Length of the segments in each stage, in ascending order, s.
     pub segment_s: Option<Vec<f64>>,
     /// Frames that are fitted; all if left out.
     pub window: Option<String>,
     /// Standard deviation of a tracked coordinate, m; measured if left out.
     pub noise_m: Option<f64>,
-    /// "recording" for its own head, "scene" for that of the scene.
+    /// Drive of the model: "recording" for the recorded head, "scene" for that of the scene; if left out,
+    /// "recording" where the head is tracked.
     pub drive: Option<String>,
-    /// What is not known of its camera.
+    /// Uncertain calibration of the camera.
     #[serde(default)]
     pub camera: JobTraceCameraTable,
 }
 
-/// What is not known of a camera: standard deviations; 0 holds one.
+/// Standard deviations of the uncertain numbers of a camera; 0 fixes a number.
 #[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct JobTraceCameraTable {
-    /// Of its tilt, degrees; 0.3 if left out.
+    /// Standard deviation of its tilt, degrees; 0.3 if left out.
     pub tilt_sd_deg: Option<f64>,
-    /// Of its scale, relative; 0.005 if left out.
+    /// Relative standard deviation of its scale; 0.005 if left out.
     pub scale_sd: Option<f64>,
-    /// Of the place of a marker against the point that it stands for, m; 0.001 if left out.
+    /// Standard deviation of the distance of a marker from the point that it marks, m; 0.001 if left out.
     pub offset_sd_m: Option<f64>,
-    /// Of the speed at which these places drift, m/s; 0 if left out.
+    /// Standard deviation of the speed at which these distances drift, m/s; 0 if left out.
     pub drift_sd_m_per_s: Option<f64>,
-    /// Of its clock against the drive, s; 0, or 0.001 with drive = "scene".
+    /// Standard deviation of its clock against the drive, s; if left out, 0, or 0.001 with drive = "scene".
     pub clock_sd_s: Option<f64>,
 }
 
-/// The camera of a recording from which features are read: `"exact"`, or what is not known of it.
+/// The camera of a recording for features: `"exact"`, or a table of its uncertain calibration.
 #[derive(Debug, JsonSchema)]
 #[schemars(untagged, extend("x-expected" = "\"exact\", or a table such as { scale_sd = 0.005, offset_sd_m = 0.001 }"))]
 pub(crate) enum RecordingCamera {
@@ -289,7 +291,7 @@ impl<'de> Visitor<'de> for RecordingCameraVisitor {
     }
 }
 
-/// Constants that are freed with a prior: all of them with one deviation, or those of a list.
+/// Constants that are free within a prior: all of them with one deviation, or those of a list.
 #[derive(Debug, JsonSchema)]
 #[schemars(untagged, extend("x-expected" = "a percentage such as \"3 %\", or a list such as [{ name = \"blade.lip_mass_kg\", sd = \"5 %\" }]"))]
 pub(crate) enum JobNuisanceEntry {
@@ -297,7 +299,7 @@ pub(crate) enum JobNuisanceEntry {
     Listed(Vec<ListedNuisance>),
 }
 
-/// A constant of the scene that is freed within a prior.
+/// A constant of the scene that is free within a prior.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ListedNuisance {
@@ -305,7 +307,7 @@ pub(crate) struct ListedNuisance {
     pub name: String,
     /// Standard deviation, such as "5 %".
     pub sd: Option<String>,
-    /// The same as a fraction, in place of sd.
+    /// Standard deviation as a fraction, instead of sd.
     pub sd_relative: Option<f64>,
 }
 
@@ -337,7 +339,7 @@ impl<'de> Visitor<'de> for NuisanceVisitor {
     }
 }
 
-/// A recording or condition by its number, counted from 1, or its name.
+/// A recording or condition: its number, counted from 1, or its name.
 #[derive(Debug, JsonSchema)]
 #[schemars(untagged, extend("x-expected" = "the number of a recording, counted from 1, or its name"))]
 pub(crate) enum ConditionReference {
@@ -361,8 +363,7 @@ impl Visitor<'_> for ConditionReferenceVisitor {
     }
 
     fn visit_i64<E: Error>(self, value: i64) -> Result<ConditionReference, E> {
-        // one below 1 is no number of a recording either way, and 0 is refused with the numbers that there
-        // are
+        // no recording has a number below 1; 0 is refused with the list of the numbers that exist
         Ok(ConditionReference::Number(usize::try_from(value).unwrap_or(0)))
     }
 

@@ -1,5 +1,5 @@
-//! Recordings and operating conditions of a job: what is simulated, and which values replace those of the
-//! scene.
+//! Recordings and operating conditions of a job: the scene of each, and the values that replace those
+//! of the scene.
 
 use super::KeyRefusal;
 use super::as_written::{self, RecordingCamera};
@@ -8,36 +8,35 @@ use crate::model::parameters;
 use crate::toml_file::suggest_key;
 use serde::Serialize;
 
-/// Name of the scene itself where a job has neither recordings nor conditions.
+/// Name of the only condition of a job that has neither recordings nor conditions.
 pub(crate) const SCENE_ALONE: &str = "scene";
 
-/// What drives the head of a model.
+/// Source of the head's motion in a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum HeadSource {
-    /// The head of the recording itself.
+    /// The recorded motion of the head.
     Recording,
     /// The drive of the scene.
     Scene,
 }
 
-/// An operating condition: a scene with some values replaced, and a recording of it or published numbers.
+/// An operating condition: a scene with some values replaced, and either a recording or published numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JobCondition {
     /// Name, unique in the job.
     pub name: String,
-    /// Path of the recording's folder, relative to the job file; `None` where there are only published
-    /// numbers.
+    /// Path of the recording's folder, relative to the job file; `None` if there are only published numbers.
     pub recording: Option<String>,
     /// Path of its scene, relative to the job file.
     pub scene: String,
-    /// What drives its head: the drive of its scene, or its own recording.
+    /// Source of the head's motion: the drive of the scene, or the recorded head.
     pub head: HeadSource,
     /// Parameters whose values replace those of the scene, in SI units.
     pub set: Vec<(String, f64)>,
-    /// Whether it is only predicted, never fitted.
+    /// Whether its features are only predicted, never fitted.
     pub held_out: bool,
-    /// Calibration errors of the camera from which features are read; `None` without a recording.
+    /// Calibration errors of the camera that recorded the features; `None` without a recording.
     pub camera: Option<FeatureCamera>,
 }
 
@@ -48,7 +47,8 @@ impl JobCondition {
     }
 }
 
-/// Recordings first, then conditions, in the order of the file; the scene alone where there is neither.
+/// Checks recordings, then conditions, each in the order of the file; if there is neither, the scene is
+/// the only condition.
 pub(super) fn check_conditions(
     written: &as_written::JobFile,
     known: &[&str],
@@ -111,7 +111,7 @@ fn scene_path(entry: &str, own: Option<&str>, scene: &str) -> Result<String, Key
     check_non_empty(&format!("{entry}, `scene`"), own, "the path of a scene, relative to the job file")
 }
 
-/// The value of a key `drive`.
+/// Parses the value of a key `drive`.
 pub(super) fn parse_head_source(
     key: impl Fn() -> String,
     word: Option<&str>,
@@ -127,7 +127,8 @@ pub(super) fn parse_head_source(
     }
 }
 
-/// Values by parameter name; `"drive.frequency_hz" = 0.5` and `drive.frequency_hz = 0.5` say the same.
+/// Parses values by parameter name; `"drive.frequency_hz" = 0.5` and `drive.frequency_hz =
+/// 0.5` are equivalent.
 fn parse_set_values(
     entry: &str,
     written: &toml::Table,
@@ -158,13 +159,13 @@ fn parse_set_number(entry: &str, name: &str, value: &toml::Value, known: &[&str]
     }
 }
 
-/// Whether two names set the same quantity, however each writes it.
+/// Whether two names denote the same quantity, in whatever form.
 pub(crate) fn is_same_quantity(a: &str, b: &str) -> bool {
     let quantity = |name: &str| parameters::find_parameter(name).map(|row| row.quantity);
     a == b || quantity(a).is_some_and(|found| quantity(b) == Some(found))
 }
 
-/// A parameter that the search moves cannot be held by a condition as well.
+/// Refuses a condition that sets a parameter that is free.
 pub(super) fn check_not_set(conditions: &[JobCondition], free: &str) -> Result<(), KeyRefusal> {
     for JobCondition { name, set, .. } in conditions {
         if let Some((set, _)) = set.iter().find(|(set, _)| is_same_quantity(set, free)) {
@@ -179,23 +180,24 @@ pub(super) fn check_not_set(conditions: &[JobCondition], free: &str) -> Result<(
 
 // Calibration errors of cameras.
 
-/// Default relative standard deviation of the scale: a scale bar of 20 mm, read to a tenth of a millimetre.
+/// Default relative standard deviation of the scale, for a scale bar of 20 mm read to a tenth
+/// of a millimetre.
 pub(super) const DEFAULT_SCALE_SD: f64 = 0.005;
-/// Largest relative standard deviation of the scale: a picture with a worse scale is not calibrated.
+/// Largest relative standard deviation of the scale; above it the picture is not calibrated.
 pub(super) const MAX_SCALE_SD: f64 = 0.1;
-/// Default standard deviation of the position of a marker, m: a marker is placed on its hinge to a
-/// millimetre.
+/// Default standard deviation of the position of a marker, m, for a marker placed on its hinge
+/// to a millimetre.
 pub(super) const DEFAULT_OFFSET_SD_M: f64 = 1e-3;
 /// Largest standard deviation of the position of a marker, m: the length of a blade.
 pub(super) const MAX_OFFSET_SD_M: f64 = 0.1;
 
-/// Standard deviations of the calibration of a camera from which features are read; 0 holds a number at its
-/// nominal value.
+/// Standard deviations of the calibration of a camera that records features; 0 fixes a number at
+/// its nominal value.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FeatureCamera {
-    /// Of the scale, relative.
+    /// Relative standard deviation of the scale.
     pub scale_sd: f64,
-    /// Of the offset between the markers of tip and head along the sweep, m.
+    /// Standard deviation of the offset between the markers of tip and head along the sweep, m.
     pub offset_sd_m: f64,
 }
 
@@ -204,7 +206,7 @@ impl FeatureCamera {
     pub(crate) const EXACT: Self = Self { scale_sd: 0.0, offset_sd_m: 0.0 };
 }
 
-/// The camera of the recording `entry`, such as `recording 1`.
+/// Checks the camera of the recording `entry`, such as `recording 1`.
 pub(super) fn check_feature_camera(
     entry: &str,
     written: Option<&RecordingCamera>,
@@ -262,7 +264,7 @@ pub(super) fn check_no_camera_with_traces(written: &as_written::JobFile) -> Resu
     }
 }
 
-/// Checks the standard deviation of a camera's number, where the job has it.
+/// Checks the standard deviation of a number of a camera, if the job gives it.
 pub(super) fn check_camera_sd(key: String, found: Option<f64>, most: f64) -> Result<Option<f64>, KeyRefusal> {
     match found {
         Some(sd) if !(0.0..=most).contains(&sd) => refuse!(key, "found {sd}, expected 0 (held) to {most}"),

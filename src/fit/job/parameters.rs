@@ -11,16 +11,16 @@ use serde::Serialize;
 /// A parameter that the search may change.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FreeParameter {
-    /// Key of the scene with its table, such as `friction.a`.
+    /// Key of the scene, with its table, such as `friction.a`.
     pub name: String,
-    /// Its range, in its own SI unit.
+    /// Its bounds, in its own SI unit.
     pub bounds: Bounds,
-    /// Its prior.
+    /// Its prior, if any.
     pub prior: Option<Prior>,
 }
 
 impl FreeParameter {
-    /// Its range and prior, as the search uses them.
+    /// Bounds and prior in the form that the search uses.
     pub(crate) fn search_axis(&self) -> SearchAxis {
         SearchAxis { bounds: self.bounds, prior: self.prior }
     }
@@ -47,8 +47,8 @@ pub(super) fn check_parameters(
     written.iter().map(check).collect()
 }
 
-/// Refuses entries that set the same quantity, such as a stiffness and its natural frequency: the second one
-/// would overwrite the first.
+/// Refuses two entries that set the same quantity, such as a stiffness and its natural frequency, because the
+/// second would overwrite the first.
 fn check_distinct(table: &str, names: &[&str], article: &str) -> Result<(), KeyRefusal> {
     if let Some(name) = find_repeated(names.iter().copied()) {
         refuse!(format!("{table} `{name}`"), "found twice; remove one of them");
@@ -97,21 +97,21 @@ fn check_prior(
     }
 }
 
-// Constants of the scene that are freed within a prior, because a mass or a damping is never known exactly.
+// Constants of the scene that are free within a prior, because a mass or a damping is never known exactly.
 
-/// Least standard deviation of a constant, %: a more precise one is held instead.
+/// Smallest standard deviation of a constant, %; a more precisely known constant must be left fixed.
 const LEAST_PERCENT: f64 = 1e-4;
-/// Largest standard deviation of a constant, %: a less precise one is a parameter.
+/// Largest standard deviation of a constant, %; a less precisely known quantity must be a free parameter.
 const MOST_PERCENT: f64 = 50.0;
 
-/// Constants of the scene that are freed within a prior.
+/// Constants of the scene that are free within a prior.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Constants {
-    /// None: all constants are exact.
+    /// No constants: all of them are exact.
     Exact,
-    /// All masses, inertias, stiffnesses, dampings, preload and shoulder angle of a scene that are not zero
-    /// and neither free parameters nor set by a condition.
+    /// All masses, inertias, stiffnesses and dampings, the preload and the shoulder angle of a scene, except
+    /// those that are zero, free parameters, or set by a condition.
     All {
         /// Relative standard deviation of each.
         sd_relative: f64,
@@ -120,10 +120,10 @@ pub enum Constants {
     Listed(Vec<NuisanceParameter>),
 }
 
-/// A constant that is freed within a prior.
+/// A constant that is free within a prior.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NuisanceParameter {
-    /// Key of the scene with its table.
+    /// Key of the scene, with its table.
     pub name: String,
     /// Standard deviation of its logarithm about the scene's value.
     pub sd_relative: f64,
@@ -198,7 +198,7 @@ fn parse_percentage(key: &str, text: &str) -> Result<f64, KeyRefusal> {
     }
 }
 
-/// A percentage as a fraction.
+/// Checks a percentage and returns it as a fraction.
 fn check_percentage(key: &str, percent: f64) -> Result<f64, KeyRefusal> {
     if (LEAST_PERCENT..=MOST_PERCENT).contains(&percent) {
         return Ok(percent / 100.0);

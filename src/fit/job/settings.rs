@@ -1,4 +1,4 @@
-//! Tables of a job that say how it is computed: ensemble, camera, plausibility, search, intervals.
+//! Tables of a job that set how the fit is computed: ensemble, camera, plausibility, search and intervals.
 
 use super::{KeyRefusal, as_written, check_above_zero};
 use crate::fit::search::{STAGNANT_GENERATIONS, SearchSettings};
@@ -6,38 +6,39 @@ use crate::fit::trace::MAX_TWINS as MOST_REPLICATES;
 use crate::simulate::twin::Camera;
 use serde::Serialize;
 
-/// Default number of points of a cloud: a few for each of up to six parameters, and a multiple of common core
-/// counts.
+/// Default number of points in a cloud: a few for each of up to six parameters, and a multiple of common
+/// numbers of processor cores.
 pub(super) const PARTICLES: usize = 24;
-/// Default number of local searches: known cases have two or three basins, and some starts share one.
+/// Default number of local searches: known cases have two or three basins, and several starts may
+/// fall into one.
 pub(super) const STARTS: usize = 6;
-/// Most local searches: they share the local evaluations.
+/// Maximum number of local searches; with more, each would get too few of the evaluations that they share.
 const MOST_STARTS: usize = 64;
-/// Most evaluations of a stage: bounds the memory of a run that would take weeks.
+/// Maximum number of evaluations in a stage; it bounds the memory of a run that would take weeks.
 const MOST_EVALUATIONS: usize = 10_000_000;
-/// Most starting states of an ensemble. Eight reduce the error of a friction from 20 % to 1-3 %, and each
-/// costs a run.
+/// Maximum number of starting states in an ensemble. Eight states reduce the error of a friction coefficient
+/// from 20 % to 1-3 %, and each costs a run.
 const MOST_MEMBERS: usize = 64;
-/// Default relative spread of the starting state: the error of a start that is guessed from a recording.
+/// Default relative spread of the starting state: the error of a state that is guessed from a recording.
 const SPREAD: f64 = 0.1;
-/// Most particles of a cloud: a thousand fill a box of many parameters.
+/// Maximum number of points in a cloud; a thousand fill a box of many parameters.
 const MOST_PARTICLES: usize = 10_000;
-/// Most entries of a kind: a page and its figures show tens, and a larger job is a mistake of the program
-/// that wrote it.
+/// Maximum number of entries of one kind. A page and its figures show tens; a larger job is a mistake of the
+/// program that wrote it.
 const MOST_ENTRIES: usize = 1000;
-/// Default number of fits to twins of the best model: forty give a standard deviation to a tenth.
+/// Default number of fits to twins of the best model: forty give a standard deviation to about a tenth.
 const REPLICATES: usize = 40;
 
-/// Starting states of a model run.
+/// Ensemble of starting states over which features are averaged.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Ensemble {
-    /// How many, 1 or more; 1 for the scene's own.
+    /// Number of starting states, at least 1; 1 is the scene's own.
     pub members: usize,
     /// Relative spread of the starting state, above 0 and at most 1.
     pub spread: f64,
 }
 
-/// How intervals are found in addition to those of the linear model.
+/// Methods for the intervals, in addition to the linear model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct IntervalSettings {
     /// Whether profiles of the cost are computed.
@@ -46,7 +47,7 @@ pub struct IntervalSettings {
     pub bootstrap: usize,
 }
 
-/// Refuses a job with too many entries before they are compared with each other.
+/// Refuses a job with too many entries, before they are compared with each other.
 pub(super) fn check_counts(written: &as_written::JobFile) -> Result<(), KeyRefusal> {
     let counts = [
         ("recording", written.recording.len()),
@@ -109,14 +110,15 @@ pub(super) fn check_largest_tilt_rad(written: &as_written::JobFile) -> Result<Op
 
 pub(super) fn check_intervals(written: &as_written::JobFile) -> Result<IntervalSettings, KeyRefusal> {
     let (profile, bootstrap) = written.intervals.as_ref().map_or((None, None), |i| (i.profile, i.bootstrap));
-    // intervals of a trace fit use the scatter of its segments, and a refit takes a tenth of the search
+    // a trace fit has intervals from the scatter of its segments, and a refit costs a tenth of its search
     let bootstrap = bootstrap.unwrap_or(if written.trace.is_empty() { REPLICATES } else { 0 });
     let why = "fits to twins of the best model; 0 for none";
     check_count("intervals.bootstrap", bootstrap, 0, MOST_REPLICATES, why)?;
     Ok(IntervalSettings { profile: profile.unwrap_or(true), bootstrap })
 }
 
-/// Budgets of a search on features. A job with traces needs none: its search ends by itself.
+/// Checks the budgets of a search on features. A job with traces needs none, because its search
+/// ends by itself.
 pub(super) fn check_search(written: &as_written::JobFile) -> Result<SearchSettings, KeyRefusal> {
     let traced = !written.trace.is_empty();
     if written.search.is_none() && !traced {

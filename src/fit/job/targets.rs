@@ -9,15 +9,15 @@ use crate::feature::{FREQUENCY_SD_FLOOR, Feature, Keys, Reading, ReadingKind, Va
 use crate::toml_file::suggest_key;
 use serde::Serialize;
 
-/// Default standard deviation of the logarithm of a spectral level: the scatter of a periodogram over a few
-/// frequency resolutions.
+/// Default standard deviation of the logarithm of a spectral level: the scatter of a periodogram that is
+/// averaged over a few frequency resolutions.
 const LEVEL_SD_RELATIVE: f64 = 0.3;
 
-/// Default tolerance of a component's frequency, relative: 2 % is the accuracy goal of this program.
+/// Default relative tolerance of a component's frequency: the accuracy goal of this program, 2 %.
 pub(super) const TOLERANCE_RELATIVE: f64 = 0.02;
 
-/// Components first, then features, in the order of the file; `nyquist_hz` is half the rate of the job's own
-/// camera.
+/// Checks components, then features, each in the order of the file; `nyquist_hz` is half the frame rate of
+/// the job's own camera.
 pub(super) fn check_targets(
     written: &as_written::JobFile,
     conditions: &[JobCondition],
@@ -110,7 +110,8 @@ fn check_feature(
     readings.into_iter().map(aim).collect()
 }
 
-/// The kind of a feature that a recording has; a frequency has to be a component.
+/// The kind of a feature; refuses a kind that only a simulated run has, and a frequency, which must
+/// be a component.
 fn find_feature_kind(written: &as_written::Feature) -> Result<&'static ReadingKind, KeyRefusal> {
     let name = written.name.as_ref().map_or_else(String::new, |name| format!(" `{name}`"));
     let key = format!("feature{name}, `kind`");
@@ -131,7 +132,8 @@ fn find_feature_kind(written: &as_written::Feature) -> Result<&'static ReadingKi
     }
 }
 
-/// Checks a series: each of its features has a target of its own, so that all of them have to be measured.
+/// Checks a series. Each of its features has a target of its own, so the targets must be measured
+/// on a recording.
 fn check_series(entry: &JobEntry, written: &as_written::Feature, measured: bool) -> Result<(), KeyRefusal> {
     if !measured {
         refuse!(
@@ -148,7 +150,7 @@ fn check_series(entry: &JobEntry, written: &as_written::Feature, measured: bool)
     Ok(())
 }
 
-/// The keys of an entry that define its reading.
+/// The keys of an entry that define how its feature is computed.
 fn reading_entry<'a>(
     entry: &'a JobEntry,
     keys: &'a Keys,
@@ -183,7 +185,7 @@ fn target_source(
     }
 }
 
-/// A least deviation relative to the target, or to the scale of a value that may be zero.
+/// Smallest deviation, relative to the target or to the difference that counts as large.
 fn measured_source(measure: ValueComparison, relative: f64) -> TargetSource {
     match measure {
         ValueComparison::Log => TargetSource::Measured { least_sd: 0.0, least_sd_relative: relative },
@@ -193,7 +195,7 @@ fn measured_source(measure: ValueComparison, relative: f64) -> TargetSource {
     }
 }
 
-/// Default least relative deviation of a reading; 0 where only the noise of the recording counts.
+/// Default smallest relative deviation of a feature; 0 if only the noise of the recording counts.
 fn default_min_sd_relative(reading: &Reading) -> f64 {
     match reading {
         Reading::Frequency(_) | Reading::CycleFrequency { .. } => FREQUENCY_SD_FLOOR,
@@ -205,11 +207,11 @@ fn default_min_sd_relative(reading: &Reading) -> f64 {
 /// A feature and the source of its target.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FitTarget {
-    /// Feature that is read from measurement and model.
+    /// The feature that is computed on measurement and model.
     pub feature: Feature,
-    /// Source of target and standard deviation.
+    /// Source of the target and its standard deviation.
     pub source: TargetSource,
-    /// Tolerance of the relative error of a component; `None` for any other feature.
+    /// Tolerance of the relative error of a component; `None` for other features.
     pub tolerance_relative: Option<f64>,
     /// Whether it is only predicted, never fitted.
     pub held_out: bool,
@@ -217,40 +219,40 @@ pub struct FitTarget {
     pub stage: TargetStage,
 }
 
-/// Stages of a search in which an aim counts.
+/// Stages of a search in which a target counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum TargetStage {
     /// All stages.
     Always,
-    /// The last stage only: the cost of spectral levels has many minima and helps only near the right one.
+    /// The last stage only. The cost of spectral levels has many minima and helps only near the right one.
     Last,
 }
 
 /// Source of a target.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub enum TargetSource {
-    /// Given in the job, in the feature's unit.
+    /// The target is given in the job, in the unit of the feature.
     Given {
-        /// The target.
+        /// Target value.
         target: f64,
-        /// Its standard deviation.
+        /// Standard deviation of the target.
         sd: f64,
     },
-    /// Measured on the recording. The standard deviation is at least `least_sd` and `least_sd_relative`
-    /// times the target; where both are 0 it is that of the recording's noise.
+    /// The target is measured on the recording. Its standard deviation is at least `least_sd`, and at least
+    /// `least_sd_relative` times the target; if both are 0, it follows from the noise of the recording.
     Measured {
-        /// Least standard deviation in the feature's unit.
+        /// Smallest standard deviation, in the unit of the feature.
         least_sd: f64,
-        /// Least standard deviation as a fraction of the target.
+        /// Smallest standard deviation, as a fraction of the target.
         least_sd_relative: f64,
     },
 }
 
-/// Least standard deviation relative to a target: better than any camera, and far from an overflow of squared
-/// residuals.
+/// Smallest standard deviation relative to a target: smaller than that of any camera, but large enough that
+/// squared residuals do not overflow.
 const MIN_SD_RELATIVE: f64 = 1e-9;
 
-/// An entry of a job, by its name in error messages.
+/// An entry of a job, with its name for error messages.
 pub(super) struct JobEntry {
     pub(super) what: String,
 }
@@ -294,8 +296,8 @@ impl JobEntry {
         )
     }
 
-    /// The recording or condition with this number, counted from 1, or name, and its index; the first one
-    /// where the entry gives neither.
+    /// The recording or condition with the number (counted from 1) or name `which`, and its index; the first
+    /// one if the entry names none.
     pub(super) fn find_condition<'a>(
         &self,
         which: Option<&ConditionReference>,

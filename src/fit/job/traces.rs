@@ -1,4 +1,5 @@
-//! Traces of a job: which recordings are fitted frame by frame, and what is not known of their cameras.
+//! Traces of a job: the recordings that are fitted frame by frame, and the uncertain numbers
+//! of their cameras.
 
 use super::conditions::{self, HeadSource, JobCondition, check_camera_sd, parse_head_source};
 use super::targets::JobEntry;
@@ -8,36 +9,39 @@ use crate::toml_file::suggest_key;
 use serde::Serialize;
 use std::f64::consts::PI;
 
-/// Most stages: segment lengths usually double, and eight reach from 4 ms to half a second.
+/// Maximum number of stages: segment lengths usually double, and eight stages reach from 4 ms to
+/// half a second.
 const MOST_STAGES: usize = 8;
-/// Default standard deviation of the camera's tilt, degrees: a camera that was set up with a spirit level.
+/// Default standard deviation of the camera's tilt, degrees, for a camera levelled with a spirit level.
 const TILT_SD_DEG: f64 = 0.3;
-/// Largest standard deviation of the tilt, degrees: a recording that is tilted more has to be levelled first.
+/// Largest standard deviation of the tilt, degrees; a recording with a larger tilt must be levelled
+/// before the fit.
 const MOST_TILT_SD_DEG: f64 = 10.0;
-/// Largest standard deviation of a marker's drift, m/s: anything faster is a motion that has to be tracked.
+/// Largest standard deviation of a marker's drift, m/s; a faster motion must be tracked.
 const MOST_DRIFT_SD_M_PER_S: f64 = 0.01;
-/// Default standard deviation of the camera's clock against the drive's where the scene drives the head, s: a
-/// camera that is started by a trigger. A recording that drives its own head has one clock.
+/// Default standard deviation of the camera's clock against the clock of the drive, s, for a camera
+/// that is started by a trigger. It applies if the scene drives the head; a recorded head has the clock
+/// of the camera.
 const CLOCK_SD_S: f64 = 1e-3;
-/// Largest standard deviation of the clock, s: a larger shift has to be removed before the fit.
+/// Largest standard deviation of the clock, s; a larger shift must be removed before the fit.
 const MOST_CLOCK_SD_S: f64 = 0.1;
 
 /// A recording whose trace is fitted.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TraceTarget {
-    /// Number of its condition, from 0.
+    /// Index of its condition, from 0.
     pub condition: usize,
-    /// Channels that are fitted; `None` for `tip-x` and `head-drop` where the recording has them.
+    /// Fitted channels; `None` for `tip-x` and `head-drop` as far as the recording has them.
     pub channels: Option<Vec<TraceChannel>>,
-    /// Segment length of each stage, rising, s; `None` for the default lengths.
+    /// Segment length of each stage, s, in ascending order; `None` for the default lengths.
     pub segment_s: Option<Vec<f64>>,
-    /// Frames that are fitted; `None` for all.
+    /// Window of the fitted frames; `None` for all frames.
     pub window: Option<Window>,
-    /// Standard deviation of a tracked coordinate, m; `None` to measure it on the recording.
+    /// Standard deviation of a tracked coordinate, m; `None` if it is to be measured on the recording.
     pub noise_m: Option<f64>,
-    /// What drives the head of its model; `None` for the recording where it tracks the head.
+    /// Source of the head's motion; `None` for the recorded head if it is tracked, else the scene.
     pub head: Option<HeadSource>,
-    /// Standard deviations of the unknowns of its camera.
+    /// Prior standard deviations of the unknowns of its camera.
     pub camera: CameraPriorSds,
 }
 
@@ -47,40 +51,40 @@ pub struct TraceTarget {
 pub enum TraceChannel {
     /// Position of the tip along the sweep.
     TipX,
-    /// Height of the head below its upright position.
+    /// Drop of the head: how far it is below its height with an upright blade.
     HeadDrop,
     /// Position of the tip relative to the head, along the sweep.
     Deflection,
 }
 
 impl TraceChannel {
-    /// Every channel with its word in a job.
+    /// Every channel with its name in a job, in the order of the variants.
     const WORDS: [(Self, &'static str); 3] =
         [(Self::TipX, "tip-x"), (Self::HeadDrop, "head-drop"), (Self::Deflection, "deflection")];
 
-    /// The word in a job and in a result.
+    /// Name of the channel in a job and in a result.
     pub(crate) fn name(self) -> &'static str {
         Self::WORDS[self as usize].1
     }
 }
 
-/// Prior standard deviations of the unknowns of a camera; 0 holds an unknown at its nominal value.
+/// Prior standard deviations of the unknowns of a camera; 0 fixes an unknown at its nominal value.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CameraPriorSds {
-    /// Of the angle from the picture's x axis to the glass, rad.
+    /// Standard deviation of the angle from the picture's x axis to the glass, rad.
     pub tilt_sd_rad: f64,
-    /// Of the scale, relative.
+    /// Relative standard deviation of the scale.
     pub scale_sd: f64,
-    /// Of the position of either marker relative to the point that it marks, m.
+    /// Standard deviation of the position of either marker relative to the point that it marks, m.
     pub offset_sd_m: f64,
-    /// Of the speed at which these positions drift, m/s.
+    /// Standard deviation of the speed at which these positions drift, m/s.
     pub drift_sd_m_per_s: f64,
-    /// Of the camera's clock where the job gives it, s.
+    /// Standard deviation of the camera's clock, s, if the job gives it.
     clock_sd_s: Option<f64>,
 }
 
 impl CameraPriorSds {
-    /// Standard deviation of the camera's clock relative to the drive's, s.
+    /// Standard deviation of the camera's clock relative to the clock of the drive, s.
     pub(crate) fn clock_sd_s(&self, head: HeadSource) -> f64 {
         self.clock_sd_s.unwrap_or(match head {
             HeadSource::Recording => 0.0,

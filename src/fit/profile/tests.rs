@@ -13,7 +13,7 @@ use std::ops::ControlFlow;
 
 struct CurvedPredictor;
 
-/// A valley along `p` with a ridge across it: the cost rises above the threshold and falls again behind it.
+/// A valley along `p` with a ridge across it: along `p` the cost exceeds the threshold and falls again.
 struct RidgedPredictor;
 
 impl FeaturePredictor for RidgedPredictor {
@@ -28,7 +28,7 @@ impl FeaturePredictor for RidgedPredictor {
     }
 }
 
-/// A valley `q = p^2` that is bent and narrow: the other parameter has to follow far.
+/// A narrow bent valley `q = p^2`: a profile of one parameter has to move the other parameter far.
 impl FeaturePredictor for CurvedPredictor {
     fn predict_features(&self, values: &[f64]) -> Result<Vec<Observed>, RunFailure> {
         Ok(vec![Observed::from_value(values[0]), Observed::from_value(values[1] / values[0].powi(2))])
@@ -39,8 +39,8 @@ impl FeaturePredictor for CurvedPredictor {
     }
 }
 
-/// Profiles of two parameters about 1 by two features with these deviations, and the evaluations of the fit;
-/// `met` is known before.
+/// Profiles of two parameters about 1, from two features with the deviations `sds`, and the number of
+/// evaluations. The points `met` are evaluated beforehand.
 fn walked(model: &dyn FeaturePredictor, sds: [f64; 2], met: &[Vec<f64>]) -> (Vec<ProfileLikelihood>, usize) {
     let target = |sd| TargetValue {
         name: format!("sd {sd}"),
@@ -77,7 +77,7 @@ fn a_ridge_in_the_cost_does_not_end_a_profile() {
     let (found, _) = walked(&RidgedPredictor, [0.5, 0.01], &[]);
     let half = 3.84_f64.sqrt() * 0.5 / length;
     assert!((found[0].upper.unwrap() - 0.5 - half).abs() < 0.03 * half, "{:?}", found[0]);
-    // a point of the fit behind a wide ridge is walked on from
+    // the walk continues from an evaluated point behind a wide ridge
     let far = vec![0.5 + 0.95 * half, 0.5];
     let (found, _) = walked(&RidgedPredictor, [0.5, 0.01], &[far]);
     assert!((found[0].upper.unwrap() - 0.5 - half).abs() < 0.03 * half, "{:?}", found[0]);

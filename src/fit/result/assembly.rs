@@ -1,4 +1,4 @@
-//! Assembles the result of a fit.
+//! Assembles the result of a fit of features.
 
 use super::{
     ComponentResult, EvaluationCounts, FeatureResult, FitResult, FitStatus, LocalOptimum, NuisanceResult,
@@ -18,10 +18,10 @@ use crate::fit::uncertainty::{CHI_SQUARED_95, FitUncertainty};
 use crate::text::format_short;
 use portable_math as math;
 
-/// Everything that goes into a result.
+/// Everything from which a result is assembled.
 pub(in crate::fit) struct FitFindings<'a> {
     pub job: &'a Job,
-    /// Fitted aims, in the order of the targets.
+    /// Fitted entries of the job, in the order of the targets.
     pub aims: &'a [FitTarget],
     pub targets: &'a [TargetValue],
     pub found: &'a FitUncertainty,
@@ -34,7 +34,7 @@ pub(in crate::fit) struct FitFindings<'a> {
 }
 
 impl FitFindings<'_> {
-    /// The result; `reads` are the features of the best model with their peaks.
+    /// The result of the fit; `reads` are the features of the best model with their peaks.
     pub(in crate::fit) fn into_result(self, ledger: &Ledger, reads: &[Option<FeatureValue>]) -> FitResult {
         let (found, names) = (self.found, self.job.parameter_names());
         let rows = self.targets.iter().zip(&found.sensitivities);
@@ -87,15 +87,15 @@ impl FitFindings<'_> {
     }
 }
 
-/// Values of the best model next to the fitted targets.
+/// Values of the best model compared with the fitted targets.
 pub(in crate::fit) struct ModelledTargets {
     pub components: Vec<ComponentResult>,
     pub features: Vec<FeatureResult>,
 }
 
 impl ModelledTargets {
-    /// Compares the best model with targets; `twin_sd` are the standard deviations over twins, `reads` the
-    /// features of the best model with their peaks. All are in the order of `aims`.
+    /// Compares the best model with the targets. `twin_sd` are the standard deviations over twins, `reads`
+    /// the features of the best model with their peaks; both are in the order of `aims`.
     pub(in crate::fit) fn compare(
         aims: &[FitTarget],
         targets: &[TargetValue],
@@ -150,7 +150,7 @@ impl ModelledTargets {
     }
 }
 
-/// A target without any value of the model.
+/// Result for a target, without any value of the model.
 fn unread_result(aim: &FitTarget, target: &TargetValue) -> FeatureResult {
     FeatureResult {
         name: target.name.clone(),
@@ -166,7 +166,7 @@ fn relative_error(model: Option<f64>, target: &TargetValue) -> Option<f64> {
     model.map(|model| model / target.value - 1.0).filter(|error| error.is_finite())
 }
 
-/// Calibrations of the cameras of features.
+/// Estimated calibration errors of the cameras of features, as nuisance parameters.
 pub(in crate::fit) fn camera_nuisance_results(job: &Job, found: &[CameraEstimate]) -> Vec<NuisanceResult> {
     let nuisance = |found: &CameraEstimate| NuisanceResult {
         recording: job.conditions.get(found.condition).map(|condition| condition.name.clone()),
@@ -180,7 +180,7 @@ pub(in crate::fit) fn camera_nuisance_results(job: &Job, found: &[CameraEstimate
     found.iter().map(nuisance).collect()
 }
 
-/// Ratio of the scatter over twins to the target's deviation above which a note is written.
+/// Ratio of the scatter over twins to the deviation of the target above which a note is written.
 const NOISY_TWIN_FACTOR: f64 = 2.0;
 
 fn twin_noise_note(target: &TargetValue, twin_sd: f64) -> Option<String> {
@@ -207,7 +207,7 @@ fn sorted_optima(names: &[String], descents: &[LocalDescent]) -> Vec<LocalOptimu
     optima
 }
 
-/// A held-out aim, with what the best model predicts.
+/// Result for a held-out target, with the prediction of the best model.
 pub(in crate::fit) fn predicted_feature_result(
     aim: &FitTarget,
     target: &TargetValue,

@@ -1,16 +1,16 @@
-//! Checks that a result belongs to a job: an edited or exchanged file would assign numbers to wrong names.
+//! Checks that a result belongs to a job; an edited or exchanged file would assign numbers to wrong names.
 
 use super::{FitResult, ParameterResult, ResultError};
 use crate::fit::job::{FreeParameter, Job};
 use std::collections::BTreeSet;
 
-/// Relative rounding error of an estimate at a bound, by a logarithm and its inverse.
+/// Relative rounding error of an estimate at a bound, caused by a logarithm and its inverse.
 const BOUND_ROUNDING: f64 = 1e-12;
 
 impl FitResult {
-    /// Checks the result against its job: the same parameters within their bounds, intervals with ordered
-    /// ends, the same components and features, no negative deviations. `file` is its name in error
-    /// messages.
+    /// Checks the result against its job: it must have the same parameters, with estimates within their
+    /// bounds and ordered ends of intervals, and the same components and features, without negative
+    /// deviations. `file` is its name in error messages.
     ///
     /// # Errors
     /// [`ResultError`] with the first key that does not match.
@@ -21,7 +21,7 @@ impl FitResult {
         problem.map_or(Ok(()), |problem| Err(ResultError { file: file.to_owned(), problem }))
     }
 
-    /// Describes a name that only the result or only the job has.
+    /// Describes a name that occurs only in the result or only in the job.
     fn name_mismatch(&self, job: &Job) -> Option<String> {
         let parameters: BTreeSet<&str> = job.parameters.iter().map(|p| p.name.as_str()).collect();
         let features = self.features.iter().chain(&self.held_out).map(|f| f.name.as_str());
@@ -32,7 +32,7 @@ impl FitResult {
             .or_else(|| set_difference("components, features and held_out", &read, &asked))
     }
 
-    /// Describes a standard deviation below zero.
+    /// Describes a negative standard deviation.
     fn negative_sd(&self) -> Option<String> {
         let components = self.components.iter().map(|c| ("components", &c.name, c.target_sd_hz));
         let features = self.features.iter().chain(&self.held_out).map(|f| ("features", &f.name, f.target_sd));

@@ -1,4 +1,4 @@
-//! The costs that a stage of a search asks for, and the slab that it may leave out.
+//! Costs for the solvers of a stage, and the slab to which a search may be limited.
 
 use crate::fit::evaluation::{Evaluation, EvaluationStage};
 use crate::fit::ledger::{Ledger, StopReason};
@@ -13,12 +13,12 @@ pub(crate) struct Slab {
 }
 
 impl Slab {
-    /// Whether a point lies in it.
+    /// Whether the slab contains a point.
     pub(crate) fn contains(&self, unit: &[f64]) -> bool {
         unit.get(self.axis).is_some_and(|u| (self.lower..=self.upper).contains(u))
     }
 
-    /// The slab reduced by `margin` at each end that is not an end of the box.
+    /// The slab, made narrower by `margin` at each end that is not an end of the box.
     pub(crate) fn shrink_by(self, margin: f64) -> Self {
         let lower = if self.lower > 0.0 { self.lower + margin } else { self.lower };
         let upper = if self.upper < 1.0 { self.upper - margin } else { self.upper };
@@ -34,16 +34,17 @@ impl Slab {
     }
 }
 
-/// Cost of every point after the ledger has stopped. A solver that gets it is abandoned before it uses it.
+/// Cost of every point after the ledger has stopped. A solver that receives it is abandoned before
+/// it uses it.
 pub(super) const STOPPED_COST: f64 = 1e100;
 
 /// Costs of points of the unit box for the solvers of a stage.
 pub(super) struct StageCosts<'l, 'a> {
     pub(super) ledger: &'l mut Ledger<'a>,
     pub(super) stage: EvaluationStage,
-    /// Why the ledger makes no more evaluations, once it has stopped.
+    /// Reason why the ledger makes no more evaluations, once it has stopped.
     pub(super) stop: Option<StopReason>,
-    /// The part of the box onto which the points are mapped; `None` for the whole box.
+    /// Slab onto which the points are mapped; `None` for the whole box.
     pub(super) slab: Option<Slab>,
 }
 

@@ -1,4 +1,4 @@
-//! A search outside the interval of one parameter: how well the model fits at other values of it.
+//! A search outside the interval of one parameter: how well the model fits at other values of this parameter.
 
 use super::SearchSettings;
 use super::costs::StageCosts;
@@ -9,16 +9,16 @@ use crate::fit::evaluation::{Evaluation, EvaluationStage};
 use crate::fit::ledger::{Ledger, StopReason};
 use crate::fit::search::costs::Slab;
 
-/// Fraction of the evaluations for the population; the rest is for the descents.
+/// Fraction of the evaluations for the population; the descents get the remaining ones.
 const POPULATION_SHARE: f64 = 0.6;
 /// Number of descents.
 const DESCENTS: usize = 3;
 
 /// Searches a slab with a population, then with Gauss-Newton descents from the best distinct points, in at
-/// most `share` evaluations. Returns why it stopped, unless its share was used up.
+/// most `share` evaluations. Returns why the search stopped, unless it only used up its share.
 ///
-/// The best point usually lies next to the known minimum and leads back to it, so the others are followed
-/// too.
+/// The best point of the slab usually lies next to the known minimum and leads back to it, so descents also
+/// start from other points.
 pub(crate) fn search_excluded_region(
     ledger: &mut Ledger,
     slab: Slab,
@@ -30,7 +30,7 @@ pub(crate) fn search_excluded_region(
         ledger.set_limit(limit.min(made.saturating_add((count * share as f64) as usize)));
     };
     until(ledger, POPULATION_SHARE);
-    // each slab has its own seed, different from those of the other populations
+    // each slab has its own seed, which differs from the seeds of the other populations
     let seed = settings.seed.rotate_left(32) ^ (slab.axis as u64 + 1) ^ slab.lower.to_bits();
     let middle = vec![0.5; ledger.objective().axes().len()];
     let costs = StageCosts { slab: Some(slab), ..StageCosts::new(ledger, EvaluationStage::Elsewhere) };

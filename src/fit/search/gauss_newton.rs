@@ -1,9 +1,9 @@
-//! Damped Gauss-Newton descent. One precise frequency and several imprecise features make a long narrow
-//! valley, in which simplices are slow.
+//! Damped Gauss-Newton descent. One precise frequency and several imprecise features form a long narrow
+//! valley of the cost, in which simplices are slow.
 //!
-//! Several Levenberg dampings are tried at once. The Jacobian comes from differences, is updated after every
-//! step by Broyden's rule and measured again when a step gains nothing. argmin's Gauss-Newton has neither
-//! damping nor bounds and stops at the first failure.
+//! Each step tries several Levenberg dampings at once. The Jacobian comes from finite differences, is updated
+//! after every step by Broyden's rule, and is computed anew when a step gains nothing. argmin's Gauss-Newton
+//! has neither damping nor bounds and stops at the first failure.
 
 use super::costs::StageCosts;
 use super::termination::{EXACT_COST, MIN_WORTHWHILE_GAIN};
@@ -14,13 +14,14 @@ use crate::fit::linear_model::{
 };
 use nalgebra::DMatrix;
 
-/// Dampings tried at every step. The first equals a prior as wide as the box, negligible in any informative
-/// direction; the others approach gradient descent.
+/// Dampings tried at every step. The first equals a prior as wide as the box and is negligible in any
+/// informative direction; the others approach gradient descent.
 const DAMPINGS: [f64; 4] = [1.0, 3e1, 1e3, 3e4];
-/// Most steps from one point. A curved valley a hundred times longer than wide takes about twenty.
+/// Maximum number of steps from one point. A curved valley a hundred times longer than wide
+/// takes about twenty.
 const MAX_STEPS: usize = 60;
 
-/// Descends from `start`. Returns the end, and why the ledger stopped, if it did.
+/// Descends from `start`. Returns the last point, and why the ledger stopped, if it did.
 pub(super) fn descend_gauss_newton(ledger: &mut Ledger, start: &[f64]) -> (Vec<f64>, Option<StopReason>) {
     let mut costs = StageCosts::new(ledger, EvaluationStage::Local);
     let (unit, cost) = (start.to_vec(), costs.evaluate_point(start.to_vec()));
@@ -34,14 +35,14 @@ pub(super) fn descend_gauss_newton(ledger: &mut Ledger, start: &[f64]) -> (Vec<f
     (steps.unit, None)
 }
 
-/// A descent in the unit box. It ends with a step from a measured Jacobian that gains less than
-/// [`MIN_WORTHWHILE_GAIN`].
+/// A descent in the unit box. It ends when a step with a Jacobian from differences gains
+/// less than [`MIN_WORTHWHILE_GAIN`].
 struct GaussNewton {
     unit: Vec<f64>,
     cost: f64,
-    /// Jacobian for the next step, where Broyden's rule gives it.
+    /// Jacobian for the next step from Broyden's rule; `None` if it must be computed from differences.
     model: Option<DMatrix<f64>>,
-    /// Whether the Jacobian of the step is measured and not updated.
+    /// Whether the Jacobian comes from differences at the current point rather than from an update.
     fresh: bool,
     stalled: bool,
 }
@@ -72,7 +73,7 @@ impl GaussNewton {
         (self.unit, self.cost) = (point, found);
     }
 
-    /// The Jacobian by differences; the descent stalls where they cannot be evaluated.
+    /// The Jacobian from differences; if these cannot be evaluated, the descent stalls.
     fn measure_jacobian(&mut self, costs: &mut StageCosts) -> DMatrix<f64> {
         costs.evaluate_points(&difference_points(&self.unit));
         let ledger = &*costs.ledger;
@@ -90,7 +91,7 @@ impl GaussNewton {
     }
 }
 
-/// Residuals at a point; empty where it cannot be evaluated.
+/// Residuals at a point; empty if the point cannot be evaluated.
 fn residuals_at(costs: &mut StageCosts, unit: &[f64]) -> Vec<Option<f64>> {
     costs.evaluate_points(&[unit.to_vec()]);
     let ledger = &*costs.ledger;

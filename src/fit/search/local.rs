@@ -1,4 +1,5 @@
-//! Local searches: descents from the best points, populations about the best ends, and a polish of the best.
+//! Local searches: descents from the best points, populations around the best ends, and a polish of
+//! the best point.
 
 use super::SearchSettings;
 use super::costs::StageCosts;
@@ -11,11 +12,11 @@ use super::termination::{
 use crate::fit::evaluation::{Evaluation, EvaluationStage};
 use crate::fit::ledger::{Ledger, StopReason};
 
-/// Number of best ends that are refined with a population.
+/// Number of best descents that are refined with a population.
 const REFINED_ENDS: usize = 3;
 
-/// Descends from each of the starts, refines the best ends with populations, then polishes the best of all.
-/// `limit` is that of the whole search.
+/// Descends from each start, refines the best ends with populations, then polishes the best point of all.
+/// `limit` is the evaluation limit of the whole search.
 pub(super) fn search_locally(
     ledger: &mut Ledger,
     settings: &SearchSettings,
@@ -56,8 +57,8 @@ pub(super) fn search_locally(
     ended
 }
 
-/// Runs a local search within its share of the evaluations, unless there is nothing left to gain. Returns why
-/// the whole search must stop, if it must.
+/// Runs a local search within its share of the evaluations, unless the best point is an exact fit. Returns
+/// the reason if the whole search must stop.
 fn search_within_share(
     ledger: &mut Ledger,
     limit: usize,
@@ -74,7 +75,8 @@ fn search_within_share(
     stop.filter(|stop| *stop != StopReason::Budget)
 }
 
-/// Continues a local search with a small population about its end, then a descent from the best new point.
+/// Continues a local search with a small population around its end, then with a descent from the
+/// best new point.
 fn refine_with_population(
     ledger: &mut Ledger,
     from: LocalDescent,
@@ -105,7 +107,7 @@ fn descend_from(ledger: &mut Ledger, start: Evaluation) -> (LocalDescent, Option
     (LocalDescent { start, end, evaluations: ledger.run_evaluations().len() - made }, stop)
 }
 
-/// Polishes the best point by a descent and simplices, until one simplex of each size in a row gains nothing.
+/// Polishes the best point by a descent and simplices, until a simplex of each size in turn gains nothing.
 pub(crate) fn polish_best(ledger: &mut Ledger) -> SearchTermination {
     let mut barren = 0;
     while let Some(edge) = SIMPLEX_EDGES.get(barren).filter(|_| !is_exact_fit(ledger)) {
@@ -131,7 +133,7 @@ fn is_exact_fit(ledger: &Ledger) -> bool {
     ledger.best_evaluation().is_some_and(|best| best.cost <= EXACT_COST)
 }
 
-/// The best points by the cost of the global stage that lie apart, best first.
+/// The best points by the cost of the global stage that lie apart from each other, best first.
 pub(super) fn distinct_best_points<'e>(
     known: impl IntoIterator<Item = &'e Evaluation>,
     most: usize,

@@ -1,8 +1,9 @@
 //! Populations of points in the unit box: covariance matrix adaptation (CMA-ES).
 //!
 //! Hansen and Ostermeier, Evol. Comput. 9 (2001) 159; formulas and defaults of Hansen, arXiv:1604.00772,
-//! without negative weights. A population learns the shape of a valley and is not caught by ripples on its
-//! floor. A point outside the unit box is evaluated at its mirror image inside. argmin has no such solver.
+//! without negative weights. A population learns the shape of a valley and is not trapped by ripples on
+//! its floor. A point outside the unit box is evaluated at its mirror image inside. argmin does not
+//! provide this method.
 
 use super::SearchSettings;
 use super::costs::StageCosts;
@@ -15,11 +16,11 @@ use portable_math::{self as math, StandardNormal};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Least relative gain in cost that counts as progress of a population.
+/// Smallest relative gain in cost that counts as progress of a population.
 const STAGNANT_GAIN: f64 = 1e-3;
 
-/// Runs populations until the evaluations of the stage are used up. The first starts in the middle of the
-/// box, the others at random points. Returns why the ledger stopped, if it did.
+/// Runs populations until the evaluations of the stage are used up. The first population starts in the middle
+/// of the box, the others at random points. Returns why the ledger stopped, if it did.
 pub(super) fn search_with_populations(
     ledger: &mut Ledger,
     dimensions: usize,
@@ -35,7 +36,7 @@ pub(super) fn search_with_populations(
             return stop;
         }
         middle = (0..dimensions).map(|_| generator.random()).collect();
-        // a population that meets only known points makes no evaluation
+        // a population whose points are all known makes no evaluation, and the loop would not end
         if ledger.remaining_evaluations() == used {
             break;
         }
@@ -44,7 +45,7 @@ pub(super) fn search_with_populations(
     None
 }
 
-/// Evolves one population until it converges or gains nothing. Returns why the ledger stopped, if it did.
+/// Evolves one population until it converges or stagnates. Returns why the ledger stopped, if it did.
 pub(super) fn evolve_population(
     mut costs: StageCosts,
     middle: Vec<f64>,
@@ -61,17 +62,17 @@ pub(super) fn evolve_population(
     costs.stop
 }
 
-/// Length of a population's longest axis in the unit box, at first and where it has converged.
+/// Length of a population's longest axis in the unit box, at the start and at convergence.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PopulationExtent {
     first: f64,
     last: f64,
 }
 
-/// For the whole box: three first lengths reach every corner. At the last length damped Gauss-Newton steps
-/// are better.
+/// Extent for the whole box: three initial lengths reach every corner. At the final length, damped
+/// Gauss-Newton steps are more efficient.
 pub(super) const WIDE_EXTENT: PopulationExtent = PopulationExtent { first: 0.3, last: 0.01 };
-/// For the neighbourhood of a point at which Gauss-Newton steps are caught by ripples.
+/// Extent for the neighbourhood of a point at which ripples trap the Gauss-Newton steps.
 pub(super) const NEAR_EXTENT: PopulationExtent = PopulationExtent { first: 0.06, last: 0.003 };
 
 /// State of a population between generations.
@@ -92,7 +93,7 @@ struct CmaEs {
     least_cost: f64,
 }
 
-/// A step from the mean, in units of the length.
+/// A step from the mean of the population, in units of `length`.
 #[derive(Debug, Clone)]
 struct PopulationStep {
     /// Standard normal coordinates along the principal axes.
@@ -101,7 +102,7 @@ struct PopulationStep {
     inside: DVector<f64>,
 }
 
-/// Learning rates.
+/// Learning rates and constants of the adaptation.
 struct AdaptationRates {
     effective: f64,
     length: f64,
@@ -109,7 +110,7 @@ struct AdaptationRates {
     path: f64,
     rank_one: f64,
     rank_mu: f64,
-    /// Expected length of a standard normal vector.
+    /// Expected length of a vector of standard normal variables.
     expected: f64,
 }
 
@@ -128,7 +129,7 @@ impl AdaptationRates {
 }
 
 impl CmaEs {
-    /// A population of `points` points (at least 4) about a point of the unit box.
+    /// A population of `points` points (at least 4) around a point of the unit box.
     fn new(mean: Vec<f64>, points: usize, extent: PopulationExtent, generator: Xoshiro256PlusPlus) -> Self {
         let (n, points) = (mean.len(), points.max(4));
         let raw = |rank| math::ln((points as f64 + 1.0) / 2.0) - math::ln(rank as f64 + 1.0);
@@ -151,7 +152,7 @@ impl CmaEs {
         }
     }
 
-    /// Draws, evaluates and learns from one generation of points.
+    /// Draws and evaluates one generation of points, and adapts the distribution to the costs.
     fn run_generation(&mut self, costs: &mut StageCosts) {
         let steps = self.draw_steps();
         let points: Vec<Vec<f64>> = steps.iter().map(|step| self.point_of(step)).collect();
@@ -169,12 +170,11 @@ impl CmaEs {
         self.length * longest < self.last || !self.length.is_finite()
     }
 
-    /// The point of the box at the end of a step.
+    /// The point of the unit box to which a step leads.
     fn point_of(&self, step: &PopulationStep) -> Vec<f64> {
         (&self.mean + &step.inside * self.length).iter().map(|u| reflect_into_unit(*u)).collect()
     }
 
-    /// Steps of a generation.
     fn draw_steps(&mut self) -> Vec<PopulationStep> {
         let mut draw = || {
             let normal = |_, _| self.generator.sample::<f64, _>(StandardNormal);
@@ -184,14 +184,14 @@ impl CmaEs {
         (0..self.points).map(|_| draw()).collect()
     }
 
-    /// Learns from the steps of a generation, best first.
+    /// Adapts the distribution to the steps of a generation, which are ordered from best to worst.
     fn update_distribution(&mut self, ranked: &[PopulationStep]) {
         let (n, rates) = (self.mean.len(), &self.rates);
         self.generation += 1;
         let sum = |of: fn(&PopulationStep) -> &DVector<f64>| {
             self.weights.iter().zip(ranked).fold(DVector::zeros(n), |sum, (w, step)| sum + of(step) * *w)
         };
-        // C^(-1/2) times the mean step equals the mean step along the axes, rotated into the box
+        // C^(-1/2) times the mean step is the mean step along the axes, rotated to the coordinates of the box
         let (along, step) = (sum(|step| &step.along), sum(|step| &step.inside));
         self.mean += &step * self.length;
         let turned = self.rotate_to_box(&along);
@@ -217,7 +217,8 @@ impl CmaEs {
         self.decompose_shape();
     }
 
-    /// Rotates coordinates along the axes into the box, without the lengths of the axes.
+    /// Rotates coordinates along the axes to the coordinates of the box; the lengths of the axes
+    /// do not count.
     fn rotate_to_box(&self, along: &DVector<f64>) -> DVector<f64> {
         let mut turned = DVector::zeros(along.len());
         for (column, z) in self.axes.column_iter().zip(along.iter()) {
@@ -237,7 +238,7 @@ impl CmaEs {
     }
 }
 
-/// The mirror image inside the unit interval.
+/// Mirrors a coordinate into the unit interval.
 fn reflect_into_unit(u: f64) -> f64 {
     let folded = u.rem_euclid(2.0);
     clamp_unit(if folded > 1.0 { 2.0 - folded } else { folded })
@@ -248,7 +249,7 @@ mod tests {
     use super::*;
     use rand::SeedableRng;
 
-    /// Generations until the mean is this near to the minimum of `cost`.
+    /// The mean of a population after a number of generations on `cost`.
     fn run(cost: impl Fn(&[f64]) -> f64, generations: usize) -> Vec<f64> {
         let mut cloud = CmaEs::new(vec![0.5; 3], 16, WIDE_EXTENT, Xoshiro256PlusPlus::seed_from_u64(1));
         for _ in 0..generations {
@@ -263,7 +264,7 @@ mod tests {
 
     #[test]
     fn a_narrow_turned_valley_is_learnt() {
-        // a hundred times longer than wide, along (1, 1, 1)
+        // a hundred times longer than wide, with its long axis along (1, 1, 1)
         let minimum = [0.3, 0.35, 0.4];
         let cost = |p: &[f64]| {
             let d: Vec<f64> = p.iter().zip(minimum).map(|(a, b)| a - b).collect();

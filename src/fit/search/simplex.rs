@@ -1,8 +1,8 @@
-//! Nelder-Mead simplices by argmin.
+//! Nelder-Mead simplices, with the solver of argmin.
 //!
-//! argmin's loop can neither stop with the ledger nor count steps without a gain, so its solver is stepped
-//! here. The solver has no bounds, so it works on the real line ([`line_to_unit`]). It panics on an error
-//! of its first costs, so costs are never errors.
+//! argmin's loop can neither stop with the ledger nor count steps without a gain, so the loop is written
+//! here. The solver has no bounds, so it works on the real line ([`line_to_unit`]). It panics if one of its
+//! first costs is an error, so costs are never errors.
 
 use super::costs::StageCosts;
 use super::stagnation::StagnationCounter;
@@ -14,7 +14,7 @@ use argmin::core::{CostFunction, Error, IterState, Problem, Solver, State};
 use argmin::solver::neldermead::NelderMead;
 use std::cell::RefCell;
 
-/// Steps per vertex without a lower cost after which a simplex ends.
+/// Number of steps without a lower cost, per vertex, after which a simplex ends.
 const STAGNANT_STEPS: usize = 20;
 
 type SimplexState = IterState<Vec<f64>, (), (), (), (), f64>;
@@ -31,8 +31,8 @@ impl CostFunction for UnboundedCost<'_, '_> {
     }
 }
 
-/// Runs one simplex from `start` with edges of this length in the unit box, until it shrinks or gains
-/// nothing.
+/// Runs one simplex from `start` with edges of length `edge` in the unit box, until it has shrunk
+/// or gains nothing.
 pub(super) fn run_simplex(ledger: &mut Ledger, start: &[f64], edge: f64) -> SearchTermination {
     let vertices = initial_simplex(start, edge);
     let steps = ledger.remaining_evaluations().saturating_mul(2).saturating_add(vertices.len());
@@ -43,7 +43,7 @@ pub(super) fn run_simplex(ledger: &mut Ledger, start: &[f64], edge: f64) -> Sear
     stop.map_or(SearchTermination::Converged, SearchTermination::Stopped)
 }
 
-/// Steps a simplex until it ends. Returns why the ledger stopped, if it did.
+/// Steps a simplex to its end. Returns why the ledger stopped, if it did.
 fn step_simplex(costs: StageCosts, vertices: Vec<Vec<f64>>, steps: usize) -> Option<StopReason> {
     let mut patience = StagnationCounter::new(STAGNANT_STEPS * vertices.len(), 0.0);
     let mut solver = NelderMead::new(vertices).with_sd_tolerance(SIMPLEX_COST_SPREAD).ok()?;
@@ -67,7 +67,7 @@ fn has_shrunk(solver: &mut NelderMead<Vec<f64>, f64>, state: &SimplexState) -> b
     <NelderMead<_, _> as Solver<UnboundedCost, SimplexState>>::terminate(solver, state).terminated()
 }
 
-/// `start` and one step of `edge` inwards along each coordinate of the box, mapped to the real line.
+/// Vertices on the real line: `start`, and for each coordinate of the box a point one `edge` further inwards.
 fn initial_simplex(start: &[f64], edge: f64) -> Vec<Vec<f64>> {
     let mut vertices = vec![start.to_vec(); start.len() + 1];
     for (axis, vertex) in vertices.iter_mut().skip(1).enumerate() {

@@ -12,30 +12,31 @@ use nalgebra::DMatrix;
 use portable_math as math;
 use std::collections::BTreeSet;
 
-/// Least eigenvalue of the scaled information that counts as determined: below it rounding decides.
+/// Smallest eigenvalue of the scaled information matrix that counts as determined; a smaller one
+/// is rounding error.
 const MIN_EIGENVALUE: f64 = 1e-10;
 
-/// An unknown at the end of a search.
+/// Estimate of an unknown at the end of a search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UnknownEstimate {
-    /// Scene parameter or camera quantity.
+    /// Parameter of the scene, or error of a camera.
     pub kind: UnknownKind,
-    /// Value in its SI unit.
+    /// Estimate, in its SI unit.
     pub value: f64,
-    /// Ends of the 95 % interval from curvature, scatter of the segments and profile, in its SI unit.
+    /// Ends of the 95 % interval from curvature, scatter of the segments, profile and bias, in its SI unit.
     pub ends_95: [f64; 2],
-    /// Standard deviation of its coordinate.
+    /// Standard deviation of its coordinate, including the bias.
     pub sd: f64,
     /// Ends of the 95 % interval from refitted twins alone, in its SI unit; `None` with too few twins.
     pub twins_95: Option<[f64; 2]>,
     /// Variance of its coordinate due to errors of the recorded heads.
     by_heads: f64,
-    /// Whether the value lies at an end of its range.
+    /// Whether the estimate lies at an end of its range.
     pub at_bound: bool,
 }
 
 impl UnknownEstimate {
-    /// Ends of the widest 95 % interval, in its SI unit.
+    /// Ends of the interval that covers both 95 % intervals, in its SI unit.
     #[must_use]
     pub fn widest_95(&self) -> [f64; 2] {
         let [low, high] = self.ends_95;
@@ -43,26 +44,26 @@ impl UnknownEstimate {
     }
 }
 
-/// Estimates with their intervals and doubts at the best end.
+/// Estimates at the best end, with their intervals and the doubts about them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TraceAssessment {
     /// One estimate per unknown, in the order of the unknowns.
     pub estimates: Vec<UnknownEstimate>,
-    /// Correlation of the estimates.
+    /// Correlation matrix of the estimates.
     pub correlation: DMatrix<f64>,
-    /// Number of combinations of the parameters that are determined.
+    /// Number of parameter combinations that are determined.
     pub rank: usize,
-    /// End of the run with the segments of the previous stage, started at the best end.
+    /// Last iterate of the run with the segments of the previous stage, which starts at the best end.
     pub shorter: Option<Iterate>,
     /// Number of refitted twins.
     pub twins: usize,
-    /// Doubts that hold for every parameter.
+    /// Doubts that apply to every parameter.
     pub doubts: Vec<String>,
 }
 
 impl TraceAssessment {
-    /// Adds the intervals from the scatter of refitted twins about the end. All twins share the recorded
-    /// head, so the variance due to its errors is added.
+    /// Adds the intervals from the scatter of refitted twins around the best end. All twins share the
+    /// recorded head, so the variance due to its errors is added to the scatter.
     fn add_twins(&mut self, model: &TraceModel, end: &Iterate, refits: &[&[f64]]) {
         self.twins = refits.len();
         if refits.len() < MIN_TWINS {
@@ -78,7 +79,7 @@ impl TraceAssessment {
     }
 }
 
-/// Assesses the end of the best descent. `runs` are its uncertainty runs with their last iterates.
+/// Assesses the end of the best descent. `runs` are its uncertainty runs, each with its last iterate.
 pub(super) fn assess_end(
     end: &SearchEnd<'_>,
     descents: &[TraceDescent],
@@ -127,7 +128,8 @@ fn is_at_bound(model: &TraceModel, end: &Iterate, i: usize) -> bool {
     end.point[i] <= low + near || end.point[i] >= high - near
 }
 
-/// Number of combinations of the parameters that the recordings determine, plus the parameters with a prior.
+/// Number of combinations of parameters without a prior that the recordings determine, plus the number of
+/// parameters with a prior.
 fn count_determined(model: &TraceModel, information: &DMatrix<f64>) -> usize {
     let (free, priors): (Vec<usize>, Vec<usize>) =
         model.unknowns.parameters().partition(|&i| model.unknowns.0[i].prior.is_none());
@@ -138,7 +140,7 @@ fn count_determined(model: &TraceModel, information: &DMatrix<f64>) -> usize {
     scaled.symmetric_eigenvalues().iter().filter(|value| **value > MIN_EIGENVALUE).count() + priors.len()
 }
 
-/// Doubts that hold for every parameter, but for those of the segments' lengths.
+/// All doubts that apply to every parameter, except the one about the lengths of the segments.
 fn shared_doubts(at: &SearchEnd<'_>, descents: &[TraceDescent], best: usize, rank: usize) -> Vec<String> {
     let SearchEnd { model, settings, at: end, sd, .. } = at;
     let mut doubts = Vec::new();
@@ -183,15 +185,16 @@ fn shared_doubts(at: &SearchEnd<'_>, descents: &[TraceDescent], best: usize, ran
 
 // Agreement of the two longest segment lengths, and of starts that fit equally well.
 
-/// Standard deviations by which estimates of two lengths of segments may differ.
+/// Largest plausible difference between the estimates of two segment lengths, in standard deviations.
 const LENGTHS_AGREE_SD: f64 = 3.0;
 
-/// Compares the best end with the end of the shorter segments; `sd` are the standard deviations at `end`.
+/// Compares the best end with the end of the run with shorter segments; `sd` are the standard
+/// deviations at `end`.
 ///
-/// Returns the bias of every unknown, in its coordinate: the difference beyond twice its scatter. The bias
-/// falls with segment length, so the difference between two lengths bounds what is left of it. Also returns
-/// the doubt about the parameter that differs most, where it differs too much: one wrong parameter makes
-/// all doubtful.
+/// Returns the bias of every unknown, in its coordinate: the difference of the two estimates, from which
+/// twice its standard deviation is subtracted in quadrature. The bias falls with the segment length, so this
+/// difference is an upper limit of the bias at `end`. Also returns the doubt about the parameter that differs
+/// most, if it differs too much: one wrong parameter casts doubt on all.
 fn compare_segment_lengths(
     model: &TraceModel,
     end: &Iterate,
@@ -212,10 +215,10 @@ fn compare_segment_lengths(
     Some((bias, disagreement))
 }
 
-/// Number of starts that end elsewhere and fit nearly as well as the best one: the costs differ by less than
-/// the cost of a true model scatters between recordings.
+/// Number of starts that end elsewhere and fit nearly as well as the best one: their costs differ by less
+/// than the scatter of the cost of a true model between recordings.
 fn count_rivals(end: &Iterate, descents: &[TraceDescent], sd: &[f64]) -> usize {
-    /// Difference of the costs, in standard deviations of chi2.
+    /// Largest difference of the costs, in standard deviations of chi2.
     const NEARLY: f64 = 2.0;
     let (widening, dof) = chi2_per_dof(end);
     let limit = end.cost + NEARLY * widening.max(1.0) * (2.0 * dof as f64).sqrt();

@@ -1,4 +1,4 @@
-//! The model of a trace fit, from a job and its recordings, and its states at given parameters.
+//! Builds the model of a trace fit from a job and its recordings, and fits its states at given parameters.
 
 use crate::fit::bounds::{BoundsSpacing, Prior};
 use crate::fit::job::{FreeParameter, HeadSource, TraceChannel};
@@ -22,15 +22,15 @@ use portable_math as math;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// The segments of the last stage at a point with their best starting states; `None` where a scene refuses
-/// the point. The result depends on nothing but the point.
+/// The segments of the last stage with their best starting states at a point; `None` if a scene refuses the
+/// point. The result depends only on the point.
 pub(crate) fn fit_states_at(model: &TraceModel, segment_s: &[f64], point: &[f64]) -> Option<Iterate> {
     let last = TraceSearchSettings { segment_s: segment_s.last().copied().into_iter().collect(), twins: 0 };
     refit_plain(model, first_iterate(model, &last, point)?)
 }
 
-/// Whitened residuals of every fitted frame, recording by recording, tip before head. A cell is `None` where
-/// the model has no value.
+/// Whitened residuals of every fitted frame, recording by recording, tip before head. An entry is `None`
+/// where the model has no value.
 pub(crate) fn frame_residuals(model: &TraceModel, at: Option<&Iterate>) -> Vec<Option<f64>> {
     let mut known = BTreeMap::new();
     for segment in at.map(|at| segment_residuals(model, at)).unwrap_or_default() {
@@ -45,12 +45,12 @@ pub(crate) fn frame_residuals(model: &TraceModel, at: Option<&Iterate>) -> Vec<O
     films.map(|place| known.get(&place).copied()).collect()
 }
 
-/// Range of a camera's error in the search, in standard deviations of its prior.
+/// Half width of the range of a camera's error in the search, in standard deviations of its prior.
 const CAMERA_RANGE_SD: f64 = 20.0;
 
 /// A recording with its scene and the settings of its fit.
 pub(crate) struct TraceSource<'a> {
-    /// The scene of its condition.
+    /// Scene of the condition.
     pub scene: &'a Scene,
     pub recording: &'a Recording,
     /// Exposure time of a frame, s.
@@ -63,7 +63,7 @@ impl TraceModel {
     /// The model of a job's traces with its free parameters and its nuisance parameters.
     ///
     /// # Errors
-    /// [`HeadMotionError`] where the head that drives a model is not tracked.
+    /// [`HeadMotionError`] if the head that drives a model is not tracked.
     pub(crate) fn new(
         sources: &[TraceSource<'_>],
         parameters: &[FreeParameter],
@@ -104,8 +104,8 @@ fn build_recording(source: &TraceSource<'_>) -> Result<TraceRecording, HeadMotio
     Ok(TraceRecording { scene, observation: film })
 }
 
-/// Noise of a channel: the job's, otherwise the measured noise without the part that is common to both
-/// points. Where it cannot be measured, white noise from the differences between frames.
+/// Noise of a channel: that of the job, otherwise the measured noise without the part that both points share.
+/// If it cannot be measured, white noise with the size of the differences between frames.
 fn channel_noise(
     traced: &TraceData,
     recording: &Recording,
@@ -123,8 +123,8 @@ fn channel_noise(
         let measured = measure_quality(recording, None);
         return white(measured.head_x.noise_m.or(measured.tip_x.noise_m).unwrap_or(MIN_NOISE_M));
     };
-    // The remaining factor assumes that both points have equal noise of their own. A large common share
-    // contradicts that, and then nothing is subtracted.
+    // The factor for the remaining noise assumes that both points have equal noise of their own. A large
+    // common share contradicts this assumption, and then nothing is subtracted.
     let left = shared
         .filter(|shared| shared.share + 2.0 * shared.sd < MAX_SHARED_NOISE)
         .map_or(1.0, |shared| (1.0 - shared.share * shared.share).sqrt());
@@ -135,7 +135,7 @@ fn channel_noise(
 /// Common share of the noise above which the two points cannot have equal noise of their own.
 const MAX_SHARED_NOISE: f64 = 0.9;
 
-/// Least noise, m: the rounding of simulated traces without noise.
+/// Smallest noise, m: the rounding of simulated traces without noise.
 const MIN_NOISE_M: f64 = 1e-9;
 
 fn parameter_unknown(free: &FreeParameter) -> TraceUnknown {
@@ -164,7 +164,7 @@ fn constant_unknown(freed: &FreedConstant) -> TraceUnknown {
     }
 }
 
-/// Unknowns of a recording's camera. A quantity with a prior of zero width is not estimated.
+/// Unknowns of the camera of a recording. A quantity whose prior has zero width is not estimated.
 fn camera_unknowns(film: usize, source: &TraceSource<'_>, data: &CameraObservation) -> Vec<TraceUnknown> {
     let (doubt, head) = (&source.traced.camera, source.traced.head);
     let has_drop = data.settings.head_drop;
@@ -189,7 +189,7 @@ fn camera_unknowns(film: usize, source: &TraceSource<'_>, data: &CameraObservati
     rows.into_iter().filter(|(_, sd, _)| *sd > 0.0).map(unknown).collect()
 }
 
-/// Tilt of the camera from the path of the tip on the glass, rad; 0 where it is not clear.
+/// Tilt of the camera from the path of the tip on the glass, rad; 0 if the path does not show it clearly.
 fn recorded_tilt_rad(recording: &Recording) -> f64 {
     let instants = ReversalInstants::find_instants(recording);
     let found = measure_tilt(recording, &instants, &measure_quality(recording, None));

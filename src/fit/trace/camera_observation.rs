@@ -1,4 +1,4 @@
-//! A recording as data of a trace fit.
+//! A recording in the form in which a trace fit uses it.
 
 use crate::recording::Recording;
 use crate::recording::noise_model::{AutoregressiveNoise, Whitener};
@@ -7,46 +7,46 @@ use crate::simulate::scene::Drive;
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// Channels and frames of a recording that are fitted, with exposure and noise.
+/// Channels and frames of a recording that are fitted, its exposure time and its noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ObservationSettings {
-    /// Whether the tip's position along the sweep is data.
+    /// Whether the tip's position along the sweep is fitted.
     pub tip_x: bool,
-    /// Whether the head's drop is data.
+    /// Whether the head's drop is fitted.
     pub head_drop: bool,
     /// Exposure time of a frame, s.
     pub exposure_s: f64,
     /// Noise of the tip's x and of the head's y, m.
     pub noise: [AutoregressiveNoise; 2],
-    /// First fitted frame and the frame behind the last one.
+    /// First fitted frame, and the frame after the last fitted one.
     pub frames: [usize; 2],
 }
 
-/// Data of a recording on its frame grid.
+/// Data of a recording, frame by frame.
 #[derive(Debug, Clone)]
 pub struct CameraObservation {
     /// Times of the frames, s.
     pub times_s: Vec<f64>,
     pub rate_hz: f64,
-    /// Tip along the sweep, m; `None` where it is lost or not fitted.
+    /// Position of the tip along the sweep, m; `None` where the tip is lost or not fitted.
     pub tip_x_m: Vec<Option<f64>>,
-    /// Drop of the head, m; `None` where it is lost or not fitted.
+    /// Drop of the head, m; `None` where the head is lost or not fitted.
     pub drop_m: Vec<Option<f64>>,
-    /// Head position of the drive in every frame, m.
+    /// Position of the head in every frame according to the drive, m.
     pub head_m: Vec<f64>,
-    /// Whether the recorded head drives the model, in lengths of the picture; otherwise the scene does, in
-    /// true lengths.
+    /// Whether the recorded head drives the model, so that `head_m` is in lengths of the picture. Otherwise
+    /// the scene drives it, in true lengths.
     pub own_head: bool,
-    /// The smooth curve behind `head_m` where the recorded head drives the model.
+    /// The smooth curve from which `head_m` is taken; `None` if the scene drives the model.
     pub own_curve: Option<Arc<HeadSpline>>,
-    /// Mean of `head_m`, about which a tilt turns, m.
+    /// Mean of `head_m` over the fitted frames, m; a tilt turns the picture about it.
     pub centre_m: f64,
     pub settings: ObservationSettings,
 }
 
 impl CameraObservation {
-    /// Data of a recording. `drive` moves the head of its model; `shared` is the part of the noise of the
-    /// tip's x and of the head's y, m, that the other point reveals, and it is subtracted.
+    /// Data of a recording. `drive` moves the head of its model. `shared` is the part of the noise of the
+    /// tip's x and of the head's y, m, that the other point shows too; it is subtracted.
     pub(crate) fn new(
         recording: &Recording,
         drive: &Drive,
@@ -81,12 +81,12 @@ impl CameraObservation {
         }
     }
 
-    /// First guesses of the offsets along the sweep and of the drop, m. A blade leans equally far to both
-    /// sides, and its head is highest where the blade is upright.
+    /// Initial guesses of the offsets of position and drop, m. They assume that a blade leans equally far to
+    /// both sides and that its head is highest when the blade is upright.
     pub(super) fn guess_offsets_m(&self, tilt_rad: f64) -> [f64; 2] {
         /// Fraction of the frames that is ignored at either end of a distribution.
         const TAIL: f64 = 0.1;
-        /// Fraction of the frames with a nearly upright blade.
+        /// Fraction of the frames in which the blade is nearly upright.
         const UPRIGHT: f64 = 0.005;
         let [first, last] = self.settings.frames;
         let sorted = |mut values: Vec<f64>| {
@@ -100,7 +100,7 @@ impl CameraObservation {
         let level = |i: usize| Some(self.drop_m[i]? + tilt_rad * (self.head_m[i] - self.centre_m));
         let drops = sorted((first..last).filter_map(level).collect());
         let [low, high] = [at(&leans, TAIL), at(&leans, 1.0 - TAIL)];
-        // (an offset that exceeds the lean hides the change of side)
+        // (an offset that exceeds the lean hides that the blade changes sides)
         let both_sides = (low < 0.0 && high > 0.0) || self.reverses();
         let middle = if both_sides { 0.5 * (low + high) } else { 0.0 };
         let upright =
@@ -110,41 +110,41 @@ impl CameraObservation {
 
     /// Whether the head reverses within the fitted frames, so that the blade leans to both sides.
     fn reverses(&self) -> bool {
-        /// Least return of the head, relative to its range, that tilts the blade to the other side.
+        /// Smallest return of the head, as a fraction of its travel, that tilts the blade to the other side.
         const LEAST: f64 = 0.05;
         let [first, last] = self.settings.frames;
         let heads = &self.head_m[first..last];
         let (low, high) =
             heads.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
         let [Some(start), Some(end)] = [heads.first(), heads.last()] else { return false };
-        // how far the head moves beyond its first and last position
+        // distance by which the head moves outside the range between its first and last position
         let beyond = (high - start.max(*end)).max(start.min(*end) - low);
         beyond > LEAST * (high - low)
     }
 
-    /// Time of a frame after the middle of the fitted frames, s.
+    /// Time of a frame relative to the middle of the fitted frames, s.
     pub(super) fn after_middle_s(&self, frame: usize) -> f64 {
         let [first, last] = self.settings.frames;
         self.times_s[frame] - 0.5 * (self.times_s[first] + self.times_s[last - 1])
     }
 
-    /// Half the exposure time, s: a run starts this long before its first frame.
+    /// Time by which a run starts before its first frame, s: half the exposure time.
     pub(crate) fn lead_s(&self) -> f64 {
         0.5 * self.settings.exposure_s
     }
 
-    /// Number of data in frames `first` to before `last`.
+    /// Number of data in the frames from `first` up to but not including `last`.
     pub(super) fn count_data(&self, first: usize, last: usize) -> usize {
         let present = |column: &[Option<f64>]| column[first..last].iter().flatten().count();
         present(&self.tip_x_m) + present(&self.drop_m)
     }
 
-    /// Frames of a segment with data: of the tip, and of the drop.
+    /// Frames of a segment that have data of the tip, and those that have data of the drop.
     pub(super) fn data_frames(&self, [first, last]: [usize; 2]) -> [Vec<usize>; 2] {
         [&self.tip_x_m, &self.drop_m].map(|column| (first..last).filter(|&i| column[i].is_some()).collect())
     }
 
-    /// The map from a segment's residuals, m, to uncorrelated residuals of unit variance.
+    /// The map from the residuals of a segment, m, to uncorrelated residuals of unit variance.
     pub(super) fn segment_whitening(&self, segment: [usize; 2]) -> SegmentWhitening {
         let frames = self.data_frames(segment);
         let maps = [0, 1].map(|k| {
@@ -158,9 +158,9 @@ impl CameraObservation {
         SegmentWhitening { tips: frames[0].len(), maps }
     }
 
-    /// Derivatives of a segment's whitened data by the coefficients of the recorded head's curve: the index
-    /// of the first coefficient that matters, and one column per coefficient. `None` where the scene drives
-    /// the head.
+    /// Derivatives of the whitened data of a segment by the coefficients of the recorded head's curve: the
+    /// index of the first coefficient with an effect, and one column per coefficient. `None` if the scene
+    /// drives the head.
     pub(super) fn head_curve_derivatives(&self, [first, last]: [usize; 2]) -> Option<(usize, DMatrix<f64>)> {
         let curve = self.own_curve.as_ref()?;
         let from = curve.position_weights(first).0;
@@ -175,7 +175,7 @@ impl CameraObservation {
     }
 }
 
-/// The map of a segment's residuals to white residuals.
+/// The map from the residuals of a segment, m, to uncorrelated residuals of unit variance.
 pub(super) struct SegmentWhitening {
     tips: usize,
     maps: [ChannelWhitening; 2],
@@ -187,7 +187,7 @@ enum ChannelWhitening {
 }
 
 impl SegmentWhitening {
-    /// Whitens a column: the tip's frames, then the drop's.
+    /// Whitens a column that holds the tip's frames, then the drop's.
     pub(super) fn whiten_column(&self, column: &mut [f64]) {
         let (tip, drop) = column.split_at_mut(self.tips);
         for (map, part) in self.maps.iter().zip([tip, drop]) {
@@ -211,7 +211,8 @@ mod tests {
     use crate::recording::{FrameGrid, Traces};
     use crate::simulate::drive::smooth_head_motion;
 
-    /// A tip that trails a head by 1 mm there and back, in view of a camera that adds `offset_m` to the tip.
+    /// A tip that trails its head by 1 mm in both directions; the camera adds `offset_m` to the position
+    /// of the tip.
     fn film(offset_m: f64, stroke: impl Fn(f64) -> f64) -> CameraObservation {
         let grid = FrameGrid { start_s: 0.0, frame_rate_hz: 1000.0, frames: 1000 };
         let place = |i: usize| stroke(i as f64 / 1000.0);
@@ -245,7 +246,7 @@ mod tests {
             let [found, _] = film(offset_m, there_and_back).guess_offsets_m(0.0);
             assert!((found - offset_m).abs() < 1e-5, "{found} {offset_m}");
         }
-        // of a head that moves one way nothing says how far a blade leans to the other side
+        // if the head moves only one way, nothing shows how far the blade leans to the other side
         assert_eq!(film(1.5e-3, |t| 0.05 * t).guess_offsets_m(0.0), [0.0, 0.0]);
     }
 }

@@ -1,11 +1,11 @@
-//! Iterates of a search, and the store that keeps them.
+//! Iterates of a trace search, and the store for them.
 
 use super::segment_simulation::LinkState;
 use std::ops::ControlFlow;
 
-/// Stores the iterates of a search: a journal, or `()`, which keeps nothing.
+/// Store for the iterates of a search: a journal, or `()`, which stores nothing.
 pub trait Checkpoint {
-    /// The stored iterate of a chain at a place, both counted from 0.
+    /// The stored iterate of a chain at a place in the chain, both counted from 0.
     fn find_iterate(&mut self, chain: usize, place: usize) -> Option<Iterate>;
     /// Stores a new iterate of a chain; `Break` ends the search.
     fn store_iterate(&mut self, chain: usize, place: usize, iterate: &Iterate) -> ControlFlow<()>;
@@ -24,9 +24,9 @@ impl Checkpoint for () {
 /// Settings of a trace search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TraceSearchSettings {
-    /// Length of the segments in each stage, s, rising.
+    /// Length of the segments in each stage, s, in ascending order.
     pub segment_s: Vec<f64>,
-    /// Number of twins of the best end that are refitted.
+    /// Number of twins of the best end that are fitted.
     pub twins: usize,
 }
 
@@ -35,17 +35,17 @@ pub struct TraceSearchSettings {
 pub struct SegmentState {
     /// Index of the recording.
     pub recording: usize,
-    /// First frame.
+    /// First frame of the segment.
     pub first: usize,
-    /// Frame behind the last one.
+    /// Frame after the last frame of the segment.
     pub last: usize,
-    /// Angles and rates of neck and lip at its start, rad and rad/s.
+    /// Angles of neck and lip, rad, and their rates, rad/s, at the start.
     pub start: [f64; 4],
-    /// The same quantities as estimated from the recording alone.
+    /// The same angles and rates, as estimated from the recording alone.
     pub shown: [f64; 4],
     /// Number of data.
     pub data: usize,
-    /// Sum of squared residuals; infinite where the model's run fails.
+    /// Sum of squared residuals; infinite if the run of the model fails.
     pub chi2: f64,
 }
 
@@ -54,7 +54,7 @@ impl SegmentState {
         LinkState::from(self.start)
     }
 
-    /// First frame and the frame behind the last one.
+    /// First frame, and the frame after the last one.
     pub(super) fn frames(&self) -> [usize; 2] {
         [self.first, self.last]
     }
@@ -76,11 +76,11 @@ pub struct Iterate {
     pub cuts: usize,
     /// Number of times that bad segments of this stage were restarted from other states.
     pub rescues: usize,
-    /// Whether the cost is plain chi2, without robust weights.
+    /// Whether the cost is plain chi2 rather than the robust cost.
     pub plain: bool,
     /// Whether the stage has converged.
     pub settled: bool,
-    /// Damping of the next step, relative to the diagonal of the normal equations.
+    /// Damping of the next step, as a fraction of the diagonal of the normal equations.
     pub damping: f64,
     /// Coordinates of the unknowns.
     pub point: Vec<f64>,
@@ -102,7 +102,7 @@ impl Iterate {
     }
 }
 
-/// Chi2 per degree of freedom, and the number of degrees of freedom.
+/// Chi2 per degree of freedom, and number of degrees of freedom.
 #[must_use]
 pub fn chi2_per_dof(at: &Iterate) -> (f64, usize) {
     let chi2: f64 = at.segments.iter().map(|segment| segment.chi2).sum();

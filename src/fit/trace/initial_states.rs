@@ -1,4 +1,4 @@
-//! Fit of a segment's starting state with everything else held.
+//! Fit of the starting state of a segment with everything else held fixed.
 
 use super::checkpoint::SegmentState;
 use super::segment_simulation::{LinkState, RecordingModel, STATE_STEPS};
@@ -6,22 +6,24 @@ use nalgebra::{DMatrix, DVector, Matrix4};
 use rayon::prelude::*;
 use std::borrow::Cow;
 
-/// When a bad segment is restarted from other states, and from which.
+/// Condition on which a bad segment is restarted, and the states from which it is restarted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum RescuePolicy {
     Never,
-    /// Where chi2 exceeds this multiple of the number of data: from the recorded state and from the end of
-    /// the segment before.
+    /// If chi2 exceeds this multiple of the number of data. Restarts from the recorded state, also with
+    /// changed rates, and from the end of the previous segment.
     Beyond(f64),
-    /// Where chi2 exceeds what noise explains: also along the two least determined directions.
+    /// If chi2 exceeds what noise explains. Also restarts from states along the two
+    /// least determined directions.
     Thorough,
 }
 
-/// Largest fraction of bad segments for which [`RescuePolicy::Beyond`] acts. Where more are bad, the unknowns
-/// are wrong and not the states.
+/// Largest fraction of bad segments for which [`RescuePolicy::Beyond`] acts. If more segments are bad, the
+/// fault lies in the unknowns rather than in the states.
 const MAX_RESCUED_SHARE: f64 = 0.4;
 
-/// Gain of chi2, absolute and relative, below which the fit of a state ends.
+/// Gain of chi2 below which the fit of a state ends, as a fraction of chi2 or, if smaller, of the
+/// number of residuals.
 const MIN_CHI2_GAIN: f64 = 1e-3;
 
 /// A starting state with its residuals and, where needed, their derivatives.
@@ -37,7 +39,7 @@ impl StateTrial {
         Some(Self { state, residuals: linear.residuals, jacobian: Some(linear.by_state) })
     }
 
-    /// A trial without derivatives, which takes a third of the time.
+    /// A trial without derivatives, which takes a third of the time of one with derivatives.
     fn without_jacobian(point: &RecordingModel<'_>, frames: [usize; 2], state: LinkState) -> Option<Self> {
         Some(Self { state, residuals: point.differentiable_residuals(frames, &state)?, jacobian: None })
     }
@@ -46,13 +48,13 @@ impl StateTrial {
         self.residuals.norm_squared()
     }
 
-    /// Least gain that justifies another step.
+    /// Smallest gain that justifies another step.
     fn least_gain(&self) -> f64 {
         MIN_CHI2_GAIN * self.cost().min(self.residuals.len() as f64)
     }
 }
 
-/// Fits the four numbers of a segment's starting state by Levenberg-Marquardt, in at most `most` steps.
+/// Fits the four numbers of the starting state of a segment by Levenberg-Marquardt in at most `most` steps.
 pub(super) fn refine_state(point: &RecordingModel<'_>, segment: &mut SegmentState, most: usize) {
     let frames = segment.frames();
     let Some(mut at) = StateTrial::with_jacobian(point, frames, segment.start_state()) else {
@@ -71,7 +73,7 @@ pub(super) fn refine_state(point: &RecordingModel<'_>, segment: &mut SegmentStat
     (segment.start, segment.chi2, segment.data) = (at.state.into(), at.cost(), at.residuals.len());
 }
 
-/// The first step that lowers the cost, with rising damping.
+/// The first step that lowers the cost; the damping rises from trial to trial.
 fn lower_cost_step(
     point: &RecordingModel<'_>,
     frames: [usize; 2],
@@ -96,7 +98,8 @@ fn lower_cost_step(
             let step = c.solve(&slope);
             let state = LinkState::from_fn(|i, _| at.state[i] - step[i]);
             is_small = 2.0 * slope.dot(&step) - step.dot(&(&normal * &step)) < at.least_gain();
-            // derivatives serve the next step, which is unlikely after a last, a small or a repeated one
+            // derivatives serve the next step, which is unlikely after a step that is the last,
+            // small or repeated
             let ends = is_last || is_small || trial > 0;
             let build = if ends { StateTrial::without_jacobian } else { StateTrial::with_jacobian };
             build(point, frames, state)
@@ -114,9 +117,10 @@ fn lower_cost_step(
     None
 }
 
-/// Computes chi2 of segments after a step of the unknowns, and refines the states of those that fit worse.
+/// Computes chi2 of the segments after a step of the unknowns, and refines the states of segments
+/// that fit worse.
 pub(super) fn update_states(points: &[RecordingModel<'_>], segments: &mut [SegmentState], most: usize) {
-    /// Rise of chi2 above which a state is refined, in standard deviations of chi2.
+    /// Rise of chi2 above which the state of a segment is refined, in standard deviations of chi2.
     const RISE_SD: f64 = 0.05;
     segments.par_iter_mut().for_each(|segment| {
         let point = &points[segment.recording];
@@ -130,7 +134,7 @@ pub(super) fn update_states(points: &[RecordingModel<'_>], segments: &mut [Segme
     });
 }
 
-/// Fits the starting states of all segments, and rescues bad segments.
+/// Fits the starting states of all segments, and restarts bad segments from other states.
 pub(super) fn fit_states(
     points: &[RecordingModel<'_>],
     segments: &mut [SegmentState],
@@ -180,7 +184,7 @@ pub(super) fn rescue_states(
     });
 }
 
-/// Refines a segment from another state, and keeps the result where it lowers chi2.
+/// Refines a segment from another state, and keeps the result if it lowers chi2.
 fn try_state(point: &RecordingModel<'_>, segment: &mut SegmentState, state: &LinkState, most: usize) {
     let mut tried = SegmentState { start: (*state).into(), ..segment.clone() };
     refine_state(point, &mut tried, most);
@@ -189,7 +193,7 @@ fn try_state(point: &RecordingModel<'_>, segment: &mut SegmentState, state: &Lin
     }
 }
 
-/// For every segment, the state at the end of the segment before; `None` where the two do not adjoin.
+/// For every segment, the state at the end of the previous segment; `None` if the two are not adjacent.
 fn previous_end_states(points: &[RecordingModel<'_>], segments: &[SegmentState]) -> Vec<Option<LinkState>> {
     let end = |s: &SegmentState| {
         s.chi2.is_finite().then(|| points[s.recording].end_state(s.frames(), &s.start_state()))?
@@ -204,8 +208,8 @@ fn previous_end_states(points: &[RecordingModel<'_>], segments: &[SegmentState])
     (0..segments.len()).map(from).collect()
 }
 
-/// Tries every segment from the end of the segment before. The motion is continuous, so this finds states in
-/// another valley of chi2.
+/// Refines every segment from the end of the previous segment as well. The motion is continuous, so this
+/// finds states in other valleys of chi2.
 pub(super) fn join_states(points: &[RecordingModel<'_>], segments: &mut [SegmentState], most: usize) {
     let follows = previous_end_states(points, segments);
     segments.par_iter_mut().zip(follows).for_each(|(segment, follows)| {
@@ -221,7 +225,7 @@ fn rescue_candidates(
     follows: Option<LinkState>,
     rescue: RescuePolicy,
 ) -> Vec<LinkState> {
-    /// Errors of the recorded rates that are tried, rad/s.
+    /// Changes of the recorded rates of neck and lip that are tried, rad/s.
     const RATES: [[f64; 2]; 4] = [[60.0, 0.0], [-60.0, 0.0], [0.0, 120.0], [0.0, -120.0]];
     let seen = LinkState::from(segment.shown);
     let mut states = vec![seen];
@@ -233,7 +237,7 @@ fn rescue_candidates(
     states
 }
 
-/// States at 3, 10 and 30 standard deviations along the two least determined directions.
+/// States at 3, 10 and 30 standard deviations in both senses of the two least determined directions.
 fn weakest_direction_states(point: &RecordingModel<'_>, segment: &SegmentState) -> Option<Vec<LinkState>> {
     let state = segment.start_state();
     let jacobian = point.linearize_state(segment.frames(), &state)?.by_state;

@@ -1,5 +1,5 @@
-//! The search as a chain of iterates. Each is a pure function of the one before, so a search that resumes
-//! from a journal continues with the same bits.
+//! The search as a chain of iterates. Each iterate is a pure function of the previous one, so a search that
+//! resumes from a journal continues with the same bits.
 
 use super::checkpoint::{Iterate, SegmentState, TraceSearchSettings};
 use super::initial_states::{RescuePolicy, fit_states, join_states, rescue_states, update_states};
@@ -11,25 +11,24 @@ use super::segmentation::{SegmentBoundary, segment_boundaries};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Most outer steps of a phase.
+/// Maximum number of outer steps in a phase.
 pub(super) const MAX_STEPS: usize = 40;
-/// Most steps of a segment's starting state after an outer step.
+/// Maximum number of steps of the starting state of a segment after an outer step.
 pub(super) const MAX_STATE_STEPS: usize = 8;
 const FIRST_DAMPING: f64 = 1e-3;
 
-/// The first iterate of a search from a point.
+/// The first iterate of a search that starts at `point`; `None` if a scene refuses the point.
 #[must_use]
 pub fn first_iterate(model: &TraceModel, settings: &TraceSearchSettings, point: &[f64]) -> Option<Iterate> {
     start_stage(model, settings, 0, point, &[])
 }
 
-/// Cost of segments and priors at a point.
+/// Cost of the segments and the priors at a point.
 fn total_cost(model: &TraceModel, point: &[f64], segments: &[SegmentState], plain: bool) -> f64 {
     segments_cost(segments, plain) + model.unknowns.prior_cost(point)
 }
 
-/// The iterate with its starting states fitted in at most `most` steps; `None` where a scene refuses its
-/// point.
+/// The iterate with its starting states fitted in at most `most` steps; `None` if a scene refuses its point.
 pub(super) fn refit(
     model: &TraceModel,
     mut at: Iterate,
@@ -42,7 +41,7 @@ pub(super) fn refit(
     Some(at)
 }
 
-/// The iterate with plain cost and its starting states fitted as well as possible; `None` where a scene
+/// The iterate with plain cost and with its starting states fitted as well as possible; `None` if a scene
 /// refuses its point.
 pub(super) fn refit_plain(model: &TraceModel, mut at: Iterate) -> Option<Iterate> {
     let points = recording_models(model, &at.point)?;
@@ -53,7 +52,7 @@ pub(super) fn refit_plain(model: &TraceModel, mut at: Iterate) -> Option<Iterate
     Some(at)
 }
 
-/// The iterate after one; `None` at the end of the search.
+/// The iterate that follows `before`; `None` at the end of the search.
 #[must_use]
 pub fn next_iterate(model: &TraceModel, settings: &TraceSearchSettings, before: &Iterate) -> Option<Iterate> {
     if !before.settled {
@@ -61,7 +60,7 @@ pub fn next_iterate(model: &TraceModel, settings: &TraceSearchSettings, before: 
     }
     let bad = before.count_bad_segments();
     let stage = before.stage + 1;
-    // (where many segments are bad, the unknowns are wrong and not the states)
+    // (if many segments are bad, the fault lies in the unknowns rather than in the states)
     if bad > 0
         && 4 * bad <= before.segments.len()
         && let Some(rescued) = rescue_segments(model, before)
@@ -78,10 +77,10 @@ pub fn next_iterate(model: &TraceModel, settings: &TraceSearchSettings, before: 
     resegment(model, settings, before)
 }
 
-/// The same point with bad segments restarted from other states, where that lowers the cost.
+/// The iterate with its bad segments restarted from other states, if that lowers the cost.
 fn rescue_segments(model: &TraceModel, before: &Iterate) -> Option<Iterate> {
     const MOST_TIMES: usize = 3;
-    /// Fall of the cost for which the stage goes on.
+    /// Fall of the cost above which the stage continues.
     const LEAST_GAIN: f64 = 1.0;
     if before.rescues == MOST_TIMES {
         return None;
@@ -92,8 +91,8 @@ fn rescue_segments(model: &TraceModel, before: &Iterate) -> Option<Iterate> {
         .filter(|next| next.cost < before.cost - LEAST_GAIN)
 }
 
-/// Repeats the last stage where its end moves the segment boundaries, so that the result does not depend on
-/// the path of the search. `None` where they stay.
+/// Repeats the last stage if its end moves the segment boundaries, so that the result does not depend on the
+/// path of the search. `None` if the boundaries stay.
 fn resegment(model: &TraceModel, settings: &TraceSearchSettings, before: &Iterate) -> Option<Iterate> {
     const MOST_CUTS: usize = 3;
     let points = recording_models(model, &before.point)?;
@@ -111,7 +110,7 @@ fn resegment(model: &TraceModel, settings: &TraceSearchSettings, before: &Iterat
 }
 
 /// The first iterate of a stage: new segments that start on the fitted motion of the segments `before`.
-/// `None` where a scene refuses the point.
+/// `None` if a scene refuses the point.
 pub(super) fn start_stage(
     model: &TraceModel,
     settings: &TraceSearchSettings,
@@ -141,7 +140,7 @@ pub(super) fn start_stage(
     refit(model, first, MAX_STATE_STEPS, RescuePolicy::Beyond(3.0))
 }
 
-/// The segments of all recordings.
+/// Divides all recordings into segments.
 fn cut_recordings(points: &[RecordingModel<'_>], length_s: f64) -> Vec<SegmentState> {
     points.iter().enumerate().flat_map(|(film, at)| cut_recording(at, film, length_s)).collect()
 }
@@ -162,7 +161,8 @@ fn cut_recording(at: &RecordingModel<'_>, film: usize, length_s: f64) -> Vec<Seg
     starts.iter().zip(lasts).map(segment).collect()
 }
 
-/// State at the start of a new segment on the fitted motion of an old segment, where the old one fits.
+/// State on the fitted motion of an old segment at the start of a new one; `None` if the old
+/// segment fits badly.
 fn carry_state_over(
     point: &RecordingModel<'_>,
     before: &[SegmentState],
@@ -181,8 +181,8 @@ fn carry_state_over(
     point.end_state([old.first, segment.first], &old.start_state())
 }
 
-/// One outer step. Where no step of the unknowns lowers the cost, the starting states alone are fitted; where
-/// that gains nothing either, the iterate is settled.
+/// One outer step. If no step of the unknowns lowers the cost, only the starting states are fitted; if that
+/// gains nothing either, the iterate is settled.
 pub(super) fn outer_step(model: &TraceModel, before: &Iterate) -> Iterate {
     const TRIALS: usize = 6;
     let number = before.number + 1;
@@ -192,10 +192,10 @@ pub(super) fn outer_step(model: &TraceModel, before: &Iterate) -> Iterate {
         return stay();
     };
     let mut damping = before.damping;
-    // The plain phase ends where a step is a hundredth of a standard deviation. The robust phase only
-    // prepares it and may end earlier.
+    // The plain phase ends when a step is below a hundredth of a standard deviation. The robust phase only
+    // prepares the plain phase and may end earlier.
     let (least_gain, least_move) = if before.plain { (1e-4, 1e-2) } else { (1e-2, 0.3) };
-    // a misfit that no model removes scales both thresholds
+    // a misfit that no model can remove raises both thresholds
     let unit = (before.cost / before.count_data().max(1) as f64).max(1.0);
     let (least_gain, least_move) = (least_gain * unit, least_move * unit.sqrt());
     for _ in 0..TRIALS {
@@ -217,12 +217,12 @@ pub(super) fn outer_step(model: &TraceModel, before: &Iterate) -> Iterate {
     }
 }
 
-/// Largest step of a coordinate, in its standard deviations with all other coordinates held.
+/// Largest change of a coordinate, in its standard deviations with all other coordinates fixed.
 fn step_in_sds(normal: &DMatrix<f64>, from: &[f64], to: &[f64]) -> f64 {
     (0..from.len()).map(|i| ((to[i] - from[i]) * normal[(i, i)].sqrt()).abs()).fold(0.0, f64::max)
 }
 
-/// The iterate at a point, if it lowers the cost.
+/// The iterate at `point`, if it has a lower cost than `before`.
 fn accept_if_lower(
     model: &TraceModel,
     before: &Iterate,

@@ -4,10 +4,10 @@ use super::camera_observation::CameraObservation;
 use super::unknowns::TraceUnknowns;
 use crate::simulate::scene::Scene;
 
-/// A recording with the scene that it is fitted with.
+/// A recording and the scene that is fitted to it.
 #[derive(Clone)]
 pub struct TraceRecording {
-    /// The scene; its drive is the one that the model runs on.
+    /// The scene, whose drive moves the head of the model.
     pub scene: Scene,
     pub observation: CameraObservation,
 }
@@ -16,6 +16,6 @@ pub struct TraceRecording {
 #[derive(Clone)]
 pub struct TraceModel {
     pub recordings: Vec<TraceRecording>,
-    /// Unknowns besides starting states.
+    /// All unknowns except the starting states.
     pub unknowns: TraceUnknowns,
 }

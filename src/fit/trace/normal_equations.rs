@@ -8,17 +8,18 @@ use nalgebra::{DMatrix, DVector};
 use portable_math as math;
 use rayon::prelude::*;
 
-/// Chi2 per datum at which a segment has half its weight, so that segments in a wrong state do not dominate.
+/// Chi2 per datum at which a segment has half its weight, so that segments in a wrong state do not
+/// dominate the cost.
 const ROBUST_CHI2: f64 = 10.0;
 
-/// Weight of a segment: the derivative of its robust cost.
+/// Weight of a segment: the derivative of its robust cost by chi2.
 fn segment_weight(segment: &SegmentState, plain: bool) -> f64 {
     if plain { 1.0 } else { 1.0 / (1.0 + segment.chi2 / (segment.data.max(1) as f64 * ROBUST_CHI2)) }
 }
 
-/// Cost of all segments: `n c ln(1 + chi2/(n c))` each, or chi2 in the plain phase.
+/// Cost of all segments: the sum of `n c ln(1 + chi2 / (n c))`, or of chi2 in the plain phase.
 pub(super) fn segments_cost(segments: &[SegmentState], plain: bool) -> f64 {
-    /// Chi2 per datum for a segment whose run fails.
+    /// Chi2 per datum of a segment whose run fails.
     const FAILED: f64 = 1e6;
     let one = |segment: &SegmentState| {
         let data = segment.data.max(segment.last - segment.first) as f64;
@@ -35,13 +36,13 @@ pub(super) struct NormalEquations {
     pub parts: Vec<Option<ProjectedSegment>>,
 }
 
-/// The models of all recordings at a point; `None` where a scene refuses it.
+/// The models of all recordings at a point; `None` if a scene refuses the point.
 pub(super) fn recording_models<'a>(model: &'a TraceModel, z: &[f64]) -> Option<Vec<RecordingModel<'a>>> {
     let recordings = model.recordings.iter().enumerate();
     recordings.map(|(number, shoot)| RecordingModel::new(shoot, number, &model.unknowns, z)).collect()
 }
 
-/// Normal equations at a point.
+/// Normal equations of all segments and priors at a point.
 pub(super) fn normal_equations(
     model: &TraceModel,
     z: &[f64],
@@ -71,14 +72,15 @@ pub(super) fn normal_equations(
     Some(NormalEquations { matrix: total, slope, parts })
 }
 
-/// The damped step of the unknowns.
+/// The point after a damped step of the unknowns, within their ranges.
 pub(super) fn damped_step(
     model: &TraceModel,
     z: &[f64],
     at: &NormalEquations,
     damping: f64,
 ) -> Option<Vec<f64>> {
-    /// Longest move of a coordinate in a step: a factor of 1.6 of a parameter.
+    /// Largest change of a parameter's coordinate in one step; a logarithmic parameter changes by a
+    /// factor of 1.6.
     const LONGEST: f64 = 0.5;
     let mut damped = at.matrix.clone();
     for i in 0..z.len() {
@@ -93,13 +95,14 @@ pub(super) fn damped_step(
     Some(model.unknowns.clamp_to_ranges(&moved))
 }
 
-/// Segments with their starting states moved along with the unknowns; the step of each state is limited.
+/// The segments with their starting states moved along with the unknowns; each state moves by
+/// a limited amount.
 pub(super) fn carry_states(
     segments: &[SegmentState],
     at: &NormalEquations,
     moved: &DVector<f64>,
 ) -> Vec<SegmentState> {
-    /// Longest move of an angle, rad, and of a rate, rad/s.
+    /// Largest changes of an angle, rad, and of a rate, rad/s, in one step.
     const ANGLE: f64 = 0.05;
     const RATE: f64 = 200.0;
     let mut segments = segments.to_vec();
@@ -114,17 +117,17 @@ pub(super) fn carry_states(
     segments
 }
 
-/// Covariance of the unknowns' coordinates, from the curvature of the cost and as a sandwich estimate over
-/// segments.
+/// Covariance of the unknowns' coordinates, from the curvature of the cost and as a sandwich estimate
+/// over the segments.
 #[derive(Debug, Clone)]
 pub(crate) struct TraceCovariance {
     /// Information matrix of the recordings and the priors.
     pub information: DMatrix<f64>,
     /// Inverse of the information, plus `heads`.
     pub curvature: DMatrix<f64>,
-    /// Sandwich estimate from the scatter of the segments' slopes, plus `heads`.
+    /// Sandwich estimate from the scatter of the slopes of the segments, plus `heads`.
     pub sandwich: DMatrix<f64>,
-    /// Part due to errors of the recorded heads.
+    /// Covariance due to errors of the recorded heads.
     pub heads: DMatrix<f64>,
 }
 
@@ -147,8 +150,8 @@ pub(crate) fn trace_covariance(model: &TraceModel, at: &Iterate) -> Option<Trace
     Some(TraceCovariance { information: found.matrix, curvature: curvature + &heads, sandwich, heads })
 }
 
-/// Covariance of the slopes of the cost due to errors of the recorded heads. The curves of the heads are
-/// smooth, so an error spans many segments and does not average out as noise does.
+/// Covariance of the slopes of the cost due to errors of the recorded heads. The curve of a head is smooth,
+/// so its error spans many segments and does not average out like noise.
 fn head_curve_covariance(model: &TraceModel, at: &Iterate) -> Option<DMatrix<f64>> {
     let points = recording_models(model, &at.point)?;
     let n = at.point.len();
@@ -175,7 +178,7 @@ fn head_curve_covariance(model: &TraceModel, at: &Iterate) -> Option<DMatrix<f64
 }
 
 /// Change of the slope of a segment's cost by each coefficient of the head's curve: the index of the first
-/// coefficient that matters, and one column per coefficient.
+/// coefficient with an effect, and one column per coefficient.
 fn head_curve_slopes(point: &RecordingModel<'_>, segment: &SegmentState) -> Option<(usize, DMatrix<f64>)> {
     let (from, columns) = point.observation.head_curve_derivatives(segment.frames())?;
     let mut linear = point.linearize(segment.frames(), &segment.start_state())?;

@@ -1,4 +1,4 @@
-//! A trace fit: chains of iterates from several starts, and the assessment of the best end.
+//! The search of a trace fit: chains of iterates from several starts, and the assessment of the best end.
 
 use super::assessment::{TraceAssessment, assess_end};
 use super::checkpoint::{Checkpoint, Iterate, TraceSearchSettings, chi2_per_dof};
@@ -13,30 +13,31 @@ use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::cmp::Reverse;
 
-/// Fewest starts.
 const MIN_STARTS: usize = 2;
-/// Fewest starts where the frame rate undersamples the fastest mode, so that other values may give the same
-/// frames.
+/// Minimum number of starts if the frame rate undersamples the fastest mode, because other parameter values
+/// may then give the same frames.
 const MIN_STARTS_SLOW: usize = 4;
 
-/// A start is given up where its first stage costs this many times the least: it is in another valley.
+/// A start is abandoned if the cost of its first stage exceeds the lowest one so far by this factor: it is
+/// in another valley.
 const GIVE_UP_FACTOR: f64 = 3.0;
 
-/// What a search found.
+/// Outcome of a trace search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TraceSearchOutcome {
-    /// One descent a start, in the order of the starts.
+    /// One descent per start, in the order of the starts.
     pub descents: Vec<TraceDescent>,
     /// Index of the descent with the best end.
     pub best: usize,
     /// Whether the checkpoint asked to stop.
     pub stopped: bool,
-    /// Intervals and doubts at the best end; `None` where no start finished.
+    /// Intervals and doubts at the best end; `None` if the search was stopped, or if the covariance at the
+    /// best end does not exist.
     pub assessment: Option<TraceAssessment>,
 }
 
-/// Searches from the middle of the ranges, then from seeded points until two starts agree. Then assesses the
-/// best end.
+/// Searches from the middle of the ranges, then from seeded points until two starts agree; then assesses
+/// the best end.
 pub fn search_trace(
     model: &TraceModel,
     settings: &TraceSearchSettings,
@@ -69,11 +70,11 @@ pub fn search_trace(
     found
 }
 
-/// Where a start begins, in the coordinates of the unknowns: start 0 in the middle of every range, the others
-/// at seeded points. An unknown with a prior always starts at its own `start`.
+/// First point of a start, in the coordinates of the unknowns. Start 0 is in the middle of every range, the
+/// others are at seeded points; an unknown with a prior always starts at its own `start`.
 #[must_use]
 pub fn start_point(model: &TraceModel, seed: u64, start: usize) -> Vec<f64> {
-    /// Fraction of a range at either end in which no search starts. Later starts stay nearer to the middle,
+    /// Fraction of a range at either end in which no search starts. Later starts lie nearer to the middle,
     /// because points near wide bounds often lead nowhere.
     const EDGES: [f64; MAX_STARTS] = [0.1, 0.1, 0.1, 0.3, 0.3, 0.3];
     let edge = EDGES[start.min(MAX_STARTS - 1)];
@@ -86,7 +87,7 @@ pub fn start_point(model: &TraceModel, seed: u64, start: usize) -> Vec<f64> {
     model.unknowns.0.iter().map(place).collect()
 }
 
-/// Whether enough starts have ended, two of them at the same point.
+/// Whether there are enough starts, and another start ends at the same point as the best one.
 fn has_enough_starts(model: &TraceModel, descents: &[TraceDescent]) -> bool {
     let best = best_descent(descents);
     let Some(end) = descents[best].last_iterate() else { return false };
@@ -101,8 +102,8 @@ fn has_enough_starts(model: &TraceModel, descents: &[TraceDescent]) -> bool {
     other_ends(descents, best).any(|other| other.plain == end.plain && is_same_end(end, other, &sd))
 }
 
-/// Frame rate and frequency of the blade's fastest mode, Hz, where the mode has fewer than two frames a
-/// period.
+/// Frame rate and frequency of the blade's fastest mode, Hz, if the mode has fewer than two
+/// frames per period.
 #[must_use]
 pub fn undersampled_mode(model: &TraceModel, at: &Iterate) -> Option<[f64; 2]> {
     let one = |point: RecordingModel<'_>| {
@@ -114,7 +115,8 @@ pub fn undersampled_mode(model: &TraceModel, at: &Iterate) -> Option<[f64; 2]> {
     recording_models(model, &at.point)?.into_iter().find_map(one)
 }
 
-/// Index of the best descent: the one that came furthest, plain before robust, then of least cost.
+/// Index of the best descent: the one that reached the latest stage, then one with plain cost, then that
+/// of lowest cost.
 fn best_descent(descents: &[TraceDescent]) -> usize {
     let rank = |descent: &TraceDescent| match descent.last_iterate() {
         Some(end) => (Reverse(end.stage), !end.plain, end.cost),
@@ -127,24 +129,25 @@ fn best_descent(descents: &[TraceDescent]) -> usize {
     (0..descents.len()).min_by(order).unwrap_or(0)
 }
 
-/// Last iterates of all descents but the best.
+/// Last iterates of all descents except the best one.
 pub(super) fn other_ends(descents: &[TraceDescent], best: usize) -> impl Iterator<Item = &Iterate> {
     let others = descents.iter().enumerate().filter(move |(at, _)| *at != best);
     others.filter_map(|(_, descent)| descent.last_iterate())
 }
 
-/// Whether two ends of a stage agree in every coordinate; `sd` are its standard deviations.
+/// Whether two ends belong to the same stage and agree in every coordinate; `sd` are the standard deviations
+/// of the coordinates.
 pub(super) fn is_same_end(end: &Iterate, other: &Iterate, sd: &[f64]) -> bool {
     let mut pairs = end.point.iter().zip(&other.point).zip(sd);
     other.stage == end.stage && pairs.all(|((a, b), sd)| (a - b).abs() <= SAME_END_SD * sd)
 }
 
-// One search from one start.
+// Search from one start.
 
-/// Largest difference of two ends that count as equal, in standard deviations of each unknown.
+/// Largest difference of two ends that count as the same, in standard deviations of each unknown.
 pub(crate) const SAME_END_SD: f64 = 1.0;
 
-/// The end of one start.
+/// Result of the search from one start.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TraceDescent {
     /// Number of its start, from 0.
@@ -159,9 +162,9 @@ impl TraceDescent {
     }
 }
 
-/// Follows the chain of a start to its end. The flag is true where the checkpoint asked to stop.
+/// Follows the chain of a start to its end. The flag is true if the checkpoint asked to stop.
 ///
-/// The start is given up where its first stage ends above the cost `limit`.
+/// The start is abandoned if its first stage ends with a cost above `limit`.
 fn descend_from_start(
     model: &TraceModel,
     settings: &TraceSearchSettings,

@@ -1,4 +1,4 @@
-//! One run of the model over a segment as the camera records it, with its derivatives.
+//! A run of the model over one segment, as the camera records it, with its derivatives.
 
 use super::camera_observation::CameraObservation;
 use super::checkpoint::Iterate;
@@ -17,17 +17,18 @@ use std::cell::RefCell;
 /// Angles, rad, and rates, rad/s, of neck and lip.
 pub(super) type LinkState = Vector4<f64>;
 
-/// Changes of angles, rad, and rates, rad/s, that are small for a segment.
+/// Units in which the four numbers of a starting state are scaled: small changes of the angles, rad,
+/// and rates, rad/s.
 pub(super) const STATE_STEPS: [f64; 4] = [3e-5, 3e-5, 0.1, 0.1];
-/// Numbers of a starting state.
+/// Number of values in a starting state.
 const STATES: usize = 4;
-/// Tolerance of a segment's run: its error is a thousandth of a pixel's noise.
+/// Tolerance of the run of a segment: its error is a thousandth of the noise of a pixel.
 const TOLERANCE: f64 = 1e-8;
 /// Relative accuracy of the derivatives, which is enough for a step of the search.
 const ACCURACY: f64 = 1e-5;
-/// Limit of right-hand sides of a segment's run.
+/// Maximum number of evaluations of the right-hand side in the run of a segment.
 const MOST_EVALUATIONS: u64 = 400_000;
-/// What is averaged over every frame: tip, head and drop.
+/// Channels that are averaged over the shutter of every frame.
 const CHANNELS: [Channel; 3] = [Channel::TipX, Channel::HeadX, Channel::HeadDrop];
 
 thread_local! {
@@ -35,17 +36,17 @@ thread_local! {
     static RUNNER: RefCell<TangentRunner> = RefCell::new(TangentRunner::with_accuracy(ACCURACY));
 }
 
-/// A run over a segment as the camera records it.
+/// A run over one segment as the camera records it.
 struct SegmentObservation {
-    /// First frame.
+    /// Index of the first frame.
     first: usize,
     /// Number of directions of the derivatives.
     directions: usize,
     /// Means of tip, head and drop over the shutter, m, one row per frame.
     means: Vec<[f64; 3]>,
-    /// Derivatives of the means: by frame, then channel, then direction.
+    /// Derivatives of the means, ordered by frame, then channel, then direction.
     slopes: Vec<f64>,
-    /// State at the end.
+    /// State at the end of the run.
     end: Option<LinkState>,
     /// Whether the derivatives are known up to the end.
     is_known: bool,
@@ -99,7 +100,7 @@ impl TangentObserver for ShutterAverage<'_> {
     }
 }
 
-/// Residuals with their derivatives by the starting state and by the unknowns.
+/// Residuals of a segment with their derivatives by the starting state and by the unknowns.
 pub(super) struct LinearizedSegment {
     pub residuals: DVector<f64>,
     pub by_state: DMatrix<f64>,
@@ -120,16 +121,17 @@ pub(super) struct RecordingModel<'a> {
 
 /// Effect of an unknown on the residuals of a recording.
 enum UnknownEffect {
-    /// No effect: it belongs to another recording.
+    /// No effect, because the unknown belongs to another recording.
     Nowhere,
-    /// On the run: number of its direction, and derivative of the direction by the coordinate.
+    /// Effect on the run: index of the direction, and derivative of the direction by the coordinate.
     Run(usize, f64),
-    /// On the picture. The scale also changes the run: direction, and its derivative by the value.
+    /// Effect on the picture: quantity, derivative of its value by the coordinate and, for a scale that also
+    /// changes the run, the direction and its derivative by the value.
     Picture(CameraUnknown, f64, Option<(usize, f64)>),
 }
 
 impl<'a> RecordingModel<'a> {
-    /// `None` where the scene refuses the point `z`.
+    /// `None` if the scene refuses the point `z`.
     pub(super) fn new(
         shoot: &'a TraceRecording,
         number: usize,
@@ -161,7 +163,8 @@ impl<'a> RecordingModel<'a> {
                 UnknownKind::Camera { what: CameraUnknown::Clock, .. } => {
                     UnknownEffect::Run(direction(TangentDirection::DriveDelay), slope)
                 }
-                // the recorded head drives the model, so true lengths are smaller by the scale
+                // the recorded head drives the model, so true lengths are those of the picture divided by
+                // 1 + scale
                 UnknownKind::Camera { what: CameraUnknown::Scale, .. } if film.own_head => {
                     let by_scale = -1.0 / (1.0 + view.scale);
                     let own = Some((direction(TangentDirection::DriveScale), by_scale));
@@ -175,7 +178,7 @@ impl<'a> RecordingModel<'a> {
         Some(Self { observation: film, camera: view, scene, none, states, all, effects })
     }
 
-    /// The state behind the last of `frames`, where the next segment starts. `None` where the run ends early.
+    /// The state after the last of `frames`, where the next segment starts; `None` if the run ends early.
     pub(super) fn end_state(&self, frames: [usize; 2], state: &LinkState) -> Option<LinkState> {
         self.simulate_segment(frames, state, &self.none)?.end
     }
@@ -194,7 +197,7 @@ impl<'a> RecordingModel<'a> {
         scene.start = StartKind::State(Pose { theta, phi, theta_rate, phi_rate });
         scene.run.stop_s = match film.times_s.get(last) {
             Some(next) => next - clock_s - lead,
-            // slightly longer than the last shutter
+            // slightly longer than to the end of the last exposure
             None => film.times_s[last - 1] - clock_s + lead + 1e-9,
         };
         let (means, slopes) = (vec![[0.0; 3]; count], vec![0.0; count * CHANNELS.len() * directions]);
@@ -214,12 +217,12 @@ impl<'a> RecordingModel<'a> {
         (whole && shot.end.is_some() && (shot.is_known || seeds.is_empty())).then_some(shot)
     }
 
-    /// Residuals of unit variance: the tip's frames, then the drop's.
+    /// Residuals whitened to unit variance: the tip's frames, then the drop's.
     pub(super) fn whitened_residuals(&self, frames: [usize; 2], state: &LinkState) -> Option<DVector<f64>> {
         self.whiten_residuals(frames, &self.simulate_segment(frames, state, &self.none)?)
     }
 
-    /// Residuals of unit variance; `None` where [`Self::linearize_state`] has no derivatives.
+    /// Residuals whitened to unit variance; `None` where [`Self::linearize_state`] has no derivatives.
     pub(super) fn differentiable_residuals(
         &self,
         frames: [usize; 2],
@@ -235,12 +238,12 @@ impl<'a> RecordingModel<'a> {
         Some(residuals).filter(|r| r.iter().all(|x| x.is_finite()))
     }
 
-    /// Residuals with their derivatives by the starting state alone; `by_unknown` is empty.
+    /// Whitened residuals with their derivatives by the starting state alone; `by_unknown` is empty.
     pub(super) fn linearize_state(&self, frames: [usize; 2], state: &LinkState) -> Option<LinearizedSegment> {
         self.linearize_by(frames, state, &self.states, &[])
     }
 
-    /// Residuals with all derivatives.
+    /// Whitened residuals with all derivatives.
     pub(super) fn linearize(&self, frames: [usize; 2], state: &LinkState) -> Option<LinearizedSegment> {
         self.linearize_by(frames, state, &self.all, &self.effects)
     }
@@ -304,7 +307,7 @@ impl<'a> RecordingModel<'a> {
         found
     }
 
-    /// Adds values of tip and drop, frame by frame, to a column with one entry per datum.
+    /// Adds values of tip and drop, given frame by frame, to a column with one entry per datum.
     fn add_to_column(
         &self,
         shot: &SegmentObservation,
@@ -328,7 +331,7 @@ impl<'a> RecordingModel<'a> {
         }
     }
 
-    /// Adds the derivative by a direction of the run, times `slope`, to a column.
+    /// Adds the derivative by a direction of the run, multiplied by `slope`, to a column.
     fn add_run_derivative(
         &self,
         shot: &SegmentObservation,
@@ -346,7 +349,7 @@ impl<'a> RecordingModel<'a> {
         });
     }
 
-    /// Adds the derivative by a quantity of the camera, times `slope`, to a column.
+    /// Adds the derivative by a quantity of the camera, multiplied by `slope`, to a column.
     fn add_picture_derivative(
         &self,
         shot: &SegmentObservation,
@@ -373,11 +376,9 @@ impl<'a> RecordingModel<'a> {
     }
 }
 
-// Misfit at one point, with nothing but the starting states fitted.
+// Residuals of a fitted trace by channel.
 
-// Residuals of a fitted trace, channel by channel.
-
-/// Residuals of one channel over one segment.
+/// Residuals of one channel in one segment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SegmentResiduals {
     /// Index of the recording.
@@ -390,11 +391,11 @@ pub struct SegmentResiduals {
     pub frames: Vec<usize>,
     /// Model minus measured, m.
     pub residual_m: Vec<f64>,
-    /// Residuals in standard deviations of the noise, without its correlation.
+    /// Whitened residuals: in standard deviations of the noise and without its correlation.
     pub whitened: Vec<f64>,
 }
 
-/// Residuals of every segment and channel with data. A segment whose run fails is left out.
+/// Residuals of every segment and channel with data. A segment whose run fails is omitted.
 #[must_use]
 pub fn segment_residuals(model: &TraceModel, at: &Iterate) -> Vec<SegmentResiduals> {
     let Some(points) = recording_models(model, &at.point) else { return Vec::new() };

@@ -1,4 +1,4 @@
-//! Boundaries of segments, and the blade's states there as estimated from the recording.
+//! Boundaries of segments, and the states of the blade there, estimated from the recording.
 
 use super::camera_observation::CameraObservation;
 use super::segment_simulation::LinkState;
@@ -8,24 +8,25 @@ use crate::simulate::scene::Scene;
 use nalgebra::{DMatrix, DVector};
 use portable_math as math;
 
-/// Least angle between the links at which the tip's two coordinates determine both angles; a nearly straight
-/// blade does not.
+/// Smallest angle between neck and lip, rad, at which the two coordinates of the tip determine both angles;
+/// those of a nearly straight blade do not.
 const MIN_BEND_RAD: f64 = 0.15;
-/// Least speed of the tip over the glass that counts as sliding, m/s. In stick, the state has only three
+/// Smallest speed of the tip over the glass that counts as sliding, m/s. In stick the state has only three
 /// degrees of freedom.
 const MIN_SPEED_M_PER_S: f64 = 0.05;
 /// Half width of the window in which rates are fitted, s: a third of a stick-slip cycle.
 const HALF_WIDTH_S: f64 = 3.5e-4;
 
-/// A frame at which a segment may begin, with the blade's state there.
+/// A frame at which a segment may begin, with the state of the blade there.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SegmentBoundary {
     pub frame: usize,
     pub state: LinkState,
 }
 
-/// Boundaries about `length_s` apart. Each is the nearest frame to its nominal position at which the tip
-/// slides and the blade is bent. (To choose the fastest frame nearby would select for large noise.)
+/// Boundaries at distances of about `length_s`. Each boundary is the frame nearest to its nominal
+/// position at which the tip slides and the blade is bent. (The fastest frame nearby would often be one
+/// with large noise.)
 pub(super) fn segment_boundaries(
     scene: &Scene,
     film: &CameraObservation,
@@ -34,7 +35,7 @@ pub(super) fn segment_boundaries(
 ) -> Vec<SegmentBoundary> {
     let [from, to] = film.settings.frames;
     let step = ((length_s * film.rate_hz).round() as usize).max(4);
-    // one-sided windows give poor rates
+    // rates from one-sided windows are poor
     let inner = half_width_frames(film)..film.times_s.len().saturating_sub(half_width_frames(film));
     let usable = |frame: usize| -> Option<SegmentBoundary> {
         inner.contains(&frame).then_some(())?;
@@ -63,8 +64,8 @@ pub(super) fn segment_boundaries(
     found
 }
 
-/// State at the opening of a frame's shutter, from parabolas through the neighbouring frames, and the tip's
-/// speed over the glass, m/s.
+/// State at the opening of a frame's shutter, from parabolas through the neighbouring frames, and speed of
+/// the tip over the glass, m/s.
 fn recorded_state(
     scene: &Scene,
     film: &CameraObservation,
@@ -109,8 +110,8 @@ fn half_width_frames(film: &CameraObservation) -> usize {
     ((HALF_WIDTH_S * film.rate_hz).round() as usize).max(1)
 }
 
-/// Value and slope, per second, at the opening of a frame's shutter, of the parabola (or line) through the
-/// neighbouring frames.
+/// Value and slope, per second, of the parabola (or line) through the neighbouring frames at the opening of
+/// a frame's shutter.
 fn fit_parabola(
     film: &CameraObservation,
     frame: usize,
@@ -131,10 +132,10 @@ fn fit_parabola(
     Some((found[0], found[1] * film.rate_hz))
 }
 
-/// Angles of both links, with trailing lip, for which the tip is `lean` from the head along the sweep and the
-/// head has dropped by `drop`; `None` out of reach.
+/// Angles of neck and lip, with the lip trailing, for which the tip is at the distance `lean` from the head
+/// along the sweep and the head has dropped by `drop`; `None` if the tip is out of reach.
 fn link_angles(linkage: &Linkage, lean: f64, drop: f64) -> Option<[f64; 2]> {
-    /// Largest cosine that is accepted: noise may make a straight blade look too long.
+    /// Largest accepted cosine, because noise may make a straight blade appear too long.
     const REACH: f64 = 1.02;
     let (l1, l2) = (linkage.l1_m, linkage.l2_m);
     let height = l1 + l2 - drop;
@@ -147,7 +148,7 @@ fn link_angles(linkage: &Linkage, lean: f64, drop: f64) -> Option<[f64; 2]> {
     Some([theta, theta + bend])
 }
 
-/// Rates of both links from the rates of lean and drop.
+/// Angular velocities of neck and lip from the rates of lean and drop.
 fn link_rates(linkage: &Linkage, [theta, phi]: [f64; 2], lean_rate: f64, drop_rate: f64) -> [f64; 2] {
     let (l1, l2) = (linkage.l1_m, linkage.l2_m);
     let determinant = l1 * l2 * math::sin(phi - theta);
@@ -157,10 +158,10 @@ fn link_rates(linkage: &Linkage, [theta, phi]: [f64; 2], lean_rate: f64, drop_ra
     ]
 }
 
-/// Angles of static equilibrium, with whatever friction it needs, for which the tip is `lean` from the head.
-/// They stand in where the drop is not tracked.
+/// Angles of a static equilibrium, with any friction that it requires, for which the tip is at the distance
+/// `lean` from the head. They are used where the drop is not tracked.
 fn equilibrium_angles(linkage: &Linkage, lean: f64) -> Option<[f64; 2]> {
-    /// Range and number of neck angles that are searched.
+    /// Largest neck angle that is searched, rad, and number of angles.
     const LARGEST_RAD: f64 = 0.7;
     const POINTS: usize = 140;
     let side = 1f64.copysign(lean);
@@ -186,7 +187,7 @@ fn equilibrium_angles(linkage: &Linkage, lean: f64) -> Option<[f64; 2]> {
     Some([low, phi_of(low)?])
 }
 
-/// Residual moment on the neck at rest when friction balances the lip.
+/// Residual moment on the neck of a blade at rest whose lip is balanced by friction.
 fn neck_moment(linkage: &Linkage, theta: f64, phi: f64) -> f64 {
     let (l1, l2) = (linkage.l1_m, linkage.l2_m);
     let drop = l1 * (1.0 - math::cos(theta)) + l2 * (1.0 - math::cos(phi));

@@ -1,5 +1,5 @@
-//! Runs from the best end of a search that measure uncertainty: one with shorter segments, one to either side
-//! of every parameter (profile), and twins (parametric bootstrap).
+//! Runs from the best end of a search that measure uncertainty: a fit with shorter segments, fits with each
+//! parameter shifted to either side (profile), and fits to twins (parametric bootstrap).
 
 use super::checkpoint::{Checkpoint, Iterate, TraceSearchSettings, chi2_per_dof};
 use super::initial_states::RescuePolicy;
@@ -15,19 +15,19 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
 use std::borrow::Cow;
 
-/// Standard deviations of a two-sided 95 % interval.
+/// Half width of a two-sided 95 % interval, in standard deviations of a normal variable.
 pub(super) const Z_95: f64 = 1.959_963_984_540_054;
 
-/// Most starts; a search ends sooner where two of them end at the same point.
+/// Maximum number of starts. A search ends sooner if two starts end at the same point.
 pub(crate) const MAX_STARTS: usize = 6;
 
-/// Most twins of a search.
+/// Maximum number of twins of a search.
 pub(crate) const MAX_TWINS: usize = 1000;
 
-/// Purpose of a run from the best end.
+/// Purpose of a run that starts at the best end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum UncertaintyRun {
-    /// A fit to twin data.
+    /// A fit to the data of the twin with this number.
     Twin(usize),
     /// A fit with the segments of the previous stage.
     Shorter,
@@ -41,7 +41,7 @@ pub(crate) enum UncertaintyRun {
 }
 
 impl UncertaintyRun {
-    /// Number of its chain, behind the chains of the starts.
+    /// Number of its chain; the chains of the starts have lower numbers.
     pub(crate) fn chain_number(self) -> usize {
         MAX_STARTS
             + match self {
@@ -65,8 +65,8 @@ impl UncertaintyRun {
         matches!(self, Self::Twin(_))
     }
 
-    /// Whether its chain ends with an iterate. Few steps suffice, because a run begins near its end, where
-    /// the linear model nearly holds.
+    /// Whether the chain of this run ends with the iterate `last`. A few steps suffice, because a run begins
+    /// near its end, where the linear model nearly holds.
     fn is_complete(self, last: &Iterate) -> bool {
         let max_steps = match self {
             Self::Twin(_) => 4,
@@ -77,7 +77,7 @@ impl UncertaintyRun {
     }
 }
 
-/// The best end of a search with its covariance: where uncertainty runs start.
+/// The best end of a search with its covariance; uncertainty runs start from it.
 pub(crate) struct SearchEnd<'a> {
     pub model: &'a TraceModel,
     /// Settings of the search.
@@ -86,9 +86,10 @@ pub(crate) struct SearchEnd<'a> {
     pub seed: u64,
     pub at: &'a Iterate,
     pub covariance: TraceCovariance,
-    /// Factor on variances, at least 1: chi2 per degree of freedom, for noise that is larger than measured.
+    /// Factor on variances, at least 1: chi2 per degree of freedom, because the noise may be
+    /// larger than measured.
     pub widening: f64,
-    /// Standard deviation of each coordinate: the larger of curvature and sandwich.
+    /// Standard deviation of each coordinate: the larger of those from curvature and sandwich estimate.
     pub sd: Vec<f64>,
 }
 
@@ -107,7 +108,8 @@ impl<'a> SearchEnd<'a> {
         Some(Self { model, settings, seed, at, covariance, widening, sd })
     }
 
-    /// The runs from this end; empty where some segments are bad.
+    /// The runs from this end; none if the search did not reach its plain phase, for example because
+    /// of bad segments.
     pub(super) fn uncertainty_runs(&self) -> Vec<UncertaintyRun> {
         if !self.at.plain {
             return Vec::new();
@@ -124,7 +126,7 @@ impl<'a> SearchEnd<'a> {
         if above { far } else { -far }
     }
 
-    /// The first iterate of a run, or the one after `before`; `None` at its end.
+    /// The first iterate of a run, or the one that follows `before`; `None` at the end of the run.
     pub(crate) fn next_iterate(&self, run: UncertaintyRun, before: Option<&Iterate>) -> Option<Iterate> {
         if before.is_some_and(|before| run.is_complete(before)) {
             return None;
@@ -133,7 +135,7 @@ impl<'a> SearchEnd<'a> {
         Some(before.map_or(first, |before| outer_step(&model, before)))
     }
 
-    /// The model of a run and its first iterate.
+    /// The model of a run, and its first iterate.
     fn start_run(&self, run: UncertaintyRun) -> RunStart<'a> {
         let at = Iterate { plain: true, settled: false, ..self.at.clone() };
         let (model, first) = match run {
@@ -155,14 +157,14 @@ impl<'a> SearchEnd<'a> {
                 (Cow::Owned(pinned), first)
             }
         };
-        // where the scene refuses the point, the run ends at once and its cost marks it as failed
+        // if the scene refuses the point, the run ends at once, and its cost marks it as failed
         let failed = || Iterate { cost: f64::MAX, settled: true, ..self.at.clone() };
         (model, Iterate { number: 0, ..first.unwrap_or_else(failed) })
     }
 }
 
-/// Number of runs that are computed together. It is fixed, so the order of the iterates does not depend on
-/// the number of threads.
+/// Number of runs that are computed together. It is fixed, so that the order of the iterates does not depend
+/// on the number of threads.
 const RUNS_TOGETHER: usize = 8;
 
 /// Model and first iterate of a run.
@@ -191,15 +193,16 @@ impl<'a> RunProgress<'a> {
     }
 }
 
-/// Follows runs to their ends, several at once. Returns the last iterate of each, in order; an entry is
-/// `None` where the scene refuses its first point. Returns `None` where the checkpoint asks to stop.
+/// Follows runs to their ends, several at once. Returns the last iterate of each run, in order; an entry is
+/// `None` if the scene refuses the first point of the run. Returns `None` if the checkpoint asks to stop.
 pub(super) fn follow_runs(
     end: &SearchEnd<'_>,
     runs: &[UncertaintyRun],
     keep: &mut dyn Checkpoint,
 ) -> Option<Vec<Option<Iterate>>> {
     let mut ends = Vec::new();
-    // twins form groups of their own, so that adding twins later leaves the order of the other iterates
+    // twins form their own groups, so that twins that are added later do not change the order of
+    // the other iterates
     let kinds = runs.chunk_by(|a, b| a.is_twin() == b.is_twin());
     for runs in kinds.flat_map(|kind| kind.chunks(RUNS_TOGETHER)) {
         let begin = |run: &UncertaintyRun| RunProgress { run: *run, start: None, place: 0, last: None };
@@ -225,16 +228,16 @@ pub(super) fn follow_runs(
     Some(ends)
 }
 
-// Profile of the cost: one point on either side of every parameter, with everything else refitted.
+// Profile of the cost: one point on either side of every parameter, with all other unknowns refitted.
 
-/// Standard deviation of the pin, relative to that of the parameter.
+/// Standard deviation of the prior that pins a parameter, relative to that of the parameter.
 const PIN_SD: f64 = 1e-3;
-/// Largest factor by which the profile widens an interval beyond the curvature.
+/// Largest factor by which the profile widens an interval.
 const MAX_STRETCH: f64 = 3.0;
 
-/// Distances below and above each estimate, in the coordinate, at which the cost reaches the 95 % threshold.
-/// They are never less than the curvature gives, and equal to it for an unknown without side runs. `sides`
-/// gives the last iterate of a run.
+/// Distances below and above each estimate, in its coordinate, at which the cost reaches the 95 % threshold.
+/// A distance is never less than that from the standard deviation, and equal to it for an unknown without
+/// side runs. `sides` gives the last iterate of a run.
 pub(super) fn profile_distances<'s>(
     end: &SearchEnd<'_>,
     sides: impl Fn(UncertaintyRun) -> Option<&'s Iterate>,
@@ -257,7 +260,8 @@ fn pin_prior(end: &SearchEnd<'_>, i: usize, moved: f64) -> [f64; 2] {
     [end.at.point[i] + moved, PIN_SD * end.covariance.curvature[(i, i)].sqrt()]
 }
 
-/// The model with unknown `i` pinned away from its estimate, and the minimum that the linear model predicts.
+/// The model with unknown `i` pinned away from its estimate, and the minimum that the linear model
+/// predicts for it.
 fn pin_unknown(end: &SearchEnd<'_>, i: usize, moved: f64) -> (TraceModel, Vec<f64>) {
     let covariance = &end.covariance.curvature;
     let mut pinned = end.model.clone();
@@ -270,7 +274,7 @@ fn pin_unknown(end: &SearchEnd<'_>, i: usize, moved: f64) -> (TraceModel, Vec<f6
     (pinned, point)
 }
 
-/// Rise of the cost to an iterate with unknown `i` pinned, without the cost of the pin.
+/// Rise of the cost to an iterate with unknown `i` pinned, without the cost of the pinning prior.
 fn cost_rise(end: &SearchEnd<'_>, i: usize, moved: f64, at: &Iterate) -> f64 {
     let [pinned_at, sd] = pin_prior(end, i, moved);
     let prior = end.model.unknowns.0[i].prior;
@@ -279,14 +283,14 @@ fn cost_rise(end: &SearchEnd<'_>, i: usize, moved: f64, at: &Iterate) -> f64 {
 }
 
 // Parametric bootstrap (Efron and Tibshirani, An Introduction to the Bootstrap, 1993, chapter 6): the model
-// at the best end with new noise, refitted from there.
+// at the best end with new noise, refitted from this end.
 
-/// Steps of a segment's starting state before the first outer step.
+/// Number of steps of the starting state of a segment before the first outer step.
 const TWIN_STATE_STEPS: usize = 3;
-/// Frames after which correlated noise has forgotten its start.
+/// Number of frames after which correlated noise no longer depends on its first values.
 const NOISE_WARM_UP_FRAMES: usize = 400;
 
-/// Twin number `draw` of the data at the end of a search.
+/// The model with the data of twin number `draw`, simulated at the end of a search.
 fn simulate_twin(end: &SearchEnd<'_>, draw: usize) -> TraceModel {
     let SearchEnd { model, at, .. } = end;
     let mut generator = Xoshiro256PlusPlus::seed_from_u64(end.seed ^ ((draw as u64 + 1) << 40));
@@ -306,14 +310,14 @@ fn simulate_twin(end: &SearchEnd<'_>, draw: usize) -> TraceModel {
             column[frame] = column[frame].map(|measured| measured + residual_m + drawn);
         }
     }
-    // a prior is a measurement and scatters too
+    // the mean of a prior is a measurement too, so it also scatters
     for [mean, sd] in twin.unknowns.0.iter_mut().filter_map(|unknown| unknown.prior.as_mut()) {
         *mean += *sd * generator.sample::<f64, _>(StandardNormal);
     }
     twin
 }
 
-/// Noise in every frame, m.
+/// Simulated noise in every frame, m.
 fn draw_noise(noise: &AutoregressiveNoise, frames: usize, generator: &mut Xoshiro256PlusPlus) -> Vec<f64> {
     let mut values: Vec<f64> = Vec::with_capacity(NOISE_WARM_UP_FRAMES + frames);
     for _ in 0..NOISE_WARM_UP_FRAMES + frames {

@@ -1,30 +1,32 @@
-//! Unknowns of a trace fit besides starting states: parameters of the scene and errors of the cameras, each
-//! along a coordinate of order one.
+//! Unknowns of a trace fit, without the starting states: parameters of the scene and errors of the cameras.
+//! Each has a coordinate of order one.
 
 use crate::simulate::scene::Scene;
 use portable_math as math;
 
-/// An unknown of the camera that took a recording.
+/// Kind of error of the camera that took a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CameraUnknown {
-    /// Offset of the tip's marker from the head's along the sweep, m, beyond the blade's own lean.
+    /// Offset between the markers of tip and head along the sweep, m, in addition to the lean of the blade.
     OffsetX,
-    /// Offset of the drop, m: the reading for an upright blade.
+    /// Offset of the drop, m: the measured drop of an upright blade.
     OffsetDrop,
-    /// Drift of [`Self::OffsetX`], m/s, about the middle of the fitted frames.
+    /// Rate of change of [`Self::OffsetX`], m/s; the offset itself applies at the middle of
+    /// the fitted frames.
     DriftX,
-    /// Drift of [`Self::OffsetDrop`], m/s, about the middle of the fitted frames.
+    /// Rate of change of [`Self::OffsetDrop`], m/s; the offset itself applies at the middle of
+    /// the fitted frames.
     DriftDrop,
     /// Relative error of the scale: a metre appears as `1 + scale` metres.
     Scale,
     /// Angle from the picture's x axis to the glass, rad.
     Tilt,
-    /// Camera's clock minus drive's clock, s.
+    /// Clock of the camera minus clock of the drive, s.
     Clock,
 }
 
 impl CameraUnknown {
-    /// Length of a unit of the coordinate: the typical size of the error.
+    /// Error that corresponds to a coordinate of 1, in its SI unit: a typical size of the error.
     pub(super) fn coordinate_unit(self) -> f64 {
         match self {
             Self::OffsetX | Self::OffsetDrop | Self::DriftX | Self::DriftDrop => 1e-4,
@@ -37,11 +39,12 @@ impl CameraUnknown {
 /// Kind of an unknown.
 #[derive(Debug, Clone, PartialEq)]
 pub enum UnknownKind {
-    /// A parameter of every scene by name; searched in its logarithm or in units of its range.
+    /// A parameter that all scenes share; its coordinate is its logarithm, or the value in units
+    /// of its range.
     Parameter {
         /// Name in the table of parameters.
         name: String,
-        /// Length of a unit of the coordinate; `None` for its logarithm.
+        /// Value that corresponds to a coordinate of 1; `None` if the coordinate is the logarithm.
         unit: Option<f64>,
     },
     /// An error of the camera of one recording.
@@ -52,7 +55,7 @@ pub enum UnknownKind {
     },
 }
 
-/// An unknown with its range and its prior, in its coordinate.
+/// An unknown with its range and its prior, both in its coordinate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TraceUnknown {
     pub kind: UnknownKind,
@@ -60,12 +63,12 @@ pub struct TraceUnknown {
     pub range: [f64; 2],
     /// Mean and standard deviation of its normal prior, in the coordinate.
     pub prior: Option<[f64; 2]>,
-    /// Where a search starts, in the coordinate.
+    /// Coordinate at which a search starts.
     pub start: f64,
 }
 
 impl TraceUnknown {
-    /// Length of a unit of the coordinate; `None` where the coordinate is the logarithm of the value.
+    /// Value that corresponds to a coordinate of 1; `None` if the coordinate is the logarithm of the value.
     fn unit(&self) -> Option<f64> {
         match self.kind {
             UnknownKind::Parameter { unit, .. } => unit,
@@ -73,12 +76,12 @@ impl TraceUnknown {
         }
     }
 
-    /// The quantity at a coordinate, in its SI unit.
+    /// The value at a coordinate, in its SI unit.
     pub(crate) fn value(&self, coordinate: f64) -> f64 {
         self.unit().map_or_else(|| math::exp(coordinate), |unit| coordinate * unit)
     }
 
-    /// The coordinate of a value in its SI unit.
+    /// The coordinate of a value, which is in its SI unit.
     pub(crate) fn coordinate(&self, value: f64) -> f64 {
         self.unit().map_or_else(|| math::ln(value), |unit| value / unit)
     }
@@ -88,13 +91,13 @@ impl TraceUnknown {
         self.unit().unwrap_or_else(|| math::exp(coordinate))
     }
 
-    /// Distance from the prior's mean in standard deviations, and its derivative by the coordinate.
+    /// Distance from the mean of the prior, in standard deviations, and its derivative by the coordinate.
     pub(super) fn prior_residual(&self, coordinate: f64) -> Option<[f64; 2]> {
         self.prior.map(|[mean, sd]| [(coordinate - mean) / sd, 1.0 / sd])
     }
 }
 
-/// All unknowns in order: parameters first.
+/// All unknowns; the parameters come first.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TraceUnknowns(pub Vec<TraceUnknown>);
 
@@ -111,7 +114,7 @@ pub(crate) struct CameraParameters {
 }
 
 impl CameraParameters {
-    /// Offsets along the sweep and of the drop, m, at a time after the middle of the fitted frames.
+    /// Offsets of position and drop, m, at the time `after_s` relative to the middle of the fitted frames.
     pub(crate) fn offsets_m(&self, after_s: f64) -> [f64; 2] {
         [
             self.offset_x_m + self.drift_x_m_per_s * after_s,
@@ -131,7 +134,7 @@ impl TraceUnknowns {
         (0..self.0.len()).filter(|&i| self.is_parameter(i))
     }
 
-    /// Name of unknown `i`, where it is a parameter of the scene.
+    /// Name of unknown `i`, if it is a parameter of the scene.
     pub(super) fn parameter_name(&self, i: usize) -> Option<&str> {
         match &self.0[i].kind {
             UnknownKind::Parameter { name, .. } => Some(name),
@@ -139,7 +142,7 @@ impl TraceUnknowns {
         }
     }
 
-    /// The camera of a recording at a point; quantities that are not estimated are 0.
+    /// Errors of the camera of a recording at a point; those that are not estimated are 0.
     pub(crate) fn camera_at(&self, film: usize, point: &[f64]) -> CameraParameters {
         let value = |what| {
             let kind = UnknownKind::Camera { film, what };
@@ -157,7 +160,7 @@ impl TraceUnknowns {
         }
     }
 
-    /// The scene of a recording at a point; `None` where it refuses a value.
+    /// The scene of a recording at a point; `None` if the scene refuses a value.
     pub(super) fn scene_at(&self, base: &Scene, own_head: bool, film: usize, point: &[f64]) -> Option<Scene> {
         let mut scene = base.clone();
         for (unknown, z) in self.0.iter().zip(point) {
@@ -171,13 +174,13 @@ impl TraceUnknowns {
         Some(scene)
     }
 
-    /// Cost of the priors.
+    /// Cost of the priors at a point.
     pub(super) fn prior_cost(&self, point: &[f64]) -> f64 {
         let residuals = self.0.iter().zip(point).filter_map(|(unknown, z)| unknown.prior_residual(*z));
         residuals.map(|[residual, _]| residual * residual).sum()
     }
 
-    /// A point moved into the ranges.
+    /// The point, clamped to the ranges of the unknowns.
     pub(super) fn clamp_to_ranges(&self, point: &[f64]) -> Vec<f64> {
         self.0.iter().zip(point).map(|(u, z)| z.clamp(u.range[0], u.range[1])).collect()
     }

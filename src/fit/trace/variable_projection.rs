@@ -6,20 +6,20 @@ use nalgebra::{DMatrix, DVector};
 /// Smallest singular value of the scaled state columns that is kept, relative to the largest.
 const MIN_SINGULAR: f64 = 1e-4;
 
-/// Normal equations of one segment for the unknowns, and the response of its starting state.
+/// Normal equations of one segment for the unknowns, and the change of its starting state with them.
 #[derive(Debug, Clone)]
 pub(super) struct ProjectedSegment {
-    /// `J^T J` of the Jacobian `J` after the state is projected out.
+    /// `J^T J` of the Jacobian `J` from which the state has been projected out.
     pub matrix: DMatrix<f64>,
     /// `J^T r` with the residuals `r`.
     pub slope: DVector<f64>,
-    /// Step of the state at fixed unknowns, with opposite sign.
+    /// Step of the state with the unknowns held fixed, with opposite sign.
     pub move_held: LinkState,
-    /// Derivative of the state's step by the unknowns, with opposite sign.
+    /// Derivative of the step of the state by the unknowns, with opposite sign.
     pub move_by_unknown: DMatrix<f64>,
 }
 
-/// Projects the columns of the state out of residuals and Jacobian; `None` where no decomposition is found.
+/// Projects the columns of the state out of residuals and Jacobian; `None` if the decomposition fails.
 pub(super) fn project_out_state(linear: &LinearizedSegment) -> Option<ProjectedSegment> {
     let LinearizedSegment { residuals, by_state, by_unknown } = linear;
     let scales: [f64; 4] = std::array::from_fn(|i| by_state.column(i).norm().max(1e-12));

@@ -2,7 +2,7 @@ use super::*;
 use crate::checkpoint::read_checkpoint;
 use crate::fit::trace_checkpoint::tests::{header, iterate};
 
-/// Iterates of a whole search.
+/// Number of iterates in a whole search.
 const STEPS: usize = 6;
 const STARTS: usize = 2;
 
@@ -11,7 +11,7 @@ fn next(before: Option<&Iterate>) -> Option<Iterate> {
     (step < STEPS).then(|| iterate(step))
 }
 
-/// Whether it came to its end, the iterates that it counts, and those that it made.
+/// Result of a search: reason why it stopped, number of iterates that it counts, and number that it computed.
 #[derive(Debug, PartialEq)]
 struct SearchTally {
     stopped: Option<TraceStopReason>,
@@ -19,7 +19,7 @@ struct SearchTally {
     made: usize,
 }
 
-/// Two searches that go on from `journal`, as the engine makes them.
+/// Two searches that continue `journal`, in the same way as the engine.
 fn searched(journal: &mut String, most: usize, asked_to_stop_at: usize) -> SearchTally {
     let before = journal.clone();
     let found = read_checkpoint::<IterateRecord>("j", &before).unwrap();

@@ -1,4 +1,4 @@
-//! Verdicts: the effect of parameters at their bounds, weights of the features, trust in the best point.
+//! Verdicts: effect of parameters at their bounds, weights of the features, and trust in the best point.
 
 use super::{ParameterResult, ParameterVerdict, interval_verdict};
 use crate::fit::evaluation::{Evaluation, EvaluationStage};
@@ -15,9 +15,9 @@ use crate::fit::target_value::TargetValue;
 use nalgebra::DMatrix;
 use portable_math as math;
 
-/// Least correlation at which a parameter at its bound makes another estimate unreliable. If the optimum lies
-/// `k` deviations beyond the bound, the other estimate is off by `k` times the correlation, in its own
-/// deviations; here ten deviations shift it by a half-width of its 95 % interval.
+/// Smallest correlation with which a parameter at its bound makes another estimate unreliable. If the optimum
+/// lies `k` deviations outside the bound, the other estimate is off by `k` times the correlation, in its own
+/// deviations. With this correlation, ten deviations shift it by a half width of its 95 % interval.
 const MIN_CORRELATION: f64 = 0.2;
 
 /// Whether a coordinate of the unit box is at an end of the box.
@@ -25,7 +25,7 @@ pub(super) fn is_at_bound(unit: f64) -> bool {
     !(AT_BOUND..=1.0 - AT_BOUND).contains(&unit)
 }
 
-/// The parameter at its bound with the strongest correlation to an estimate, and that correlation.
+/// The parameter at its bound that is most strongly correlated with an estimate, and that correlation.
 pub(super) fn strongest_bound_correlation(
     axis: usize,
     unit: &[f64],
@@ -37,7 +37,7 @@ pub(super) fn strongest_bound_correlation(
         .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
 }
 
-/// The parameter at its bound whose optimum beyond the bound lowers the cost most, and that gain by the
+/// The parameter at its bound whose optimum outside the bound would lower the cost most, and that gain by the
 /// linear model; `None` if no gain is worth a step.
 pub(super) fn best_excluded_gain(
     unit: &[f64],
@@ -55,7 +55,7 @@ pub(super) fn best_excluded_gain(
     gains.filter(|(_, gain)| *gain > MIN_WORTHWHILE_GAIN).max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Withdraws all verdicts because a bound excludes a better value; returns the note on it.
+/// Withdraws all verdicts because a bound excludes a better value; returns a note if there were any.
 pub(super) fn withdraw_all(
     intervals: &mut [ParameterResult],
     names: &[String],
@@ -76,7 +76,8 @@ pub(super) fn withdraw_all(
     ))
 }
 
-/// Withdraws the verdicts of parameters that are correlated with one at its bound; returns a note on each.
+/// Withdraws the verdicts of parameters that are correlated with a parameter at its bound; returns one
+/// note for each.
 pub(super) fn withdraw_correlated(
     intervals: &mut [ParameterResult],
     names: &[String],
@@ -100,19 +101,19 @@ pub(super) fn withdraw_correlated(
     notes
 }
 
-/// Weights of the features at the best point.
+/// Weights of the features at the best point, as additional scatter.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FeatureWeights {
     /// Scatter of each feature, in its unit, that accounts for the misfit and for the roughness of the model.
     pub scatter: Vec<f64>,
     /// Factor on all deviations that accounts for the misfit (Birge, Phys. Rev. 40 (1932) 207); at least 1.
     pub inflation: f64,
-    /// The same scatter without that factor.
+    /// Scatter of each feature, in its unit, that accounts for the roughness of the model alone.
     pub roughness: Vec<f64>,
 }
 
-/// Weighs the features at the ledger's best point; `None` if the model failed there or its neighbours
-/// cannot be evaluated.
+/// Weighs the features at the best point of the ledger; `None` if the model failed there or the neighbours of
+/// the point cannot be evaluated.
 pub(crate) fn weigh_features(ledger: &mut Ledger) -> Option<FeatureWeights> {
     let best = ledger.best_evaluation().filter(|best| best.failure.is_none())?.clone();
     let targets = ledger.objective().targets();
@@ -133,9 +134,9 @@ pub(crate) fn weigh_features(ledger: &mut Ledger) -> Option<FeatureWeights> {
     })
 }
 
-/// Checks the best point: another local search has to reach it, unless the cost is zero there. After a single
-/// search it is enough that the features are met within their deviations. `costs` are those of the local
-/// searches without the last polish.
+/// Checks the best point: a second local search must reach it, unless its cost is practically zero. If there
+/// was only one local search, it is enough that the features are met within their deviations. `costs` are
+/// those of the local searches without the final polish.
 ///
 /// # Errors
 /// The note on a best point that is not confirmed.
@@ -162,11 +163,11 @@ pub(super) fn check_best_point(
     ))
 }
 
-/// The 99.9 % point of the standard normal distribution, for the cube root of chi-squared (Wilson and
+/// The 99.9 % quantile of the standard normal distribution, for the cube root of chi-squared (Wilson and
 /// Hilferty, Proc. Natl. Acad. Sci. 17 (1931) 684).
 const CHI2_TAIL_SD: f64 = 3.09;
 
-/// Sum of the squares of the residuals and its degrees of freedom.
+/// Sum of the squares of the residuals, and its number of degrees of freedom.
 fn squared_misfit(objective: &Objective, best: &Evaluation) -> (f64, f64) {
     let squares: Vec<f64> = residuals(objective, best).into_iter().flatten().map(|r| r * r).collect();
     let unknowns = best.unit.len() + objective.count_camera_unknowns();
@@ -179,12 +180,12 @@ fn birge_factor(objective: &Objective, best: &Evaluation) -> f64 {
     if freedom > 0.0 { (misfit / freedom).sqrt().max(1.0) } else { 1.0 }
 }
 
-/// The verdicts that follow from the numbers of a stored result of features, one per parameter in job
-/// order. A parameter that the result does not have is not identified.
+/// Verdicts that follow from the numbers of a stored result of a fit of features, one per parameter in job
+/// order. A parameter that the result lacks is not identified.
 pub(in crate::fit) fn stored_verdicts(job: &Job, result: &FitResult) -> Vec<ParameterVerdict> {
     let names = job.parameter_names();
     let found = |axis: usize| result.parameters.get(&names[axis]);
-    // a parameter that the linear model determines has a correlation with itself
+    // only a parameter that the linear model determines has a correlation with itself
     let correlation = |a: usize, b: usize| result.correlations.get(&names[a])?.get(&names[b]).copied();
     let unit: Vec<f64> = (job.parameters.iter().enumerate())
         .map(|(axis, free)| found(axis).map_or(0.5, |p| free.bounds.unit_coordinate(p.estimate)))
@@ -192,7 +193,7 @@ pub(in crate::fit) fn stored_verdicts(job: &Job, result: &FitResult) -> Vec<Para
     let of = |axis: usize| {
         let Some(p) = found(axis) else { return ParameterVerdict::NotIdentified };
         match interval_verdict(unit[axis], p.lower_95, p.upper_95, correlation(axis, axis).is_some()) {
-            // an unfinished search identifies nothing
+            // an unfinished search identifies no parameter
             _ if matches!(result.status, FitStatus::BudgetExhausted | FitStatus::Failed) => {
                 ParameterVerdict::NotIdentified
             }

@@ -1,10 +1,10 @@
-//! Cameras of features.
+//! Tests of the cameras of features.
 
 use super::*;
 use crate::feature::LengthCalibration;
 use crate::fit::target_value::TargetCalibration;
 
-/// What a job with this in its recording says.
+/// The job with this text in its recording.
 fn with(camera: &str) -> Job {
     super::job(&MEASURED.replacen(
         "path = \"../../data/x\"\n",

@@ -1,4 +1,4 @@
-//! Refusals of conditions, tables and kinds.
+//! Tests of the refusal of wrong conditions, tables and kinds.
 
 use super::*;
 use crate::checkpoint::fingerprint;
@@ -236,7 +236,7 @@ fn the_problem_is_what_decides_a_cost_and_nothing_else() {
         ("bootstrap = 0", "bootstrap = 9"),
         ("profile = false", "profile = true"),
         ("local_evaluations = 0", "local_evaluations = 9"),
-        // what is read from these counts, not where it lies
+        // the data count, not their place
         ("data/x", "data/z"),
         ("t.toml", "u.toml"),
     ]) {

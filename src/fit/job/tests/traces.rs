@@ -1,8 +1,8 @@
-//! Traces and constants of a job.
+//! Tests of the traces and constants of a job.
 
 use super::*;
 
-/// The keys of a trace that are there without a word.
+/// A job whose trace has only the keys that it needs.
 const TRACED: &str = r#"format = 1
 title = "traced"
 scene = "s.toml"

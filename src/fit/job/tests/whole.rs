@@ -1,4 +1,4 @@
-//! What a job with every table says.
+//! Tests of a job that has every table.
 
 use super::*;
 
