@@ -1,16 +1,16 @@
 //! Linear equations of second order, `M(t) y'' + D(t) y' + K(t) y = g(t)`, by collocation at the nodes of
 //! Gauss and Legendre (Hairer, Lubich and Wanner, *Geometric Numerical Integration*, section II.1.3).
 //!
-//! On a step of length `h` the accelerations `a_j` at the nodes `c_j` are the unknowns. With the polynomials
-//! `l_j` that are 1 at one node and 0 at the others
+//! The unknowns of a step of length `h` are the accelerations `a_j` at its nodes `c_j`. With the polynomials
+//! `l_j`, each 1 at node `j` and 0 at the others,
 //!
 //! ```text
 //! y'(x) = y'_0 + h sum a_j int_0^x l_j          y(x) = y_0 + h x y'_0 + h^2 sum a_j int_0^x int l_j
 //! ```
 //!
-//! `s` nodes give the end of the step to the order `2 s` and its inside to the order `s + 2`. The equations
-//! of the nodes are eliminated in blocks in the order of time, without exchange of rows: a later node hardly
-//! acts on an earlier one.
+//! With `s` nodes the solution is of order `2 s` at the end of the step and of order `s + 2` inside it. The
+//! equations are eliminated block by block in the order of time, without exchange of rows, because a later
+//! node has little effect on an earlier one.
 
 #![allow(clippy::needless_range_loop)] // indices are those of the equations
 
@@ -19,12 +19,12 @@ use std::array::from_fn;
 use std::ops::{Add, Mul, Sub};
 use std::sync::LazyLock;
 
-/// Most nodes of a step.
+/// Maximum number of nodes of a step.
 pub const MOST_NODES: usize = 12;
-/// Fewest nodes of a step.
+/// Minimum number of nodes of a step.
 pub const LEAST_NODES: usize = 3;
 
-/// One number a node.
+/// One value per node.
 pub type NodeArray<T> = [T; MOST_NODES];
 
 /// The nodes of a step and the integrals of their polynomials.
@@ -36,9 +36,10 @@ pub struct CollocationRule {
     pub positions: NodeArray<f64>,
     /// Weights of the integral over [0, 1].
     pub weights: NodeArray<f64>,
-    /// `(2 m + 1) b_j P_m(2 c_j - 1)` by node and degree: coefficients of `l_j` by Legendre's polynomials.
+    /// Coefficients `(2 m + 1) b_j P_m(2 c_j - 1)` of `l_j` in Legendre polynomials, by node `j` and degree
+    /// `m`.
     legendre: NodeArray<NodeArray<f64>>,
-    /// Integrals of `l_j` up to each node, once and twice.
+    /// Integral (`once`) and double integral (`twice`) of each `l_j` from 0 to each node.
     once: NodeArray<NodeArray<f64>>,
     twice: NodeArray<NodeArray<f64>>,
 }
@@ -47,17 +48,17 @@ pub struct CollocationRule {
 static RULES: LazyLock<Vec<CollocationRule>> =
     LazyLock::new(|| (0..=MOST_NODES).map(CollocationRule::new).collect());
 
-/// The rule with some number of nodes, at most [`MOST_NODES`].
+/// The rule with this number of nodes, at most [`MOST_NODES`].
 pub fn collocation_rule(nodes: usize) -> &'static CollocationRule {
     &RULES[nodes]
 }
 
-/// One number, or a vector with one number a lane.
+/// A number, or a vector with one number per lane.
 pub trait LaneNumber: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
-    /// The same number in every lane.
+    /// A value with `x` in every lane.
     fn splat(x: f64) -> Self;
 
-    /// All lanes times one number.
+    /// Every lane multiplied by `factor`.
     fn scale_by(self, factor: f64) -> Self;
 }
 
@@ -90,15 +91,16 @@ impl CollocationRule {
         rule
     }
 
-    /// Integrals from 0 to `x` on [0, 1] of each `l_j`, once and twice.
+    /// Integral and double integral of each `l_j` from 0 to `x`, which lies in [0, 1].
     pub(crate) fn integrals(&self, x: f64) -> [NodeArray<f64>; 2] {
         let [mut once, mut twice] = [[0.0; MOST_NODES]; 2];
         self.integrals_by_degree(x, &mut once, &mut twice);
         [self.to_nodal(&once), self.to_nodal(&twice)]
     }
 
-    /// Integrals from 0 to `x` of Legendre's polynomials of `2 x - 1`, once and twice, one for each degree
-    /// below the number of nodes. `int P_m = (P_(m+1) - P_(m-1)) / (2 (2 m + 1))`, and likewise again.
+    /// Integral (`once`) and double integral (`twice`) from 0 to `x` of the Legendre polynomials of `2 x -
+    /// 1`, for each degree below the number of nodes. `int P_m = (P_(m+1) - P_(m-1)) / (2 (2 m + 1))`; the
+    /// same rule, applied twice, gives the double integral.
     #[inline(always)]
     pub fn integrals_by_degree<R: LaneNumber>(
         &self,
@@ -112,7 +114,7 @@ impl CollocationRule {
             once[m] = (p[m + 1] - p[m - 1]).scale_by(0.5 * RECIPROCALS[2 * m + 1]);
         }
         for m in 1..self.nodes {
-            // (the last one is needed beyond the nodes)
+            // (the highest degree needs the integral of the next degree, which `once` does not contain)
             let next = if m + 1 < self.nodes {
                 once[m + 1]
             } else {
@@ -122,7 +124,7 @@ impl CollocationRule {
         }
     }
 
-    /// Values by node from coefficients by degree.
+    /// Integrals of each `l_j` from the integrals of each Legendre polynomial.
     pub fn to_nodal(&self, by_degree: &NodeArray<f64>) -> NodeArray<f64> {
         let mut sums = [0.0; MOST_NODES];
         for (sum, legendre) in sums.iter_mut().zip(&self.legendre[..self.nodes]) {
@@ -134,9 +136,9 @@ impl CollocationRule {
     }
 }
 
-/// Node `j` of `nodes` on [0, 1] and its weight, by Newton's steps.
+/// Node `j` of `nodes` on [0, 1] and its weight, by Newton's method.
 fn gauss_node(nodes: usize, j: usize) -> (f64, f64) {
-    /// More than Newton's method needs from Tricomi's start.
+    /// More iterations than Newton's method needs from Tricomi's starting value.
     const ROUNDS: usize = 12;
     let mut z = -math::cos(std::f64::consts::PI * (j as f64 + 0.75) / (nodes as f64 + 0.5));
     let mut slope = 1.0;
@@ -152,7 +154,7 @@ fn gauss_node(nodes: usize, j: usize) -> (f64, f64) {
     (0.5 * (1.0 + z), 1.0 / ((1.0 - z * z) * slope * slope))
 }
 
-/// Legendre's polynomials of `2 x - 1`, up to two degrees beyond those of the nodes.
+/// Legendre polynomials of `2 x - 1`, up to the degree `nodes + 1`.
 #[inline(always)]
 fn legendre_polynomials<R: LaneNumber>(x: R, nodes: usize) -> [R; MOST_NODES + 2] {
     let z = x.scale_by(2.0) - R::splat(1.0);
@@ -165,7 +167,7 @@ fn legendre_polynomials<R: LaneNumber>(x: R, nodes: usize) -> [R; MOST_NODES + 2
     p
 }
 
-/// `1 / m`.
+/// Reciprocals `1 / m` by index `m`.
 const RECIPROCALS: [f64; 2 * MOST_NODES + 4] = {
     let mut shares = [0.0; 2 * MOST_NODES + 4];
     let mut m = 1;
@@ -250,7 +252,8 @@ impl<const D: usize> CollocationStep<D> {
         }
     }
 
-    /// Turns right-hand sides at the nodes, starting values included, into accelerations there.
+    /// Replaces the right-hand sides at the nodes, which include the terms of the starting values, by the
+    /// accelerations at the nodes.
     #[inline(always)]
     pub fn solve<R: LaneNumber>(&self, rows: &mut [[R; D]]) {
         let nodes = self.rule.nodes;
@@ -274,7 +277,7 @@ impl<const D: usize> CollocationStep<D> {
     }
 }
 
-/// `sum - block row`.
+/// Subtracts the product `block row` from `sum`.
 #[inline(always)]
 fn subtract_product<const D: usize, R: LaneNumber>(sum: &mut [R; D], block: &SquareMatrix<D>, row: &[R; D]) {
     for r in 0..D {
@@ -284,7 +287,7 @@ fn subtract_product<const D: usize, R: LaneNumber>(sum: &mut [R; D], block: &Squ
     }
 }
 
-/// `block row`.
+/// The product `block row`.
 #[inline(always)]
 pub fn multiply_row<const D: usize, R: LaneNumber>(block: &SquareMatrix<D>, row: &[R; D]) -> [R; D] {
     from_fn(|r| {
@@ -347,7 +350,7 @@ mod tests {
         }
     }
 
-    /// Integrals of a power of `x` below the number of nodes are exact.
+    /// The integrals of `x^k` are exact for `k` below the number of nodes.
     #[test]
     fn powers_are_integrated_exactly() {
         for nodes in LEAST_NODES..=MOST_NODES {
@@ -365,7 +368,7 @@ mod tests {
         }
     }
 
-    /// End of one step of `y'' + 0.2 y' + y = 0` from (1, 0) and its error.
+    /// Error at the end of one step of `y'' + 0.2 y' + y = 0` from (1, 0).
     fn error(nodes: usize, length: f64) -> f64 {
         let [mass, damping, stiffness] = [1.0, 0.2, 1.0].map(|x| [[[x]]; MOST_NODES]);
         let equations = CollocationEquations::<1> { mass, damping, stiffness };
@@ -382,7 +385,7 @@ mod tests {
         (value - left * (cos + decay / omega * sin)).hypot(rate + left / omega * sin)
     }
 
-    /// The error of a step falls with its length to the power of twice the nodes, and one.
+    /// The error of a step is proportional to its length to the power `2 nodes + 1`.
     #[test]
     fn the_end_of_a_step_is_of_twice_the_order_of_the_nodes() {
         for (nodes, length) in [(3, 0.8), (4, 0.4)] {

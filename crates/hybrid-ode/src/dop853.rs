@@ -6,11 +6,11 @@ use portable_math as math;
 
 /// Exponent of the step control: the error estimate of a step is of order 8, `err ~ h^8`.
 pub(crate) const ERROR_EXPONENT: f64 = 1.0 / 8.0;
-/// Right-hand sides of a step except the first, which is the last one of the step before.
+/// Number of right-hand sides of a step, without the first, which is the last one of the previous step.
 pub(crate) const EVALUATIONS_PER_STEP: u64 = 12;
-/// Additional right-hand sides of the dense output.
+/// Number of additional right-hand sides for the dense output.
 pub(crate) const EVALUATIONS_FOR_DENSE: u64 = 3;
-/// Weight of the order 3 estimate against the order 5 one in the combined error (Hairer's code).
+/// Weight of the order 3 estimate relative to the order 5 estimate in the combined error (Hairer's code).
 const ORDER_3_WEIGHT: f64 = 0.01;
 /// The stages of one step of length `h` from `(t, y)`.
 #[derive(Debug, Clone)]
@@ -48,8 +48,8 @@ fn combine_stages<const N: usize, const M: usize>(
 }
 
 impl<const N: usize> StepStages<N> {
-    /// Takes the step; `first` is the derivative at its start, `f(t, y)` the right-hand side (12
-    /// evaluations).
+    /// Takes the step with 12 evaluations of the right-hand side `f(t, y)`; `first` is the derivative at the
+    /// start.
     #[inline]
     pub(crate) fn take_step(
         f: impl Fn(f64, &[f64; N]) -> [f64; N],
@@ -77,8 +77,8 @@ impl<const N: usize> StepStages<N> {
         &self.k[12]
     }
 
-    /// Combined error estimate in units of the tolerance; a step with at most 1 is accepted. `scale` is the
-    /// tolerated error of each component.
+    /// Combined error estimate in units of the tolerance; the step is accepted if it is at most 1. `scale` is
+    /// the tolerated error of each component.
     #[inline]
     pub(crate) fn error_norm(&self, scale: &[f64; N]) -> f64 {
         let zero = [0.0; N];
@@ -309,7 +309,7 @@ mod tests {
             sum(&A15),
         ];
         for (stage, found) in sums.iter().enumerate() {
-            // cancellation among entries up to 44 leaves a few units of 44 eps
+            // cancellation among entries of size up to 44 leaves an error of the order of 44 eps
             assert!(
                 (found - C[stage + 1]).abs() < 44.0 * f64::EPSILON,
                 "stage {}: {found} against {}",
@@ -344,7 +344,7 @@ mod tests {
         [y[1], -y[0]]
     }
 
-    /// Neither the even nor the odd derivatives vanish here.
+    /// Phase of the oscillation at the start; neither the even nor the odd derivatives vanish there.
     const PHASE: f64 = 0.7;
 
     fn exact(t: f64) -> [f64; 2] {
@@ -372,8 +372,8 @@ mod tests {
             .fold(0.0, f64::max)
     }
 
-    /// The error of the method falls as `h^8`, that of its dense output within one step as `h^8` too: order
-    /// 7.
+    /// The global error falls as `h^8`. The error of the dense output within one step does so too, which
+    /// makes it of order 7.
     #[test]
     fn the_method_is_of_order_eight_and_its_dense_output_of_order_seven() {
         let order = (global_error(16) / global_error(32)).log2();

@@ -1,33 +1,33 @@
-//! The classical Runge-Kutta method of order 4 in steps of fixed length, for comparisons: no error control,
-//! guards evaluated at the end of each step. Two roots within one step are missed.
+//! The classical Runge-Kutta method of order 4 in steps of fixed length, for comparisons. It has no error
+//! control and evaluates the guards only at the end of each step, so it misses two roots within one step.
 
 use super::slack_variable::{SlackVariable, StatePoint};
 use super::{
     AcceptedStep, DenseOutput, HybridPhase, ObserverReply, PhaseEnd, PhaseEndCause, PhaseStart, WorkCounters,
 };
 
-/// How the end of a phase is located within a step in which a guard has fallen below zero.
+/// Method that locates the end of a phase within a step in which a guard has fallen below zero.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum FixedStepLocator {
-    /// At the step's end: order 1 in the step, for any order of the method.
+    /// The end of the step: the error is of order 1 in the step length, whatever the order of the method.
     StepEnd,
-    /// At the guard's zero, reached by a step in the guard as a slack variable: order 4.
+    /// The zero of the guard, reached by integration in a slack variable: the error is of order 4.
     #[default]
     Slack,
 }
 
-/// Length of the steps and how events are located.
+/// Step length and method of event location.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FixedStepOptions {
     /// Length of a step, s.
     pub step_s: f64,
-    /// How events are located.
+    /// Method of event location.
     pub locate: FixedStepLocator,
 }
 
-/// Integrates `phase` from `start` until `stop` or a guard in steps of fixed length (the last one is cut).
-/// `observe` sees every step. The zero orders of the start are ignored: only a guard that falls over a step
-/// ends the phase.
+/// Integrates `phase` from `start` in steps of fixed length until `stop` or until a guard falls to zero; the
+/// last step is shortened. `observe` is called with every step. The zero orders of the start are ignored: a
+/// guard ends the phase only if it falls during a step.
 pub fn integrate_fixed<const N: usize, const G: usize, P: HybridPhase<N, G>, A: ObserverReply>(
     phase: &P,
     start: PhaseStart<N, G>,
@@ -50,7 +50,7 @@ pub fn integrate_fixed<const N: usize, const G: usize, P: HybridPhase<N, G>, A: 
     let mut count = 0.0;
     while run.t < stop {
         count += 1.0;
-        let due = start.t + count * steps.step_s; // (a sum of steps would accumulate rounding)
+        let due = start.t + count * steps.step_s; // (a sum of steps would accumulate rounding errors)
         let due = if stop - due > SHORTEST_LAST_STEP * steps.step_s { due } else { stop };
         let Some(ahead) = run.take_step(due) else { return run.phase_end(PhaseEndCause::StepTooSmall) };
         let event = run.find_event(&ahead);
@@ -73,16 +73,16 @@ pub fn integrate_fixed<const N: usize, const G: usize, P: HybridPhase<N, G>, A: 
     run.phase_end(PhaseEndCause::Stop)
 }
 
-/// A last step shorter than this share of a step is joined to the one before.
+/// A last step shorter than this fraction of a full step is joined to the step before it.
 const SHORTEST_LAST_STEP: f64 = 1e-6;
-/// Halvings of a step in search of a point from which a guard falls steadily; 2^-50 of a step is below the
-/// rounding of time.
+/// Maximum number of halvings of a step in search of a point from which a guard falls steadily; 2^-50 of a
+/// step is below the rounding error of the time.
 const MOST_HALVINGS: usize = 50;
 
-/// Right-hand sides of [`runge_kutta_4_step`] beyond the first.
+/// Number of right-hand sides of [`runge_kutta_4_step`], without the first.
 pub(super) const RUNGE_KUTTA_4_EVALUATIONS: u64 = 3;
 
-/// One classical Runge-Kutta step, from `k1`, the derivative at its start.
+/// One classical Runge-Kutta step; `k1` is the derivative at its start.
 pub(super) fn runge_kutta_4_step<const N: usize>(
     f: impl Fn(f64, &[f64; N]) -> [f64; N],
     t: f64,
@@ -97,7 +97,7 @@ pub(super) fn runge_kutta_4_step<const N: usize>(
     (t + h, std::array::from_fn(|i| y[i] + h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])))
 }
 
-/// The end of a step.
+/// Time, state, derivative and guards at the end of a step.
 struct TrialStep<const N: usize, const G: usize> {
     at: StatePoint<N>,
     flow: [f64; N],
@@ -123,7 +123,7 @@ impl<const N: usize, const G: usize, P: HybridPhase<N, G>> FixedRun<'_, N, G, P>
         PhaseEnd { t: self.t, y: self.y, cause, first_step: self.steps.step_s }
     }
 
-    /// The state a step later; `None` when the time does not advance or a value is not finite.
+    /// The end of a step to the time `to`; `None` if the time does not advance or a value is not finite.
     fn take_step(&mut self, to: f64) -> Option<TrialStep<N, G>> {
         if to.partial_cmp(&self.t) != Some(std::cmp::Ordering::Greater) {
             return None;
@@ -135,7 +135,7 @@ impl<const N: usize, const G: usize, P: HybridPhase<N, G>> FixedRun<'_, N, G, P>
         finite.then_some(ahead)
     }
 
-    /// The solution at `to`, one step from a point.
+    /// The state at `to` after one step from the point `from`.
     fn state_at(&mut self, from: &StatePoint<N>, to: f64) -> [f64; N] {
         let f = |t: f64, y: &[f64; N]| self.phase.derivative(t, y);
         let own = from.t == self.t;
@@ -150,9 +150,10 @@ impl<const N: usize, const G: usize, P: HybridPhase<N, G>> FixedRun<'_, N, G, P>
         TrialStep { flow: self.phase.derivative(at.t, &at.y), guards: self.phase.guards(at.t, &at.y), at }
     }
 
-    /// The guard that ends the phase within a step, with the point where it does.
+    /// Index of the guard that ends the phase within the step, and the point where it falls to zero.
     fn find_event(&mut self, ahead: &TrialStep<N, G>) -> Option<(usize, StatePoint<N>)> {
-        // (a guard that starts slightly below zero, from its location, and rises has not fallen)
+        // (a guard that starts slightly below zero, because its zero was located with an error, and then
+        // rises has not fallen)
         let (before, after) = (self.guards, ahead.guards);
         let fallen = |g: &usize| after[*g] <= 0.0 && (before[*g] > 0.0 || after[*g] <= before[*g]);
         let share = |g: usize| before[g].max(0.0) / (before[g].max(0.0) - after[g]).max(f64::MIN_POSITIVE);
@@ -165,7 +166,7 @@ impl<const N: usize, const G: usize, P: HybridPhase<N, G>> FixedRun<'_, N, G, P>
         zeros.min_by(|a, b| a.1.t.total_cmp(&b.1.t))
     }
 
-    /// Point where a guard that is positive at the start of the step and not at its end falls to zero.
+    /// Point where a guard falls to zero that is positive at the start of the step and not at its end.
     fn locate_zero(&mut self, guard: usize, ahead: &TrialStep<N, G>) -> StatePoint<N> {
         let (mut low, mut high) = (self.current_point(), ahead.at);
         for _ in 0..MOST_HALVINGS {
@@ -202,7 +203,7 @@ impl<const N: usize, const G: usize, P: HybridPhase<N, G>> FixedRun<'_, N, G, P>
     }
 }
 
-/// Cubic through the states and slopes at both ends of a step: of order 3.
+/// Cubic polynomial through the states and derivatives at both ends of a step, of order 3.
 struct HermiteOutput<const N: usize> {
     start: StatePoint<N>,
     start_flow: [f64; N],
@@ -227,7 +228,7 @@ impl<const N: usize> DenseOutput<N> for HermiteOutput<N> {
 mod tests {
     use super::*;
 
-    /// `y = t^3 - 2 t` is its own interpolant.
+    /// The interpolant of the cubic `y = t^3 - 2 t` is the cubic itself.
     #[test]
     fn the_interpolant_is_exact_for_a_cubic() {
         let (y, slope) = (|t: f64| t * t * t - 2.0 * t, |t: f64| 3.0 * t * t - 2.0);

@@ -3,14 +3,14 @@
 //! ([`fixed_step`]). [`collocation`] solves linear equations along a solution.
 //!
 //! A *phase* is a smooth right-hand side with inequalities, its *guards*, that hold while it lasts.
-//! Integration ends at the stop time or where the first guard falls to zero. A guard that starts at zero (a
-//! body that has just been released) is armed by the order of its first nonzero derivative, so that its
-//! trivial root is neither reported nor hides the next one.
+//! Integration ends at the stop time or where the first guard falls to zero. If a guard starts at zero (a
+//! body that has just been released), the start of the phase states the order of that zero, so that it is not
+//! reported as an event and does not hide the next zero.
 //!
 //! # A ball that falls and bounces
 //!
-//! The guard is the height. From 1 m the ball lands after `sqrt(2/g)`; from then on its flight starts at a
-//! simple zero of the guard and lasts `2 v/g`.
+//! The guard is the height. From 1 m the ball lands after `sqrt(2/g)`; each later flight starts at a simple
+//! zero of the guard and lasts `2 v/g`.
 //!
 //! ```
 //! use hybrid_ode::{HybridPhase, PhaseEndCause, PhaseStart, WorkCounters, integrate};
@@ -61,9 +61,9 @@ use std::ops::ControlFlow;
 pub trait HybridPhase<const N: usize, const G: usize> {
     /// Right-hand side `dy/dt`.
     fn derivative(&self, t: f64, y: &[f64; N]) -> [f64; N];
-    /// The guards, positive while the phase lasts; infinity for one that does not apply.
+    /// The guards, positive while the phase lasts; infinity for a guard that does not apply.
     fn guards(&self, t: f64, y: &[f64; N]) -> [f64; G];
-    /// Magnitude of each state below which its error counts as absolute.
+    /// Magnitude of each state below which the tolerance is absolute.
     fn scale(&self) -> [f64; N];
 }
 
@@ -81,14 +81,14 @@ pub struct PhaseStart<const N: usize, const G: usize> {
     pub step: Option<f64>,
 }
 
-/// Why a phase ended.
+/// Cause of the end of a phase.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PhaseEndCause {
-    /// This guard fell to zero.
+    /// The guard with this index fell to zero.
     Guard(usize),
     /// The stop time was reached.
     Stop,
-    /// The observer of the steps ended it.
+    /// The observer of the steps ended the phase.
     Interrupted,
     /// No step is short enough for the tolerance, the state is not finite, or the work limit is reached.
     StepTooSmall,
@@ -101,16 +101,16 @@ pub struct PhaseEnd<const N: usize> {
     pub t: f64,
     /// State.
     pub y: [f64; N],
-    /// Why it ended.
+    /// Cause of the end.
     pub cause: PhaseEndCause,
-    /// The longest first step within the tolerance, s: a good first step for the next phase of this kind.
+    /// Suggested first step of the next phase of this kind, s.
     pub first_step: f64,
 }
 
 /// Work counters, cumulative over phases.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct WorkCounters {
-    /// Evaluations of a right-hand side, guards on the dense output not included.
+    /// Evaluations of the right-hand side; guards on the dense output are not included.
     pub rhs_evaluations: u64,
     /// Evaluations of the guards.
     pub guard_evaluations: u64,
@@ -118,12 +118,12 @@ pub struct WorkCounters {
     pub steps: u64,
     /// Rejected steps.
     pub rejected_steps: u64,
-    /// Right-hand sides after which a phase ends; `None` for no limit.
+    /// The phase ends when it has evaluated more right-hand sides than this; `None` for no limit.
     pub most_rhs_evaluations: Option<u64>,
 }
 
 impl WorkCounters {
-    /// Whether the limit is exceeded.
+    /// Whether the limit on right-hand sides is exceeded.
     #[inline]
     pub fn is_spent(&self) -> bool {
         self.most_rhs_evaluations.is_some_and(|most| self.rhs_evaluations > most)
@@ -142,7 +142,7 @@ pub struct AcceptedStep<'a, const N: usize> {
     pub solution: &'a dyn DenseOutput<N>,
 }
 
-/// Reply of a step observer: nothing, or whether the integration continues.
+/// Reply of a step observer: `()`, or a [`ControlFlow`] that may end the integration.
 pub trait ObserverReply {
     /// `Break` ends the phase with [`PhaseEndCause::Interrupted`].
     fn control_flow(self) -> ControlFlow<()>;

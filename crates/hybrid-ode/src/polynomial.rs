@@ -1,43 +1,45 @@
-//! Truncated power series about the start of a step, and the first zero of one of them.
+//! Truncated power series about the start of a step, and the search for the first zero of a series.
 //!
 //! On a step of length `h` a series with coefficients `g_k` is the polynomial `sum g_k h^k s^k`, `s` in [0,
-//! 1]. It lies in the convex hull of its Bernstein coefficients. So it has no root if all are positive, and
-//! exactly one if they change sign once; otherwise the interval is halved by de Casteljau's algorithm. No
-//! root inside a step is missed, double ones included.
+//! 1]. It lies in the convex hull of its Bernstein coefficients. It therefore has no root if all of them are
+//! positive, and exactly one if they change sign once; otherwise the interval is halved by de Casteljau's
+//! algorithm. No root inside a step is missed, not even one of a close pair.
 
-/// Highest order of an expansion; beyond it rounding, not truncation, limits double precision.
+/// Highest order of an expansion; at higher orders rounding, not truncation, limits the accuracy.
 pub(crate) const MOST_ORDER: usize = 20;
 /// Coefficients of `x^0` to `x^MOST_ORDER`.
 pub const TERMS: usize = MOST_ORDER + 1;
 
-/// Taylor coefficients about the start of a step, `g(t + x) = sum g_k x^k`; those beyond the order in use are
-/// unspecified.
+/// Taylor coefficients about the start of a step, `g(t + x) = sum g_k x^k`; coefficients above the order in
+/// use are unspecified.
 pub(crate) type TaylorSeries = [f64; TERMS];
 
-/// Halvings after which a root that cannot be distinguished from a touch counts as a touch: 2^-30 of a step
-/// is below every tolerance.
+/// Number of halvings after which two roots that are still not separated count as a touch, which is no root:
+/// 2^-30 of a step is below every tolerance.
 const MOST_HALVINGS: u32 = 30;
-/// Terms below this share of the sum are rounding: they do not decide whether a guard starts at a zero.
+/// Terms below this fraction of the sum are rounding errors and do not decide whether a guard starts at a
+/// zero.
 const NOISE: f64 = 1e-14;
-/// A part of the step on which no Bernstein coefficient exceeds this share of the sum of all terms is flat at
-/// zero: its signs are rounding, and further halving would take a billion steps.
+/// A part of the step on which no Bernstein coefficient exceeds this fraction of the sum of all terms counts
+/// as zero throughout: the signs of its coefficients are rounding errors, and halving it further would take a
+/// billion steps.
 const FLAT: f64 = 4.0 * f64::EPSILON;
 
 /// First fall of a guard on a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum GuardFall {
     Nowhere,
-    /// It falls to zero this far after the start, in the units of `h`.
+    /// Time from the start of the step to the zero, in the units of `h`.
     At(f64),
-    /// Its series is not finite.
+    /// The series of the guard is not finite.
     Undefined,
 }
 
 /// First fall of a guard to zero on `[0, h]`.
 ///
-/// `zero_order` is the multiplicity of the guard's zero at the start, 0 where it is positive. A zero at the
-/// start is armed by the first coefficient above rounding: if it is positive that zero is divided out, if it
-/// is negative the guard falls at once.
+/// `zero_order` is the multiplicity of the guard's zero at the start, 0 if the guard is positive there. If
+/// the guard starts at a zero, the first coefficient above rounding decides: if it is positive the zero is
+/// divided out, if it is negative the guard falls at once.
 pub(crate) fn first_fall(guard: &TaylorSeries, order: usize, zero_order: usize, h: f64) -> GuardFall {
     if guard[0] == f64::INFINITY {
         return GuardFall::Nowhere;
@@ -69,7 +71,8 @@ pub(crate) fn first_fall(guard: &TaylorSeries, order: usize, zero_order: usize, 
 
 /// Quick test for no root: whether the first few terms, in the Bernstein basis, exceed the sum of all others.
 fn is_root_free(c: &[f64]) -> bool {
-    /// Degree of the part evaluated in the Bernstein basis; the rest falls with the power of the step.
+    /// Degree of the part that is evaluated in the Bernstein basis; the higher terms shrink faster with the
+    /// step.
     const HEAD: usize = 4;
     /// Reciprocals of the binomial coefficients of that degree.
     const SHARES: [f64; HEAD + 1] = [1.0, 1.0 / 4.0, 1.0 / 6.0, 1.0 / 4.0, 1.0];
@@ -102,13 +105,13 @@ fn first_root(c: &[f64]) -> Option<f64> {
     first_crossing(&RootSearch { c, flat }, &mut b, 0.0, 1.0, 0)
 }
 
-/// A polynomial and the size below which its values are rounding.
+/// A polynomial and the size below which its values are rounding errors.
 struct RootSearch<'a> {
     c: &'a [f64],
     flat: f64,
 }
 
-/// First crossing in `[low, high]`; `b` are the Bernstein coefficients there and are overwritten.
+/// First root in `[low, high]`; `b` holds the Bernstein coefficients on this interval and is overwritten.
 fn first_crossing(search: &RootSearch, b: &mut [f64; TERMS], low: f64, high: f64, depth: u32) -> Option<f64> {
     let degree = search.c.len() - 1;
     if b[0] <= 0.0 {
@@ -132,7 +135,7 @@ fn first_crossing(search: &RootSearch, b: &mut [f64; TERMS], low: f64, high: f64
             b[i] = 0.5 * (b[i] + b[i + 1]);
         }
     }
-    // `b` now holds the right half, from its start
+    // `b` now holds the coefficients of the right half
     let middle = 0.5 * (low + high);
     first_crossing(search, &mut left, low, middle, depth + 1)
         .or_else(|| first_crossing(search, b, middle, high, depth + 1))
@@ -141,7 +144,7 @@ fn first_crossing(search: &RootSearch, b: &mut [f64; TERMS], low: f64, high: f64
 /// The single root between `low`, where the polynomial is positive, and `high`, where it is not, by Newton's
 /// method. Steps outside the bracket are replaced by false position, slow ones by bisection.
 fn single_root(c: &[f64], mut low: f64, mut high: f64, at_low: f64, at_high: f64) -> f64 {
-    /// More than Newton's method and bisection together need in double precision.
+    /// More rounds than Newton's method and bisection together need in double precision.
     const ROUNDS: usize = 80;
     let mut x = low + (high - low) * at_low / (at_low - at_high);
     let mut before = high - low;
@@ -158,7 +161,7 @@ fn single_root(c: &[f64], mut low: f64, mut high: f64, at_low: f64, at_high: f64
         }
         let step = -value / slope;
         let newton = x + step;
-        // a step that does not halve the one before is not converging
+        // a step longer than half the previous one does not converge
         let converges = newton > low && newton < high && 2.0 * step.abs() < before;
         let next = if converges { newton } else { 0.5 * (low + high) };
         before = (next - x).abs();
@@ -207,7 +210,7 @@ mod tests {
     fn the_first_of_two_close_roots_is_found_and_a_near_miss_is_none() {
         assert_falls(fall(1.0, &[0.51, 0.52], 0, 1.0), 0.51, 1e-13);
         assert_falls(fall(1.0, &[0.51, 0.510_001, -2.0], 0, 1.0), 0.51, 1e-9);
-        // (x - 0.515)^2 lifted by a little more than rounding
+        // (x - 0.515)^2 plus a little more than the rounding error
         let (mut c, order) = with_roots(1.0, &[0.515, 0.515]);
         c[0] += 1e-14;
         assert_eq!(first_fall(&c, order, 0, 1.0), GuardFall::Nowhere);
@@ -220,7 +223,7 @@ mod tests {
             assert_eq!(fall(1.0, &roots, order, 1.0), GuardFall::Nowhere);
             roots.push(0.01);
             assert_falls(fall(-1.0, &roots, order, 1.0), 0.01, 1e-16);
-            // the same zero, not announced: the first coefficient that rounding does not explain arms it
+            // if the zero is not announced, the first coefficient above rounding reveals it
             assert_falls(fall(-1.0, &roots, 0, 1.0), 0.01, 1e-16);
         }
     }
@@ -238,7 +241,8 @@ mod tests {
         assert_eq!(fall(-1.0, &[0.0, 0.0, 0.0], 2, 1.0), GuardFall::At(0.0));
     }
 
-    /// A root of multiplicity 20 is flat to rounding over a sixth of the step: halving that on would not end.
+    /// A root of multiplicity 20 makes a sixth of the step zero to rounding; halving that part further would
+    /// not end.
     #[test]
     fn a_flat_touch_ends_the_search() {
         let found = fall(1.0, &[1.0; 20], 0, 1.0);
@@ -252,7 +256,7 @@ mod tests {
         assert_eq!(first_fall(&c, 4, 0, 1.0), GuardFall::Undefined);
         c[0] = f64::INFINITY;
         assert_eq!(first_fall(&c, 4, 0, 1.0), GuardFall::Nowhere);
-        // a corner that was passed at the same instant as another one
+        // a guard that does not apply, although a zero at the start is announced
         assert_eq!(first_fall(&c, 4, 1, 1.0), GuardFall::Nowhere);
     }
 }

@@ -1,4 +1,5 @@
-//! First zero of a guard inside a step, certain for the interpolating polynomial, double roots included.
+//! First zero of a guard inside a step. No root of the interpolating polynomial is missed, not even one of a
+//! close pair.
 //!
 //! A guard is sampled on the dense output at equispaced fractions of the step and written in the Bernstein
 //! basis. If all coefficients are positive there is no root, because the polynomial lies in their convex
@@ -6,27 +7,29 @@
 
 use portable_math as math;
 
-/// Samples of the quick test: fractions 0, 1/4, 1/2, 3/4, 1.
+/// Number of samples of the quick test, at the fractions 0, 1/4, 1/2, 3/4 and 1 of the step.
 pub(crate) const COARSE_SAMPLES: usize = 5;
-/// Samples of the full search: fractions 0, 1/8, ..., 1.
+/// Number of samples of the full search, at the fractions 0, 1/8, ..., 1 of the step.
 pub(crate) const FINE_SAMPLES: usize = 9;
 
-/// Halvings after which a root that cannot be distinguished from a touch counts as a touch: 2^-30 of a step
-/// is below every tolerance.
+/// Number of halvings after which two roots that are still not separated count as a touch, which is no root:
+/// 2^-30 of a step is below every tolerance.
 const MOST_HALVINGS: u32 = 30;
-/// A part of the step on which no Bernstein coefficient exceeds this share of the largest is flat at zero:
-/// its signs are rounding, and further halving would take a billion steps.
+/// A part of the step on which no Bernstein coefficient exceeds this fraction of the largest one counts as
+/// zero throughout: the signs of its coefficients are rounding errors, and halving it further would take a
+/// billion steps.
 const FLAT: f64 = 8.0 * f64::EPSILON;
 
 const COARSE_TO_BERNSTEIN: [[f64; COARSE_SAMPLES]; COARSE_SAMPLES] = bernstein_from_samples(0);
 const FINE_TO_BERNSTEIN: [[f64; FINE_SAMPLES]; FINE_SAMPLES] = bernstein_from_samples(0);
 const INNER_TO_BERNSTEIN: [[f64; FINE_SAMPLES - 1]; FINE_SAMPLES - 1] = bernstein_from_samples(1);
 
-/// Whether a guard with these coarse samples and one check sample (at fraction 7/8) stays clear of zero. The
-/// least Bernstein coefficient must exceed the interpolation error at the check sample, with a margin.
+/// Whether a guard with these coarse samples and one check sample, at the fraction 7/8, stays above zero. The
+/// smallest Bernstein coefficient must exceed the interpolation error at the check sample, with a margin.
 #[inline]
 pub(crate) fn is_root_free(samples: &[f64; COARSE_SAMPLES], check: f64) -> bool {
-    /// The check sample shows the interpolation error at one place; elsewhere it may be larger.
+    /// Safety factor: the check sample shows the interpolation error at one place; elsewhere it may be
+    /// larger.
     const MARGIN: f64 = 8.0;
     /// Lagrange weights of the five coarse nodes at fraction 7/8.
     const AT_CHECK: [f64; COARSE_SAMPLES] =
@@ -41,8 +44,9 @@ pub(crate) fn first_root(samples: &[f64; FINE_SAMPLES]) -> Option<f64> {
     find_first_root(multiply_matrix(&FINE_TO_BERNSTEIN, samples))
 }
 
-/// The same for a guard that starts at a zero of multiplicity `order` and grows. The samples, except the
-/// first, are divided by `fraction^order`, which removes that zero, and the quotient is searched.
+/// First fraction of the step at which a guard falls to zero that starts at a zero of multiplicity `order`
+/// and grows. The samples, except the first, are divided by `fraction^order`, which removes the zero at the
+/// start, and the quotient is searched.
 pub(crate) fn first_root_after_zero(samples: &[f64; FINE_SAMPLES], order: i32) -> Option<f64> {
     let mut quotient = [0.0; FINE_SAMPLES - 1];
     for (i, q) in quotient.iter_mut().enumerate() {
@@ -61,8 +65,9 @@ fn multiply_matrix<const M: usize>(matrix: &[[f64; M]; M], x: &[f64; M]) -> [f64
     out
 }
 
-/// First root, given Bernstein coefficients. A guard that does not apply (infinity or a difference from it)
-/// has no root, nor has one that is zero throughout.
+/// First root of the polynomial with these Bernstein coefficients. A guard that does not apply (its samples
+/// are infinite, so that coefficients are infinite or NaN) has no root, nor has a guard that is zero
+/// throughout.
 fn find_first_root<const M: usize>(b: [f64; M]) -> Option<f64> {
     let largest = b.iter().fold(0.0, |a: f64, c| a.max(c.abs()));
     if largest == 0.0 || !b.iter().all(|c| c.is_finite()) {
@@ -139,7 +144,7 @@ fn subdivide<const M: usize>(b: [f64; M]) -> ([f64; M], [f64; M]) {
 }
 
 /// Inverse of the collocation matrix of the Bernstein basis of degree `M - 1` at the nodes `i / (M - 1 +
-/// first)`, `i` from `first` on. With `first` 1 the quotient of a guard is not sampled at 0.
+/// first)`, `i` from `first` on. `first` is 1 for the quotient of a guard, which has no sample at 0.
 const fn bernstein_from_samples<const M: usize>(first: usize) -> [[f64; M]; M] {
     let mut nodes = [0.0; M];
     let mut i = 0;
@@ -177,8 +182,8 @@ const fn power_of(x: f64, n: usize) -> f64 {
     product
 }
 
-/// Gauss-Jordan elimination without pivoting: collocation matrices of the Bernstein basis at ordered nodes
-/// are totally positive.
+/// Inverse by Gauss-Jordan elimination. It needs no pivoting, because collocation matrices of the Bernstein
+/// basis at ordered nodes are totally positive.
 const fn invert_matrix<const M: usize>(mut a: [[f64; M]; M]) -> [[f64; M]; M] {
     let mut out = [[0.0; M]; M];
     let mut p = 0;
@@ -253,7 +258,7 @@ mod tests {
         assert_eq!(first_root_after_zero(&sample(|x| -x), 1), Some(0.0));
     }
 
-    /// Both would be halved a billion times: the test would not end.
+    /// Without their own tests, both guards would be halved a billion times, and this test would not end.
     #[test]
     fn a_guard_that_does_not_apply_or_is_flat_ends_the_search() {
         assert_eq!(first_root_after_zero(&[f64::INFINITY; FINE_SAMPLES], 1), None);

@@ -1,5 +1,6 @@
-//! The Dormand-Prince 8(5,3) method with error control, up to the first guard that falls. Roots are isolated
-//! on nine samples of the dense output; a step of the method's own order gives the state there.
+//! Integration by the Dormand-Prince 8(5,3) method with error control, up to the first guard that falls to
+//! zero. Roots are isolated with nine samples of the dense output; a step of the method itself, of full
+//! order, gives the state at a root.
 
 use super::dop853::{ERROR_EXPONENT, EVALUATIONS_FOR_DENSE, EVALUATIONS_PER_STEP, StepOutput, StepStages};
 use super::fixed_step::{RUNGE_KUTTA_4_EVALUATIONS, runge_kutta_4_step};
@@ -8,20 +9,22 @@ use super::slack_variable::{MOST_HALVINGS, SlackVariable, StatePoint};
 use super::{AcceptedStep, HybridPhase, ObserverReply, PhaseEnd, PhaseEndCause, PhaseStart, WorkCounters};
 use portable_math as math;
 
-/// How the time at which a guard falls to zero is located. Which guard falls first, double roots included,
-/// always follows from the dense output.
+/// Method that locates the time at which a guard falls to zero. Which guard falls first always follows from
+/// the dense output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum EventLocator {
-    /// The root is bracketed on the dense output, the step repeated up to it and the remainder closed by
-    /// Newton's iteration.
+    /// The root is bracketed on the dense output, the step is repeated up to the root, and Newton's iteration
+    /// removes the remaining value of the guard.
     #[default]
     Bracket,
-    /// The step is rejected and a slack variable, as the independent variable, brought to zero. A guard that
-    /// turns inside the step is bracketed until it falls.
+    /// The step is rejected, and the state is integrated in a slack variable that falls to zero with the
+    /// guard. If the guard rises before it falls, the start is moved towards the zero until the guard falls
+    /// there.
     Slack,
 }
 
-/// Integrates `phase` from `start` until `stop` or a guard; `observe` sees every accepted step.
+/// Integrates `phase` from `start` until `stop` or until a guard falls to zero; `observe` is called with
+/// every accepted step.
 ///
 /// `relative` is the tolerated error of a step relative to each state, or to its [`HybridPhase::scale`] where
 /// that is larger.
@@ -36,7 +39,7 @@ pub fn integrate<const N: usize, const G: usize, P: HybridPhase<N, G>, A: Observ
     integrate_with_locator(EventLocator::Bracket, phase, start, stop, relative, work, observe)
 }
 
-/// [`integrate`] with a choice of the event location.
+/// As [`integrate`], with a given method of event location.
 pub fn integrate_with_locator<const N: usize, const G: usize, P: HybridPhase<N, G>, A: ObserverReply>(
     locator: EventLocator,
     phase: &P,
@@ -83,26 +86,30 @@ pub fn integrate_with_locator<const N: usize, const G: usize, P: HybridPhase<N, 
     }
 }
 
-/// Largest and least factor of the step size (Hairer's code), and the share of the predicted step that is
-/// taken.
+/// Largest and smallest factor by which the step size changes (Hairer's code), and the fraction of the
+/// predicted step that is taken.
 const GROWTH: (f64, f64, f64) = (6.0, 1.0 / 3.0, 0.9);
 /// Influence of the last step's error on the step size (the beta of Hairer's code, section IV.2).
 const STABILISATION: f64 = 0.04;
-/// Smaller errors count as this, so that one lucky step does not make the next one too long.
+/// Lower limit of the error in the step size control, so that one lucky step does not make the next one too
+/// long.
 const NEGLIGIBLE: f64 = 1e-4;
-/// Shortest first step to try, in units of the rounding of time; error control shortens it where necessary.
+/// Shortest first step to try, in units of the rounding error of the time; error control shortens it where
+/// necessary.
 const SHORTEST_START: f64 = 1e3;
-/// Factor of a step that leaves the domain of the right-hand side or of the guards.
+/// Factor by which a step is shortened that leaves the domain of the right-hand side or of the guards.
 const OUT_OF_DOMAIN: f64 = 0.1;
-/// A step this close to the stop time, relative to its length, ends there, so that no tiny step remains.
+/// A step is lengthened by up to this factor to end at the stop time, so that no tiny step remains.
 const STRETCH: f64 = 1.01;
-/// Length of step, in units of the rounding of time, up to which a guard that starts at zero is ignored.
+/// Step length, in units of the rounding error of the time, up to which a guard that starts at zero is
+/// ignored.
 const SLIVER_STEP: f64 = 64.0;
-/// Most remainder of a guard at its located zero, as a share of its largest sample. With more, the polynomial
-/// through the samples has a root that the guard does not have, and a shorter step is taken.
+/// Largest value of a guard at its located zero, as a fraction of its largest sample. If the value is larger,
+/// the polynomial through the samples has a root that the guard does not have, and a shorter step is taken.
 const MOST_GUARD_REMAINDER: f64 = 1e-3;
-/// Length of step, in units of the rounding of time, below which a shorter one shows no more of a guard: over
-/// it, a double zero at the start opens by less than the rounding of the state.
+/// Step length, in units of the rounding error of the time, below which a shorter step reveals no more about
+/// a guard: within it, a guard that starts at a double zero changes by less than the rounding error of the
+/// state.
 const SHORTEST_TELLING_STEP: f64 = 1e8;
 
 /// First event of a step.
@@ -163,14 +170,14 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> AdaptiveRun<'a, N
         std::array::from_fn(|i| self.relative * scale[i].max(self.y[i].abs()).max(y[i].abs()))
     }
 
-    /// Hairer's starting step (section II.4): from the sizes of the state and of its first two derivatives.
+    /// Hairer's first step (section II.4), from the sizes of the state and of its first two derivatives.
     fn estimate_first_step(&mut self) -> f64 {
         let tolerated = self.tolerated_error(&self.y);
         let norm = |v: &[f64; N]| {
             (v.iter().zip(&tolerated).map(|(v, s)| math::powi(v / s, 2)).sum::<f64>() / N as f64).sqrt()
         };
         let (d0, d1) = (norm(&self.y), norm(&self.derivative));
-        // a state that happens to be almost zero says nothing of its time scale, but the step must advance
+        // a state that happens to be almost zero says nothing about its time scale, but the step must advance
         // the time
         let shortest = SHORTEST_START * f64::EPSILON * self.t.abs();
         let h0 = if d0 < 1e-5 || d1 < 1e-5 { 1e-6 } else { 0.01 * d0 / d1 }.max(shortest);
@@ -214,7 +221,7 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> AdaptiveRun<'a, N
             }
             self.work.rejected_steps += 1;
             rejected = true;
-            // (an error that is not finite: the stages left the domain of the right-hand side)
+            // (if the error is not finite, the stages have left the domain of the right-hand side)
             let shorter = || (safety * math::powf(error, -ERROR_EXPONENT)).max(least);
             self.h = h * if error.is_finite() { shorter() } else { OUT_OF_DOMAIN };
         }
@@ -231,7 +238,7 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> AdaptiveRun<'a, N
         self.t
     }
 
-    /// Whether a step is so short that a guard which starts at its zero stays within rounding.
+    /// Whether a step is so short that a guard which starts at a zero stays zero to rounding.
     fn is_sliver(&self, stages: &StepStages<N>) -> bool {
         stages.h <= SLIVER_STEP * f64::EPSILON * stages.t.abs()
     }
@@ -251,7 +258,7 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> AdaptiveRun<'a, N
         }
         self.work.guard_evaluations += 1 + sampled.count;
         if sampled.samples.iter().flatten().any(|s| s.is_nan()) {
-            return EventLocation::Outside; // no search for roots could end on it
+            return EventLocation::Outside; // a search for roots on NaN would not end
         }
         let first = (0..G)
             .filter(|&g| suspects[g])
@@ -268,7 +275,7 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> AdaptiveRun<'a, N
         // (a guard that has fallen before the start of the step needs no check)
         if t > stages.t && left > MOST_GUARD_REMAINDER * largest {
             if stages.h <= SHORTEST_TELLING_STEP * f64::EPSILON * t.abs() {
-                return EventLocation::Nowhere; // a shorter step shows no more: the remainder is rounding
+                return EventLocation::Nowhere; // the value of the guard is rounding error
             }
             self.guards = before;
             return EventLocation::Outside;
@@ -276,8 +283,9 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> AdaptiveRun<'a, N
         EventLocation::At { guard, t, y }
     }
 
-    /// State at the event by the slack variable, from the start of the step, or from nearer the zero if the
-    /// guard turns before it falls; `None` for a guard that turns too close to its zero.
+    /// Time and state at the event, by the slack variable. The descent begins at the start of the step, or
+    /// nearer to the zero if the guard rises before it falls; `None` if the guard turns too close to its
+    /// zero.
     fn land_by_slack(
         &mut self,
         stages: &StepStages<N>,
@@ -308,14 +316,15 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> AdaptiveRun<'a, N
         None
     }
 
-    /// State at the event to the order of the method: the step is repeated up to the root of the dense
-    /// output, then Newton's iteration on the guard closes the remainder with short steps.
+    /// Time and state at the event, to the order of the method: the step is repeated up to the root of the
+    /// dense output, then Newton's iteration moves the time to the zero of the guard by short steps.
     fn refine_event(&mut self, stages: &StepStages<N>, guard: usize, fraction: f64) -> (f64, [f64; N]) {
-        /// Most corrections; one is usual, because the dense output's root is accurate to its order.
+        /// Maximum number of corrections; one is usual, because the dense output's root is accurate to its
+        /// order.
         const ROUNDS: usize = 4;
-        /// Share of the step above which a correction is dropped: the guard only grazes zero.
+        /// Fraction of the step above which a correction is dropped, because the guard only grazes zero.
         const GRAZING: f64 = 1e-3;
-        /// Share of the step over which the guard's slope is measured, which is the relative error of a
+        /// Fraction of the step over which the slope of the guard is measured, about the relative error of a
         /// correction.
         const PROBE: f64 = 1e-6;
         if fraction * stages.h <= 4.0 * f64::EPSILON * stages.t.abs() {
@@ -369,7 +378,7 @@ impl<const N: usize, const G: usize, P: HybridPhase<N, G>> GuardSamples<'_, N, G
         }
     }
 
-    /// Guards that may reach zero: those that start or end there and those that the quick test cannot
+    /// Whether each guard may reach zero: a guard that starts at zero, or one that the quick test does not
     /// exclude.
     fn find_suspects(&mut self, zero_order: &[u8; G]) -> [bool; G] {
         self.sample_at([2, 4, 6, 7]);
@@ -411,8 +420,8 @@ mod tests {
         }
     }
 
-    /// Just below -1 the solution never gets there; just above it dips below for `2 acos(1 - 1e-6)` = 2.8e-3
-    /// s, well inside one step.
+    /// The solution never reaches a level just below -1. It is below a level just above -1 for `2 acos(1 -
+    /// 1e-6)` = 2.8e-3 s, well inside one step.
     #[test]
     fn a_dip_inside_one_step_is_found_and_a_near_miss_is_not() {
         let (end, _) = fall(-1.0 + 1e-6, 1e-8);
@@ -425,8 +434,8 @@ mod tests {
     #[test]
     fn a_guard_armed_at_a_double_zero_falls_a_period_later() {
         let mut work = WorkCounters::default();
-        // 1 - x starts at a double zero and returns to it after one period, where it only touches; x + 0.5
-        // ends the phase before
+        // 1 - x starts at a double zero and touches zero again after one period, 2 pi; 5 - t ends the phase
+        // before
         struct Released;
         impl HybridPhase<2, 2> for Released {
             fn derivative(&self, _: f64, y: &[f64; 2]) -> [f64; 2] {
@@ -465,7 +474,7 @@ mod tests {
         assert!((end.t - 1.0).abs() < 1e-6, "the solution 1/(1-t) ends at 1, found {}", end.t);
     }
 
-    /// A guard that ceases to exist while the right-hand side does not: `sqrt(1 - t)` beyond 1.
+    /// The guard is undefined where y exceeds 1, but the right-hand side is still defined there.
     #[test]
     fn a_guard_that_leaves_its_domain_ends_with_a_reason() {
         struct Level;

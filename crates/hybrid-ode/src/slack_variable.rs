@@ -11,31 +11,33 @@
 
 use super::{HybridPhase, WorkCounters};
 
-/// A time, s, with the state there.
+/// A time, s, and the state at that time.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct StatePoint<const N: usize> {
     pub t: f64,
     pub y: [f64; N],
 }
 
-/// Steps in `s` of the first descent. A descent only determines the time: the method's own step then gives
-/// the state, and further descents close the remainder of the guard.
+/// Number of steps in `s` of the first descent. A descent determines only the time: the method's own step
+/// then gives the state, and further descents remove the remaining value of the guard.
 const FIRST_STEPS: u32 = 4;
-/// Most further descents; two or three are usual. Close to a double zero a descent leaves up to a sixth of
-/// the way.
+/// Maximum number of further descents; two or three are usual. Close to a double zero a descent may leave up
+/// to a sixth of the way to the zero.
 const MOST_DESCENTS: usize = 40;
-/// A descent shorter than this share of the way to the zero keeps the state to the order of any method.
+/// If a descent is shorter than this fraction of the way from the start to the zero, its own result for the
+/// state is accurate enough for any method.
 const SHORT: f64 = 1e-3;
-/// Most share of its way that a short descent leaves. When that is below the rounding of time, the zero is
-/// reached.
+/// Largest fraction of its length by which a short descent misses the zero. If that distance is below the
+/// rounding error of the time, the zero is reached.
 const MOST_REMAINDER: f64 = 1e-4;
-/// Span of the central difference for the guard's rate, as a share of the step. Its error, about 1e-10 of the
-/// rate, shifts the end of one descent and is removed by the next.
+/// Span of the central difference for the rate of the guard, as a fraction of the step. The error of the
+/// rate, about 1e-10 of it, shifts the end of one descent and is removed by the next descent.
 const PROBE: f64 = 1e-5;
-/// Least rate of fall at the start of a descent, relative to the mean rate down to the zero: near a maximum
-/// of the guard the slopes in `s` have a pole. A straight fall has 1, the fall to a double zero 2.
+/// Smallest rate of fall at the start of a descent, relative to the mean rate down to the zero; near a
+/// maximum of the guard the slopes in `s` have a pole. The relative rate is 1 for a linear fall and 2 for the
+/// fall to a double zero.
 const LEAST_FALL: f64 = 0.5;
-/// Halvings of the way to the zero after which the guard counts as one that only grazes it.
+/// Number of halvings of the way to the zero after which the guard counts as only grazing zero.
 pub(super) const MOST_HALVINGS: usize = 30;
 
 /// One guard of a phase, near its zero inside a step.
@@ -47,7 +49,7 @@ pub(super) struct SlackVariable<'a, const N: usize, const G: usize, P: HybridPha
 }
 
 impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> SlackVariable<'a, N, G, P> {
-    /// The guard with this index; `step_s` is the length of the step that it falls in, s.
+    /// The guard with index `guard`; `step_s` is the length of the step in which it falls, s.
     pub(super) fn new(phase: &'a P, guard: usize, step_s: f64, work: &'a mut WorkCounters) -> Self {
         Self { phase, guard, probe_s: PROBE * step_s, work }
     }
@@ -57,13 +59,13 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> SlackVariable<'a,
         self.work.rhs_evaluations += evaluations;
     }
 
-    /// The guard at a point.
+    /// Value of the guard at a point.
     pub(super) fn guard_value(&mut self, at: &StatePoint<N>) -> f64 {
         self.work.guard_evaluations += 1;
         self.phase.guards(at.t, &at.y)[self.guard]
     }
 
-    /// Rate of the guard, 1/s times its unit, by a central difference along the flow.
+    /// Rate of change of the guard, in its unit per second, by a central difference along the flow.
     fn guard_rate(&mut self, at: &StatePoint<N>, flow: &[f64; N]) -> f64 {
         let probe = (at.t + self.probe_s) - at.t; // the rounded change of time
         let mut along = |share: f64| {
@@ -73,17 +75,17 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> SlackVariable<'a,
         (along(probe) - along(-probe)) / (2.0 * probe)
     }
 
-    /// Whether a descent may start here, a time `ahead_s` before the zero: the guard falls, and not much
-    /// slower than on average.
+    /// Whether a descent may start at `at`, a time `ahead_s` before the zero: the guard must fall there, not
+    /// much more slowly than on average.
     pub(super) fn can_descend(&mut self, at: &StatePoint<N>, ahead_s: f64) -> bool {
         let value = self.guard_value(at);
         let flow = self.derivative(at);
         value > 0.0 && -self.guard_rate(at, &flow) * ahead_s >= LEAST_FALL * value
     }
 
-    /// The point where the guard is zero, from a point where it falls. `advance` takes the state from there
-    /// to a given time by the method's own step, which costs `cost` right-hand sides. `None` when the guard
-    /// turns before it is zero.
+    /// Point where the guard is zero, starting from a point where it falls. `advance` returns the state at a
+    /// given time by the method's own step from that point, which costs `cost` right-hand sides. `None` if
+    /// the guard turns before it reaches zero.
     pub(super) fn land_on_zero(
         &mut self,
         from: &StatePoint<N>,
@@ -132,7 +134,7 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> SlackVariable<'a,
         Some(at)
     }
 
-    /// `(dt/ds, dy/ds)`; `side_s` is `s` with the sign of the guard. `None` where the guard does not fall.
+    /// `(dt/ds, dy/ds)`; `side_s` is `s` with the sign of the guard. `None` if the guard does not fall.
     fn slope_by_slack(&mut self, at: &StatePoint<N>, side_s: f64) -> Option<StatePoint<N>> {
         let flow = self.derivative(at);
         let rate = self.guard_rate(at, &flow);

@@ -1,9 +1,9 @@
 //! Integration by Taylor series, whose coefficients follow from one another by recurrence, order by order.
 //!
-//! A step needs no trial: its length follows from the last coefficients (Jorba and Zou 2005, *Experimental
-//! Mathematics* 14, section 3.2). Nothing is rejected, and no step size is carried over a transition. The
-//! polynomials of the guards are as accurate as those of the states, so an event on them is found with
-//! certainty, and its state needs no further step.
+//! The step length follows from the last coefficients (Jorba and Zou 2005, *Experimental Mathematics* 14,
+//! section 3.2), so no step is rejected and no step size is carried over from one phase to the next. The
+//! polynomials of the guards are as accurate as those of the states, so events on them are found with
+//! certainty, and the state at an event needs no further step.
 
 use super::polynomial::{GuardFall, MOST_ORDER, TERMS, TaylorSeries, first_fall};
 use super::{
@@ -13,12 +13,12 @@ use portable_math as math;
 
 /// A phase whose Taylor coefficients follow by recurrence.
 pub trait TaylorPhase<const N: usize, const G: usize>: HybridPhase<N, G> {
-    /// Data that the recurrences keep; one tape serves all steps of a phase.
+    /// Working data of the recurrences; one tape serves all steps of a phase.
     type Tape: Default;
 
-    /// Writes the coefficients of states and guards about `(t, y)` up to `out.order`; equal to the
-    /// derivatives of [`HybridPhase::derivative`] and [`HybridPhase::guards`] along the solution, divided by
-    /// `k!`.
+    /// Writes the coefficients of states and guards about `(t, y)` up to `out.order`. Coefficient `k` is the
+    /// derivative `k` of the solution of [`HybridPhase::derivative`], or of [`HybridPhase::guards`] along it,
+    /// divided by `k!`.
     fn expand_series(&self, t: f64, y: &[f64; N], tape: &mut Self::Tape, out: &mut TaylorExpansion<N, G>);
 }
 
@@ -29,15 +29,15 @@ pub struct TaylorExpansion<const N: usize, const G: usize> {
     pub t: f64,
     /// Highest power in use.
     pub order: usize,
-    /// Coefficients of the states, one row a power.
+    /// Coefficients of the states, one row per power.
     pub states: [[f64; N]; TERMS],
-    /// Coefficients of the guards, one row a power; a first coefficient of infinity for a guard that does not
-    /// apply.
+    /// Coefficients of the guards, one row per power; the first is infinity for a guard that does not apply.
     pub guards: [[f64; G]; TERMS],
-    /// Last coefficient but one and last of quantities that follow from the states and must converge too, as
-    /// a multiple of their scale.
+    /// Sizes of the last coefficient but one and of the last coefficient of further quantities that follow
+    /// from the states and must converge too, as multiples of their scale.
     pub followers: [f64; 2],
-    /// `x` of a term in `exp(-x)`, `x >= 0`, that the equations contain and that may vary much over a step.
+    /// Series of the exponent `x >= 0`, if the equations contain a term in `exp(-x)` that may vary much over
+    /// a step.
     pub exponent: Option<TaylorSeries>,
 }
 
@@ -49,7 +49,7 @@ impl<const N: usize, const G: usize> Default for TaylorExpansion<N, G> {
 }
 
 impl<const N: usize, const G: usize> TaylorExpansion<N, G> {
-    /// States at `x` after the start, by Horner's rule.
+    /// States at a time `x` after the start of the step, by Horner's rule.
     #[inline]
     fn states_after(&self, x: f64) -> [f64; N] {
         let mut sum = [0.0; N];
@@ -61,8 +61,8 @@ impl<const N: usize, const G: usize> TaylorExpansion<N, G> {
         sum
     }
 
-    /// Length of step at which the last two coefficients of every state reach the tolerance. The error, of
-    /// the next order, is smaller.
+    /// Longest step over which the last two terms of every state stay within the tolerance. The error is of
+    /// the next order and therefore smaller.
     #[inline]
     fn step_length(&self, scale: &[f64; N], relative: f64) -> f64 {
         let largest = |k: usize, follower: f64| {
@@ -75,15 +75,15 @@ impl<const N: usize, const G: usize> TaylorExpansion<N, G> {
         if last < before { last } else { before }
     }
 
-    /// A length up to `h` over which the terms of the exponential fall. An exponential too small to show in
-    /// the last coefficients, but growing by many powers of ten within the step, would otherwise be missed:
-    /// the coefficients of `exp(x)` rise up to the order `x`.
+    /// Step length, at most `h`, over which the terms of the exponential fall. An exponential that is too
+    /// small to show in the last coefficients, but grows by many powers of ten within the step, would
+    /// otherwise be missed: the coefficients of `exp(x)` rise up to the order `x`.
     #[inline]
     fn limit_by_exponential(&self, h: f64) -> f64 {
-        /// Most change of the exponent, as a share of the order: at the end of the series each term is then
-        /// at most this share of the one before.
+        /// Largest change of the exponent over the step, as a fraction of the order: at the end of the series
+        /// each term is then at most this fraction of the term before it.
         const SHARE: f64 = 0.25;
-        /// Exponent from which the exponential is below rounding.
+        /// Exponent above which the exponential is below rounding.
         const NEGLIGIBLE: f64 = 40.0;
         let Some(exponent) = &self.exponent else { return h };
         let varies = h * exponent[1..=self.order].iter().rev().fold(0.0, |sum, c| sum * h + c.abs());
@@ -92,8 +92,8 @@ impl<const N: usize, const G: usize> TaylorExpansion<N, G> {
         if varies > most { h * most / varies } else { h }
     }
 
-    /// The first guard that falls within `h`, with its distance from the start; of two that fall at once the
-    /// first in the list.
+    /// Index of the guard that falls first within `h`, and the time from the start of the step to its zero;
+    /// of two guards that fall at the same time, the one with the lower index.
     #[inline]
     fn find_event(&self, zero_order: &[u8; G], h: f64) -> Result<Option<(usize, f64)>, UndefinedGuard> {
         let mut rest = [0.0; G];
@@ -138,27 +138,27 @@ impl<const N: usize, const G: usize> DenseOutput<N> for TaylorExpansion<N, G> {
     }
 }
 
-/// Order of the series at a tolerance: the order of least work for a series that falls geometrically, `1 -
-/// ln(relative)/2` (Jorba and Zou 2005, section 3.1), and a little more, because the coefficients of
-/// oscillations fall faster. The optimum is flat: in an oscillation 2 to 6 more cost the same time.
+/// Order of the series for a tolerance. The order of least work is `1 - ln(relative)/2` if the terms fall
+/// geometrically (Jorba and Zou 2005, section 3.1); a few more are added, because the coefficients of
+/// oscillations fall faster. The optimum is flat: for an oscillation, adding 2 to 6 takes the same time.
 pub(crate) fn order_for_tolerance(relative: f64) -> usize {
     const MORE: f64 = 3.0;
-    /// A lower order would derive the step length from too few coefficients.
+    /// Smallest order; a lower one would derive the step length from too few coefficients.
     const LEAST_ORDER: usize = 6;
     ((1.0 + MORE - 0.5 * math::ln(relative)).ceil() as usize).clamp(LEAST_ORDER, MOST_ORDER)
 }
 
-/// Share of the tolerance that a step may use. The errors of thousands of steps add up, and an unstable
-/// motion amplifies them: after hundreds of events the worst one is off by 10 to 50 times the error of a
-/// step. With this share it is off by about the tolerance.
+/// Fraction of the tolerance that a step may use. The errors of thousands of steps add up, and an unstable
+/// motion amplifies them: after hundreds of events the worst event is off by 10 to 50 times the error of a
+/// step. With this fraction it is off by about the tolerance.
 const STEP_SHARE: f64 = 0.02;
 
-/// A step this close to the stop time, relative to its length, ends there, so that no tiny step remains.
+/// A step is lengthened by up to this factor to end at the stop time, so that no tiny step remains.
 const STRETCH: f64 = 1.01;
 
-/// Integrates `phase` from `start` until `stop` or a guard; `observe` sees every step and the tape of its
-/// recurrences. The contract is that of [`integrate`](super::integrate). The coefficients of all states at
-/// one order count as one right-hand side.
+/// Integrates `phase` from `start` until `stop` or until a guard falls to zero, under the contract of
+/// [`integrate`](super::integrate). `observe` is called with every step and the tape of its recurrences. The
+/// coefficients of all states at one order count as one right-hand side.
 pub fn integrate_taylor<const N: usize, const G: usize, P: TaylorPhase<N, G>, A: ObserverReply>(
     phase: &P,
     start: PhaseStart<N, G>,
@@ -208,8 +208,9 @@ pub fn integrate_taylor<const N: usize, const G: usize, P: TaylorPhase<N, G>, A:
     }
 }
 
-/// Moves the root of a guard's series to that of the guard itself on the states' polynomials. Forces follow
-/// from second derivatives, so their series end one order before those of the states.
+/// Corrects the root of a guard's series to the root of the guard itself, evaluated on the polynomials of the
+/// states. A guard that contains a force follows from second derivatives, so its series ends one order before
+/// those of the states.
 fn correct_root<const N: usize, const G: usize, P: TaylorPhase<N, G>>(
     phase: &P,
     expansion: &TaylorExpansion<N, G>,
@@ -218,7 +219,7 @@ fn correct_root<const N: usize, const G: usize, P: TaylorPhase<N, G>>(
     h: f64,
     work: &mut WorkCounters,
 ) -> f64 {
-    /// Share of the step above which a correction is dropped: the guard only grazes zero.
+    /// Fraction of the step above which a correction is dropped, because the guard only grazes zero.
     const GRAZING: f64 = 1e-2;
     if x <= 0.0 {
         return x;
@@ -235,7 +236,7 @@ fn correct_root<const N: usize, const G: usize, P: TaylorPhase<N, G>>(
 pub(super) mod tests {
     use super::*;
 
-    /// x'' = -x with the guard `x - level`: from x = 1 at rest it falls to `level` at acos(level).
+    /// x'' = -x with the guard `x - level`: from x = 1 at rest, x falls to `level` at the time acos(level).
     pub(crate) struct Oscillator {
         pub level: f64,
     }
@@ -301,8 +302,7 @@ pub(super) mod tests {
         assert_eq!((end.cause, end.t), (PhaseEndCause::Stop, 10.0));
     }
 
-    /// The error over a fixed time falls as `h^p`, the step being `(tolerance)^(1/p)` times what the solution
-    /// sets.
+    /// The error after a fixed time falls as `h^p`, with `p` the order of the series.
     #[test]
     fn the_global_error_is_of_the_order_of_the_series() {
         for order in [8, 10] {
@@ -341,7 +341,8 @@ pub(super) mod tests {
         assert_eq!((end.t, last, work.steps), (3.0, 3.0, count));
     }
 
-    /// y' = y^2 from 1: `1/(1 - t)` ends at 1, its coefficients are all one.
+    /// The solution of y' = y^2 from y = 1 is `1/(1 - t)`, which diverges at t = 1; its coefficients are all
+    /// 1.
     #[test]
     fn a_state_that_blows_up_ends_with_a_reason() {
         struct TaylorBlowup;

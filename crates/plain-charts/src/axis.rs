@@ -7,7 +7,7 @@ use portable_math as math;
 /// Scale of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum AxisScale {
-    /// Equal steps.
+    /// Equal differences have equal lengths.
     #[default]
     Linear,
     /// Logarithmic; values of zero or less are not drawn.
@@ -23,11 +23,11 @@ pub struct ChartAxis {
     pub scale: AxisScale,
     /// Ends; `None` to take them from the data.
     pub range: Option<(f64, f64)>,
-    /// Positions and names of the ticks of a categorical axis; empty for numbers.
+    /// Positions and names of the ticks of a categorical axis; empty for a numerical axis.
     pub categories: Vec<(f64, String)>,
 }
 
-/// Label of every time axis; panels are recognised by it.
+/// Label of every time axis; a time axis is recognised by it.
 const TIME_LABEL: &str = "time, s";
 
 impl ChartAxis {
@@ -36,7 +36,7 @@ impl ChartAxis {
         Self { label: label.into(), scale: AxisScale::Linear, ..Self::default() }
     }
 
-    /// A linear time axis, s; panels with one share a cursor on a page.
+    /// A linear time axis, s; panels with a time axis share a cursor on a page.
     pub fn time() -> Self {
         Self::linear(TIME_LABEL)
     }
@@ -64,7 +64,7 @@ impl ChartAxis {
         self.with_ends(Some((low, high)))
     }
 
-    /// The same axis with fixed ends; `None` fits the data.
+    /// The same axis with fixed ends, or fitted to the data for `None`.
     pub fn with_ends(self, range: Option<(f64, f64)>) -> Self {
         Self { range, ..self }
     }
@@ -97,17 +97,18 @@ pub(super) struct CanvasAxis {
 
 /// Margin beyond the data on a linear axis, fraction of their range.
 const LINEAR_ROOM: f64 = 0.05;
-/// Least margin relative to the values: a smaller variation is rounding, and tick labels could not show it.
+/// Smallest margin relative to the values; a smaller variation is rounding error, and tick labels could not
+/// show it.
 const MIN_RELATIVE_SPAN: f64 = 1e-4;
-/// Margin of an axis that holds only zero.
+/// Margin of an axis whose data are all zero.
 const SINGLE_VALUE_ROOM: f64 = 1.0;
 /// Margin on a logarithmic axis, as a factor.
 const LOG_ROOM: f64 = 1.4;
-/// Most decades of a logarithmic axis that fits the data: more would show only rounding.
+/// Maximum number of decades of a logarithmic axis that fits the data; lower values are rounding errors.
 const MOST_DECADES: i32 = 6;
 
-/// Largest distance from the low end, in lengths of the axis. Farther points are moved there, so that
-/// clipping a line cannot overflow.
+/// Largest distance of a point from the low end, in lengths of the axis. Points farther away are moved to
+/// this distance, so that clipping a line cannot overflow.
 const FARTHEST_POSITION: f64 = 1e6;
 
 /// Ends of an axis: the given ones, or those of the data with a margin. They are finite, ordered and
@@ -131,13 +132,13 @@ pub(super) fn axis_limits(axis: &ChartAxis, values: impl Iterator<Item = f64>) -
     (low - room, high + room)
 }
 
-/// Least and greatest value; `(inf, -inf)` without any.
+/// Smallest and largest value; `(inf, -inf)` if there are no values.
 pub fn value_span(values: impl Iterator<Item = f64>) -> (f64, f64) {
     values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
 }
 
 impl CanvasAxis {
-    /// Canvas coordinate of a value; `None` where it has none.
+    /// Canvas coordinate of a value; `None` for a value without a place on the axis.
     pub(crate) fn canvas_position(&self, value: f64) -> Option<f64> {
         let share = match self.scale {
             AxisScale::Linear => (value - self.low) / (self.high - self.low),
@@ -163,7 +164,7 @@ impl CanvasAxis {
         }
     }
 
-    /// Ticks that are about `apart` canvas units or more from each other.
+    /// Ticks at distances of about `apart` canvas units or more.
     pub(crate) fn ticks(&self, apart: f64) -> Vec<Tick> {
         let most = ((self.to - self.from).abs() / apart).clamp(2.0, 12.0) as usize;
         let length = (self.to - self.from).abs();
@@ -177,11 +178,11 @@ impl CanvasAxis {
     }
 }
 
-/// Least distance of minor ticks, canvas units: they stay distinct in print.
+/// Smallest distance of minor ticks, canvas units, at which they are distinct in print.
 const MIN_MINOR_TICK_SPACING: f64 = 1.0 * UNITS_PER_MM;
 
-/// Appends minor ticks to those of a linear axis where there is room: four between neighbours, three where
-/// the step is 2.
+/// Appends minor ticks to those of a linear axis if there is room: four between neighbours, or three if the
+/// step is 2 times a power of ten.
 fn add_minor_ticks(mut ticks: Vec<Tick>, axis: &CanvasAxis, length: f64) -> Vec<Tick> {
     let [first, second, ..] = ticks.as_slice() else { return ticks };
     let (start, step) = (first.value, second.value - first.value);
@@ -199,15 +200,15 @@ fn add_minor_ticks(mut ticks: Vec<Tick>, axis: &CanvasAxis, length: f64) -> Vec<
     ticks
 }
 
-/// The names of an axis as ticks.
+/// Ticks of a categorical axis, with `shown(name)` as their labels.
 pub(super) fn category_ticks(axis: &ChartAxis, shown: impl Fn(&str) -> String) -> Vec<Tick> {
     axis.categories.iter().map(|(value, name)| Tick { value: *value, label: Some(shown(name)) }).collect()
 }
 
-/// Ticks may be closer than asked for by this factor before the next coarser step is taken.
+/// Factor by which ticks may be closer than requested before the next coarser step is chosen.
 const TICK_SPACING_SLACK: f64 = 0.8;
 
-/// Multiples of 1, 2 or 5 times a power of ten.
+/// Ticks at the multiples of a step of 1, 2 or 5 times a power of ten.
 fn linear_ticks(low: f64, high: f64, most: usize) -> Vec<Tick> {
     let rough = (high - low) / most as f64;
     let mut exponent = math::log10(rough).floor() as i32;
@@ -238,13 +239,13 @@ fn linear_ticks(low: f64, high: f64, most: usize) -> Vec<Tick> {
     (first as i64..=last as i64).map(|k| Tick { value: value(k), label: Some(label(value(k))) }).collect()
 }
 
-/// Labelled multiples in a decade, with the least distance of two of them in decades; the first that fits is
-/// taken.
+/// Multiples that are labelled in a decade, with the smallest distance between two of them, in decades; the
+/// first list that fits is used.
 const LOG_LABEL_MULTIPLES: [(&[i32], f64); 2] = [(&[1, 2, 3, 5, 7], 0.154), (&[1, 2, 5], 0.301)];
 
-/// Decades with their multiples as minor ticks, some of them labelled. `room` is the length of a decade over
-/// the least distance of labels. Axes under two decades always label 2 and 5; shorter ones have the ticks of
-/// a linear axis.
+/// Ticks at the powers of ten and their multiples, some of them labelled. `room` is the ratio of the length
+/// of a decade to the smallest distance of labels. An axis with fewer than two powers of ten always labels 2
+/// and 5; if fewer than two of all these labels lie on it, it has the ticks of a linear axis.
 fn log_ticks(low: f64, high: f64, most: usize, room: f64) -> Vec<Tick> {
     let decades = (math::log10(low).floor() as i32)..=(math::log10(high).ceil() as i32);
     let inside = |v: &f64| *v >= low * (1.0 - 1e-9) && *v <= high * (1.0 + 1e-9);
@@ -269,7 +270,7 @@ fn log_ticks(low: f64, high: f64, most: usize, room: f64) -> Vec<Tick> {
     decades.clone().flat_map(|e| (1..10).filter_map(move |m| tick(m, e))).collect()
 }
 
-/// The label of `m 10^e`: plain digits where short, otherwise a power.
+/// The label of `m 10^e`: plain digits if they are few, otherwise a power of ten.
 fn log_label(m: i32, e: i32) -> String {
     match e {
         0..=4 => format!("{m}{}", "0".repeat(e as usize)),

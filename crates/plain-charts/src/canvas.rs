@@ -9,7 +9,7 @@ use plotters::prelude::{DrawingBackend, IntoFont, RGBColor};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color as _, FontStyle, FontTransform, ShapeStyle, TextStyle};
 
-/// Point of a text that lies at its position.
+/// Point of a text that is placed at its position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum TextAnchor {
     /// Middle of the left edge.
@@ -73,7 +73,7 @@ impl Canvas {
         let _ = self.back.draw_path(whole, &plotters_colour(colour).stroke_width(width));
     }
 
-    /// A PNG in an area, clipped to another.
+    /// Draws a PNG in `area`, clipped to `within`.
     pub(crate) fn draw_png(&mut self, area: &CanvasArea, within: &CanvasArea, png: &[u8]) {
         self.back.append_png(area, within, png);
     }

@@ -1,5 +1,5 @@
-//! A plotters back end that writes compact SVG: neighbouring lines, rectangles or dots of one look become one
-//! path, where plotters' own back end writes one element each.
+//! A plotters back end that writes compact SVG: consecutive lines, rectangles or dots of one look become one
+//! path, while the back end of plotters writes one element for each.
 
 use super::path::CanvasArea;
 use super::style::format_hex;
@@ -13,7 +13,7 @@ use plotters_backend::{
 use std::convert::Infallible;
 use std::fmt::Write;
 
-/// Writing into a string cannot fail.
+/// Result of drawing; writing into a string cannot fail.
 type DrawResult = Result<(), DrawingErrorKind<Infallible>>;
 
 /// The elements drawn so far.
@@ -63,7 +63,7 @@ impl CompactSvg {
         self.elements.push_str("</g>\n");
     }
 
-    /// A PNG as base64 data in its element, clipped to `within`.
+    /// Appends a PNG as an element with base64 data, clipped to `within`.
     pub(crate) fn append_png(&mut self, area: &CanvasArea, within: &CanvasArea, png: &[u8]) {
         let (x, y) = (area.left - within.left, area.top - within.top);
         let _ = self.append_element(&format!(
@@ -77,7 +77,7 @@ impl CompactSvg {
             area.right - area.left,
             area.bottom - area.top,
             STANDARD.encode(png)
-        )); // (a string takes everything)
+        )); // (writing into a string cannot fail)
     }
 
     fn append_element(&mut self, element: &str) -> DrawResult {
@@ -87,7 +87,7 @@ impl CompactSvg {
     }
 }
 
-/// Fill colour and, where it is not 1, opacity.
+/// Fill colour, and opacity if it is not 1.
 fn fill_attributes(colour: BackendColor) -> String {
     let opacity = if colour.alpha < 1.0 { format!("opacity=\"{}\" ", colour.alpha) } else { String::new() };
     format!("{opacity}fill=\"{}\"", format_hex(colour.rgb))
@@ -161,7 +161,7 @@ impl DrawingBackend for CompactSvg {
         self.append_element(&format!("<polygon {} points=\"{corners}\"/>\n", fill_attributes(style.color())))
     }
 
-    /// A filled circle is a line of zero length with round caps.
+    /// Draws a filled circle as a line of zero length with round caps.
     fn draw_circle<S: BackendStyle>(
         &mut self,
         (x, y): BackendCoord,

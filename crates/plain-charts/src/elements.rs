@@ -37,9 +37,9 @@ impl Series {
 pub struct SampledSeries {
     /// Position of the first value, in units of the x axis.
     pub start: f64,
-    /// Distance of two values, in units of the x axis.
+    /// Distance between neighbouring values, in units of the x axis.
     pub step: f64,
-    /// Values in units of the y axis; `None` where one is missing.
+    /// Values in units of the y axis; `None` for a missing value.
     pub values: Vec<Option<f64>>,
 }
 
@@ -47,13 +47,13 @@ pub struct SampledSeries {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[allow(missing_docs)]
 pub enum ErrorBar {
-    /// Along the x axis, at a height `y`.
+    /// Along the x axis, at the height `y`.
     Horizontal { y: f64, from: f64, to: f64 },
-    /// Along the y axis, at a place `x`.
+    /// Along the y axis, at the position `x`.
     Vertical { x: f64, from: f64, to: f64 },
 }
 
-/// A picture, to scale.
+/// A picture, drawn to the scale of the axes.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Raster {
     /// The picture as PNG bytes.
@@ -71,8 +71,8 @@ pub struct Ribbon {
     pub label: String,
     /// Colour, drawn pale.
     pub colour: Colour,
-    /// Position on the x axis with the lower and upper end there, in axis units; `None` interrupts the
-    /// ribbon.
+    /// Positions on the x axis, each with the lower and the upper end of the ribbon, in axis units; `None`
+    /// interrupts the ribbon.
     pub points: Vec<Option<(f64, f64, f64)>>,
 }
 
@@ -114,7 +114,7 @@ impl ShadedSpan {
     }
 }
 
-/// A vertical line with a label over the panel.
+/// A vertical line with a label above the panel.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct VerticalLine {
     /// Label; empty for none.
@@ -123,20 +123,20 @@ pub struct VerticalLine {
     pub colour: Colour,
     /// Line style.
     pub mark: Mark,
-    /// Place, in units of the x axis.
+    /// Position, in units of the x axis.
     pub at: f64,
     /// Lower end in units of the y axis; `None` for the bottom of the axes.
     pub above: Option<f64>,
 }
 
 impl VerticalLine {
-    /// A line over the full height of the axes.
+    /// A line that spans the full height of the axes.
     pub fn new(label: impl Into<String>, colour: Colour, mark: Mark, at: f64) -> Self {
         Self { label: label.into(), colour, mark, at, above: None }
     }
 }
 
-/// A label over the panel, without a line.
+/// A label above the panel, without a line.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TopLabel {
     /// Label.
@@ -192,7 +192,7 @@ pub enum HatchPattern {
     DashedUpright,
 }
 
-/// One pair of axes. Stacked panels with equal x axes share tick labels.
+/// A panel with one pair of axes. Stacked panels with equal x axes share tick labels.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Panel {
     /// Title above the left corner, of one or more lines; empty for none.
@@ -205,8 +205,8 @@ pub struct Panel {
     pub height_mm: f64,
     /// Lines and symbols, later ones on top.
     pub series: Vec<Series>,
-    /// Full data of the first series where their points are thinned; shown when a reader enlarges a part on a
-    /// screen.
+    /// Entry `i` is the full data of `series[i]` if its points are thinned; shown when a reader enlarges a
+    /// part on a screen. Missing entries count as `None`.
     pub sampled_series: Vec<Option<SampledSeries>>,
     /// Shaded intervals, under the lines.
     pub shaded_spans: Vec<ShadedSpan>,
@@ -214,17 +214,17 @@ pub struct Panel {
     pub vertical_lines: Vec<VerticalLine>,
     /// Surfaces between curves, under the lines.
     pub ribbons: Vec<Ribbon>,
-    /// Labels over the panel.
+    /// Labels above the panel.
     pub top_labels: Vec<TopLabel>,
     /// A picture under everything else.
     pub raster: Option<Raster>,
     /// Heat map, under everything else.
     pub heat_map: Option<HeatMap>,
-    /// Hatched cells over it.
+    /// Hatched cells, over the heat map.
     pub hatches: Vec<Hatch>,
-    /// Text inside, over everything else.
+    /// Text inside the axes, over everything else.
     pub annotations: Vec<TextAnnotation>,
-    /// Whether both axes have one scale, as in a drawing; the shorter range is widened.
+    /// Whether both axes have the same scale, as in a drawing; the shorter range is widened.
     pub equal_aspect: bool,
     /// Whether frame, grid and ticks are left out, as in a drawing.
     pub bare: bool,

@@ -5,18 +5,19 @@ use super::elements::Panel;
 /// A figure of one or more panels.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Figure {
-    /// Heading on a screen: the main result with its number. Title and subtitle are the name for screen
-    /// readers; in print both belong in the caption.
+    /// Heading on a screen: the main result with its number. Title and subtitle together name the figure for
+    /// screen readers; in print both belong in the caption.
     pub title: String,
     /// Line under the heading: contents, and whether the data are synthetic; empty for none.
     pub subtitle: String,
-    /// Whether the data are synthetic: print marks that inside the axes, screens in the subtitle.
+    /// Whether the data are synthetic. In print a mark inside the axes says so, on a screen the subtitle
+    /// does.
     pub watermarked: bool,
     /// Description for screen readers.
     pub description: String,
     /// Width on a screen, mm.
     pub width_mm: f64,
-    /// Number of panels side by side where the width allows; 0 and 1 stack them.
+    /// Number of panels side by side if the width allows; 0 and 1 stack them.
     pub columns: usize,
     /// Panels in the order of reading.
     pub panels: Vec<Panel>,

@@ -9,11 +9,11 @@ use super::style::UNITS_PER_MM;
 use super::style::{FRAME, NO_VALUE, Rgb};
 
 const HATCH_GREY: Rgb = (0x66, 0x66, 0x66);
-/// Spacing of the lines, canvas units; doubled until there are at most [`MOST_STROKES`], which limits the
-/// file size.
+/// Spacing of the lines, canvas units; doubled until there are at most [`MOST_STROKES`] lines, which limits
+/// the file size.
 const HATCH_SPACING: f64 = 1.3 * UNITS_PER_MM;
 const MOST_STROKES: usize = 1200;
-/// Strokes closer than this along a line are joined, canvas units.
+/// Largest gap over which strokes of one line, or areas of one row, are joined, canvas units.
 const TOUCHING_DISTANCE: f64 = 1.5;
 const STROKE_WIDTH: u32 = 3;
 
@@ -67,7 +67,7 @@ pub(super) fn draw_hatch(canvas: &mut Canvas, placed: &PanelLayout, hatch: &Hatc
     draw_strokes(canvas, &areas, hatch.pattern);
 }
 
-/// Joins touching areas of one height.
+/// Joins touching areas with the same top and bottom.
 fn merge_areas(areas: &[CanvasArea]) -> Vec<CanvasArea> {
     let mut sorted = areas.to_vec();
     sorted.sort_by(|a, b| {
@@ -78,7 +78,7 @@ fn merge_areas(areas: &[CanvasArea]) -> Vec<CanvasArea> {
     rows.filter_map(|row| Some(CanvasArea { right: row.last()?.right, ..*row.first()? })).collect()
 }
 
-/// Draws the sample of the legend.
+/// Draws the sample of a pattern in the legend.
 pub(super) fn draw_hatch_sample(canvas: &mut Canvas, area: &CanvasArea, pattern: HatchPattern) {
     canvas.fill_rectangle(area, NO_VALUE, 1.0);
     draw_strokes(canvas, &[*area], pattern);

@@ -22,16 +22,16 @@ pub struct HeatMap {
     pub x: Vec<f64>,
     /// Centres of the rows, ascending, in units of the y axis.
     pub y: Vec<f64>,
-    /// One list per column, one value per row; `None` where missing.
+    /// One list per column, one value per row; `None` for a missing value.
     pub values: Vec<Vec<Option<f64>>>,
-    /// Values of the first and the last colour; `None` takes them from the data. Values beyond have the
-    /// nearer of the two colours.
+    /// Values of the first and the last colour; `None` takes them from the data. A value outside this range
+    /// has the colour of the nearer end.
     pub range: Option<(f64, f64)>,
     /// Colours.
     pub colour_map: ColourMap,
     /// Whether contours at round values are drawn; only on fine and smooth maps.
     pub contours: bool,
-    /// Whether the colour bar is left out, as beside a map on the same scale.
+    /// Whether the colour bar is left out, for example beside a map on the same scale.
     pub without_bar: bool,
 }
 
@@ -51,7 +51,7 @@ impl HeatMap {
         let (low, high) = given.unwrap_or_else(|| axis::value_span(self.finite_values()));
         match (low < high, low.is_finite()) {
             (true, _) => Some((low, high)),
-            (false, true) => Some(axis::axis_limits(&ChartAxis::default(), [low].into_iter())), // a constant
+            (false, true) => Some(axis::axis_limits(&ChartAxis::default(), [low].into_iter())), // all equal
             (false, false) => None,
         }
     }
@@ -64,8 +64,8 @@ impl HeatMap {
     }
 }
 
-/// Edges of cells from their centres: halfway between neighbours on the axis scale, and equally far beyond
-/// the ends. A single cell is unbounded; centres that do not ascend have no edges.
+/// Edges of cells from their centres: halfway between neighbours on the axis scale, and half a spacing beyond
+/// the first and the last centre. A single cell is unbounded; centres that do not ascend have no edges.
 #[must_use]
 pub fn cell_edges(middles: &[f64], scale: AxisScale) -> Vec<f64> {
     let [first, second, ..] = middles else {
@@ -100,16 +100,17 @@ pub(super) fn colour_at(heat: &HeatMap, (x, y): (AxisScale, AxisScale), at: (f64
 
 // Cells as vectors: runs of one colour along a row are thick lines over a background of the commonest colour.
 
-/// Most columns, rows and colours that are drawn, in steps; the next step is taken while a map takes more
-/// bytes than [`MAX_CELL_BYTES`]. Finer cells are merged by their largest value, which keeps thin lines.
+/// Maximum numbers of columns, rows and colours, from fine to coarse; the next entry is used if a map takes
+/// more bytes than [`MAX_CELL_BYTES`]. Finer cells are merged into one with their largest value, which keeps
+/// thin lines.
 const CELL_RESOLUTIONS: [(usize, usize, u32); 6] =
     [(480, 240, 96), (320, 180, 64), (240, 135, 48), (200, 110, 32), (160, 90, 24), (120, 68, 16)];
 const MAX_CELL_BYTES: usize = 150_000;
-/// Lines exceed their cells by this length and thickness, canvas units, so that no background shows between
-/// them.
+/// Excess length and thickness of a line over its cells, canvas units, so that no background shows between
+/// lines.
 const CELL_OVERLAP: i64 = 2;
 
-/// A row or column of cells: its ends on the canvas, ascending, and the covered cells.
+/// A row or column of the drawing: its ends on the canvas, ascending, and the range of cells that it covers.
 type CellBlock = (i64, i64, Option<Range<usize>>);
 
 /// The cells of a heat map over the axes, as SVG; `None` without values.
@@ -131,7 +132,8 @@ pub(super) fn heat_cells_svg(
     svg
 }
 
-/// The cells along an axis; `most` equal steps where there are more.
+/// The cells along an axis; `most` equal steps if there are more cells, or if a cell is too narrow to be
+/// drawn.
 fn cell_blocks(middles: &[f64], axis: &CanvasAxis, most: usize) -> Vec<CellBlock> {
     let edges = cell_edges(middles, axis.scale);
     let (from, to) = (axis.from.min(axis.to), axis.from.max(axis.to));
@@ -144,7 +146,7 @@ fn cell_blocks(middles: &[f64], axis: &CanvasAxis, most: usize) -> Vec<CellBlock
     let cells = edges.windows(2).enumerate().map(|(at, ends)| (ordered(place(ends[0]), place(ends[1])), at));
     let shown = cells.filter(|((low, high), _)| low < high);
     let shown: Vec<CellBlock> = shown.map(|((low, high), at)| (low, high, Some(at..at + 1))).collect();
-    // cells that overlap the axis
+    // cells that overlap the range of the axis
     let visible = edges.windows(2).filter(|ends| ends[1] > axis.low && ends[0] < axis.high).count();
     if (1..=most).contains(&shown.len()) && shown.len() == visible {
         return shown;
@@ -177,7 +179,8 @@ fn resample_cells(middles: &[f64], edges: &[f64], axis: &CanvasAxis, count: usiz
     (0..count).map(|k| (ends(k).0, ends(k).1, of(k))).collect()
 }
 
-/// The rows as runs of one colour; all lines of one colour and thickness are one path.
+/// The rows as SVG, with one line for each run of one colour; all lines of one colour and thickness are one
+/// path.
 fn cell_rows_svg(
     (heat, ends): (&HeatMap, (f64, f64)),
     columns: &[CellBlock],
@@ -208,7 +211,7 @@ fn cell_rows_svg(
                 // the middle may lie at half a unit
                 let middle = format_half(top + bottom);
                 let line = lines.entry((run[0], bottom - top)).or_default();
-                let _ = write!(line, "M{from} {middle}h{}", to - from); // (a string takes everything)
+                let _ = write!(line, "M{from} {middle}h{}", to - from); // (writing into a string cannot fail)
             }
             start = end;
         }
@@ -251,12 +254,12 @@ const BAR_GAP_MM: f64 = 2.5;
 const BAR_MM: f64 = 3.0;
 const POINT_MM: f64 = 2.0;
 
-/// The axis of the bar between two positions.
+/// The axis of the colour bar, between two positions.
 fn colour_bar_axis(ends: (f64, f64), from: f64, to: f64) -> CanvasAxis {
     CanvasAxis { scale: AxisScale::Linear, low: ends.0, high: ends.1, from, to }
 }
 
-/// Width that the bar takes beside the axes, mm.
+/// Width that the colour bar needs beside the axes, mm.
 pub(super) fn colour_bar_width_mm(heat: &HeatMap, height_mm: f64) -> f64 {
     let Some(ends) = heat.value_range().filter(|_| !heat.without_bar) else { return 0.0 };
     let label_mm = widest_bar_label_mm(&colour_bar_axis(ends, 0.0, height_mm), Y_TICKS_MM);
@@ -265,13 +268,13 @@ pub(super) fn colour_bar_width_mm(heat: &HeatMap, height_mm: f64) -> f64 {
 
 /// Width of the widest label of a bar with this tick distance, mm.
 fn widest_bar_label_mm(scale: &CanvasAxis, apart: f64) -> f64 {
-    /// Width of digits and signs over that of the mean letter.
+    /// Ratio of the width of digits and signs to that of the mean letter.
     const DIGITS: f64 = 1.2;
     let labels = scale.ticks(apart).into_iter().filter_map(|t| t.label);
     labels.map(|l| DIGITS * text_width(&l, TEXT_MM)).fold(0.0, f64::max)
 }
 
-/// Draws the colour bar with ticks and label; an end is pointed where values lie beyond it.
+/// Draws the colour bar with ticks and label; an end is pointed if there are values beyond it.
 pub(super) fn draw_colour_bar(canvas: &mut Canvas, heat: &HeatMap, axes: &CanvasArea) {
     let Some((low, high)) = heat.value_range() else { return };
     let left = axes.right + BAR_GAP_MM * UNITS_PER_MM;
@@ -368,7 +371,7 @@ mod tests {
                 .collect::<Vec<_>>()
         };
         let some = |r: Range<usize>| Some(r);
-        // cells from 0.5 to 3.5, one wide: the steps beyond have none
+        // the cells cover 0.5 to 3.5, each 1 wide; steps outside contain no cell
         assert_eq!(
             covered(&[1.0, 2.0, 3.0], 8),
             [None, some(0..1), some(0..1), some(1..2), some(1..2), some(2..3), some(2..3), None]

@@ -15,7 +15,7 @@ use labels::{assign_label_rows, place_legend};
 use panel_layout::{HALF_LABEL_MM, MOST_NAMES, y_axis_ticks};
 pub(super) use panel_layout::{PanelLayout, SMALL_LINE_MM, widest_label_mm};
 
-/// Height of a row of labels over a panel, mm.
+/// Height of a row of labels above a panel, mm.
 const LABEL_ROW_MM: f64 = SMALL_MM + 0.6;
 
 /// Panel letters; figures with a single panel or with more than these have none.
@@ -44,7 +44,7 @@ impl<'a> FigureLayout<'a> {
                 .collect();
             let rows: Vec<_> =
                 row.iter().zip(&mapped).map(|(panel, x)| assign_label_rows(panel, x)).collect();
-            // below another panel, a letter has room beside the ticks
+            // in lower rows, a letter has room beside the ticks of the panel above it
             let alone = lettered && index == 0;
             let over = |(panel, rows): (&Panel, &Vec<Option<usize>>)| {
                 let title = panel.title.lines().count().max(usize::from(alone));
@@ -70,15 +70,16 @@ impl<'a> FigureLayout<'a> {
 
 // Lowering of panels so that a figure fits on a page.
 
-/// Least height of axes, mm: room for two labelled ticks with the same margin beyond each.
+/// Smallest height of axes, mm: room for two labelled ticks and for equal margins beyond them.
 const MIN_AXES_HEIGHT_MM: f64 = 16.0;
-/// Least height per name along a y axis, mm: a line of text and a gap.
+/// Smallest height per name along a y axis, mm: a line of text and a gap.
 const MIN_CATEGORY_HEIGHT_MM: f64 = 3.0;
-/// Rounds until the heights settle: labels of lower panels wrap to more lines, which take height again.
+/// Maximum number of rounds until the heights settle: labels of lowered panels wrap to more lines, which take
+/// up height again.
 const MAX_HEIGHT_ROUNDS: usize = 4;
 
 /// Lowers all panels by the same fraction of their spare height until the figure is at most `most_mm` high.
-/// Letters keep their size, so a figure with very many panels may stay higher.
+/// Letters keep their size, so a figure with very many panels may remain higher.
 pub(super) fn limit_height(mut figure: Figure, most_mm: f64) -> Figure {
     for _ in 0..MAX_HEIGHT_ROUNDS {
         let over_mm = FigureLayout::new(&figure).height - most_mm;
@@ -93,7 +94,7 @@ pub(super) fn limit_height(mut figure: Figure, most_mm: f64) -> Figure {
     figure
 }
 
-/// Height that a panel can spare, mm.
+/// Height by which a panel can be lowered, mm.
 fn spare_height_mm(panel: &Panel) -> f64 {
     let least_mm = MIN_AXES_HEIGHT_MM.max(panel.y.categories.len() as f64 * MIN_CATEGORY_HEIGHT_MM);
     (panel.height_mm - least_mm).max(0.0)
@@ -101,7 +102,7 @@ fn spare_height_mm(panel: &Panel) -> f64 {
 
 // Panels side by side.
 
-/// Least width of axes in a row of panels, and of a panel without axes, mm.
+/// Smallest width of axes in a row of panels, and of a panel without axes, mm.
 const MIN_PANEL_WIDTH_MM: f64 = 30.0;
 const MIN_BARE_WIDTH_MM: f64 = 18.0;
 
@@ -113,7 +114,7 @@ pub(crate) struct PanelColumns {
 }
 
 impl PanelColumns {
-    /// As many columns as the figure asks for and its width allows.
+    /// The number of columns that the figure requests, or fewer if its width does not allow them.
     pub(crate) fn new(figure: &Figure) -> Self {
         let most = figure.columns.clamp(1, figure.panels.len().max(1));
         let least =
@@ -160,7 +161,7 @@ impl PanelColumns {
     }
 }
 
-/// Left margin: tick labels and title of the y axis, mm.
+/// Left margin, mm: tick labels and label of the y axis.
 fn left_margin(panel: &Panel, column_mm: f64) -> f64 {
     if panel.bare {
         return EDGE_MM / 2.0;
@@ -203,14 +204,14 @@ pub(crate) fn y_label_lines(panel: &Panel) -> Vec<String> {
     lines_of_text(&panel.y.label, WIDE_LETTER * TEXT_MM, panel.height_mm + PANEL_GAP_MM)
 }
 
-/// Empty text takes no line.
+/// The lines of a wrapped text; none for an empty text.
 fn lines_of_text(text: &str, letter_mm: f64, width_mm: f64) -> Vec<String> {
     if text.is_empty() { Vec::new() } else { wrap_lines(text, letter_mm, width_mm) }
 }
 
 // Data that set the ends of axes.
 
-/// Values of y within the ends of x.
+/// y values of the points with x from `low` to `high`, and of all rows of the heat map.
 pub(super) fn visible_y_values(panel: &Panel, low: f64, high: f64) -> impl Iterator<Item = f64> {
     let points = panel.series.iter().flat_map(|s| s.points.iter().flatten());
     let bars = panel.series.iter().flat_map(|s| &s.error_bars).flat_map(|bar| match bar {
@@ -271,7 +272,7 @@ mod tests {
     #[test]
     fn panels_give_what_they_can_spare_and_no_more() {
         let high = figure(&[56.0, 56.0, 36.0, 13.0]);
-        // 40 + 40 + 20 + 0 mm to spare, of which a half goes
+        // 40 + 40 + 20 + 0 mm to spare, half of which is used
         let most_mm = FigureLayout::new(&high).height - 50.0;
         assert_eq!(lowered(&high, most_mm), [36.0, 36.0, 26.0, 13.0]);
         assert_eq!(FigureLayout::new(&limit_height(high.clone(), most_mm)).height, most_mm);

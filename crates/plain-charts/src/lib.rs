@@ -1,12 +1,13 @@
 //! Charts as SVG: stacked panels with axes, lines, symbols, shaded intervals and heat maps; no physics.
 //!
 //! Positions are whole canvas units, four per pixel of 1/96 inch; a `viewBox` scales them to millimetres.
-//! Axes, layout, gaps, clipping and thinning are made here, because plotters clamps points to its range and
-//! draws a NaN as a spike. A canvas draws with the shapes and fonts of plotters on the back end
+//! This crate handles axes, layout, gaps, clipping and thinning itself, because plotters clamps points to its
+//! range and draws a NaN as a spike. A canvas draws with the shapes and fonts of plotters on the back end
 //! `compact_svg`.
 //!
-//! From the bottom up: `style`, `path`, `axis`, `text`; the parts of a figure (`elements`, `heat_map`,
-//! `figure`); `layout`; `canvas` on `compact_svg`; the drawing of contours, hatches, series and panels.
+//! The modules from the bottom up: `style`, `path`, `axis`, `text`; the parts of a figure (`elements`,
+//! `heat_map`, `figure`); `layout`; `canvas` on `compact_svg`; the drawing of contours, hatches, series and
+//! panels.
 //!
 //! # A figure of two panels
 //!

@@ -4,7 +4,7 @@ use portable_math as math;
 
 /// Sign for a missing value.
 pub const DASH: &str = "\u{2013}";
-/// Powers of ten that are written in plain digits.
+/// Powers of ten for which a number is written in plain digits.
 const PLAIN_POWERS: std::ops::RangeInclusive<i32> = -3..=4;
 const MINUS: &str = "\u{2212}";
 const TIMES_TEN: &str = "\u{b7}10";
@@ -27,7 +27,7 @@ pub fn round_to_digits(value: f64, count: usize) -> f64 {
     format!("{value:.*e}", count.saturating_sub(1)).parse().unwrap_or(value)
 }
 
-/// A number with all of its digits, as typed; with a power of ten instead of many zeros.
+/// A number with all of its digits, as typed in a file, and with a power of ten instead of many zeros.
 #[must_use]
 pub fn format_plain(value: f64) -> String {
     const WITHOUT_POWER: std::ops::Range<f64> = 1e-3..1e6;
@@ -50,7 +50,7 @@ pub fn format_digits(value: f64, count: usize) -> String {
     format_significant(value, count, |plain| plain)
 }
 
-/// The same without trailing zeros of a fraction.
+/// As [`format_digits`], but plain digits have no trailing zeros after the decimal point.
 pub fn format_trimmed(value: f64, count: usize) -> String {
     format_significant(value, count, trim_zeros)
 }
@@ -64,7 +64,7 @@ fn format_significant(value: f64, count: usize, shorten: impl Fn(&str) -> &str) 
         return DASH.to_owned();
     }
     let last = count.saturating_sub(1);
-    // the power once rounded: 0.0999 with two digits is 0.10
+    // the power of ten after rounding: 0.0999 with two digits is 0.10
     let scientific = format!("{value:.last$e}");
     match split_exponent(&scientific) {
         Some((_, power)) if PLAIN_POWERS.contains(&power) => {
@@ -80,7 +80,7 @@ pub fn format_decimals(value: f64, count: usize) -> String {
     if value.is_finite() { typeset(&format!("{value:.count$}")) } else { DASH.to_owned() }
 }
 
-/// Digits without trailing zeros times a power of ten.
+/// A number as digits, with at most `count` decimals and no trailing zeros, times a power of ten.
 pub fn format_scientific(value: f64, count: usize) -> String {
     let written = format!("{value:.count$e}");
     match split_exponent(&written) {
@@ -90,8 +90,8 @@ pub fn format_scientific(value: f64, count: usize) -> String {
     }
 }
 
-/// Typesets a number in program notation such as `-1.5e-7`: a true minus sign, none before zero, and a power
-/// of ten.
+/// Typesets a number in program notation such as `-1.5e-7`: with a true minus sign (none before zero) and a
+/// power of ten.
 pub fn typeset(written: &str) -> String {
     let (digits, power) = match split_exponent(written) {
         Some((digits, power)) => (digits, format!("{TIMES_TEN}{}", to_superscript(power))),
@@ -134,15 +134,15 @@ pub fn to_ascii(printed: &str) -> String {
 
 // A value with its standard deviation.
 
-/// Most decimals shown, beyond the accuracy of any measurement here; a smaller deviation is rounded up to the
-/// last one.
+/// Maximum number of decimals, more than the accuracy of any measurement here; a smaller deviation is rounded
+/// up to 1 in the last decimal.
 const MOST_DECIMALS: i32 = 6;
-/// Powers of ten of the larger of value and deviation that are written in plain digits.
+/// Powers of ten of the larger of value and deviation for which both are written in plain digits.
 const PLAIN_POWERS_WITH_SD: std::ops::RangeInclusive<i32> = -4..=6;
 
 /// A value with one digit of its standard deviation, in units of the last digit shown: `78.40(3)` for 78.40
-/// with 0.03 (JCGM 100:2008, 7.2.2). Four significant digits without a deviation (missing, zero or not
-/// finite); a dash for a value that is not finite.
+/// with 0.03 (JCGM 100:2008, 7.2.2). A value without a deviation (missing, zero or not finite) has four
+/// significant digits; a value that is not finite is a dash.
 pub fn format_with_sd(value: f64, sd: impl Into<Option<f64>>) -> String {
     if !value.is_finite() {
         return DASH.to_owned();

@@ -65,7 +65,7 @@ fn draw_outline(canvas: &mut Canvas, area: &CanvasArea, colour: Rgb) {
     canvas.draw_line(&area.outline(), colour, OUTLINE);
 }
 
-/// Draws a panel; a `live` one has groups that the script of a page can move.
+/// Draws a panel; a `live` panel has groups that the script of a page can move.
 pub(super) fn draw_panel(canvas: &mut Canvas, placed: &PanelLayout, live: bool) {
     let plot = panel_attributes(placed).filter(|_| live);
     let is_live = plot.is_some();
@@ -82,7 +82,7 @@ pub(super) fn draw_panel(canvas: &mut Canvas, placed: &PanelLayout, live: bool) 
     });
 }
 
-/// Canvas area of a span; `None` outside the axes.
+/// Canvas area of a span; `None` for a span outside the axes.
 fn shaded_span_area(placed: &PanelLayout, band: &ShadedSpan) -> Option<CanvasArea> {
     let (area, from, to) =
         (&placed.area, placed.x.canvas_position(band.from)?, placed.x.canvas_position(band.to)?);
@@ -143,7 +143,8 @@ fn draw_annotation(canvas: &mut Canvas, placed: &PanelLayout, text: &TextAnnotat
 
 /// Mean colour of the heat map under a text with its centre at `middle`; `None` without a heat map.
 fn mean_heat_colour(placed: &PanelLayout, text: &TextAnnotation, middle: f64) -> Option<Rgb> {
-    /// Sampled points to either side of the centre, and the fraction of the half width that they cover.
+    /// Number of sampled points on either side of the centre, and the fraction of the half width that they
+    /// cover.
     const PLACES: i32 = 3;
     const COVERED: f64 = 0.8;
     let heat = placed.panel.heat_map.as_ref()?;
@@ -168,7 +169,7 @@ fn draw_vertical_lines(canvas: &mut Canvas, placed: &PanelLayout) {
     }
 }
 
-/// Canvas position of a vertical line; `None` outside the axes.
+/// Canvas position of a vertical line; `None` for a line outside the axes.
 fn visible_position(placed: &PanelLayout, rule: &VerticalLine) -> Option<f64> {
     placed.x.canvas_position(rule.at).filter(|x| *x >= placed.area.left && *x <= placed.area.right)
 }
@@ -186,7 +187,7 @@ fn draw_top_labels(canvas: &mut Canvas, placed: &PanelLayout) {
     }
 }
 
-/// Draws a label above the panel where it has a row.
+/// Draws a label above the panel if it has a row.
 fn draw_top_label(
     canvas: &mut Canvas,
     placed: &PanelLayout,
@@ -201,7 +202,7 @@ fn draw_top_label(
     canvas.draw_text(&shorten_to_panel(text, &placed.x), at, look);
 }
 
-/// Canvas height of a row of labels above the panel.
+/// Canvas coordinate y of the bottom of a row of labels above the panel.
 fn label_row_y(placed: &PanelLayout, row: usize) -> f64 {
     placed.area.top - (0.6 + row as f64 * (SMALL_MM + 0.6)) * UNITS_PER_MM
 }
@@ -319,7 +320,8 @@ pub(super) fn draw_panel_letters(canvas: &mut Canvas, panels: &[PanelLayout]) {
     }
 }
 
-/// Draws the watermark in the corner of a panel with the fewest lines.
+/// Draws the watermark in the corner of a panel that has no text and the fewest lines, or else above the
+/// axes.
 pub(super) fn draw_watermark(canvas: &mut Canvas, placed: &PanelLayout) {
     let width = text_width(WATERMARK, SMALL_MM) * WIDE_LETTER / super::text::LETTER * UNITS_PER_MM;
     let (height, inside) = (SMALL_MM * 1.2 * UNITS_PER_MM, WATERMARK_INSET_MM * UNITS_PER_MM);
@@ -330,7 +332,7 @@ pub(super) fn draw_watermark(canvas: &mut Canvas, placed: &PanelLayout) {
         CanvasArea { left, top, right: left + width, bottom: top + height }
     };
     let corners = [(true, false), (false, false), (true, true), (false, true)].map(|(r, b)| corner(r, b));
-    // above the axes where every corner holds a number
+    // above the axes if every corner holds a text
     let over = CanvasArea { top: area.top - inside - height, bottom: area.top - inside, ..corners[0] };
     let full = |corner: &CanvasArea| count_texts_in(placed, corner) > 0;
     let free =
@@ -380,11 +382,11 @@ fn count_lines_in(placed: &PanelLayout, area: &CanvasArea) -> usize {
 pub(super) const WITHIN_AXES_CLASS: &str = "class=\"within\"";
 /// Group of the ticks of the time axis.
 pub(super) const TICKS_CLASS: &str = "class=\"ticks\"";
-/// Group of the labels above the axes, which belong to instants.
+/// Group of the labels above the axes, whose positions are times.
 pub(super) const OVER_AXES_CLASS: &str = "class=\"over\"";
 
-/// Attributes of the group of a time panel: edges and ends of its axes, and the label of the y axis; `None`
-/// for other panels.
+/// Attributes of the group of a time panel: canvas edges and ends of its axes, and the label of the y axis;
+/// `None` for other panels.
 pub(super) fn panel_attributes(placed: &PanelLayout) -> Option<String> {
     let (panel, area, x, y) = (placed.panel, &placed.area, &placed.x, &placed.y);
     let timed =
@@ -408,7 +410,7 @@ pub(super) fn panel_attributes(placed: &PanelLayout) -> Option<String> {
     })
 }
 
-/// Attributes of the group of a series, with its full data where the drawn points are thinned.
+/// Attributes of the group of a series, with its full data if the drawn points are thinned.
 pub(super) fn series_attributes(index: usize, series: &Series, placed: &PanelLayout) -> String {
     let label = encode_safe(&make_printable(&series.label)).into_owned();
     let detail = placed.panel.sampled_series.get(index).and_then(Option::as_ref);
@@ -416,11 +418,11 @@ pub(super) fn series_attributes(index: usize, series: &Series, placed: &PanelLay
     format!("class=\"series\" data-label=\"{label}\"{detail}")
 }
 
-/// Resolution of values over the y axis: an enlarged curve is as fine as a screen.
+/// Number of steps of a value over the y axis, enough for an enlarged curve on a screen.
 const VALUE_STEPS: f64 = 1e4;
 
-/// Start and step of the grid, offset and unit of the values, then each value as the difference to the one
-/// before; a dash where missing.
+/// Attributes with the full data: start and step of the grid, offset and unit of the values, and each value
+/// as the difference from the previous one; a dash for a missing value.
 fn sample_attributes(detail: &SampledSeries, placed: &PanelLayout) -> String {
     let (low, one) = (placed.y.low, (placed.y.high - placed.y.low) / VALUE_STEPS);
     let mut before = 0_i64;
@@ -429,7 +431,7 @@ fn sample_attributes(detail: &SampledSeries, placed: &PanelLayout) -> String {
         match value {
             Some(value) => {
                 let now = ((value - low) / one).round() as i64;
-                let _ = write!(values, "{} ", now - before); // (a string takes everything)
+                let _ = write!(values, "{} ", now - before); // (writing into a string cannot fail)
                 before = now;
             }
             None => values.push_str("- "),
@@ -447,7 +449,7 @@ fn sample_attributes(detail: &SampledSeries, placed: &PanelLayout) -> String {
 mod tests {
     use crate::{ChartAxis, Figure, Medium, Panel, Series, TextAnnotation};
 
-    /// Place of a text in a figure, canvas units.
+    /// Position of a text in a figure, canvas units.
     fn found(svg: &str, text: &str) -> Option<(f64, f64)> {
         let before =
             svg.split(&format!(">\n{text}\n</text>")).next().filter(|part| part.len() < svg.len())?;

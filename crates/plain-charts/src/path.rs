@@ -15,7 +15,7 @@ pub(super) struct CanvasArea {
 }
 
 impl CanvasArea {
-    /// Whether a point lies in it.
+    /// Whether a point lies inside or on the edge.
     pub(crate) fn contains(&self, (x, y): CanvasPoint) -> bool {
         x >= self.left && x <= self.right && y >= self.top && y <= self.bottom
     }
@@ -31,7 +31,7 @@ impl CanvasArea {
         ]
     }
 
-    /// The part of a segment inside (Liang and Barsky).
+    /// The part of a segment inside the area (Liang and Barsky).
     pub(crate) fn clip(&self, a: CanvasPoint, b: CanvasPoint) -> Option<(CanvasPoint, CanvasPoint)> {
         let (dx, dy) = (b.0 - a.0, b.1 - a.1);
         let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
@@ -67,8 +67,8 @@ pub(super) fn split_at_gaps(points: impl Iterator<Item = Option<CanvasPoint>>) -
     runs
 }
 
-/// Thins every column of `width` with more than four points to the first, lowest, highest and last. The line
-/// looks the same, and its length is bounded by the width of the canvas.
+/// Keeps only the first, lowest, highest and last point in every column of width `width` with more than four
+/// points. The line looks the same, and its number of points is bounded by the width of the canvas.
 pub(super) fn thin_points(run: &[CanvasPoint], width: f64) -> Vec<CanvasPoint> {
     let column = |p: &CanvasPoint| (p.0 / width).floor();
     let mut kept = Vec::new();
@@ -113,8 +113,8 @@ pub(super) fn clip_polygon(corners: &[CanvasPoint], area: &CanvasArea) -> Vec<Ca
     })
 }
 
-/// The corners that the side from `a` to `b` adds to the clipped polygon: its start where inside (depth of
-/// zero or more), and its crossing.
+/// The corners that the side from `a` to `b` adds to the clipped polygon: `a` if it is inside (at a depth of
+/// zero or more), and the point where the side crosses the edge, if it does.
 fn clip_polygon_side(a: CanvasPoint, b: CanvasPoint, depth_a: f64, depth_b: f64) -> [Option<CanvasPoint>; 2] {
     let crosses = (depth_a < 0.0) != (depth_b < 0.0);
     let share = depth_a / (depth_a - depth_b);

@@ -28,7 +28,8 @@ fn is_bidi_control(c: char) -> bool {
     matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
-/// Whether a character steers a terminal or is invalid in XML. None needs more than four hexadecimal digits.
+/// Whether a character controls a terminal or is invalid in XML. All of them have at most four hexadecimal
+/// digits.
 fn is_control(c: char) -> bool {
     c.is_control() || matches!(c, '\u{2028}' | '\u{2029}' | '\u{fffe}' | '\u{ffff}')
 }

@@ -13,7 +13,7 @@ use portable_math as math;
 const THINNING_COLUMN: f64 = 4.0;
 /// Half width of a symbol, canvas units.
 const SYMBOL_HALF_WIDTH: f64 = 0.8 * UNITS_PER_MM;
-/// Least radius of a single point of a line, canvas units.
+/// Smallest radius of a single point of a line, canvas units.
 const MIN_DOT_HALF_WIDTH: u32 = 4;
 /// Half width of the cap at the end of an error bar, canvas units.
 const CAP_HALF_WIDTH: f64 = 0.7 * UNITS_PER_MM;
@@ -70,7 +70,7 @@ pub(super) fn draw_marks(
     }
 }
 
-/// Draws a line over a wider white one, with dots where the points are far apart or single.
+/// Draws a line over a wider white one, with dots if its points are far apart or if it has only one.
 fn draw_edged_line(canvas: &mut Canvas, run: &[CanvasPoint], colour: Rgb, area: &CanvasArea) {
     const DOT: u32 = 5;
     const EDGE: u32 = 3;
@@ -148,7 +148,7 @@ fn is_strictly_inside(area: &CanvasArea, (x, y): CanvasPoint) -> bool {
     x > area.left && x < area.right && y > area.top && y < area.bottom
 }
 
-/// The surface between two curves.
+/// Draws the surface between two curves.
 pub(super) fn draw_ribbon(canvas: &mut Canvas, placed: &PanelLayout, ribbon: &Ribbon) {
     let corners = |(x, low, high): (f64, f64, f64)| {
         let [low, high] = [low, high].map(|end| placed.y.canvas_position_or_low(end));

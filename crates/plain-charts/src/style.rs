@@ -4,8 +4,8 @@ use super::path::CanvasPoint;
 use portable_math as math;
 use std::fmt::Write;
 
-/// Colours for colour-blind readers (Okabe and Ito). The yellow is left out, as it vanishes on white; orange
-/// and sky blue are darker for a contrast of 3 to 1 of thin lines.
+/// Colours for colour-blind readers (Okabe and Ito). The yellow is left out, because it vanishes on white;
+/// orange and sky blue are darkened to give thin lines a contrast of 3 to 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[allow(missing_docs)]
 pub enum Colour {
@@ -36,7 +36,7 @@ impl Colour {
         Self::Grey,
     ];
 
-    /// Hexadecimal colour of SVG.
+    /// The colour in the hexadecimal notation of SVG.
     pub fn hex(self) -> String {
         format_hex(self.rgb())
     }
@@ -144,7 +144,7 @@ pub(super) const FRAME: Rgb = (0x33, 0x33, 0x33);
 pub(super) const NEAR_WHITE: Rgb = (0xFE, 0xFE, 0xFE);
 const NEAR_BLACK: Rgb = (0x01, 0x01, 0x01);
 
-/// Hexadecimal colour of SVG.
+/// A colour in the hexadecimal notation of SVG.
 pub(super) fn format_hex((red, green, blue): Rgb) -> String {
     format!("#{red:02X}{green:02X}{blue:02X}")
 }
@@ -174,14 +174,14 @@ const VIRIDIS: [Rgb; 11] = [
     (0xBB, 0xDF, 0x27),
     (0xFD, 0xE7, 0x25),
 ];
-/// Blue, near white, vermilion: distinct for the colour-blind. The ends differ by one from the line colours,
-/// which change in the dark theme.
+/// Blue, near white, vermilion: distinct for the colour-blind. The end colours differ by one from the line
+/// colours, so that the dark theme does not replace them.
 const DIVERGING: [Rgb; 5] =
     [(0x00, 0x72, 0xB1), (0x80, 0xB8, 0xD8), (0xF7, 0xF7, 0xF5), (0xEA, 0xAE, 0x80), (0xD5, 0x5E, 0x01)];
 /// Colour of missing values: a grey that neither map contains.
 pub(super) const NO_VALUE: Rgb = (0xE4, 0xE4, 0xE4);
 
-/// Colour at a fraction from 0 to 1; beyond, that of the nearer end.
+/// Colour at a fraction of the map from 0 to 1; outside this range, the colour of the nearer end.
 pub(super) fn sample_colour_map(map: ColourMap, share: f64) -> Rgb {
     let stops: &[Rgb] = match map {
         ColourMap::Viridis => &VIRIDIS,
@@ -194,7 +194,7 @@ pub(super) fn sample_colour_map(map: ColourMap, share: f64) -> Rgb {
     (between(a.0, b.0), between(a.1, b.1), between(a.2, b.2))
 }
 
-/// Relative luminance, 0 to 1 (WCAG 2.2, with its curve as a power of 2.2).
+/// Relative luminance, 0 to 1 (WCAG 2.2, with its transfer curve approximated by a power of 2.2).
 fn luminance((red, green, blue): Rgb) -> f64 {
     let linear = |part: u8| math::powf(f64::from(part) / 255.0, 2.2);
     0.2126 * linear(red) + 0.7152 * linear(green) + 0.0722 * linear(blue)
@@ -207,7 +207,8 @@ pub(super) fn contrast(a: Rgb, b: Rgb) -> f64 {
     a.max(b) / a.min(b)
 }
 
-/// Near white or near black, whichever has more contrast on a colour; they are equal at a luminance of 0.18.
+/// Near white or near black, whichever has more contrast with a colour; the contrasts are equal at a
+/// luminance of 0.18.
 pub(super) fn readable_on(colour: Rgb) -> Rgb {
     if luminance(colour) > 0.18 { NEAR_BLACK } else { NEAR_WHITE }
 }
@@ -220,7 +221,7 @@ pub(super) const UNITS_PER_MM: f64 = 15.0;
 pub const FULL_WIDTH_MM: f64 = 170.0;
 /// Width of a figure in one column, mm.
 pub const COLUMN_WIDTH_MM: f64 = 85.0;
-/// Greatest height of a figure in print, mm: Springer's journals, among the strictest, allow 234 mm.
+/// Largest height of a figure in print, mm: Springer's journals, among the strictest, allow 234 mm.
 pub const MAX_HEIGHT_MM: f64 = 230.0;
 /// Size of labels, mm (7.5 pt, readable at print size).
 pub(super) const TEXT_MM: f64 = 2.6;
@@ -229,10 +230,10 @@ pub(super) const SMALL_MM: f64 = 2.3;
 pub(super) const LINE_MM: f64 = 4.0;
 pub(super) const EDGE_MM: f64 = 2.0;
 pub(super) const TICK_MM: f64 = 1.0;
-/// Least distance of labelled ticks, mm.
+/// Smallest distance of labelled ticks, mm.
 pub(super) const X_TICKS_MM: f64 = 18.0;
 pub(super) const Y_TICKS_MM: f64 = 5.5;
-/// Least distance of labelled ticks on a logarithmic axis, mm.
+/// Smallest distance of labelled ticks on a logarithmic axis, mm.
 pub(super) const X_LOG_TICKS_MM: f64 = 7.0;
 pub(super) const Y_LOG_TICKS_MM: f64 = 3.6;
 /// Opacity of shaded surfaces: pale enough for lines and grid to stay readable.
@@ -258,7 +259,7 @@ const DARK_COLOURS: [(Rgb, Rgb); 13] = [
     ((0x80, 0x80, 0x80), (0xA6, 0xA6, 0xA6)),
 ];
 
-/// A style element that gives all figures of a page their dark colours where the reader prefers a dark theme.
+/// A style element that gives all figures of a page their dark colours if the reader prefers a dark theme.
 pub(crate) fn dark_theme_style() -> String {
     let mut rules = String::new();
     for (light, dark) in DARK_COLOURS {
@@ -267,7 +268,7 @@ pub(crate) fn dark_theme_style() -> String {
             rules,
             "svg [fill=\"{light}\"]{{fill:{dark}}}svg \
                            [stroke=\"{light}\"]{{stroke:{dark}}}"
-        ); // (a string takes everything)
+        ); // (writing into a string cannot fail)
     }
     format!("<style>@media screen and (prefers-color-scheme:dark){{{rules}}}</style>\n")
 }

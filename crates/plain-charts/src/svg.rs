@@ -1,4 +1,4 @@
-//! A figure as SVG text for a medium, with or without something drawn over it.
+//! A figure as SVG text for a medium, with or without an overlay.
 
 use crate::axis::CanvasAxis;
 use crate::canvas::Canvas;
@@ -58,8 +58,8 @@ impl Figure {
         }
     }
 
-    /// Height in a medium, mm. In print, panels are lowered to at most
-    /// [`MAX_HEIGHT_MM`] as far as they stay legible.
+    /// Height in a medium, mm. In print, panels are lowered until the figure is at most [`MAX_HEIGHT_MM`]
+    /// high, as far as they stay legible.
     #[must_use]
     pub fn height_mm(&self, medium: Medium) -> f64 {
         FigureLayout::new(&self.resize_for_medium(medium)).height
@@ -75,7 +75,7 @@ impl Figure {
         limit_height(bare, MAX_HEIGHT_MM)
     }
 
-    /// Renders a figure as laid out for a medium, with the title and name of `self`.
+    /// Renders `laid_out`, this figure resized for a medium, with the title and name of `self`.
     fn render_layout(&self, laid_out: &Self, style: &str, marked: bool) -> String {
         let parts = [self.title.as_str(), &self.subtitle].into_iter();
         let name: Vec<&str> = parts.filter(|s| !s.is_empty()).collect();

@@ -43,7 +43,7 @@ fn lines(svg: &str, colour: &str, width: u32) -> Vec<Vec<(f64, f64)>> {
     paths.flat_map(|data| data.trim_end_matches("\"/>").split('M').skip(1)).map(points).collect()
 }
 
-/// A start and steps from there.
+/// The points of path data, which hold a start and relative steps.
 fn points(data: &str) -> Vec<(f64, f64)> {
     let spaced = data.replace('l', " ").replace('-', " -");
     let numbers: Vec<f64> = spaced.split_whitespace().map(|n| n.parse().unwrap()).collect();
@@ -148,7 +148,7 @@ fn the_same_figure_gives_the_same_bytes_also_in_one_column() {
 
 #[test]
 fn every_point_is_drawn_also_one_between_two_gaps() {
-    // of three frames the middle one alone, and two frames that are neighbours
+    // two single points, at 2 and 8, and a pair of neighbours, at 5 and 6
     let at = |i: u32| Some((0.1 * f64::from(i), 0.5));
     let alone = |mark| {
         let mut drawn = figure(vec![None, at(2), None, at(5), at(6), None, at(8)], "y");

@@ -4,13 +4,14 @@ use super::style::{SMALL_MM, TEXT_MM};
 use crate::printable::make_printable;
 use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 
-/// Mean width of a sans-serif letter over the font size.
+/// Ratio of the mean width of a sans-serif letter to the font size.
 pub(super) const LETTER: f64 = 0.58;
-/// The same for the widest fallback font of browsers (DejaVu Sans), plain and bold; lines must fit in it.
+/// The same ratio for the widest fallback font of browsers (DejaVu Sans), plain and bold; lines must fit in
+/// this font.
 pub(super) const WIDE_LETTER: f64 = 0.63;
 pub(super) const WIDE_BOLD_LETTER: f64 = 0.7;
 const ELLIPSIS: char = '\u{2026}';
-/// Largest fraction of a text in the first of two lines.
+/// Largest fraction of a text that stands in the first of two lines.
 const NEAR_MIDDLE: f64 = 0.65;
 
 /// Estimated width of text, mm; ideographs and emoji count twice, combining marks not at all.
@@ -62,7 +63,7 @@ pub(super) fn truncate_text(text: &str, size_mm: f64, width_mm: f64) -> String {
     format!("{}{ELLIPSIS}", kept.trim_end())
 }
 
-/// Text in one line of at most `width_mm`, or in two lines of small letters, the second cut where needed.
+/// Text in one line of at most `width_mm`, or in two lines of small letters, the second cut if necessary.
 pub(super) fn wrap_in_two_lines(text: &str, width_mm: f64) -> String {
     let text = make_printable(text);
     if text.width() as f64 * WIDE_LETTER * TEXT_MM <= width_mm {

@@ -1,9 +1,9 @@
 //! Functions whose last bit is the same on every machine, and draws from the normal distribution.
 //!
-//! The functions of `f64` are those of the system's library, which rounds as it likes: glibc has one version
-//! for processors with fused multiply-add and one for those without. The ones here are made of additions,
-//! multiplications and divisions alone, whose rounding IEEE 754 fixes. So is that of `sqrt`, `mul_add`,
-//! `floor` and the like, which stay methods.
+//! The functions of `f64` call the system's library, whose rounding is not specified: glibc has one version
+//! for processors with fused multiply-add and another for those without. The functions here consist only of
+//! additions, multiplications and divisions, whose rounding IEEE 754 specifies. It also specifies that of
+//! `sqrt`, `mul_add`, `floor` and the like, which are used as methods of `f64`.
 //!
 //! ```
 //! // the same bits wherever it runs
@@ -45,21 +45,21 @@ pub fn tan(x: f64) -> f64 {
     libm::tan(x)
 }
 
-/// The angle of a sine, rad.
+/// The inverse sine, rad.
 #[must_use]
 #[inline]
 pub fn asin(x: f64) -> f64 {
     libm::asin(x)
 }
 
-/// The angle of a cosine, rad.
+/// The inverse cosine, rad.
 #[must_use]
 #[inline]
 pub fn acos(x: f64) -> f64 {
     libm::acos(x)
 }
 
-/// The angle of a tangent, rad.
+/// The inverse tangent, rad.
 #[must_use]
 #[inline]
 pub fn atan(x: f64) -> f64 {
@@ -94,7 +94,7 @@ pub fn ln(x: f64) -> f64 {
     libm::log(x)
 }
 
-/// `ln(1 + x)`, exact for small `x`.
+/// `ln(1 + x)`, accurate for small `x`.
 #[must_use]
 #[inline]
 pub fn ln_1p(x: f64) -> f64 {
@@ -138,7 +138,7 @@ pub fn powi(x: f64, n: i32) -> f64 {
     }
 }
 
-/// `sqrt(x^2 + y^2)` without overflow on the way.
+/// `sqrt(x^2 + y^2)` without overflow of the squares.
 #[must_use]
 #[inline]
 pub fn hypot(x: f64, y: f64) -> f64 {

@@ -1,6 +1,7 @@
-//! Draws from the standard normal distribution by the ziggurat of Doornik ("An improved ziggurat method to
-//! generate normal random samples", 2005), in the layers of the crate `rand_distr` and with its use of random
-//! bits: the draws are the same but for the last bits of those beyond 3.65, where a logarithm is needed.
+//! Draws from the standard normal distribution by the ziggurat method of Doornik ("An improved ziggurat
+//! method to generate normal random samples", 2005). Layers and use of random bits are those of the crate
+//! `rand_distr`: the draws are the same, except for the last bits of draws beyond 3.65, which need a
+//! logarithm.
 
 use super::{exp, ln};
 use rand::Rng;
@@ -44,7 +45,7 @@ fn draw_tail<R: Rng + ?Sized>(generator: &mut R) -> f64 {
     }
 }
 
-/// The density, 1 at its top.
+/// The density of the normal distribution, scaled to a maximum of 1.
 fn relative_density(x: f64) -> f64 {
     exp(-x * x / 2.0)
 }
@@ -52,8 +53,8 @@ fn relative_density(x: f64) -> f64 {
 /// Exponent bits of the numbers from 2 to 4; 52 random bits are the mantissa.
 const FROM_TWO: u64 = 0x4000_0000_0000_0000;
 
-/// Edges of 256 layers of one area. The lowest has the tail from its edge on, `EDGES[1]`; `EDGES[0]` is that
-/// of a box of the same area.
+/// Edges of 256 layers of equal area. The lowest layer has the edge `LAYER_EDGES[1]` and includes the tail
+/// beyond it; `LAYER_EDGES[0]` is the edge of a box of the same area.
 #[rustfmt::skip] // fewer lines
 const LAYER_EDGES: [f64; 257] = [
     3.91075795953709, 3.654152885361009, 3.4492782985609645, 3.320244733839166, 3.224575052047029,
@@ -129,7 +130,7 @@ mod tests {
             assert!((found - expected).abs() <= 4.0 * f64::EPSILON, "{found:e} {expected:e}");
             assert!(found == expected || expected.abs() > LAYER_EDGES[1], "{found:e} {expected:e}");
         }
-        // 2.58e-4 of all
+        // expected: 2.58e-4 of all draws
         assert!((450..600).contains(&beyond), "{beyond} of 2,000,000 in the tail");
         assert!(differing <= beyond / 2, "{differing} of {beyond}");
     }

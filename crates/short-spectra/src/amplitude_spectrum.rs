@@ -1,4 +1,4 @@
-//! A record after its transform, from which many bands are read.
+//! The transform of a record, in which the components of many bands can be found.
 
 use super::component::Component;
 use super::error::{SpectrumError, check_band, check_record};
@@ -15,18 +15,18 @@ pub struct WindowedTransform {
     amplitude_m: Vec<f64>,
     frame_rate_hz: f64,
     trend: Trend,
-    /// Amplitude of rounding, m.
+    /// Amplitude of rounding errors, m.
     rounding_m: f64,
-    /// Whether the bins are too far apart for a parabola.
+    /// Whether the bins are too far apart to locate a peak by a parabola.
     coarse: bool,
 }
 
 impl WindowedTransform {
-    /// Transforms samples, m, one a frame (`None` where a frame has no value). The number of components in
+    /// Transforms samples, m, one per frame (`None` for a frame without a value). The number of components in
     /// the settings has no effect here.
     ///
     /// # Errors
-    /// [`SpectrumError`] when the record, the rate or the settings' band cannot give one.
+    /// [`SpectrumError`] if the record, the frame rate or the band of the settings allows no spectrum.
     pub fn new(
         samples: &[Option<f64>],
         frame_rate_hz: f64,
@@ -57,16 +57,16 @@ impl WindowedTransform {
     /// The components of a band, Hz, largest amplitude first.
     ///
     /// # Errors
-    /// [`SpectrumError::Band`] where the band holds no frequency of the spectrum.
+    /// [`SpectrumError::Band`] if the band contains no frequency of the spectrum.
     pub fn components(&self, band_hz: (f64, f64)) -> Result<Vec<Component>, SpectrumError> {
         self.check_band(band_hz)?;
         Ok(self.find_components(band_hz, MAX_COMPONENTS).1)
     }
 
-    /// Whether a band, Hz, holds a frequency of the spectrum.
+    /// Checks that a band, Hz, contains a frequency of the spectrum.
     ///
     /// # Errors
-    /// [`SpectrumError::Band`] where it does not.
+    /// [`SpectrumError::Band`] if it contains none.
     pub fn check_band(&self, band_hz: (f64, f64)) -> Result<(), SpectrumError> {
         check_band(Some(band_hz), self.frame_rate_hz)
     }
@@ -132,17 +132,17 @@ impl WindowedTransform {
 pub struct Spectrum {
     /// Frequencies of the bins, Hz, from 0 to half the frame rate.
     pub frequency_hz: Vec<f64>,
-    /// Amplitude of a sine that peaks in each bin, m; with many gaps it reads low (9 % at 900 Hz and 5,000
-    /// frames/s with 40 % missing at random), where the components do not.
+    /// Amplitude of a sine that peaks in each bin, m. With many gaps it is too small (by 9 % at 900 Hz and
+    /// 5,000 frames/s with 40 % of the frames missing at random), unlike the amplitudes of the components.
     pub amplitude_m: Vec<f64>,
     /// Root mean square of the noise in a bin, m, from the median over the band.
     pub noise_floor_m: f64,
-    /// One over the record's length, Hz: finer structure is not in the data.
+    /// Reciprocal of the length of the record, Hz; the data contain no finer structure.
     pub resolution_hz: f64,
-    /// Equivalent noise bandwidth of the window as weighted by the frames present, Hz (1.5 resolutions
-    /// without gaps).
+    /// Equivalent noise bandwidth of the window over the frames present, Hz (1.5 times the resolution without
+    /// gaps).
     pub noise_bandwidth_hz: f64,
-    /// Share of the frames that hold a value.
+    /// Fraction of the frames that have a value.
     pub present: f64,
     /// The components, largest amplitude first.
     pub components: Vec<Component>,
@@ -156,8 +156,8 @@ impl Spectrum {
         resolvable.find(|c| c.frequency_hz >= low_hz && c.frequency_hz <= high_hz)
     }
 
-    /// Root mean square of the motion between two frequencies, m: Parseval's sum over the bins, each counted
-    /// once for its noise bandwidth.
+    /// Root mean square of the motion between two frequencies, m: Parseval's sum over the bins, corrected for
+    /// the noise bandwidth of the window.
     #[must_use]
     pub fn rms_in_band_m(&self, low_hz: f64, high_hz: f64) -> f64 {
         let bin_hz = self.frequency_hz.get(1).copied().unwrap_or(0.0);

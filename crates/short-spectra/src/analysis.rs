@@ -1,5 +1,5 @@
-//! The complete analysis of a record: its parts, how well each is known, and how far its frequency can be
-//! trusted.
+//! The complete analysis of a record: its parts, their standard deviations, and the reliability of each
+//! frequency.
 
 mod component_estimates;
 mod long_record;
@@ -19,39 +19,39 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 
 /// Longest record that is fitted, frames: three seconds at 5,000 frames/s, which take about one second. The
-/// time grows faster than the record; longer ones are read by their windowed periodogram.
+/// computing time grows faster than the length; longer records are analysed by their windowed periodogram.
 pub const LONGEST_DECOMPOSED: usize = 1 << 14;
 
-/// A record taken apart.
+/// A record decomposed into trend, components and residual.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpectralAnalysis {
-    /// Amplitude spectrum of the record less what was removed, with the components.
+    /// Amplitude spectrum of the record without the removed parts, with the components.
     pub spectrum: Spectrum,
-    /// Frames left out at the start because they hold a step that no model describes. All fields below are of
-    /// the frames after them.
+    /// Frames left out at the start because they contain a step that no model describes. All fields below
+    /// refer to the frames after them.
     pub skipped_frames: usize,
-    /// Distance between frames that may have a value: 1, or more where only every second, third ... has one.
+    /// Distance between frames that may have a value: 1, or more if only every second, third ... frame has
+    /// one.
     pub stride: usize,
-    /// Trend and relaxations removed before the components were read.
+    /// Trend and relaxations that were removed before the components were estimated.
     pub removed: RemovedTrend,
-    /// Trend and relaxations in every frame, m.
+    /// Sum of trend and relaxations in every frame, m.
     pub removed_m: Vec<f64>,
-    /// Amplitude that the removed parts would have shown in each bin of the spectrum, m.
+    /// Amplitude that the removed parts would have in each bin of the spectrum, m.
     pub leakage_m: Vec<f64>,
     /// The sum of the components in every frame, m; zero for a long record.
     pub model_m: Vec<f64>,
-    /// What is left in each frame, m.
+    /// Residual in each frame, m.
     pub residual_m: Vec<Option<f64>>,
-    /// The components that are oscillations, as they are listed: all but one that drifts; none for a
-    /// long record.
+    /// The oscillations among the components, except one that drifts; empty for a long record.
     pub oscillations: Vec<Oscillation>,
-    /// Course of the strongest component above the slow ones, where there is one.
+    /// Course of the strongest component above the slow ones, if there is one.
     pub ridge: Option<Ridge>,
-    /// Power density of the record less what was removed; `None` where gaps leave no room for tapers, and for
-    /// a long record.
+    /// Power density of the record without the removed parts; `None` if gaps leave no room for tapers, and
+    /// for a long record.
     pub multitaper: Option<Multitaper>,
     /// Noise floor in each bin of the spectrum, m, from the multitaper density of the residual; empty without
-    /// one.
+    /// such a density.
     pub noise_floor_m: Vec<f64>,
 }
 
@@ -60,13 +60,13 @@ pub struct SpectralAnalysis {
 pub struct Oscillation {
     /// Frequency, Hz.
     pub frequency_hz: f64,
-    /// Decay of the amplitude, 1/s; zero for a steady one.
+    /// Decay of the amplitude, 1/s; zero for a steady oscillation.
     pub decay_per_s: f64,
-    /// Amplitude where it begins, m.
+    /// Amplitude at the start of the oscillation, m.
     pub amplitude_m: f64,
-    /// Phase of the cosine where the record starts, rad.
+    /// Phase of the cosine at the start of the record, rad.
     pub phase_rad: f64,
-    /// Where it begins, s from the record's first frame; 0 for one that is there from the start.
+    /// Start of the oscillation, s from the record's first frame; 0 if it is present from that frame on.
     pub begins_s: f64,
 }
 
@@ -86,12 +86,12 @@ impl Oscillation {
     }
 }
 
-/// What was removed before the components were read.
+/// Parts that were removed before the components were estimated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RemovedTrend {
     /// The trend.
     pub detrend: Detrend,
-    /// Exponential relaxations removed with it.
+    /// Number of exponential relaxations removed with the trend.
     pub relaxations: usize,
 }
 
@@ -106,20 +106,21 @@ impl std::fmt::Display for RemovedTrend {
     }
 }
 
-/// Polynomials with more columns bend as fast as a component, so the frames after a step are tried instead.
+/// Largest number of columns of a smooth trend; with more, it bends as fast as a component, so the frames
+/// after a step are tried instead.
 const MAX_SMOOTH_TREND_COLUMNS: usize = 20;
 
 impl SpectralAnalysis {
-    /// The record less what was removed, m.
+    /// The record without the removed parts, m.
     pub fn detrended_m(&self) -> Vec<Option<f64>> {
         self.residual_m.iter().zip(&self.model_m).map(|(left, m)| left.map(|left| left + m)).collect()
     }
 
-    /// Analyses a record. With `settings.detrend` `None` the trend is chosen from the record. Where only
-    /// every second, third ... frame has a value, the record is read at that lower rate.
+    /// Analyses a record. If `settings.detrend` is `None`, the trend is chosen from the record. If only every
+    /// second, third ... frame has a value, the record is analysed at that lower rate.
     ///
     /// # Errors
-    /// [`SpectrumError`] when the record, the rate or the band cannot give one.
+    /// [`SpectrumError`] if the record, the frame rate or the band allows no spectrum.
     pub fn from_record(record: &SampledRecord, settings: &SpectrumSettings) -> Result<Self, SpectrumError> {
         let Some(kept) = decimation::find_stride(record.samples) else {
             return Self::analyse_frames(record, settings);
@@ -131,7 +132,7 @@ impl SpectralAnalysis {
         Ok(analysis.interpolate_to_record(record, kept))
     }
 
-    /// The analysis of the kept frames as one of the whole record; removed trend and components are
+    /// Extends the analysis of the kept frames to the whole record; removed trend and components are
     /// interpolated linearly between kept frames.
     fn interpolate_to_record(self, record: &SampledRecord, (first, stride): (usize, usize)) -> Self {
         let left_out = first + stride * self.skipped_frames;
@@ -176,9 +177,9 @@ impl SpectralAnalysis {
         Ok(best.with_densities(record.frame_rate_hz))
     }
 
-    /// Analyses each stretch between the steps of a piece: the first frames that leave noise only, or else
-    /// the first whose trend has no fast waves. A trend through a step takes many times as long as the
-    /// oscillation that the step starts.
+    /// Analyses each stretch between the steps of a piece. For each stretch it takes the first range of
+    /// frames that leaves only noise, or else the first whose trend has no fast waves. Fitting a trend
+    /// through a step takes many times as long as fitting the oscillation that the step starts.
     fn analyse_between_steps(record: &SampledRecord, settings: &SpectrumSettings) -> Vec<Self> {
         let of_stretch = |tries: &Vec<Range<usize>>| {
             let mut parts =
@@ -194,7 +195,7 @@ impl SpectralAnalysis {
         step_detection::stretches_between_steps(record.samples).iter().filter_map(of_stretch).collect()
     }
 
-    /// Some frames of a record, if they can be analysed and their trend has no fast waves.
+    /// Analyses some frames of a record; `None` if that fails or if their trend has fast waves.
     fn read_part(
         record: &SampledRecord,
         settings: &SpectrumSettings,
@@ -223,7 +224,7 @@ impl SpectralAnalysis {
         let smooth = |fit: &ModelFit| fit.model.trend().column_count() <= MAX_SMOOTH_TREND_COLUMNS;
         if let Some((drifting, range)) = drift {
             if let Some(pair) = search.split_into_pair(&fit, &range) {
-                // two that beat look like one that drifts
+                // two oscillations that beat look like one that drifts
                 course = course.map(|course| DriftCourse { range: None, ..course });
                 fit = search.run_second_pass(pair).ok_or_else(too_few)?;
             } else {
@@ -231,7 +232,7 @@ impl SpectralAnalysis {
                 fit = search.select_without_drift(&fit).ok_or_else(too_few)?;
             }
         } else if !search.trend_grows || smooth(&fit) {
-            // where no trend describes a step, a second pass would split everything into pieces
+            // if no trend describes a step, a second pass would split everything into pieces
             fit = search.run_second_pass(fit).ok_or_else(too_few)?;
         }
         let exhausted = search.trend_grows && fit.model.trend().next_richer().is_none();
@@ -244,7 +245,8 @@ impl SpectralAnalysis {
         Ok(Attempt { leaves_only_noise, trend_competes, analysis })
     }
 
-    /// With the power density, the noise floor and each component's chance of being a steady line.
+    /// Adds the power density, the noise floor and, for each component, the probability that noise gives so
+    /// steady a line.
     fn with_densities(mut self, frame_rate_hz: f64) -> Self {
         let padded = 2 * (self.spectrum.amplitude_m.len() - 1);
         let density = |samples: &[Option<f64>]| {
@@ -268,8 +270,8 @@ impl SpectralAnalysis {
     }
 }
 
-/// An analysis, whether it leaves nothing but noise, and whether its trend has waves as fast as a component:
-/// trend and component then oscillate against each other, also where the record is flat.
+/// An analysis, whether it leaves only noise, and whether its trend has waves as fast as a component; trend
+/// and component then cancel each other even where the record is flat.
 struct Attempt {
     leaves_only_noise: bool,
     trend_competes: bool,

@@ -1,6 +1,6 @@
-//! Alternatives to a second oscillation near a first one: a frequency that drifts evenly, or an amplitude
-//! that falls linearly. Neither is a term of the fit. Where one explains as much as a second oscillation
-//! does, the second is dropped.
+//! Alternatives to a second oscillation near a first one: a frequency that drifts at a constant rate, or an
+//! amplitude that falls linearly. Neither is a term of the fit. If one of them explains as much as a second
+//! oscillation does, the second oscillation is dropped.
 
 use super::least_squares::SineTerm;
 use super::model_selection::{ModelFit, ModelSelector};
@@ -8,28 +8,30 @@ use super::second_pass::DoubtfulTerm;
 use portable_math as math;
 use std::f64::consts::{PI, TAU};
 
-/// Steps of a search for the best shape; each halving is one.
+/// Maximum number of steps of the search for the best shape; each halving counts as a step.
 const MOST_STEPS: usize = 40;
-/// First steps of frequency and of its change over the record, cycles, and of nepers.
+/// Initial step sizes of the frequency and of its change over the record, cycles, and of the decay, nepers.
 const FIRST_STEPS: [f64; 3] = [0.3, 1.0, 1.0];
 /// Parameters of a term, and extra parameters of an alternative.
 const TERM_PARAMETERS: f64 = 4.0;
 const EXTRA_PARAMETERS: f64 = 1.0;
-/// Distance of terms that may be pieces of one oscillation, resolutions.
+/// Distance, resolutions, within which terms may be parts of one oscillation.
 const NEARBY_RESOLUTIONS: f64 = 5.0;
-/// Blocks that represent the record: a difference of a few cycles turns little within one block.
+/// Number of blocks that represent the record: over one block, a difference of a few cycles changes the phase
+/// little.
 const BLOCKS: usize = 128;
-/// Limits of the time, in records, in which an amplitude may fall to zero.
+/// Limits of the time, in lengths of the record, in which an amplitude may fall to zero.
 const LINEAR_DECAY_ENDS: (f64, f64) = (0.1, 4.0);
 
-/// An oscillation whose frequency or amplitude changes evenly.
+/// An oscillation whose frequency or amplitude changes at a constant rate.
 #[derive(Clone, Copy)]
 struct UnsteadyTone {
-    /// Frequency in the middle, cycles in the record.
+    /// Frequency in the middle of the record, cycles in the record.
     cycles: f64,
-    /// Its change over the record, cycles.
+    /// Change of the frequency over the record, cycles.
     change: f64,
-    /// Nepers over the record, or the time, in records, in which the amplitude falls to zero.
+    /// Decay over the record, nepers, or the time in which the amplitude falls to zero, in lengths of the
+    /// record.
     decay: EnvelopeDecay,
 }
 
@@ -49,7 +51,7 @@ impl UnsteadyTone {
         Self { cycles: start.cycles + cycles, change, decay }
     }
 
-    /// Envelope and phase, rad, at a time `s` in records.
+    /// Envelope and phase, rad, at a time `s` in lengths of the record.
     fn envelope_and_phase(&self, s: f64) -> (f64, f64) {
         let envelope = match self.decay {
             EnvelopeDecay::Exponential(nepers) => math::exp(-nepers * s),
@@ -60,14 +62,15 @@ impl UnsteadyTone {
 }
 
 impl ModelSelector<'_> {
-    /// Terms that leave more than noise around them.
+    /// Indices of the terms that leave more than noise around them.
     pub(super) fn terms_with_residual(&self, fit: &ModelFit) -> Vec<usize> {
         let terms = fit.model.terms();
         let leaves = |k: &usize| terms[*k].cycles > 0.0 && self.leaves_peak(fit, &terms[*k]);
         (0..terms.len()).filter(leaves).collect()
     }
 
-    /// The same terms, each with the criterion that its replacement must fall below.
+    /// The terms that leave more than noise around them, each with the criterion that its replacement must
+    /// fall below.
     pub(super) fn doubtful_terms(&self, fit: &ModelFit) -> Vec<DoubtfulTerm> {
         let least = self.bic_of(&fit.model);
         let criterion = |k: usize| self.alternatives_criterion(fit, k).min(least);
@@ -75,11 +78,12 @@ impl ModelSelector<'_> {
         terms.map(|k| DoubtfulTerm { index: k, criterion: criterion(k) }).collect()
     }
 
-    /// Terms that may be pieces of one: an even drift or fall in their place explains more.
+    /// Indices of terms that may be parts of one oscillation: in their place, a constant drift or a linear
+    /// fall explains more.
     pub(super) fn unsteady_terms(&self, fit: &ModelFit) -> Vec<usize> {
         let terms = fit.model.terms();
         let steady = self.bic_of(&fit.model);
-        // a term without neighbours is one line in any case
+        // a term without neighbours is a single line in any case
         let in_pieces =
             |k: &usize| nearby_terms(terms, *k).len() > 1 && self.alternatives_criterion(fit, *k) < steady;
         let whole: Vec<usize> = self.terms_with_residual(fit).into_iter().filter(in_pieces).collect();
@@ -87,8 +91,8 @@ impl ModelSelector<'_> {
         fit.model.oscillations().into_iter().filter(is_piece).collect()
     }
 
-    /// The criterion with an evenly drifting or fading oscillation in the place of term `k`, or of `k` and
-    /// its neighbours.
+    /// The criterion with an oscillation of constant drift or linear fall in the place of term `k`, or of `k`
+    /// and its neighbours.
     pub(super) fn alternatives_criterion(&self, fit: &ModelFit, k: usize) -> f64 {
         let group = nearby_terms(fit.model.terms(), k);
         let alone = self.replacement_criterion(fit, k, &[k]);
@@ -126,7 +130,7 @@ impl ModelSelector<'_> {
         self.bic_with(parts, alone(false).min(alone(true)), EXTRA_PARAMETERS - less)
     }
 
-    /// Reduction of the sum of squares by a shape with the best amplitude and phase, m^2.
+    /// Reduction of the sum of squares by a shape with its best amplitude and phase, m^2.
     fn power_of_alternative(&self, values: &[f64], shape: &UnsteadyTone) -> f64 {
         let add = |[cc, cs, ss, xc, xs]: [f64; 5], (i, x): (usize, &f64)| {
             let (envelope, phase) = shape.envelope_and_phase((i as f64 + 0.5) / values.len() as f64);
@@ -158,7 +162,7 @@ impl ModelSelector<'_> {
     }
 }
 
-/// The oscillations that may be pieces of one with term `k`.
+/// The oscillations that may be parts of one oscillation with term `k`.
 pub(super) fn nearby_terms(terms: &[SineTerm], k: usize) -> Vec<usize> {
     let near = |j: &usize| terms[*j].cycles > 0.0 && are_near(&terms[*j], &terms[k]);
     (0..terms.len()).filter(near).collect()
@@ -168,18 +172,18 @@ fn are_near(a: &SineTerm, b: &SineTerm) -> bool {
     (a.cycles - b.cycles).abs() < NEARBY_RESOLUTIONS
 }
 
-/// A block of frames.
+/// A block of frames of the demodulated record.
 struct DemodulatedBlock {
-    /// Time of its middle, in records.
+    /// Time of its middle, in lengths of the record.
     middle: f64,
     /// Sum of its demodulated frames, m.
     phasor: [f64; 2],
-    /// Sum of their weights.
+    /// Sum of the weights of its frames.
     weight: f64,
 }
 
-/// Approximates `power_of_alternative` from blocks; the relative error is about one over the cycles in the
-/// record.
+/// Approximates `power_of_alternative` from blocks; the relative error is about the reciprocal of the number
+/// of cycles in the record.
 fn power_from_blocks(blocks: &[DemodulatedBlock], start: &SineTerm, shape: &UnsteadyTone) -> f64 {
     let add = |[re, im, power]: [f64; 3], block: &DemodulatedBlock| {
         let (envelope, phase) = shape.envelope_and_phase(block.middle);

@@ -1,4 +1,4 @@
-//! The criteria for and against a component's frequency, one for each reason.
+//! The criteria for and against the frequency of a component, one for each reason.
 
 use super::SampledRecord;
 use super::component::{AliasSource, Component, ComponentReason, ComponentVerdict};
@@ -7,27 +7,27 @@ use super::relations::{describe_relations, find_relations};
 use super::settings::{CLEAR_DB, MIN_CYCLES, SpectrumSettings};
 use crate::sampling::{aliased_frequencies_hz, exposure_gain};
 
-/// Exposure gain below which a reason is given: a loss of a tenth exceeds the uncertainty of a scale.
+/// Exposure gain below which a reason is given: a loss of 10 % exceeds the uncertainty of a scale.
 const ATTENUATED_BELOW: f64 = 0.9;
-/// Deviations by which a richer trend may move a frequency.
+/// Largest shift of a frequency by a richer trend, in standard deviations.
 const MOST_TREND_SHIFT: f64 = 3.0;
-/// Share of a component's amplitude that may be left around it: with more, a second line or a drift has as
-/// much to say.
+/// Largest ratio of the residual around a component to its amplitude; above it, a second line or a drift
+/// explains as much.
 const MOST_RESIDUAL: f64 = 0.25;
-/// Resolutions between two oscillations below which one could be taken for the other: of equal pairs half a
-/// resolution apart at 50 dB, one fit is as good as two.
+/// Distance of two oscillations, resolutions, below which one could be taken for the other: for equal pairs
+/// half a resolution apart at 50 dB, one oscillation fits as well as two.
 const LEAST_SEPARATION: f64 = 0.5;
-/// Resolutions of a drift that two lines cannot imitate: pairs up to 1.7 apart looked like one component that
-/// drifts by up to five.
+/// Range of a drift, resolutions, that two lines cannot imitate: pairs up to 1.7 resolutions apart looked
+/// like one component that drifts by up to five.
 const LEAST_CLEAR_DRIFT: f64 = 5.0;
-/// Damping ratio from which an oscillation is over within a cycle: its amplitude falls to a quarter.
+/// Damping ratio above which an oscillation is over within a cycle: its amplitude falls to a quarter.
 pub(super) const SINGLE_CYCLE_DAMPING: f64 = 0.22;
-/// Most distance of a drifting frequency from its extrapolated rate, resolutions of its segments: noise in
-/// bands of 5 to 40 resolutions strays by 0.35 and more, a measured cycle by up to 0.26.
+/// Largest distance of a drifting frequency from its extrapolated rate, resolutions of its segments: noise in
+/// bands of 5 to 40 resolutions strays by 0.35 or more, a measured cycle by up to 0.26.
 const MOST_STRAY: f64 = 0.3;
-/// Deviations from zero from which an amplitude is known.
+/// Ratio of an amplitude to its standard deviation from which the amplitude is significant.
 const LEAST_DEVIATIONS: f64 = 3.0;
-/// What the camera and the motion allow.
+/// Limits that the camera and the motion set.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RecordContext {
     pub frame_rate_hz: f64,
@@ -46,36 +46,36 @@ impl RecordContext {
 /// Evidence for and against one component.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Evidence {
-    /// Whether the trend could grow no further and the component is slow enough to be a piece of a step.
+    /// Whether the trend could not grow further and the component is slow enough to be a part of a step.
     pub trend_exhausted: bool,
-    /// Shift of the frequency with a richer trend, in its own deviations.
+    /// Shift of the frequency with a richer trend, in standard deviations of the frequency.
     pub trend_shift: f64,
-    /// Largest amplitude left within the lobe around it, as a share of its own; only what stands out of the
-    /// noise.
+    /// Ratio of the largest residual peak within the lobe around the component to its amplitude; only peaks
+    /// that stand out from the noise count.
     pub residual_ratio: f64,
-    /// Whether a frequency that drifts evenly or an amplitude that falls in a line explains more.
+    /// Whether a frequency with a constant drift or an amplitude that falls linearly explains more.
     pub unsteady: bool,
     /// Distance to the nearest other oscillation, resolutions.
     pub nearest: Option<f64>,
-    /// Distance to another oscillation, resolutions, where one of the two may be a piece of the other.
+    /// Distance to another oscillation, resolutions, if one of the two may be a part of the other.
     pub fragment_distance: Option<f64>,
-    /// Share of the segments in which one that drifts was followed.
+    /// Fraction of the segments in which a drifting component was followed.
     pub followed_share: Option<f64>,
-    /// Whether it is as slow as what a trend that had to grow describes.
+    /// Whether the component is as slow as the waves of a trend that had to grow.
     pub slow: bool,
-    /// Whether two more near it begin late or are over soon, as it does.
+    /// Whether the component and two others near it begin late or end soon.
     pub crowded: bool,
-    /// Distance of a drifting frequency from its extrapolated rate, resolutions of its segments: the median.
+    /// Median distance of a drifting frequency from its extrapolated rate, resolutions of its segments.
     pub median_stray: Option<f64>,
-    /// How far it drifts, resolutions.
+    /// Range of the drift, resolutions.
     pub drift: Option<f64>,
-    /// Whether it changes over a record that is too long for a fit.
+    /// Whether the component changes over a record that is too long for a fit.
     pub changes: bool,
-    /// Whether it stayed at the peak that it was found at.
+    /// Whether the component stayed at the peak at which it was found.
     pub keeps_peak: bool,
 }
 
-/// Judges components, largest first, each with its evidence.
+/// Judges components, sorted by falling amplitude, each with its evidence.
 pub(super) fn classify_components(components: &mut [Component], evidence: &[Evidence], at: &RecordContext) {
     find_relations(components, at);
     for (c, evidence) in components.iter_mut().zip(evidence) {
@@ -89,7 +89,7 @@ pub(super) fn classify_components(components: &mut [Component], evidence: &[Evid
     }
 }
 
-/// Every reason against a component, gravest first.
+/// Every reason against a component, the most serious first.
 fn collect_reasons(c: &Component, evidence: &Evidence, at: &RecordContext) -> Vec<ComponentReason> {
     let mut found = Vec::new();
     let mut add =
@@ -107,7 +107,7 @@ fn collect_reasons(c: &Component, evidence: &Evidence, at: &RecordContext) -> Ve
     found
 }
 
-/// What makes a frequency ambiguous.
+/// Reasons for which a frequency is ambiguous.
 fn describe_ambiguities(c: &Component, evidence: &Evidence) -> [Option<String>; 15] {
     let shift_hz = c.trend_shift_hz.unwrap_or_default();
     let near = evidence.nearest.filter(|nearest| *nearest < LEAST_SEPARATION);
@@ -168,18 +168,19 @@ fn describe_ambiguities(c: &Component, evidence: &Evidence) -> [Option<String>; 
     ]
 }
 
-/// Effect of the exposure, in words; near a zero of its response the amplitude before it is unknown.
+/// Effect of the exposure as text; near a zero of its response the amplitude before exposure is unknown.
 fn describe_attenuation(c: &Component, passes: f64) -> String {
-    /// Least gain by which an amplitude may be divided: it is known to a tenth at best.
+    /// Smallest gain by which an amplitude may be divided; below it, even a tenth of the result would be
+    /// uncertain.
     const LEAST: f64 = 0.02;
     let before = || format!(", {:.3} um before it", c.amplitude_m * 1e6 / passes);
     let before = if passes < LEAST { String::new() } else { before() };
     format!("the exposure has passed {passes:.3} of the amplitude{before}")
 }
 
-/// The frequencies that could fold onto a component, in words.
+/// The frequencies that could fold onto a component, as text.
 fn describe_aliases(c: &Component, at: &RecordContext) -> String {
-    /// More are left out of the words; the file has them all.
+    /// Number of frequencies in the text; the file lists all of them.
     const MOST: usize = 4;
     let one = |fold: &AliasSource| {
         let passes = fold.exposure_passes;

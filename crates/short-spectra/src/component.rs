@@ -10,41 +10,41 @@ use std::f64::consts::TAU;
 pub struct Component {
     /// Frequency, Hz.
     pub frequency_hz: f64,
-    /// Standard deviation of the frequency, Hz. Least squares: from the residual around the component, and
-    /// from the shift with a richer trend. Periodogram: 1.6 times the Cramér-Rao bound, and the effect of a
-    /// removed trend.
+    /// Standard deviation of the frequency, Hz. For least squares it follows from the residual around the
+    /// component and from the shift with a richer trend; for a periodogram it is 1.6 times the Cramér-Rao
+    /// bound, plus the effect of a removed trend.
     pub frequency_sd_hz: f64,
-    /// Least and greatest frequency of a component that drifts; `frequency_hz` is then its mean while it was
-    /// followed, by counting cycles.
+    /// Lowest and highest frequency of a component that drifts; `frequency_hz` is then the mean, from the
+    /// cycles counted while it was followed.
     pub range_hz: Option<FrequencyRange>,
-    /// Start, s from the first frame analysed; `None` for a component present from the first frame. In a
-    /// piece of a long record: the start of the piece, if the component is present by then.
+    /// Start, s from the first frame analysed; `None` for a component present from the first frame on. For a
+    /// component found in a piece of a long record: the start of the piece, if it is present by then.
     pub begins_s: Option<f64>,
-    /// Amplitude, m; of a decaying component where it begins or the record starts.
+    /// Amplitude, m; for a decaying component, at its start or the start of the record.
     pub amplitude_m: f64,
     /// Standard deviation of the amplitude, m.
     pub amplitude_sd_m: f64,
-    /// Damping ratio, negative for a growing one; `None` where the estimator has none.
+    /// Damping ratio, negative for a growing component; `None` if the estimator gives none.
     pub damping_ratio: Option<f64>,
     /// Standard deviation of the damping ratio.
     pub damping_ratio_sd: Option<f64>,
-    /// Amplitude in the spectrum over its noise floor, `20 log10`, dB.
+    /// Ratio of the amplitude in the spectrum to its noise floor, `20 log10`, dB.
     pub snr_db: f64,
-    /// Cramér-Rao bound of the frequency of this component alone, in white noise of the size found around it,
-    /// in a record without gaps, Hz.
+    /// Cramér-Rao bound of the frequency, Hz, for this component alone in a record without gaps, in white
+    /// noise of the size found around it.
     pub cramer_rao_hz: f64,
-    /// The chance that noise gives so steady a line (Thomson's F over the tapers): small for a steady
+    /// Probability that noise gives so steady a line (Thomson's F over the tapers): small for a steady
     /// oscillation, near one for a ring-down.
     pub line_probability: Option<f64>,
-    /// How it was read.
+    /// Method that estimated it.
     pub estimator: Estimator,
-    /// Shift of the frequency when the trend takes two columns more, Hz.
+    /// Shift of the frequency if the trend has two more columns, Hz.
     pub trend_shift_hz: Option<f64>,
     /// Amplitude of the removed trend at this frequency, m.
     pub leakage_m: Option<f64>,
-    /// Exposure gain at this frequency, 0 to 1; `None` where the exposure is not known.
+    /// Exposure gain at this frequency, 0 to 1; `None` if the exposure is not known.
     pub exposure_passes: Option<f64>,
-    /// Faster frequencies that would appear at this one.
+    /// Faster frequencies that would appear at this frequency.
     pub folded_from: Vec<AliasSource>,
     /// The component of which this is a harmonic.
     pub harmonic_of: Option<Harmonic>,
@@ -52,29 +52,29 @@ pub struct Component {
     pub subharmonic_of: Option<Subharmonic>,
     /// The component of which this is a sideband.
     pub sideband_of: Option<Sideband>,
-    /// The multiple of the mains frequency that lies within its deviation.
+    /// The multiple of the mains frequency that lies within the standard deviation of the frequency.
     pub mains: Option<MainsMultiple>,
-    /// The gravest of the reasons, or clear.
+    /// The verdict of the most serious reason, or clear.
     pub verdict: ComponentVerdict,
-    /// All that was found against it, gravest first.
+    /// All reasons against the component, the most serious first.
     pub reasons: Vec<ComponentReason>,
 }
 
-/// How a component was read.
+/// Method that estimated a component.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Estimator {
-    /// The top of a Hann-windowed periodogram.
+    /// The maximum of a Hann-windowed periodogram.
     #[default]
     Periodogram,
     /// Least squares of the trend and all components on the frames present.
     LeastSquares,
-    /// Means over the course of its frequency.
+    /// Means along the course of the frequency.
     Ridge,
 }
 
 impl Component {
-    /// Whether the record holds enough of its cycles for a frequency of its own.
+    /// Whether the record holds enough cycles of the component to determine its frequency.
     pub fn is_resolvable(&self) -> bool {
         self.verdict != ComponentVerdict::NotResolvable
     }
@@ -85,9 +85,9 @@ impl Component {
 /// A decaying tone in white noise.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct DecayingTone {
-    /// Amplitude where the record starts, m.
+    /// Amplitude at the start of the record, m.
     pub amplitude_m: f64,
-    /// Nepers by which it decays over the record.
+    /// Decay over the record, nepers.
     pub nepers: f64,
     /// Standard deviation of the noise, m.
     pub noise_m: f64,
@@ -98,8 +98,8 @@ impl DecayingTone {
     ///
     /// Amplitude and decay are uncorrelated with phase and frequency, so with weights `p = exp(-2 d t / T)`
     /// the information on the frequency is `(2 pi A)^2 / (2 sigma^2)` times the spread `sum p t^2 - (sum p
-    /// t)^2 / sum p`. For a steady tone that is the closed form `fs / (2 pi) sqrt(12 / (eta N (N^2 - 1)))`,
-    /// `eta = A^2 / (2 sigma^2)`.
+    /// t)^2 / sum p`. For a steady tone the bound has the closed form `fs / (2 pi) sqrt(12 / (eta N (N^2 -
+    /// 1)))`, `eta = A^2 / (2 sigma^2)`.
     pub(super) fn cramer_rao_bound_hz(&self, frames: usize, frame_rate_hz: f64) -> f64 {
         let shrink = math::exp(-2.0 * self.nepers / frames as f64);
         let (mut power, mut sums) = (1.0, [0.0; 3]);
@@ -113,30 +113,32 @@ impl DecayingTone {
     }
 }
 
-/// How far a component's frequency can be trusted, gravest reason first.
+/// Reliability of a component's frequency, the most serious doubt first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ComponentVerdict {
-    /// Fewer than `MIN_CYCLES` in the record: the frequency depends on the trend and the window.
+    /// Fewer than `MIN_CYCLES` cycles in the record: the frequency depends on the trend and the window.
     NotResolvable,
-    /// A faster oscillation that the motion may hold would appear at the same frequency.
+    /// A faster oscillation that the motion may contain would appear at the same frequency.
     AliasSuspected,
-    /// No trend describes the motion under it, or a richer trend moves it by more than three deviations; its
-    /// amplitude is within three deviations of zero; a quarter of it is left around it; or no oscillation of
-    /// constant frequency and steady decay explains it.
+    /// No trend describes the motion under the component, or a richer trend shifts it by more than three
+    /// standard deviations; its amplitude is within three standard deviations of zero; the residual around it
+    /// exceeds a quarter of its amplitude; or no oscillation of constant frequency and steady decay explains
+    /// it.
     Ambiguous,
-    /// A multiple of a stronger component, to within four deviations.
+    /// A multiple of the frequency of a stronger component, to within four standard deviations.
     Harmonic,
-    /// A half or a third of a stronger component, or a multiple of these: beats alternate.
+    /// A half or a third of the frequency of a stronger component, or a multiple of these: successive cycles
+    /// alternate.
     Subharmonic,
-    /// A stronger component, modulated by another.
+    /// A stronger component, modulated by another component.
     Sideband,
-    /// Within its deviation of a multiple of the mains frequency: a lamp may have made it.
+    /// Within its standard deviation of a multiple of the mains frequency: a lamp may have caused it.
     Mains,
     /// The exposure has passed less than nine tenths of the amplitude.
     Attenuated,
-    /// Above the level that noise reaches once in a hundred spectra, but less than `CLEAR_DB` above the noise
-    /// floor.
+    /// Above the level that noise reaches in one of a hundred spectra, but less than `CLEAR_DB` above the
+    /// noise floor.
     Weak,
     /// No reason against it.
     #[default]
@@ -157,7 +159,7 @@ impl ComponentVerdict {
         "clear",
     ];
 
-    /// The word in files and tables.
+    /// The name in files and tables.
     #[must_use]
     pub fn name(self) -> &'static str {
         Self::NAMES[self as usize]
@@ -169,27 +171,27 @@ impl ComponentVerdict {
 pub struct ComponentReason {
     /// The verdict.
     pub verdict: ComponentVerdict,
-    /// The numbers, in a sentence.
+    /// The numbers, as a sentence.
     pub words: String,
 }
 
-/// A faster frequency that would appear at that of a component.
+/// A faster frequency that would appear at the frequency of a component.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AliasSource {
     /// The faster frequency, Hz.
     pub frequency_hz: f64,
-    /// Exposure gain at the faster frequency, 0 to 1; `None` where the exposure is not known.
+    /// Exposure gain at the faster frequency, 0 to 1; `None` if the exposure is not known.
     pub exposure_passes: Option<f64>,
 }
 
-/// A component of which another is a fraction.
+/// A component; the frequency of another component is a fraction of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Subharmonic {
     /// Frequency of the component, Hz.
     pub frequency_hz: f64,
-    /// The fraction's numerator.
+    /// The numerator of the fraction.
     pub numerator: usize,
-    /// Its denominator: beats until one is like the first.
+    /// The denominator of the fraction: number of cycles after which the pattern repeats.
     pub denominator: usize,
 }
 
@@ -211,7 +213,7 @@ pub struct MainsMultiple {
     pub multiple: usize,
 }
 
-/// A component of which another is a multiple.
+/// A component; the frequency of another component is a multiple of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Harmonic {
     /// Frequency of the component, Hz.

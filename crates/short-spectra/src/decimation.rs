@@ -1,6 +1,6 @@
-//! Records of which only every second, third ... frame was kept, as from a camera of that lower rate.
+//! Records in which only every second, third ... frame was kept, as from a camera of that lower rate.
 
-/// First frame with a value and distance of the kept frames, if that is two frames or more.
+/// First frame with a value, and distance of the kept frames if it is at least two frames.
 pub(super) fn find_stride(samples: &[Option<f64>]) -> Option<(usize, usize)> {
     let mut present = samples.iter().enumerate().filter(|(_, x)| x.is_some()).map(|(i, _)| i);
     let first = present.next()?;
@@ -15,7 +15,7 @@ pub(super) fn find_stride(samples: &[Option<f64>]) -> Option<(usize, usize)> {
     (stride > 1).then_some((first, stride))
 }
 
-/// The frames of such a record alone, at their own rate.
+/// The kept frames of such a record, at their own rate.
 pub(super) fn decimate(samples: &[Option<f64>], (first, stride): (usize, usize)) -> Vec<Option<f64>> {
     samples.iter().skip(first).step_by(stride).copied().collect()
 }

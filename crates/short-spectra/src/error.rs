@@ -1,38 +1,38 @@
-//! Why a record has no spectrum.
+//! Reasons for which a record has no spectrum.
 
 use super::settings::{LONG_PADDED, MIN_SAMPLES, MOST_PADDED, SpectrumSettings};
 use super::trend::{Detrend, Trend};
 
-/// Why a record has no spectrum.
+/// Reason for which a record has no spectrum.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SpectrumError {
-    /// Too few frames hold a value.
+    /// Too few frames have a value.
     #[error(
         "found {found} frames with a value, expected at least {least}; widen the window, remove less or choose another channel"
     )]
     TooFew {
-        /// Frames with a value.
+        /// Number of frames with a value.
         found: usize,
-        /// Fewest that this trend and a spectrum take.
+        /// Minimum number for this trend and a spectrum.
         least: usize,
     },
-    /// A sample, or what follows from it, is no finite number.
+    /// A sample is not a finite number, or its square overflows.
     #[error(
         "frame {frame} of the record: found {found}, expected a finite number below 1e100; remove the frame"
     )]
     NotFinite {
-        /// 0-based frame.
+        /// Number of the frame, counted from 0.
         frame: usize,
         /// The value.
         found: f64,
     },
-    /// The frame rate is no rate.
+    /// The frame rate is not a positive finite number.
     #[error("frame rate: found {found} Hz, expected a finite number above 0")]
     FrameRate {
         /// The value, Hz.
         found: f64,
     },
-    /// The band holds no frequency of the spectrum.
+    /// The band contains no frequency of the spectrum.
     #[error(
         "band {low}..{high} Hz: expected 0 <= low < high and low below half the frame rate, {nyquist} Hz; choose another band"
     )]
@@ -49,7 +49,7 @@ pub enum SpectrumError {
         "`{detrend}` on a record of {duration_s:.3} s: expected at most 46 half-waves; choose a lower frequency, a polynomial or a shorter window"
     )]
     Trend {
-        /// What was to be removed.
+        /// The trend that was to be removed.
         detrend: Detrend,
         /// Length of the record, s.
         duration_s: f64,
@@ -59,32 +59,32 @@ pub enum SpectrumError {
         "segment of {found_s} s: expected {least_s} s to {most_s} s; choose another length or leave it out"
     )]
     Segment {
-        /// The value, s.
+        /// The length of the segment, s.
         found_s: f64,
-        /// Shortest, s.
+        /// Shortest permitted length, s.
         least_s: f64,
-        /// The record, s.
+        /// Length of the record, s.
         most_s: f64,
     },
-    /// The padded record would not fit.
+    /// The padded record would be too long.
     #[error(
         "a record of {frames} frames padded {padding} times: expected at most {MOST_PADDED} samples in all; shorten the window or the padding"
     )]
     TooLong {
-        /// Frames.
+        /// Number of frames.
         frames: usize,
-        /// Padding.
+        /// Padding factor.
         padding: usize,
     },
 }
 
-// What is checked before a record is analysed.
+// Checks before a record is analysed.
 
-/// Padding of longer records: bins half a resolution apart still show every peak of a Hann window, which is
-/// four resolutions wide.
+/// Padding factor of longer records: bins half a resolution apart still show every peak of a Hann window,
+/// which is four resolutions wide.
 const LONG_PADDING: usize = 2;
 
-/// Whether a band holds a frequency of the spectrum.
+/// Checks that a band contains a frequency of the spectrum.
 pub(super) fn check_band(band_hz: Option<(f64, f64)>, frame_rate_hz: f64) -> Result<(), SpectrumError> {
     let nyquist = frame_rate_hz / 2.0;
     match band_hz.filter(|(low, high)| !(*low >= 0.0 && low < high && *low < nyquist)) {
@@ -93,7 +93,7 @@ pub(super) fn check_band(band_hz: Option<(f64, f64)>, frame_rate_hz: f64) -> Res
     }
 }
 
-/// Frame and value of the first sample that is no number or whose square overflows.
+/// Frame and value of the first sample that is not a number or whose square would overflow.
 pub(super) fn find_unusable(samples: &[Option<f64>]) -> Option<(usize, f64)> {
     const LARGEST: f64 = 1e100;
     let unusable = |x: &f64| x.is_nan() || x.abs() > LARGEST;

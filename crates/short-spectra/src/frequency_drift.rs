@@ -1,9 +1,8 @@
-//! A cycle whose frequency changes over the record: sought in addition to steady and decaying oscillations,
-//! and read as one component.
+//! A cycle whose frequency changes over the record: it is sought in addition to steady and decaying
+//! oscillations and treated as one component.
 //!
-//! Sinusoids can only split such a cycle into pieces. If they leave as much as they explain, or if three or
-//! more of them lie within the range of a ridge that drifts, the ridge is the component and the pieces are
-//! dropped.
+//! Sinusoids can only split such a cycle into pieces. If they leave a large peak, or if three or more of them
+//! lie within the range of a drifting ridge, the ridge is the component and the pieces are dropped.
 
 use super::model_selection::{DriftRegion, LOBE, ModelFit, ModelSelector};
 use super::periodogram::upper_median;
@@ -12,44 +11,44 @@ use portable_math as math;
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
 /// The largest component is slow if every component above four times its frequency has less than a quarter of
-/// its amplitude. The drifting component is sought above it.
+/// its amplitude. The drifting component is sought above the slow one.
 const SLOW_COMPONENT: (f64, f64) = (4.0, 0.25);
-/// The band starts at the lowest strong part of a component divided by this: near the ends of a record the
-/// window hides lower frequencies.
+/// The lower end of the band is the frequency of the lowest strong component divided by this margin, because
+/// the window hides lower frequencies near the ends of a record.
 const BAND_MARGIN: f64 = 2.0;
-/// Share of followed segments from which the component counts as followed everywhere.
+/// Fraction of followed segments from which a component counts as followed everywhere.
 pub(super) const FULLY_FOLLOWED: f64 = 0.9;
-/// Shorter segments tried below that share, and the gain in it that they must bring: noise hides a component
-/// in short segments.
+/// Shorter segments, as fractions of the best length, that are tried if less was followed, and the increase
+/// of the fraction that they must bring: noise hides a component in short segments.
 const SHORTER_SEGMENTS: [f64; 3] = [0.8, 0.65, 0.5];
 const LEAST_GAIN: f64 = 0.1;
-/// Deviation of the instant of a cycle, cycles: its form changes with its frequency, and the fundamental
-/// moves against the start of the cycle.
+/// Standard deviation of the instant of a cycle, cycles: the shape of a cycle changes with its frequency, so
+/// the phase of the fundamental moves relative to the start of the cycle.
 const CYCLE_INSTANT_SD: f64 = 0.05;
-/// Distance of points that share too few frames to follow each other's noise, segments.
+/// Distance of points, segments, at which they share so few frames that their noise is independent.
 const INDEPENDENT_SEGMENTS: f64 = 0.5;
-/// Share of the segments in which a drift must be followed to be one.
+/// Fraction of the segments above which a drift must be followed to count.
 const LEAST_FOLLOWED: f64 = 0.08;
-/// Range of a drift, resolutions; a smaller range is a slightly broad line.
+/// Smallest range of a drift, resolutions; a smaller range is a slightly broad line.
 const LEAST_RANGE: f64 = 2.0;
-/// Sinusoids within the range that are pieces of one cycle.
+/// Number of sinusoids within the range from which they count as pieces of one cycle.
 const FRAGMENTS: usize = 3;
-/// Peak left within the range, over the largest sinusoid there, from which sinusoids do not explain the
-/// cycle.
+/// Ratio of the largest residual peak within the range to the largest sinusoid there above which sinusoids do
+/// not explain the cycle.
 const LARGE_RESIDUAL: f64 = 0.25;
 
 /// The course of the strongest component above the slow ones.
 pub(super) struct DriftCourse {
     pub ridge: Ridge,
-    /// Share of the segments in which it was followed.
+    /// Fraction of the segments in which it was followed.
     pub followed_share: f64,
-    /// Its range, where it is a component that drifts.
+    /// Frequency range, if it is a component that drifts.
     pub range: Option<FrequencyRange>,
 }
 
 impl DriftCourse {
-    /// Median distance of its frequencies from the extrapolated rates of points half a segment apart,
-    /// resolutions.
+    /// Median distance of a frequency from the value extrapolated from a point half a segment away,
+    /// resolutions of the segments.
     pub(super) fn median_stray(&self) -> f64 {
         let ridge = &self.ridge;
         let apart = ((INDEPENDENT_SEGMENTS * ridge.segment_s / ridge.hop_s).round() as usize).max(1);
@@ -62,7 +61,7 @@ impl DriftCourse {
         upper_median(pairs.map(stray).collect()).unwrap_or(0.0)
     }
 
-    /// The frequencies that it covers in a spectrum, if it is a component that drifts.
+    /// The frequencies that the course covers in a spectrum, if it is a component that drifts.
     pub(super) fn drift_region(&self) -> Option<DriftRegion> {
         let FrequencyRange { low_hz, high_hz, .. } = self.range?;
         Some(DriftRegion { low_hz, high_hz, lobe_hz: LOBE / self.ridge.segment_s })
@@ -88,8 +87,9 @@ pub(super) fn find_drift_course(
     Some(DriftCourse { ridge, followed_share, range })
 }
 
-/// The ridge of the segment length that shows the component best. If it misses much of the record, the
-/// shorter length that misses least: the component may be weak or fast in a part of the record.
+/// The ridge for the segment length that shows the component best. If that ridge misses much of the record,
+/// the one for the shorter length that misses least: the component may be weak or change fast in a part of
+/// the record.
 fn select_best_ridge(record: &[Option<f64>], frame_rate_hz: f64, band: (f64, f64)) -> Option<(f64, Ridge)> {
     let cut = |segment_s: Option<f64>| {
         let settings = time_frequency::SpectrogramSettings { segment_s, band_hz: Some(band) };
@@ -106,7 +106,7 @@ fn select_best_ridge(record: &[Option<f64>], frame_rate_hz: f64, band: (f64, f64
     Some(better.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or(best))
 }
 
-/// Band in which the strongest component above the slow ones may run, Hz. The shortest segment holds a few
+/// Band in which the strongest component above the slow ones may lie, Hz. The shortest segment holds a few
 /// cycles of the lower end, so the lower end must not lie far below the component.
 fn natural_band_hz(search: &ModelSelector, fit: &ModelFit) -> (f64, f64) {
     let prominent = prominent_peaks(search, fit);
@@ -119,7 +119,7 @@ fn natural_band_hz(search: &ModelSelector, fit: &ModelFit) -> (f64, f64) {
     (if lowest_hz.is_finite() { low.max(lowest_hz / BAND_MARGIN) } else { low }, top)
 }
 
-/// A sinusoid, or a peak that is left.
+/// A fitted sinusoid, or a peak of the residual.
 struct ProminentPeak {
     hz: f64,
     amplitude_m: f64,
@@ -137,7 +137,7 @@ fn prominent_peaks(search: &ModelSelector, fit: &ModelFit) -> Vec<ProminentPeak>
     sinusoids.chain(left).collect()
 }
 
-/// Frequency of the largest, if it is slow, Hz.
+/// Frequency of the largest peak, if it is slow, Hz.
 fn dominant_slow_hz(standing: &[ProminentPeak]) -> Option<f64> {
     let largest = standing.iter().max_by(|a, b| a.amplitude_m.total_cmp(&b.amplitude_m))?;
     let mut above = standing.iter().filter(|s| s.hz > SLOW_COMPONENT.0 * largest.hz).peekable();
@@ -156,7 +156,7 @@ fn remove_slow_parts(search: &ModelSelector, fit: &ModelFit, low_hz: f64) -> Vec
     record
 }
 
-/// Whether sinusoids only split the cycle into pieces.
+/// Whether sinusoids only split the drifting cycle into pieces.
 fn is_fragmented(search: &ModelSelector, fit: &ModelFit, range: &FrequencyRange) -> bool {
     let resolution_hz = search.resolution_hz();
     if range.high_hz - range.low_hz < LEAST_RANGE * resolution_hz {
@@ -171,20 +171,20 @@ fn is_fragmented(search: &ModelSelector, fit: &ModelFit, range: &FrequencyRange)
     pieces().count() >= FRAGMENTS || left_m > LARGE_RESIDUAL * largest_m
 }
 
-/// One component from a course.
+/// Means along a course, which describe it as one component.
 pub(super) struct RidgeMean {
-    /// Cycles counted along the course, over its duration, Hz.
+    /// Ratio of the cycles counted along the course to its duration, Hz.
     pub frequency_hz: f64,
     pub frequency_sd_hz: f64,
     /// Root of the mean power, m.
     pub amplitude_m: f64,
     pub amplitude_sd_m: f64,
-    /// Mean over the points, weighted with their power.
+    /// Mean over the points, weighted by their power, dB.
     pub snr_db: f64,
 }
 
 impl RidgeMean {
-    /// Of a ridge with points. Points half a segment apart count as independent.
+    /// The means of a ridge that has points. Points half a segment apart count as independent.
     pub(super) fn from_ridge(ridge: &Ridge) -> Self {
         let points = &ridge.points;
         let power: f64 = points.iter().map(|p| math::powi(p.amplitude_m, 2)).sum();
@@ -205,7 +205,7 @@ impl RidgeMean {
     }
 }
 
-/// Cycles along a course, their variance, and its duration.
+/// Cycles along a course, their variance, and the duration of the course.
 #[derive(Default)]
 struct CycleCount {
     cycles: f64,
@@ -214,8 +214,9 @@ struct CycleCount {
 }
 
 impl CycleCount {
-    /// Whole cycles and the parts of one at both ends of each part of the ridge, from the phases of its
-    /// points. Where the ridge reaches an end of the record, the cycles up to it follow from the frequencies.
+    /// Counts whole and fractional cycles along each unbroken part of the ridge from the phases of its
+    /// points. If the ridge reaches an end of the record, the cycles up to that end follow from the
+    /// frequencies.
     fn along_ridge(ridge: &Ridge) -> Self {
         let mut all = Self::default();
         ridge.unbroken_parts().for_each(|part| all.add_part(part));
@@ -237,7 +238,7 @@ impl CycleCount {
         for pair in part.windows(2) {
             let [a, b] = [&pair[0], &pair[1]];
             let apart_s = b.time_s - a.time_s;
-            // a cubic through both frequencies and their rates
+            // from a cubic through both frequencies and their rates
             let expected = apart_s * (a.frequency_hz + b.frequency_hz) / 2.0
                 + apart_s * apart_s * (a.rate_hz_per_s - b.rate_hz_per_s) / 12.0;
             let part_of_one = (b.phase_rad - a.phase_rad) / TAU;
@@ -249,8 +250,8 @@ impl CycleCount {
 
     fn add_end(&mut self, end: &RidgeEnd, point: &RidgePoint) {
         let apart_s = (end.time_s - point.time_s).abs();
-        // a parabola through both frequencies with the rate of the point; a mismatch at the end counts as
-        // uncertainty
+        // from a parabola through both frequencies with the rate of the point; a mismatch at the end counts
+        // as uncertainty
         let led_hz = point.frequency_hz + point.rate_hz_per_s * (end.time_s - point.time_s);
         let off_hz = (end.frequency_hz - led_hz) / 3.0;
         self.cycles += apart_s * ((point.frequency_hz + led_hz) / 2.0 + off_hz);

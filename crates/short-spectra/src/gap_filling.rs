@@ -1,30 +1,32 @@
-//! Short gaps in a record, filled for the transform alone.
+//! Filling of short gaps in a record, for the transform only.
 //!
-//! A frame of weight zero leaks a little of every component over the whole spectrum: with one frame in forty
-//! missing, a ring-down of 180 um buries a cycle of 6 um. Short gaps are therefore filled with the values
-//! that minimise the sum of squared fourth differences. That reproduces cubics exactly, and a component of
-//! frequency f to `(2 sin(pi f/fs))^8/70` for a single frame: 2.5 % at 900 Hz and 5,000 frames/s, 1e-12 at 78
-//! Hz. Longer gaps stay gaps of weight zero. The record itself is never filled.
+//! A frame of weight zero spreads a little of every component over the whole spectrum: with one frame in
+//! forty missing, a ring-down of 180 um hides a cycle of 6 um. Short gaps are therefore filled with the
+//! values that minimise the sum of squared fourth differences. This restores cubics exactly. The relative
+//! error for a component of frequency f in a single frame is `(2 sin(pi f/fs))^8/70`: 2.5 % at 900 Hz and
+//! 5,000 frames/s, 1e-12 at 78 Hz. Longer gaps keep weight zero. The record itself is never filled.
 //!
-//! Measured on 0.15 s at 5,000 frames/s (78.4 Hz at 20 um, 900 Hz at 8 um, a step, frames lost at random;
-//! rms error of the frequencies, with filling | without): 20 % lost 0.014 and 0.022 Hz | 0.077 and 0.31 Hz;
-//! 40 % lost 0.083 and 0.093 Hz | 0.11 and 0.42 Hz. At 3 um and 40 % the fast component is always found with
-//! filling and missed in two of three records without. The cost is its amplitude, which reads 2 % low with 20
-//! % lost and 9 % low with 40 %. The components of such records are therefore refined without filling
-//! (`gap_refinement.rs`); the curve is not.
+//! Measured on 0.15 s at 5,000 frames/s (78.4 Hz at 20 um, 900 Hz at 8 um, a step, frames lost at random),
+//! the rms errors of the two frequencies are: with 20 % lost, 0.014 and 0.022 Hz with filling, 0.077 and 0.31
+//! Hz without; with 40 % lost, 0.083 and 0.093 Hz with filling, 0.11 and 0.42 Hz without. At 3 um and with 40
+//! % lost, the fast component is always found with filling, and missed in two of three records without. The
+//! cost is its amplitude, which is 2 % too small with 20 % lost and 9 % too small with 40 %. The components
+//! of such records are therefore refined without filling (`gap_refinement.rs`); the spectrum is not.
 
 use rayon::prelude::*;
 
-/// Longest gap that is filled, frames: a longer fill amplifies noise more than a gap of weight zero costs.
+/// Longest gap that is filled, frames: filling a longer gap would amplify noise more than a gap of weight
+/// zero does harm.
 pub(crate) const LONGEST_FILLED_GAP: usize = 4;
 const DIFFERENCE: [f64; 5] = [1.0, -4.0, 6.0, -4.0, 1.0];
 const ORDER: usize = DIFFERENCE.len() - 1;
-/// Most frames solved for together; the rest of a denser cluster is solved apart.
+/// Maximum number of frames that are solved for together; a denser cluster is split.
 const MOST_UNKNOWNS: usize = 64;
 
-/// Frames from which clusters are solved in parallel: below, all of them take a few milliseconds.
+/// Number of frames from which clusters are solved in parallel; for fewer, all clusters take only a few
+/// milliseconds.
 const PARALLEL_FROM: usize = 1 << 17;
-/// Clusters that a thread takes at a time.
+/// Number of clusters that a thread solves at a time.
 const CLUSTERS_AT_ONCE: usize = 256;
 
 /// The record with its short gaps filled; frames that cannot be filled stay `None`.
@@ -53,7 +55,7 @@ pub(crate) fn fill_short_gaps(samples: &[Option<f64>]) -> Vec<Option<f64>> {
     filled
 }
 
-/// Half-open runs of missing frames.
+/// Runs of missing frames, each from its first frame to the one after its last.
 fn missing_runs(samples: &[Option<f64>]) -> Vec<(usize, usize)> {
     let mut runs: Vec<(usize, usize)> = Vec::new();
     for (frame, _) in samples.iter().enumerate().filter(|(_, sample)| sample.is_none()) {
@@ -65,7 +67,8 @@ fn missing_runs(samples: &[Option<f64>]) -> Vec<(usize, usize)> {
     runs
 }
 
-/// Least squares over every fourth difference that touches the cluster and no other missing frame.
+/// Values of a cluster of missing frames, by least squares over every fourth difference that touches the
+/// cluster and no other missing frame.
 fn solve_cluster(samples: &[Option<f64>], cluster: &[usize]) -> Option<[f64; MOST_UNKNOWNS]> {
     let (first, last) = (*cluster.first()?, *cluster.last()?);
     let mut normal = BandedEquations { band: [[0.0; ORDER + 1]; MOST_UNKNOWNS], right: [0.0; MOST_UNKNOWNS] };
@@ -75,20 +78,20 @@ fn solve_cluster(samples: &[Option<f64>], cluster: &[usize]) -> Option<[f64; MOS
         let difference = &samples[start..=start + ORDER];
         differences += usize::from(normal.add_difference(difference, start, next, &cluster[next..]));
     }
-    // as many differences again as unknowns: a fill supported from one side only would extrapolate
+    // `ORDER` more differences than unknowns: a fill supported from one side only would extrapolate
     if differences < cluster.len() + ORDER { None } else { normal.cholesky_solve(cluster.len()) }
 }
 
-/// Normal equations of a cluster: unknowns further apart than a difference reaches are not coupled.
+/// Normal equations of a cluster; only unknowns within one difference of each other are coupled.
 struct BandedEquations {
-    /// The diagonal and what is under it, column by column.
+    /// The diagonal and the elements below it, column by column.
     band: [[f64; ORDER + 1]; MOST_UNKNOWNS],
     right: [f64; MOST_UNKNOWNS],
 }
 
 impl BandedEquations {
-    /// Adds the difference over the frames from `start` on and returns true, unless one of them is missing
-    /// that is not in `gaps`. The first of `gaps` has the index `at` among the unknowns.
+    /// Adds the difference over the frames from `start` on and returns true, unless a frame that is not in
+    /// `gaps` is missing. The first of `gaps` has the index `at` among the unknowns.
     fn add_difference(&mut self, samples: &[Option<f64>], start: usize, at: usize, gaps: &[usize]) -> bool {
         let (mut known, mut weights, mut unknowns) = (0.0, [0.0; ORDER + 1], 0);
         for ((frame, sample), weight) in samples.iter().enumerate().zip(DIFFERENCE) {
@@ -109,7 +112,7 @@ impl BandedEquations {
         unknowns > 0
     }
 
-    /// The first `count` unknowns, by Cholesky's factors; `None` where the equations do not determine them.
+    /// The first `count` unknowns, by Cholesky factorisation; `None` if the equations do not determine them.
     fn cholesky_solve(mut self, count: usize) -> Option<[f64; MOST_UNKNOWNS]> {
         for j in 0..count {
             for k in j.saturating_sub(ORDER)..j {

@@ -1,20 +1,20 @@
-//! Components refined on the true frame times, where too many frames are missing for gap filling alone.
+//! Refinement of components on the true frame times, if too many frames are missing for gap filling alone.
 //!
-//! With more than [`REFINED_MISSING`] of the frames missing, trend and steady sinusoids are fitted together
+//! If more than [`REFINED_MISSING`] of the frames are missing, trend and steady sinusoids are fitted together
 //! to the frames present (`least_squares.rs`). The residual of the fit decides what follows:
 //! - It is white: the sinusoids are the whole signal. Every frame present then counts the same, which is most
 //!   accurate, and components that the filling created are found to be absent.
-//! - It is not (the cycle decays or drifts, the trend is no cubic): only the residual is filled, the model is
-//!   added back, and the fit is repeated with the Hann weights of the transform. Without gaps that is the
-//!   maximum of the windowed periodogram, so such a cycle reads the same with and without gaps.
+//! - It is not white (the cycle decays or drifts, the trend is not a cubic): only the residual is filled, the
+//!   model is added back, and the fit is repeated with the Hann weights of the transform. Without gaps this
+//!   gives the maximum of the windowed periodogram, so the result is the same with and without gaps.
 //!
-//! Measured on 0.15 s at 5,000 frames/s (78.4 Hz at 20 um, 900 Hz at 8 um with 20 dB of noise, a step, 40
-//! % of the frames missing at random, 50 records; rms error of the frequencies, filled alone | refined): 0.10
-//! and 0.11 Hz | 0.007 and 0.019 Hz, 1.1 times the Cramér-Rao bound; the amplitude of the fast one reads 9 %
-//! | 0.04 % low. With 0.3 um of noise and 100 um at 78.4 Hz that decay with a damping ratio of 0.05: 0.11 and
-//! 0.13 Hz
-//! |
-//! 0.07 and 0.06 Hz. A chirp from 870 to 930 Hz: its mean is off by 1.7 | 1.4 Hz.
+//! Measured on 0.15 s at 5,000 frames/s (78.4 Hz at 20 um, 900 Hz at 8 um with 20 dB of noise, a step, 40 %
+//! of the frames missing at random, 50 records), the rms errors of the two frequencies are 0.10 and 0.11 Hz
+//! with filling alone, and 0.007 and 0.019 Hz refined, which is 1.1 times the Cramér-Rao bound; the amplitude
+//! of the fast component is 9 % too small with filling alone, and 0.04 % refined. With 0.3 um of noise and
+//! 100 um at 78.4 Hz, decaying with a damping ratio of 0.05, the errors are 0.11 and 0.13 Hz with filling
+//! alone, and 0.07 and 0.06 Hz refined. The mean of a chirp from 870 to 930 Hz is off by 1.7 Hz with filling
+//! alone, and by 1.4 Hz refined.
 
 use super::least_squares::{FreeSet, SineProblem, SineSolution, SineTerm, Tolerance};
 use super::settings::MAX_COMPONENTS;
@@ -22,61 +22,64 @@ use super::trend::Trend;
 use super::{gap_filling, periodogram};
 use portable_math as math;
 
-/// Share of missing frames above which components are refined; below, filled gaps move 900 Hz by hundredths
-/// of a hertz only.
+/// Fraction of missing frames above which components are refined; with fewer missing, filled gaps shift 900
+/// Hz only by hundredths of a hertz.
 pub(crate) const REFINED_MISSING: f64 = 0.10;
-/// Most components fitted together, largest first; smaller ones keep their start.
+/// Maximum number of components that are fitted together, largest first; smaller ones keep their start
+/// values.
 pub(super) const MOST_REFINED: usize = MAX_COMPONENTS;
-/// Frames for each unknown below which the fit would follow the noise.
+/// Number of frames for each unknown below which the fit would follow the noise.
 const FRAMES_PER_UNKNOWN: usize = 4;
-/// The residual is white while its mean square is below this many times that of noise: of sixty fourth
-/// differences one in a thousand exceeds it, and a misfit as large as the noise leaks no more than the noise.
+/// The residual is white if its mean square is below this multiple of that of noise. With sixty fourth
+/// differences, noise exceeds it once in a thousand records, and a misfit as large as the noise leaks no more
+/// than the noise does.
 const WHITE_RATIO: f64 = 2.0;
-/// Fewest fourth differences that tell noise from a cycle.
+/// Minimum number of fourth differences that can tell noise from a cycle.
 const FEWEST_DIFFERENCES: usize = 20;
-/// Times the residual is filled: the second moves the result of the first by a tenth.
+/// Number of times that the residual is filled: the second fill changes the result by a tenth of what the
+/// first does.
 const FILL_ROUNDS: usize = 2;
 
-/// A component as the transform shows it.
+/// A component as estimated from the transform.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RefinementStart {
     /// Frequency, cycles in the record.
     pub cycles: f64,
-    /// Whether the frequency may move; that of a residue of the trend may not.
+    /// Whether the frequency may move; the frequency of a residue of the trend may not.
     pub moves: bool,
 }
 
-/// A component as the frames present show it.
+/// A component as estimated from the frames present.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct RefinedComponent {
     /// Frequency, cycles in the record.
     pub cycles: f64,
     pub amplitude_m: f64,
-    /// `None` where the residual is not white and so does not determine them.
+    /// `None` if the residual is not white, which leaves them undetermined.
     pub deviations: Option<RefinedDeviations>,
 }
 
 /// Standard deviations from the normal matrix and the size of a white residual.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct RefinedDeviations {
-    /// Of the frequency, cycles in the record.
+    /// Standard deviation of the frequency, cycles in the record.
     pub cycles: f64,
-    /// Of the amplitude, m.
+    /// Standard deviation of the amplitude, m.
     pub amplitude_m: f64,
 }
 
 /// Result of a refinement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Refinement {
-    /// The component stays as the transform shows it.
+    /// The component stays as estimated from the transform.
     Unchanged,
-    /// It stays as the transform shows it, though the frames present have this amplitude, m, at its
-    /// frequency.
+    /// The component stays as estimated from the transform; a fit to the frames present at its frequency has
+    /// this amplitude, m.
     FixedFrequency(f64),
     Refined(RefinedComponent),
 }
 
-/// The components refined together, in the order of their starts.
+/// The results of refining all components together, in the order of their starts.
 pub(super) fn refine_peaks(
     samples: &[Option<f64>],
     trend: Trend,
@@ -134,8 +137,8 @@ fn fit_components(
     outcome
 }
 
-/// Result for each start. `white` says that all weights are one and the residual is noise, which determines
-/// the deviations.
+/// Result for each start. `white` means that all weights are one and the residual is noise, which determines
+/// the standard deviations.
 fn refinement_outcomes(
     problem: &SineProblem,
     solved: &SineSolution,
@@ -166,8 +169,8 @@ fn refinement_outcomes(
     Some(starts.iter().enumerate().map(outcome).collect())
 }
 
-/// Whether the values scatter from frame to frame as much as over the whole record: fourth differences of
-/// white noise have 70 times its variance.
+/// Whether the fourth differences of the values are as large as white noise of their variance would make
+/// them, which is 70 times that variance.
 fn is_white(left: &[Option<f64>]) -> bool {
     const GAIN: f64 = 70.0;
     let difference = |w: &[Option<f64>]| Some(w[0]? - 4.0 * w[1]? + 6.0 * w[2]? - 4.0 * w[3]? + w[4]?);

@@ -1,10 +1,11 @@
-//! Trend and (decaying) sinusoids fitted together to the frames present: the most accurate reading where the
-//! record holds nothing else.
+//! Fit of a trend and (decaying) sinusoids together to the frames present: the most accurate estimate if the
+//! record contains nothing else.
 //!
 //! Model: `x = sum c_p L_p + sum exp(-d_k ((u + 1) / 2 - s_k)) (a_k cos(pi n_k u) + b_k sin(pi n_k u))` with
-//! `u` from -1 to 1 over the record, so `n` are cycles and `d` nepers in it; a term is zero before its start
-//! `s`. Amplitudes are linear and solved for at every step. Cycles and nepers move by Gauss-Newton steps,
-//! halved until the misfit falls. All of it works on inner products of columns, which are summed once a step.
+//! `u` from -1 to 1 over the record, so that `n` is the number of cycles and `d` the decay in nepers over the
+//! record; a term is zero before its start `s`. Amplitudes are linear and solved for at every step. Cycles
+//! and nepers move by Gauss-Newton steps, halved until the misfit falls. All computations use inner products
+//! of columns, which are summed once per step.
 
 mod columns;
 
@@ -15,27 +16,28 @@ use portable_math as math;
 use std::f64::consts::{PI, TAU};
 use std::rc::Rc;
 
-/// Farthest a steady frequency moves, resolutions: half way down the lobe of a Hann window (-6 dB at one
-/// resolution, its end at two).
+/// Largest shift of a steady frequency in a fit, resolutions: half way down the lobe of a Hann window (-6 dB
+/// at one resolution; the lobe ends at two).
 const MOST_FREQUENCY_SHIFT: f64 = 1.0;
-/// Halvings of a step that raises the misfit.
+/// Maximum number of halvings of a step that raises the misfit.
 const MOST_HALVINGS: i32 = 8;
-/// A step below this many cycles or nepers is the last.
+/// A step of less than this many cycles and nepers is the last.
 const SMALLEST_STEP: f64 = 1e-6;
-/// Directions of the normal matrix, scaled to a unit diagonal, below this share of the largest are not
-/// determined by the data.
+/// Ratio of an eigenvalue of the normal matrix, scaled to a unit diagonal, to the largest eigenvalue, below
+/// which the data do not determine its direction.
 const SINGULAR_DIRECTION: f64 = 1e-10;
-/// Pivots of that matrix from which all directions are determined: each column then keeps a thousandth of its
-/// length next to those before it.
+/// Smallest squared pivot of that matrix above which the data determine all directions: each column then
+/// keeps at least a thousandth of its length perpendicular to the columns before it.
 const WELL_POSED_PIVOT: f64 = 1e-6;
-/// Most nepers gained over the record: a growth by a factor of 400 is a transient at its end.
+/// Largest growth over the record, nepers: a growth by a factor of 400 is a transient at the end of the
+/// record.
 const MOST_GROWTH: f64 = 6.0;
-/// Largest damping ratio of an oscillation: above a half, nothing is left of it after one cycle.
+/// Largest damping ratio of an oscillation: above a half, almost nothing is left of it after one cycle.
 const MOST_DAMPING: f64 = 0.5;
-/// Most nepers of a relaxation over the record: it is over within a hundredth of the record.
+/// Largest decay of a relaxation over the record, nepers: it is over within a hundredth of the record.
 const MOST_RELAXED: f64 = 500.0;
-/// The same for a relaxation at the end of the record. It grows from the start, and the squares of greater
-/// growth would come near the largest number.
+/// Largest growth of a relaxation at the end of the record, nepers; the squares of a larger growth would come
+/// near the largest floating-point number.
 const MOST_RELAXED_AT_END: f64 = 330.0;
 
 /// Parameters of a term that a fit moves.
@@ -44,7 +46,7 @@ pub(super) enum FreeSet {
     Amplitude,
     Cycles,
     Both,
-    /// The decay alone: with no cycles, a relaxation.
+    /// The decay alone; a relaxation, which has no cycles, moves only this.
     Nepers,
 }
 
@@ -68,7 +70,7 @@ impl FreeSet {
 pub(super) struct SineTerm {
     /// Cycles in the record.
     pub cycles: f64,
-    /// Nepers by which it decays over the record.
+    /// Decay over the record, nepers.
     pub nepers: f64,
     /// First frame in which it is present.
     pub first: usize,
@@ -82,7 +84,7 @@ impl SineTerm {
         Self { cycles, nepers, first: 0, free }
     }
 
-    /// Least and most nepers that a fit may reach.
+    /// Smallest and largest decay that a fit may reach, nepers.
     pub(super) fn nepers_bounds(&self) -> (f64, f64) {
         if self.cycles == 0.0 {
             (-MOST_RELAXED_AT_END, MOST_RELAXED)
@@ -97,19 +99,20 @@ pub(super) fn nepers_from_damping_ratio(cycles: f64, damping_ratio: f64) -> f64 
     TAU * cycles * damping_ratio / (1.0 - damping_ratio * damping_ratio).sqrt()
 }
 
-/// How closely a minimum is approached.
+/// Accuracy with which a minimum is approached.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Tolerance {
-    /// To a few hundredths of a deviation: more terms follow.
+    /// To a few hundredths of a standard deviation, because more terms follow.
     Coarse,
     /// To the last step that lowers the misfit.
     Fine,
 }
 
 impl Tolerance {
-    /// Relative decrease of the misfit below which a step is the last, and most steps. [`Self::Fine`] is a
-    /// thousandth of a deviation for 450 frames, a hundredth for a million. A steady tone takes four steps, a
-    /// drifting one a dozen; a signal that is no sinusoid may never converge.
+    /// Relative decrease of the misfit below which a step is the last, and maximum number of steps.
+    /// [`Self::Fine`] reaches a thousandth of a standard deviation for 450 frames, a hundredth for a million.
+    /// A steady tone takes four steps, a drifting one a dozen; a signal that is not a sinusoid may never
+    /// converge.
     fn least_decrease_and_most_steps(self) -> (f64, usize) {
         match self {
             Self::Coarse => (1e-6, 8),
@@ -132,23 +135,23 @@ pub(super) struct SineProblem {
 #[derive(Debug, Clone)]
 pub(super) struct SineSolution {
     pub terms: Vec<SineTerm>,
-    /// Trend, then cosine and sine amplitude of each term with its phase counted from the middle of the
-    /// record and at the start of its envelope, m.
+    /// Coefficients of the trend, then cosine and sine amplitude of each term, m. The phase is counted from
+    /// the middle of the record; the amplitude is that at the start of the envelope.
     pub amplitudes: DVector<f64>,
-    /// Weighted sum of squares of what is left, m^2.
+    /// Weighted sum of squares of the residual, m^2.
     pub misfit: f64,
 }
 
 impl SineProblem {
-    /// A record, m, with the weight of each frame, zero where there is none.
+    /// A record, m, with the weight of each frame, which is zero for a missing frame.
     pub(super) fn new(data: &[f64], weights: &[f64], trend: Trend) -> Self {
         let columns = Rc::new(FixedColumns::new(trend, data, weights));
         Self { trend, weight: weights.iter().sum(), frames: data.len(), columns }
     }
 
-    /// Minimises the misfit over the free parameters; `None` where the normal matrix is not finite. A term
-    /// whose step would leave its peak returns to it and keeps its frequency; one that would decay or grow
-    /// beyond bounds becomes steady.
+    /// Minimises the misfit over the free parameters; `None` if the normal matrix is not finite. A term whose
+    /// step would leave its peak returns to the peak and keeps that frequency. A term that would decay or
+    /// grow beyond its bounds becomes steady, or keeps its decay if only the decay was free.
     pub(super) fn gauss_newton(&self, terms: &[SineTerm], care: Tolerance) -> Option<SineSolution> {
         let (least_decrease, most_steps) = care.least_decrease_and_most_steps();
         let mut solved = self.solve_amplitudes(terms.to_vec())?;
@@ -202,7 +205,7 @@ impl SineProblem {
         self.trend.column_count() + terms.iter().map(|t| amplitudes(t) + t.free.count()).sum::<usize>()
     }
 
-    /// The amplitudes of least misfit at given terms.
+    /// The amplitudes that minimise the misfit for given terms.
     pub(super) fn solve_amplitudes(&self, terms: Vec<SineTerm>) -> Option<SineSolution> {
         let gram = self.columns.gram_matrix::<QUADRATURE_COLUMNS>(&terms);
         let last = gram.ncols() - 1;
@@ -212,7 +215,7 @@ impl SineProblem {
         Some(SineSolution { terms, amplitudes, misfit })
     }
 
-    /// The step, halved until the misfit falls; `None` where it does not.
+    /// The solution after the step, halved until the misfit falls; `None` if it does not fall.
     fn halve_until_descent(&self, from: &SineSolution, step: &[[f64; 2]]) -> Option<SineSolution> {
         (0..MOST_HALVINGS).find_map(|halvings| {
             let share = math::powi(0.5, halvings);
@@ -226,8 +229,8 @@ impl SineProblem {
         })
     }
 
-    /// The unknowns as combinations of the columns: the linear ones, then cycles and nepers of each term
-    /// where they are free.
+    /// Derivatives of the model with respect to the unknowns, as combinations of the columns: first the
+    /// linear unknowns, then cycles and nepers of each term if they are free.
     fn unknowns_matrix(&self, solved: &SineSolution) -> DMatrix<f64> {
         let trend = self.trend.column_count();
         let pair = |k| [TermColumn::Cosine, TermColumn::Sine].map(|column| column.column_index(trend, k));
@@ -297,7 +300,7 @@ impl SineProblem {
     }
 }
 
-/// Covariance of everything fitted.
+/// Covariance of all fitted unknowns.
 pub(super) struct SineCovariance {
     matrix: DMatrix<f64>,
     places: Vec<UnknownIndices>,
@@ -312,15 +315,15 @@ struct UnknownIndices {
 /// Standard deviations of one term for white noise of variance one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct TermDeviations {
-    /// Of the cycles in the record; 0 where they are held.
+    /// Standard deviation of the cycles in the record; 0 if they are held.
     pub cycles: f64,
-    /// Of the nepers over the record; 0 where they are held.
+    /// Standard deviation of the nepers over the record; 0 if they are held.
     pub nepers: f64,
     pub amplitude: f64,
 }
 
 impl SineCovariance {
-    /// The deviations of term `k`, whose cosine and sine amplitudes are `pair`.
+    /// The standard deviations of term `k`, whose cosine and sine amplitudes are `pair`.
     pub(super) fn deviations(&self, k: usize, pair: [f64; 2]) -> TermDeviations {
         let place = &self.places[k];
         let size = math::hypot(pair[0], pair[1]).max(f64::MIN_POSITIVE);
@@ -335,9 +338,9 @@ impl SineCovariance {
     }
 }
 
-/// The term that replaces one whose step leaves its peak or its bounds; `None` for a step that may be taken.
+/// The term that replaces a term whose step leaves its peak or its bounds; `None` for a permitted step.
 fn constrain_step(start: &SineTerm, now: &SineTerm, step: [f64; 2]) -> Option<SineTerm> {
-    let width = now.nepers.abs() / TAU; // a decaying peak is as wide as it decays
+    let width = now.nepers.abs() / TAU; // the width of a peak grows with its decay
     if (now.cycles + step[0] - start.cycles).abs() > MOST_FREQUENCY_SHIFT + width {
         let decays = now.free == FreeSet::Both;
         let free = if decays { FreeSet::Nepers } else { FreeSet::Amplitude };
@@ -351,7 +354,7 @@ fn constrain_step(start: &SineTerm, now: &SineTerm, step: [f64; 2]) -> Option<Si
     })
 }
 
-/// Iterations of an eigenvalue decomposition; one that converges takes a few for each row.
+/// Maximum number of iterations of an eigenvalue decomposition; one that converges takes a few per row.
 const MOST_ITERATIONS: usize = 10_000;
 
 /// Inverse of a symmetric matrix over the directions that the data determine.
@@ -361,7 +364,7 @@ fn pseudo_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     }
     let scale = matrix.diagonal().map(|x| if x > 0.0 { x.sqrt().recip() } else { 0.0 });
     let scaled = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
-        // an empty column, the sine of a relaxation, has no part in the others
+        // a zero column, such as the sine of a relaxation, is decoupled from the others
         if i == j && scale[i] == 0.0 { 1.0 } else { matrix[(i, j)] * scale[i] * scale[j] }
     });
     if scaled.iter().any(|x| !x.is_finite()) {

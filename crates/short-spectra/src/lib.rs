@@ -1,15 +1,15 @@
 //! Components of short records with missing frames.
 //!
 //! [`SpectralAnalysis::from_record`] fits a record: trend, steady and decaying oscillations by least squares
-//! on the frames present, and a drifting component by its ridge, each with deviations and a verdict.
+//! on the frames present, and a drifting component by its ridge, each with standard deviations and a verdict.
 //!
-//! [`analyse_spectrum`] reads the peaks of one Hann-windowed spectrum, fast and without choices that depend
+//! [`analyse_spectrum`] finds the peaks of one Hann-windowed spectrum, fast and without choices that depend
 //! on the data, so that a fit can compare thousands of records. Gaps of up to four frames are filled for the
-//! transform alone (`gap_filling.rs`). Where more than a tenth of the frames is missing, the
-//! components are then refined on the frames present (`gap_refinement.rs`). The record is detrended,
-//! weighted, padded with zeros and transformed. A frame that is still missing has weight zero on the true
-//! frame grid. Amplitudes are scaled by the weights present, `2 |sum w x exp(-i w t)| / sum w`: a sine of
-//! amplitude A reads A at its peak.
+//! transform only (`gap_filling.rs`). If more than a tenth of the frames are missing, the components are then
+//! refined on the frames present (`gap_refinement.rs`). The record is detrended, weighted, padded with zeros
+//! and transformed. A frame that is still missing has weight zero on the true frame grid. Amplitudes are
+//! scaled by the sum of the weights present, `2 |sum w x exp(-i w t)| / sum w`: the peak of a sine of
+//! amplitude A has the height A.
 //!
 //! # Three tones among gaps
 //!
@@ -84,10 +84,10 @@ pub use target::Target;
 
 pub use trend::{Detrend, UnknownDetrend};
 
-/// Spectrum of a record of displacement, m, one sample a frame (`None` where there is none).
+/// Spectrum of a record of displacement, m, one sample per frame (`None` for a missing frame).
 ///
 /// # Errors
-/// [`SpectrumError`] when the record, the rate or the band cannot give one.
+/// [`SpectrumError`] if the record, the frame rate or the band allows no spectrum.
 pub fn analyse_spectrum(
     samples: &[Option<f64>],
     frame_rate_hz: f64,

@@ -1,35 +1,36 @@
 //! Frequency and decay of a ring-down by the matrix pencil, in a band around a peak.
 //!
-//! The record is demodulated by the peak's frequency and summed in blocks. A block sum of `z^n` is again an
-//! exponential, `z^(mD)` times a constant. So sixty blocks represent the record, and a decay from the first
-//! frame on stays exact where a filter would blur it. The number of exponentials is the number of singular
-//! values of the sums' Hankel matrix above the noise, by the minimum description length; the shift from its
-//! rows to the next gives the poles (Hua and Sarkar 1990; Roy and Kailath 1989).
+//! The record is demodulated by the frequency of the peak and summed in blocks of `D` frames. The block sums
+//! of `z^n` are again an exponential, `z^(mD)` times a constant. Sixty block sums therefore represent the
+//! record, and a decay from the first frame on remains exact, where a filter would blur it. The number of
+//! exponentials is the number of singular values of the Hankel matrix of the sums above the noise, by the
+//! minimum description length. The shift from each row of the matrix to the next gives the poles (Hua and
+//! Sarkar 1990; Roy and Kailath 1989).
 
 use nalgebra::{Complex, DMatrix, DVector};
 use portable_math as math;
 use std::f64::consts::TAU;
 
-/// Blocks that represent the record: a decay within a twentieth of it is still three blocks long, and the
-/// matrix is solved in a millisecond.
+/// Number of blocks that represent the record: a decay within a twentieth of the record still spans three
+/// blocks, and the matrix is solved in a millisecond.
 const BLOCKS: usize = 60;
-/// Most exponentials: the peak, its mirror image, a residue of the trend and their neighbours.
+/// Maximum number of exponentials: the peak, its mirror image, a residue of the trend and their neighbours.
 const MOST_POLES: usize = 8;
-/// Farthest distance of a pole from its peak, cycles in the record.
+/// Largest distance of a pole from its peak, cycles in the record.
 const FARTHEST_POLE: f64 = 2.0;
 /// Relative precision of a decomposition.
 const PRECISION: f64 = 5.0 * f64::EPSILON;
-/// Iterations of a decomposition. One that converges takes a few for each row; among gaps it may not
-/// converge.
+/// Maximum number of iterations of a decomposition. One that converges takes a few per row; with gaps in the
+/// record it may not converge.
 const MOST_ITERATIONS: usize = 2000;
-/// Nepers gained over the record above which powers come near the largest number; a record that is mostly
-/// gaps gives such poles.
+/// Largest growth over the record, nepers; with a larger growth, powers come near the largest floating-point
+/// number. A record that is mostly gaps gives such poles.
 const MOST_NEPERS: f64 = 200.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pole {
     /// Cycles in the record.
     pub cycles: f64,
-    /// Nepers by which it decays over the record.
+    /// Decay over the record, nepers.
     pub nepers: f64,
 }
 
@@ -148,7 +149,7 @@ mod tests {
 
     #[test]
     fn a_record_that_is_mostly_gaps_comes_to_an_end() {
-        // values at both ends alone: growing and decaying poles of any size
+        // values at the ends only, which give growing and decaying poles of any size
         let ends: Vec<f64> = (0..900)
             .map(|i| {
                 if (20..880).contains(&i) {

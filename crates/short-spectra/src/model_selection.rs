@@ -1,10 +1,11 @@
 //! The parts of a record: a trend, relaxations and (decaying) sinusoids, added one after another until the
 //! residual shows no peak.
 //!
-//! Each round takes the windowed spectrum of the residual. A peak that stands out of the noise is explained
-//! by a sinusoid whose start comes from the matrix pencil. A peak so low that a step may have made it is
-//! explained by a sinusoid, two more degrees of the trend or a relaxation `exp(-d t)`, whichever has the
-//! least Bayesian information criterion. Then everything is fitted again together (`least_squares.rs`).
+//! Each round computes the windowed spectrum of the residual. A peak that stands out from the noise is
+//! explained by a sinusoid, whose start values come from the matrix pencil. A peak at so low a frequency that
+//! a step may have caused it is explained by a sinusoid, two more degrees of the trend or a relaxation
+//! `exp(-d t)`, whichever has the lowest Bayesian information criterion. Then everything is fitted again
+//! together (`least_squares.rs`).
 
 use super::least_squares::{FreeSet, SineProblem, SineSolution, SineTerm, Tolerance};
 use super::peaks::{self, Peak, PeakList};
@@ -15,43 +16,46 @@ use super::{gap_filling, matrix_pencil};
 use portable_math as math;
 use std::f64::consts::{PI, TAU};
 
-/// Rounds; each adds at least one term.
+/// Maximum number of rounds; each adds at least one term.
 const MOST_ROUNDS: usize = 12;
-/// Rounds of the second pass, which tries ring-downs and pairs.
+/// Maximum number of rounds in which the second pass tries ring-downs and pairs.
 const SECOND_PASS_ROUNDS: usize = 5;
-/// Cycles in the record below which a step makes peaks of its own: the spectrum of a step over a tenth of the
-/// record lies there.
+/// Number of cycles in the record below which a step causes peaks of its own: the spectrum of a step over a
+/// tenth of the record lies there.
 pub(super) const STEP_CYCLES: f64 = 8.0;
 /// Half width of the lobe of a Hann window, resolutions: a residual closer to a term belongs to that term.
 pub(super) const LOBE: f64 = 2.0;
-/// Nepers over the record at which a relaxation is tried, at its start or, negative, at its end.
+/// Decays over the record, nepers, with which a relaxation is tried: at the start of the record or, if
+/// negative, at its end.
 const RELAXATION_NEPERS: [f64; 8] = [5.0, 15.0, 45.0, 135.0, -5.0, -15.0, -45.0, -135.0];
 const MOST_RELAXATIONS: usize = 3;
-/// Frames for each unknown below which the fit would follow the noise.
+/// Number of frames per unknown below which the fit would follow the noise.
 const FRAMES_PER_UNKNOWN: usize = 4;
-/// The same for a trend alone, which noise cannot imitate: a cubic takes four frames and as many are left.
+/// Number of frames per column that a trend alone needs, because noise cannot imitate it: a cubic takes four
+/// frames and leaves as many.
 pub(super) const FRAMES_PER_COLUMN: usize = 2;
-/// Deviations of the noise by which a relaxation must lower the residual: eight decays are tried, and one in
-/// 10,000 noise records reaches this.
+/// A relaxation must lower the misfit by the square of this many standard deviations of the noise: eight
+/// decays are tried, and one in 10,000 noise records reaches this limit.
 const RELAXATION_STANDS_OUT: f64 = 4.5;
-/// Multiples of a drifting cycle whose peaks belong to it, because it is not a sine.
+/// Multiples of the frequency of a drifting cycle whose peaks belong to the cycle, because it is not a sine.
 const DRIFT_HARMONICS: [f64; 4] = [1.0, 2.0, 3.0, 4.0];
-/// Nepers over the record tried in addition to the pencil's: among gaps the pencil may fail.
+/// Decays over the record, nepers, that are tried besides that of the matrix pencil, which may fail if there
+/// are gaps.
 const START_NEPERS: [f64; 4] = [0.0, 2.0, 6.0, 18.0];
 
 /// A record to decompose.
 pub(super) struct ModelSelector<'a> {
-    /// Samples, m; `None` where there is none.
+    /// Samples, m; `None` for a missing frame.
     pub samples: &'a [Option<f64>],
     pub frame_rate_hz: f64,
-    /// The spectrum of records with the same gaps.
+    /// Window and transform for records with the same gaps.
     pub periodogram: &'a Periodogram,
-    /// Amplitude of rounding, m.
+    /// Amplitude of rounding errors, m.
     pub rounding_m: f64,
     /// Whether the trend may grow.
     pub trend_grows: bool,
-    /// Whether noise is measured around each component, because it need not be white. The drifting cycle is
-    /// sought before, because over an octave it looks like noise.
+    /// Whether noise is measured around each component, because it need not be white. Not set while a
+    /// drifting cycle is sought, because a cycle that drifts over an octave looks like noise.
     pub noise_is_coloured: bool,
     /// Range of a drifting cycle; peaks in it and its multiples belong to that cycle.
     pub drift_region: Option<DriftRegion>,
@@ -96,7 +100,7 @@ impl SineModel {
         (0..self.terms().len()).filter(|k| self.terms()[*k].cycles == 0.0).collect()
     }
 
-    /// The terms except those at some indices, followed by new ones.
+    /// The terms except those with the indices `out`, followed by new ones.
     pub(super) fn swap_terms(&self, out: &[usize], new: impl IntoIterator<Item = SineTerm>) -> Vec<SineTerm> {
         let kept = (0..self.terms().len()).filter(|k| !out.contains(k)).map(|k| self.terms()[k]);
         kept.chain(new).collect()
@@ -125,12 +129,12 @@ pub(super) struct ModelFit {
     /// Residual in each frame, m.
     pub residual_m: Vec<Option<f64>>,
     pub amplitude_m: Vec<f64>,
-    /// Peaks and noise floor of its spectrum.
+    /// Peaks and noise floor of the spectrum of the residual.
     pub peaks: PeakList,
 }
 
 impl ModelFit {
-    /// Residual in each frame, m; zero where a frame has no value.
+    /// Residual in each frame, m; zero for a frame without a value.
     pub(super) fn residual_or_zero(&self) -> Vec<f64> {
         self.residual_m.iter().map(|x| x.unwrap_or(0.0)).collect()
     }
@@ -192,7 +196,8 @@ impl<'a> ModelSelector<'a> {
         self.add_terms(self.fit_model(parts.problem.clone(), &kept, Tolerance::Coarse)?, false)
     }
 
-    /// Continues with terms that begin late or end soon, and with two lines where one was found.
+    /// Continues the decomposition with terms that begin late or end soon, and with pairs of lines found as
+    /// one.
     pub(super) fn run_second_pass(&self, fit: ModelFit) -> Option<ModelFit> {
         self.add_terms(fit.model, true)
     }
@@ -213,13 +218,14 @@ impl<'a> ModelSelector<'a> {
         self.prune_terms(fit)
     }
 
-    /// The model with another part added; `None` where nothing stands out or no more can be determined.
+    /// The model with another part added; `None` if nothing stands out from the noise or no further part can
+    /// be determined.
     fn improve_model(&self, fit: &ModelFit) -> Option<SineModel> {
         let parts = &fit.model;
         let fresh = fit.peaks.accepted.iter().filter(|p| self.is_new_peak(parts.terms(), p));
         let (mut high, low): (Vec<Peak>, Vec<Peak>) =
             fresh.copied().partition(|p| self.cycles_of_peak(p) >= STEP_CYCLES);
-        // noise need not be white; the residue of a step is no noise
+        // noise need not be white, but the residue of a step is not noise
         high.retain(|p| !self.noise_is_coloured || self.stands_out_widely(fit, p));
         let room = MAX_COMPONENTS.saturating_sub(parts.oscillations().len());
         let largest = low.first().filter(|l| high.first().is_none_or(|h| l.amplitude_m > h.amplitude_m));
@@ -240,7 +246,7 @@ impl<'a> ModelSelector<'a> {
         peak.frequency_hz / self.resolution_hz()
     }
 
-    /// One over the record's length, Hz.
+    /// Reciprocal of the length of the record, Hz.
     pub(super) fn resolution_hz(&self) -> f64 {
         self.frame_rate_hz / self.samples.len() as f64
     }
@@ -262,7 +268,7 @@ impl<'a> ModelSelector<'a> {
         })
     }
 
-    /// Explains a low peak by a sinusoid, more trend or a relaxation, whichever has the least criterion.
+    /// Explains a low peak by a sinusoid, more trend or a relaxation, whichever has the lowest criterion.
     fn explain_low_peak(&self, fit: &ModelFit, peak: &Peak) -> Option<SineModel> {
         let parts = &fit.model;
         let mut candidates = Vec::new();
@@ -279,20 +285,20 @@ impl<'a> ModelSelector<'a> {
         self.fit_if_better(parts, &self.select_best(candidates)?)
     }
 
-    /// The model of the least criterion.
+    /// The model with the lowest criterion.
     pub(super) fn select_best(&self, models: impl IntoIterator<Item = SineModel>) -> Option<SineModel> {
         let order = |a: &SineModel, b: &SineModel| self.bic_of(a).total_cmp(&self.bic_of(b));
         models.into_iter().min_by(order)
     }
 
-    /// The candidate once fitted, if its criterion is less than that of the model.
+    /// The fitted candidate, if its criterion is lower than that of the model `parts`.
     fn fit_if_better(&self, parts: &SineModel, candidate: &SineModel) -> Option<SineModel> {
         self.fit_model(candidate.problem.clone(), candidate.terms(), Tolerance::Coarse)
             .filter(|fitted| self.bic_of(fitted) < self.bic_of(parts))
     }
 
     /// The model with the relaxation that lowers the misfit most, if by more than noise. A relaxation found
-    /// before has absorbed as much of another as it could: both must move before the other shows.
+    /// before may have absorbed part of another, which then shows only when both are fitted again.
     fn with_relaxation(&self, fit: &ModelFit) -> Option<SineModel> {
         let parts = &fit.model;
         let relaxations = parts.relaxations().len();
@@ -326,7 +332,7 @@ impl<'a> ModelSelector<'a> {
         terms
     }
 
-    /// The sinusoid from which a fit starts.
+    /// The sinusoid from which the fit of a peak starts.
     fn start_sinusoid(&self, fit: &ModelFit, peak: &Peak) -> SineTerm {
         let cycles = self.cycles_of_peak(peak);
         let filled = gap_filling::fill_short_gaps(&fit.residual_m).into_iter();
@@ -349,8 +355,8 @@ impl<'a> ModelSelector<'a> {
         Some(SineModel { problem, solution })
     }
 
-    /// The model with these terms moved to the least misfit, if there are enough frames; frequencies held
-    /// before are free again.
+    /// The fitted model with these terms, if there are enough frames; frequencies that were held are free
+    /// again.
     pub(super) fn fit_model(
         &self,
         problem: SineProblem,
@@ -366,7 +372,7 @@ impl<'a> ModelSelector<'a> {
         Some(SineModel { problem, solution })
     }
 
-    /// Whether there are enough frames. A trend alone needs fewer.
+    /// Whether there are enough frames for the unknowns. A trend alone needs fewer.
     pub(super) fn has_frames_for(&self, problem: &SineProblem, terms: &[SineTerm]) -> bool {
         let each = if terms.is_empty() { FRAMES_PER_COLUMN } else { FRAMES_PER_UNKNOWN };
         self.periodogram.sums.present >= each * problem.unknown_count(terms)
@@ -383,11 +389,11 @@ impl<'a> ModelSelector<'a> {
         self.bic_with(parts, parts.solution.misfit, 0.0)
     }
 
-    /// The same for another misfit, m^2, and more unknowns.
+    /// The criterion of a model with another misfit, m^2, and `more` additional unknowns.
     pub(super) fn bic_with(&self, parts: &SineModel, misfit: f64, more: f64) -> f64 {
         let present = self.periodogram.sums.present as f64;
         let terms = parts.terms();
-        let late = terms.iter().filter(|t| t.first > 0).count(); // a first frame is a number too
+        let late = terms.iter().filter(|t| t.first > 0).count(); // the first frame is an unknown too
         let unknowns = (parts.problem.unknown_count(terms) + late) as f64 + more;
         present * math::ln(misfit.max(f64::MIN_POSITIVE)) + unknowns * math::ln(present)
     }
@@ -404,7 +410,8 @@ impl<'a> ModelSelector<'a> {
         ModelFit { model, residual_m, amplitude_m, peaks }
     }
 
-    /// Drops sinusoids that noise alone may have made, and those that explain less than they leave.
+    /// Drops sinusoids that noise alone may have caused, and those that are smaller than the residual near
+    /// them.
     fn prune_terms(&self, mut fit: ModelFit) -> Option<ModelFit> {
         for _ in 0..MOST_ROUNDS {
             let kept = self.find_significant_terms(&fit)?;
@@ -420,14 +427,15 @@ impl<'a> ModelSelector<'a> {
         Some(fit)
     }
 
-    /// Which terms stand out of the noise, keep their place and explain more than they leave.
+    /// For each term, whether it stands out from the noise, keeps its peak and is larger than the residual
+    /// near it.
     fn find_significant_terms(&self, fit: &ModelFit) -> Option<Vec<bool>> {
         let parts = &fit.model;
         let covariance = parts.problem.covariance(&parts.solution)?;
         let white_m = self.periodogram.noise_sd_m(fit.peaks.floor_m);
         let kept = |(k, term): (usize, &SineTerm)| {
-            // the noise of a bin holds both parts of an amplitude, so it is the square root of two times the
-            // deviation
+            // the noise of a bin holds both parts of an amplitude, so it is sqrt(2) times the standard
+            // deviation of the amplitude
             let sd = covariance.deviations(k, parts.amplitudes(k)).amplitude;
             let least = fit.peaks.detection * std::f64::consts::SQRT_2 * sd;
             let amplitude_m = parts.amplitude_m(k);
@@ -461,7 +469,7 @@ pub(super) fn lobe_half_width(term: &SineTerm) -> f64 {
 }
 
 impl SineTerm {
-    /// Whether it completes a cycle before it has decayed.
+    /// Whether its decay is within the bounds and less than `2 pi` nepers per cycle.
     pub(super) fn is_oscillation(&self) -> bool {
         let (low, high) = self.nepers_bounds();
         self.cycles > 0.0 && self.nepers > low && self.nepers < high && self.nepers < TAU * self.cycles

@@ -3,7 +3,8 @@
 //!
 //! Each sine taper gives a nearly independent estimate. Their mean is the density, and their scatter its
 //! uncertainty (jackknife over the tapers). Thomson's harmonic F measures how well one steady sine explains
-//! them all. A line is spread over `tapers + 1` resolutions, so other estimators read its frequency better.
+//! all of them. A line is spread over `tapers + 1` resolutions, so other estimators give its frequency more
+//! accurately.
 //!
 //! Sources: Riedel and Sidorenko 1995 (IEEE Trans. Signal Process. 43, 188) for the tapers; Thomson 1982
 //! (Proc. IEEE 70, 1055) for F; Thomson and Chave 1991 (in Haykin, Advances in Spectrum Analysis and Array
@@ -18,95 +19,97 @@ use rayon::prelude::*;
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2, PI};
 use std::ops::RangeInclusive;
 
-/// Tapers unless asked for otherwise: a density of 14 degrees of freedom scatters by 38 %, and a line takes 8
-/// resolutions, 53 Hz in 0.15 s, so that 78 Hz is still apart from zero and from 900 Hz.
+/// Default number of tapers: a density with 14 degrees of freedom scatters by 38 %, and a line is 8
+/// resolutions wide, 53 Hz in 0.15 s, so that 78 Hz is still separate from zero and from 900 Hz.
 pub const TAPERS: usize = 7;
-/// Least and most tapers: one has no scatter, and more than fifty smooth away every feature.
+/// Smallest and largest number of tapers: one has no scatter, and more than fifty smooth away every feature.
 pub(crate) const TAPER_RANGE: RangeInclusive<usize> = 2..=50;
-/// Least width of a noise floor's window, in widths of a line, so that a line does not set its own floor.
+/// Smallest width of the window of a noise floor, in widths of a line, so that a line does not set its own
+/// floor.
 pub(crate) const FLOOR_LINES: f64 = 5.0;
-/// Longest padded record, samples: every taper keeps its transform.
+/// Longest padded record, samples, limited by memory because every taper keeps its transform.
 const MOST_PADDED: usize = 1 << 24;
-/// Values from which threads share the work; fewer take a millisecond or two.
+/// Number of values from which threads share the work; fewer take a millisecond or two.
 const PARALLEL_FROM: usize = 1 << 17;
-/// Share of the sum of powers below which the residual of one taper is rounding.
+/// Fraction of the sum of powers below which the remaining power without one taper is rounding error.
 const ROUNDING: f64 = 1e-15;
 
-/// A multitaper estimate; one value a bin, from 0 to half the frame rate.
+/// A multitaper estimate; one value per bin, from 0 to half the frame rate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Multitaper {
     /// Frequencies of the bins, Hz.
     pub frequency_hz: Vec<f64>,
-    /// One-sided power density, m^2/Hz: white noise of variance `s^2` reads `2 s^2 / rate`, and the sum over
-    /// the bins times their distance is the mean square of the record as the tapers weigh it. At 0 and half
-    /// the frame rate, which have no mirror image, it is half of that.
+    /// One-sided power density, m^2/Hz: white noise of variance `s^2` has `2 s^2 / rate`, and the sum over
+    /// the bins times their distance is the mean square of the record, weighted by the tapers. At 0 and at
+    /// half the frame rate, which have no mirror image, the density is half as large.
     pub density_m2_per_hz: Vec<f64>,
     /// Standard deviation of the density's natural logarithm, by the delete-one jackknife over the tapers.
     pub log_density_sd: Vec<f64>,
-    /// Thomson's F for one steady sine against noise, of 2 and `2 tapers - 2` degrees of freedom; holds where
-    /// a line's half width is clear of 0 and of half the frame rate. Infinite where the sine leaves nothing.
+    /// Thomson's F for one steady sine in noise, with 2 and `2 tapers - 2` degrees of freedom; valid in bins
+    /// more than half the width of a line from 0 and from half the frame rate. Infinite if the sine leaves no
+    /// residual.
     pub line_f: Vec<f64>,
-    /// Amplitude of that sine, m.
+    /// Amplitude of the sine that explains the bin best, m.
     pub line_amplitude_m: Vec<f64>,
-    /// Tapers used; fewer than asked for where long gaps leave room for fewer.
+    /// Number of tapers used; long gaps may leave room for fewer than requested.
     pub tapers: usize,
-    /// One over the time from the first to the last frame present, Hz.
+    /// Reciprocal of the time from the first to the last frame present, Hz.
     pub resolution_hz: f64,
-    /// Half the width of a steady line, Hz: `(tapers asked for + 1) / 2` resolutions.
+    /// Half the width of a steady line, Hz: `(requested tapers + 1) / 2` resolutions.
     pub half_bandwidth_hz: f64,
-    /// Student's t within which 95 % lie.
+    /// Limit of Student's t for the 95 % interval.
     student_t: f64,
 }
 
-/// Why a record has no multitaper estimate.
+/// Reason for which a record has no multitaper estimate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MultitaperError {
-    /// Not a number of tapers.
+    /// The number of tapers is outside the permitted range.
     #[error("tapers: found {found}, expected {} to {}; {TAPERS} are usual", TAPER_RANGE.start(), TAPER_RANGE.end())]
     Tapers {
-        /// Tapers asked for.
+        /// Number of tapers requested.
         found: usize,
     },
-    /// Too few frames hold a value.
+    /// Too few frames have a value.
     #[error(
         "found {found} frames with a value, expected at least {expected} for this number of tapers; widen the window or take fewer tapers"
     )]
     TooFew {
-        /// Frames with a value.
+        /// Number of frames with a value.
         found: usize,
-        /// Twice the tapers.
+        /// Twice the number of tapers.
         expected: usize,
     },
-    /// The frames present lie in so few clumps that one taper alone fits them.
+    /// The frames present lie in so few clumps that they leave room for only one taper.
     #[error(
         "the {found} frames with a value lie in clumps that leave room for one taper, expected room for two; choose a window with fewer gaps"
     )]
     Clumped {
-        /// Frames with a value.
+        /// Number of frames with a value.
         found: usize,
     },
-    /// A sample is no usable number.
+    /// A sample is not a usable number.
     #[error(
         "frame {frame} of the record: found {found}, expected a finite number below 1e100; remove the frame"
     )]
     NotFinite {
-        /// 0-based frame.
+        /// Number of the frame, counted from 0.
         frame: usize,
         /// The value.
         found: f64,
     },
-    /// The frame rate is no rate.
+    /// The frame rate is not a positive finite number.
     #[error("frame rate: found {found} Hz, expected a finite number above 0")]
     FrameRate {
         /// The value, Hz.
         found: f64,
     },
-    /// The padded record would not fit.
+    /// The padded record would be too long.
     #[error(
         "found a record of {frames} frames padded to {padded} samples, expected at most {MOST_PADDED}; shorten the window or the padding"
     )]
     TooLong {
-        /// Frames.
+        /// Number of frames.
         frames: usize,
         /// Padded length, samples.
         padded: usize,
@@ -114,12 +117,13 @@ pub enum MultitaperError {
 }
 
 impl Multitaper {
-    /// The estimate for a record less its trend, m, one sample a frame (`None` where there is none), padded
-    /// with zeros to the next power of two that holds the record and `padded` samples, from `tapers` tapers,
-    /// [`TAPERS`] as a rule.
+    /// The estimate for a record without its trend, m, one sample per frame (`None` for a missing frame),
+    /// from `tapers` tapers, usually [`TAPERS`]. The record is padded with zeros to the smallest power of two
+    /// that holds both the record and `padded` samples.
     ///
     /// # Errors
-    /// [`MultitaperError`] when record, rate, padding or tapers cannot give one.
+    /// [`MultitaperError`] if the record, the frame rate, the padding or the number of tapers allows no
+    /// estimate.
     pub fn new(
         residual_m: &[Option<f64>],
         frame_rate_hz: f64,
@@ -157,8 +161,8 @@ impl Multitaper {
         2 * self.tapers
     }
 
-    /// The 95 % interval of the density in a bin, m^2/Hz, from the jackknife with Student's t of one degree
-    /// of freedom less than tapers; `None` for a bin outside the spectrum.
+    /// The 95 % interval of the density in a bin, m^2/Hz, from the jackknife with Student's t, which has one
+    /// degree of freedom less than there are tapers; `None` for a bin outside the spectrum.
     #[must_use]
     pub fn interval_95(&self, bin: usize) -> Option<(f64, f64)> {
         let (density, sd) = (self.density_m2_per_hz.get(bin)?, self.log_density_sd.get(bin)?);
@@ -166,9 +170,9 @@ impl Multitaper {
         Some((density / factor, density * factor))
     }
 
-    /// Probability that noise alone, level within a line's width, gives an F as large as in a bin: `(1 +
-    /// F/(K-1))^-(K-1)` for `K` tapers. In a record of `n` frames, less than `1/n` counts as a line
-    /// (Thomson's rule). `None` for a bin outside the spectrum.
+    /// Probability that noise alone, flat within the width of a line, gives an F as large as that of a bin:
+    /// `(1 + F/(K-1))^-(K-1)` for `K` tapers. In a record of `n` frames, a probability below `1/n` counts as
+    /// a line (Thomson's rule). `None` for a bin outside the spectrum.
     #[must_use]
     pub fn line_probability(&self, bin: usize) -> Option<f64> {
         let others = (self.tapers - 1) as f64;
@@ -176,8 +180,8 @@ impl Multitaper {
     }
 
     /// Mean density of the noise in every bin, m^2/Hz: the running median of the density over `width_hz`, at
-    /// least `FLOOR_LINES` lines wide, without bins that stand out of it. It follows a steady slope of the
-    /// density, and is level over half its width at both ends.
+    /// least `FLOOR_LINES` lines wide, without the bins that stand out from it. The curve follows a steady
+    /// slope of the density, and is flat over half the width of the median at both ends.
     #[must_use]
     pub fn noise_density(&self, width_hz: f64) -> Vec<f64> {
         let bin_hz = self.frequency_hz.get(1).copied().unwrap_or(f64::INFINITY);
@@ -201,14 +205,14 @@ fn check_input(samples: &[Option<f64>], frame_rate_hz: f64, tapers: usize) -> Re
     if found < expected { Err(MultitaperError::TooFew { found, expected }) } else { Ok(()) }
 }
 
-/// The samples from the first to the last frame present: missing frames at the ends are no gap.
+/// The samples from the first to the last frame present: missing frames at the ends are not gaps.
 fn trim_missing_ends(samples: &[Option<f64>]) -> &[Option<f64>] {
     let first = samples.iter().position(Option::is_some).unwrap_or(0);
     let end = samples.iter().rposition(Option::is_some).map_or(first, |last| last + 1);
     samples.get(first..end).unwrap_or_default()
 }
 
-/// The values of `of` in order, computed in parallel where `work` is large.
+/// The values of `of` in order, computed in parallel if `work` is large.
 fn map_parallel_above<T: Send>(count: usize, work: usize, of: impl Fn(usize) -> T + Sync) -> Vec<T> {
     if work < PARALLEL_FROM {
         (0..count).map(&of).collect()
@@ -276,7 +280,7 @@ fn jackknife_log_sd<I: Iterator<Item = f64>>(total: f64, powers: impl Fn() -> I)
     if total <= 0.0 {
         return 0.0;
     }
-    // (the divisor of the means is the same for all, so it moves no deviation)
+    // (the divisor of the means is the same for all, so it does not affect the standard deviation)
     let logs = || powers().map(|p| math::ln(((total - p) / total).max(ROUNDING)));
     let (count, sum, squares) = logs().fold((0.0, 0.0, 0.0), |(n, s, q), x| (n + 1.0, s + x, q + x * x));
     let scatter: f64 = squares - sum * sum / count;
@@ -285,16 +289,17 @@ fn jackknife_log_sd<I: Iterator<Item = f64>>(total: f64, powers: impl Fn() -> I)
 
 // The noise under the lines of a density: a running median without the lines.
 
-/// Knots of the curve in the width of its window; the logarithms are linear between knots.
+/// Number of knots of the curve in the width of its window; the logarithm is linear between knots.
 const KNOTS_PER_WINDOW: usize = 4;
-/// Ratio to the curve from which a bin counts as a line: of 14 degrees of freedom one bin of noise in seventy
-/// does.
+/// Ratio of a bin to the curve above which it counts as a line; with 14 degrees of freedom, one bin of noise
+/// in seventy does.
 const LINE_RATIO: f64 = 2.0;
-/// Passes without the lines found before; the skirts of a line 60 dB above the noise are gone after three.
+/// Number of passes, each without the lines found before it; after three, the skirts of a line 60 dB above
+/// the noise are excluded.
 const FLOOR_PASSES: usize = 3;
 
-/// Mean of the noise in every bin; `window` is the width of the median, bins, and `degrees` are those of
-/// chi-square in a bin.
+/// Mean of the noise in every bin; `window` is the width of the median, bins, and `degrees` the number of
+/// degrees of freedom in a bin.
 pub(super) fn noise_floor_curve(density: &[f64], window: usize, degrees: f64) -> Vec<f64> {
     let all = running_median(density, window, |_| true);
     let without_lines =
@@ -303,8 +308,8 @@ pub(super) fn noise_floor_curve(density: &[f64], window: usize, degrees: f64) ->
     (0..FLOOR_PASSES).fold(all, without_lines).into_iter().map(|m| m * mean_over_median).collect()
 }
 
-/// Running median over the bins that count. A window with fewer of them than half its width grows until it
-/// has enough; at the ends it is cut.
+/// Running median over the bins that count. A window in which fewer bins count than half its width is widened
+/// until it has enough; at the ends it is cut off.
 fn running_median(density: &[f64], window: usize, counts: impl Fn(usize) -> bool + Sync) -> Vec<f64> {
     let Some(last) = density.len().checked_sub(1) else { return Vec::new() };
     let (half, step) = ((window / 2).max(1), (window / KNOTS_PER_WINDOW).max(1));
@@ -336,10 +341,10 @@ fn running_median(density: &[f64], window: usize, counts: impl Fn(usize) -> bool
 
 // Quantiles of Student's t for whole degrees of freedom.
 
-/// The `t` with the chance `inside` that a value of `degrees` degrees of freedom, one or more, lies between
-/// `-t` and `t`.
+/// The limit `t` for which a value with `degrees` degrees of freedom, at least one, lies between `-t` and `t`
+/// with the probability `inside`.
 pub(super) fn student_t_quantile(inside: f64, degrees: usize) -> f64 {
-    /// Halvings that leave the last bit of an angle.
+    /// Number of halvings after which only the last bit of an angle is uncertain.
     const HALVINGS: usize = 60;
     let (mut low, mut high) = (0.0, FRAC_PI_2);
     for _ in 0..HALVINGS {
@@ -349,7 +354,8 @@ pub(super) fn student_t_quantile(inside: f64, degrees: usize) -> f64 {
     (degrees as f64).sqrt() * math::tan(low)
 }
 
-/// The chance to lie within `sqrt(degrees) tan(angle)` (Abramowitz and Stegun 26.7.3, 26.7.4).
+/// Probability that Student's t lies within `sqrt(degrees) tan(angle)` of zero (Abramowitz and Stegun 26.7.3,
+/// 26.7.4).
 fn student_t_probability(angle: f64, degrees: usize) -> f64 {
     let (sine, cosine) = math::sin_cos(angle);
     let odd = degrees % 2;
@@ -369,12 +375,12 @@ fn student_t_probability(angle: f64, degrees: usize) -> f64 {
 // Sine tapers, orthonormal over the frames present.
 //
 // Over `n` frames without gaps the tapers `sqrt(2/(n+1)) sin(pi k m/(n+1))`, `m = 1..n`, `k = 1..K`, are
-// orthonormal (Riedel and Sidorenko 1995, eq. 2). Where frames are missing they are not; with their inner
-// products `G` over the frames present, `G^(-1/2)` times the tapers are, and of all such sets these are the
-// nearest to the tapers themselves.
+// orthonormal (Riedel and Sidorenko 1995, eq. 2). With missing frames they are not. If `G` are their inner
+// products over the frames present, `G^(-1/2)` times the tapers are orthonormal, and of all orthonormal sets
+// this is the nearest to the tapers.
 
-/// Frames whose inner products are summed at a time, so that the sum does not depend on the number of
-/// threads.
+/// Number of frames whose inner products are summed at a time, so that the sum does not depend on the number
+/// of threads.
 const PRODUCT_BLOCK: usize = 1 << 15;
 /// Energy on the frames present, relative to the largest, below which a combination of tapers is dropped: it
 /// lies in the gaps, and scaled to unit energy it would leak over the whole spectrum.
@@ -389,7 +395,7 @@ pub(super) struct SineTapers {
 }
 
 impl SineTapers {
-    /// At most `count` tapers for a record; fewer where its gaps leave no room.
+    /// At most `count` tapers for a record; fewer if its gaps leave no room.
     pub(super) fn new(samples: &[Option<f64>], count: usize) -> Self {
         let turn = PI / (samples.len() + 1) as f64;
         let sines = DMatrix::identity(count, count) * (2.0 / (samples.len() + 1) as f64).sqrt();
@@ -401,7 +407,7 @@ impl SineTapers {
         Self { turn, rows }
     }
 
-    /// The taper of a row in a frame, by Clenshaw's recurrence.
+    /// Value of the taper with the coefficients `row` in a frame, by Clenshaw's recurrence.
     pub(super) fn value(&self, row: &[f64], frame: usize) -> f64 {
         let (sine, cosine) = math::sin_cos(self.turn * (frame + 1) as f64);
         let next = |(b1, b2): (f64, f64), c: &f64| (c + 2.0 * cosine * b1 - b2, b1);
@@ -434,7 +440,8 @@ fn taper_inner_products(samples: &[Option<f64>], turn: f64, count: usize) -> DMa
     map_parallel_above(samples.len().div_ceil(PRODUCT_BLOCK), samples.len(), block).into_iter().sum()
 }
 
-/// `G^(-1/2)`; where some combinations lie in the gaps, the others, each of unit energy.
+/// `G^(-1/2)`, or, if some combinations of tapers lie in the gaps, the other combinations, each of unit
+/// energy.
 fn orthonormal_combinations(products: &DMatrix<f64>) -> DMatrix<f64> {
     let eigen = products.clone().symmetric_eigen();
     let least = LEAST_ENERGY_SHARE * eigen.eigenvalues.max();
@@ -461,7 +468,7 @@ mod tests {
         // with many degrees of freedom the mean and the median agree
         let curve = noise_floor_curve(&density, 200, 1e9);
         assert_eq!(curve.len(), 1000);
-        // next to the line the median is that of the bins that are left, at most 20 bins aside: 7 %
+        // next to the line, the median is that of the remaining bins, at most 20 bins to one side: 7 %
         assert!((100..900).all(|bin| (curve[bin] / slope(bin) - 1.0).abs() < 0.07), "{:?}", &curve[380..620]);
         assert!([150, 300, 700, 850].iter().all(|bin| (curve[*bin] / slope(*bin) - 1.0).abs() < 1e-3));
     }

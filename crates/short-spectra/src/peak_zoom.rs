@@ -1,21 +1,21 @@
-//! The peak of a long record between bins that are far apart: the transform itself is summed around it.
+//! Location of a peak of a long record between bins that are far apart, by summing the transform around it.
 //!
-//! The record is demodulated once by the frequency of the bin and summed over a thousandth of it at a time.
-//! Around that frequency these sums represent the record: a fraction of a cycle over the record hardly turns
-//! within one of them.
+//! The record is demodulated once by the frequency of the bin and summed in about a thousand blocks. Near
+//! that frequency the sums represent the record, because a fraction of a cycle over the record hardly turns
+//! the phase within a block.
 
 use portable_math as math;
 use std::f64::consts::TAU;
 
-/// Pieces of the record that are summed: half a cycle over all of it turns by 0.003 within one, which lowers
-/// the amplitude by 4e-7.
+/// Number of blocks that represent the record: half a cycle over the record turns the phase by 0.003 rad
+/// within a block, which lowers the amplitude by 4e-7.
 const DEMODULATED_BLOCKS: usize = 1024;
-/// Frames after which a rotated phasor starts afresh, so that rounding does not accumulate.
+/// Number of frames after which a rotated phasor starts afresh, so that rounding errors do not accumulate.
 const FRAMES_PER_RESTART: usize = 256;
 /// Distance of the three amplitudes of a parabola, cycles: an eighth of a resolution.
 const PARABOLA_SPACING: f64 = 0.125;
-/// Parabolas: each starts at the vertex of the one before, at most half a spacing away, and a parabola is
-/// exact about its own middle.
+/// Number of parabolas; each is centred on the vertex of the one before, at most half a spacing away, because
+/// a parabola is exact only at its own centre.
 const PARABOLAS: usize = 6;
 
 /// A weighted record.
@@ -24,12 +24,12 @@ pub(super) struct WeightedRecord<'a> {
     pub residual: &'a [f64],
     /// Weight of each frame.
     pub weights: &'a [f64],
-    /// Factor that makes a sum an amplitude.
+    /// Factor that converts a sum to an amplitude.
     pub amplitude_scale: f64,
 }
 
 impl WeightedRecord<'_> {
-    /// Cycles in the record and amplitude, m, of the peak within a resolution of `cycles`.
+    /// Cycles in the record and amplitude, m, of the peak near `cycles`.
     pub(super) fn zoom_peak(&self, cycles: f64) -> (f64, f64) {
         let (length, pieces) = self.demodulate_blocks(cycles);
         let frames = self.residual.len() as f64;
@@ -52,7 +52,7 @@ impl WeightedRecord<'_> {
         (cycles + shift, height_m)
     }
 
-    /// Frames of a block, and the sums over the blocks of the record demodulated by `cycles`.
+    /// Number of frames of a block, and the sums over the blocks of the record demodulated by `cycles`.
     fn demodulate_blocks(&self, cycles: f64) -> (usize, Vec<[f64; 2]>) {
         let frames = self.residual.len();
         let length = frames.div_ceil(DEMODULATED_BLOCKS).max(1);

@@ -1,4 +1,4 @@
-//! Components: local maxima that are no sidelobe, no ripple of a larger peak, and not noise.
+//! Components: local maxima that are not a sidelobe, a ripple of a larger peak, or noise.
 
 use super::component::{Component, ComponentVerdict, Estimator};
 use super::gap_refinement::{MOST_REFINED, Refinement, RefinementStart};
@@ -9,27 +9,29 @@ use portable_math as math;
 use rayon::prelude::*;
 use std::f64::consts::{FRAC_1_SQRT_2, LN_2, SQRT_2, TAU};
 
-/// Chance that noise alone puts one component into a spectrum.
+/// Probability that noise alone causes a component in a spectrum.
 const FALSE_ALARM: f64 = 0.01;
-/// Independent trials for each resolution: a Hann spectrum has more maxima than independent values.
+/// Number of independent trials per resolution: a Hann spectrum has more maxima than independent values.
 const TRIALS_PER_RESOLUTION: f64 = 3.0;
 /// Half width of the main lobe of a Hann window, resolutions.
 const LOBE: f64 = 2.0;
-/// Assumed height of sidelobes over the window's own, because a real component is neither steady nor alone.
+/// Assumed ratio of sidelobes to those of the window, because a real component is neither steady nor alone.
 const SIDELOBE_MARGIN: f64 = 1.5;
-/// The same below [`MIN_CYCLES`]: a residue of the trend is no sine, and its sidelobes fall more slowly.
+/// The same ratio below [`MIN_CYCLES`]: a residue of the trend is not a sine, and its sidelobes fall more
+/// slowly.
 const TREND_MARGIN: f64 = 4.0;
-/// Least amplitude listed, over the largest resolvable component: 50 dB. A cubic absorbs a little of a tone,
-/// and of twelve cycles that comes back 56 dB below.
+/// Smallest ratio of a listed amplitude to that of the largest resolvable component: -50 dB. A cubic absorbs
+/// a little of a tone, which appears 56 dB below a tone of twelve cycles.
 const DYNAMIC_RANGE: f64 = 3.2e-3;
-/// A second maximum counts if the spectrum falls this far below it towards every larger one: 3 dB, half its
-/// power.
+/// A second maximum counts if the spectrum falls below this fraction of it towards every larger one: 3 dB,
+/// half its power.
 const VALLEY_RATIO: f64 = FRAC_1_SQRT_2;
-/// Least width of the noise floor's median, resolutions, so that a component does not set its own floor.
+/// Smallest width of the median of the noise floor, resolutions, so that a component does not set its own
+/// floor.
 const FLOOR_RESOLUTIONS: f64 = 40.0;
-/// Scatter of this estimator over the Cramér-Rao bound, as measured at 20 dB (1.5 to 1.8).
+/// Ratio of the standard deviation of this estimator to the Cramér-Rao bound, measured at 20 dB (1.5 to 1.8).
 const OVER_BOUND: f64 = 1.6;
-/// Error after removal of a cubic at 78 Hz in 0.15 s, 0.03 Hz, as a share of the resolution there.
+/// Error of a frequency after removal of a cubic, resolutions: 0.03 Hz at 78 Hz in 0.15 s.
 const TREND_SHARE: f64 = 0.005;
 
 impl WindowedSpectrum<'_> {
@@ -41,11 +43,11 @@ impl WindowedSpectrum<'_> {
 /// The peaks that are components of their own.
 pub(super) struct PeakList {
     pub floor_m: f64,
-    /// Level over the noise from which a peak is a component.
+    /// Ratio of a peak to the noise floor from which it is a component.
     pub detection: f64,
     /// Every peak accepted, largest first; peaks outside the band leak into it too.
     pub accepted: Vec<Peak>,
-    /// Which of them are listed.
+    /// Indices of the accepted peaks that are listed.
     listed: Vec<usize>,
 }
 
@@ -67,7 +69,7 @@ impl PeakList {
         });
     }
 
-    /// The components listed, largest first; `outcomes` are those of the starts.
+    /// The listed components, largest first; `outcomes` are the results of the refinement starts.
     pub(super) fn list_components(
         &self,
         spectrum: &WindowedSpectrum,
@@ -80,8 +82,8 @@ impl PeakList {
         let absent = |index: usize| match outcomes[index] {
             Refinement::Unchanged => false,
             Refinement::FixedFrequency(amplitude_m) => amplitude_m < least_m,
-            // the noise of a bin holds both parts of an amplitude, so it is the square root of two times the
-            // deviation
+            // the noise of a bin holds both parts of an amplitude, so it is sqrt(2) times the standard
+            // deviation of the amplitude
             Refinement::Refined(r) => {
                 let noise_m = r.deviations.map_or(0.0, |sd| self.detection * SQRT_2 * sd.amplitude_m);
                 r.amplitude_m < least_m.max(noise_m)
@@ -126,7 +128,7 @@ pub(super) fn find_peaks(spectrum: &WindowedSpectrum, band_hz: (f64, f64), most:
             if listed.len() < most && peak.frequency_hz >= band_hz.0 && peak.frequency_hz <= band_hz.1 {
                 listed.push(accepted.len());
             }
-            accepted.push(peak); // one outside the band still casts its sidelobes into it
+            accepted.push(peak); // a peak outside the band still casts its sidelobes into it
         }
     }
     PeakList { floor_m, detection, accepted, listed }
@@ -145,8 +147,8 @@ fn noise_floor(spectrum: &WindowedSpectrum, (low, high): (f64, f64)) -> f64 {
     upper_median(inside).map_or(0.0, |median| median / LN_2.sqrt())
 }
 
-/// Level over the floor that noise reaches anywhere in the band with the chance [`FALSE_ALARM`]: a bin
-/// exceeds `r` times its rms with the chance `exp(-r^2)`.
+/// Ratio to the floor that noise reaches anywhere in the band with the probability [`FALSE_ALARM`]: a bin
+/// exceeds `r` times its rms with the probability `exp(-r^2)`.
 fn detection_threshold(spectrum: &WindowedSpectrum, (low, high): (f64, f64)) -> f64 {
     let trials = (TRIALS_PER_RESOLUTION * (high - low) / spectrum.resolution_hz).max(1.0);
     math::ln(trials / FALSE_ALARM).sqrt()
@@ -154,8 +156,8 @@ fn detection_threshold(spectrum: &WindowedSpectrum, (low, high): (f64, f64)) -> 
 
 /// Local maxima, except those that cannot reach `least_m`.
 fn local_maxima(spectrum: &WindowedSpectrum, least_m: f64) -> Vec<Peak> {
-    /// A parabola through logarithms rises above its middle point by at most the eighth root of that point
-    /// over its lower neighbour: by 9 % where the neighbour is half as high.
+    /// Largest ratio of the vertex of a parabola through logarithms to its middle point. It is at most the
+    /// eighth root of the ratio of this point to its lower neighbour: 9 % if the neighbour is half as high.
     const RISE: f64 = 1.1;
     let a = spectrum.amplitude_m;
     let is_top = |k: &usize| {
@@ -182,7 +184,7 @@ fn is_separate_peak(spectrum: &WindowedSpectrum, larger: &Peak, peak: &Peak) -> 
     peak.amplitude_m > sidelobe && valley < VALLEY_RATIO * peak.amplitude_m
 }
 
-/// The component of a peak, from its refinement where it has one.
+/// The component of a peak, from its refinement if it has one.
 fn peak_component(spectrum: &WindowedSpectrum, floor_m: f64, peak: &Peak, outcome: Refinement) -> Component {
     let trend_hz = TREND_SHARE * spectrum.resolution_hz;
     let bound_sd_hz = OVER_BOUND * cramer_rao_bound_hz(spectrum, floor_m, peak);

@@ -1,14 +1,15 @@
-//! The Hann-windowed amplitude spectrum of one pattern of frames, reused for every record of that pattern.
+//! The Hann-windowed amplitude spectrum for one pattern of missing frames, reused for every record of that
+//! pattern.
 
 use super::transform::RealTransform;
 use portable_math as math;
 use std::cell::RefCell;
 use std::sync::{Arc, OnceLock};
 
-/// Windows without gaps that a thread keeps: a fit reads a few, of the same lengths in every run of its
+/// Number of windows without gaps that a thread keeps: a fit uses a few lengths, the same in every run of its
 /// model.
 const CACHED_WINDOWS: usize = 16;
-/// Longest padded length of a window that is kept: together they take a few megabytes.
+/// Longest padded length of a window that is kept, samples; all kept windows together take a few megabytes.
 const LONGEST_CACHED: usize = 1 << 16;
 
 thread_local! {
@@ -63,7 +64,7 @@ pub(super) struct Periodogram {
 }
 
 impl Periodogram {
-    /// A window for records with values where `pattern` has them, padded to `padded` values.
+    /// A window for records with values in the same frames as `pattern`, padded to `padded` values.
     pub(super) fn new(pattern: &[Option<f64>], padded: usize) -> Self {
         let HannWindow { weights, envelope, sums, padded } = HannWindow::from_cache(pattern, padded);
         Self { transform: RealTransform::new(padded), weights, envelope, sums, padded }
@@ -75,7 +76,7 @@ impl Periodogram {
         self.envelope.get_or_init(|| sidelobe_maxima(lobe(), self.weights.len(), self.padded))
     }
 
-    /// Factor that makes a weighted sum an amplitude.
+    /// Factor that converts a weighted sum to an amplitude.
     pub(super) fn amplitude_scale(&self) -> f64 {
         2.0 / self.sums.first
     }
@@ -86,7 +87,7 @@ impl Periodogram {
         self.transform.magnitudes(residual.iter().zip(self.weights.iter()).map(|(x, w)| x * w * scaled))
     }
 
-    /// The spectrum in which peaks are sought; `least_m` is the amplitude of rounding.
+    /// The spectrum in which peaks are sought; `least_m` is the amplitude of rounding errors.
     pub(super) fn windowed_spectrum<'a>(
         &'a self,
         amplitude_m: &'a [f64],
@@ -117,7 +118,7 @@ impl Periodogram {
         Self::amplitude_with_weights(&self.weights, values, cycles)
     }
 
-    /// The same by other weights.
+    /// The amplitude of such an oscillation, m, with other weights.
     pub(super) fn amplitude_with_weights(weights: &[f64], values: &[f64], cycles: f64) -> f64 {
         let turn = std::f64::consts::TAU * cycles / values.len() as f64;
         let add = |(re, im): (f64, f64), (i, (x, w)): (usize, (&f64, &f64))| {
@@ -144,7 +145,7 @@ impl Periodogram {
 pub(super) struct WindowSums {
     pub first: f64,
     pub second: f64,
-    /// Frames that hold a value.
+    /// Number of frames that have a value.
     pub present: usize,
 }
 
@@ -174,8 +175,8 @@ pub(super) fn upper_median(mut values: Vec<f64>) -> Option<f64> {
 
 /// Bin width, resolutions, above which bins miss the top of a sidelobe, which is one resolution wide.
 const COARSE_BINS: f64 = 0.25;
-/// Bins by which the distance of two peaks is then reduced: half a bin for each peak, and one for a
-/// sidelobe's top between two bins.
+/// Number of bins by which the distance of two peaks is then reduced: half a bin for each peak, and one bin
+/// because the top of a sidelobe may lie between two bins.
 const ROUNDED_BINS: usize = 2;
 
 /// An amplitude spectrum with the sidelobes of its window.
@@ -187,7 +188,7 @@ pub(super) struct WindowedSpectrum<'a> {
     pub frames: usize,
     pub present: usize,
     pub sums: WindowSums,
-    /// Amplitude of rounding, m.
+    /// Amplitude of rounding errors, m.
     pub least_m: f64,
 }
 
@@ -199,7 +200,7 @@ pub(super) fn sidelobe_maxima(lobe: Vec<f64>, frames: usize, padded: usize) -> V
         envelope[k] = envelope[k].max(envelope[k + 1]);
     }
     if frames as f64 > COARSE_BINS * padded as f64 {
-        // both peaks are up to half a bin off, which is too much of a sidelobe's width
+        // the position of both peaks is up to half a bin off, which is too much of a sidelobe's width
         let rounded = ROUNDED_BINS.min(envelope.len());
         envelope.rotate_right(rounded);
         envelope.iter_mut().take(rounded).for_each(|value| *value = 1.0);

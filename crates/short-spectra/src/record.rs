@@ -3,10 +3,10 @@
 /// A record and the camera that took it.
 #[derive(Debug, Clone, Copy)]
 pub struct SampledRecord<'a> {
-    /// One sample a frame, m; `None` where there is none.
+    /// One sample per frame, m; `None` for a missing frame.
     pub samples: &'a [Option<f64>],
     /// Frames per second, 1/s.
     pub frame_rate_hz: f64,
-    /// Exposure of a frame, s, where known.
+    /// Exposure of a frame, s, if known.
     pub exposure_s: Option<f64>,
 }

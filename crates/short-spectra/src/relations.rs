@@ -1,7 +1,8 @@
 //! Relations of a component to another, as a multiple, a fraction or a sideband, or to the mains.
 //!
-//! A relation is met within four deviations. Many multiples, or wide deviations, would match every frequency,
-//! so multiples are tried only up to a chance of one in twenty of a random match.
+//! A relation is met within four standard deviations. Many multiples, or large standard deviations, would
+//! match every frequency, so multiples are tried only until the probability of a random match exceeds one in
+//! twenty.
 
 use super::classification::RecordContext;
 use super::component::{Component, ComponentVerdict, Harmonic, MainsMultiple, Sideband, Subharmonic};
@@ -9,30 +10,30 @@ use super::settings::MIN_CYCLES;
 use crate::sampling::alias_hz;
 use portable_math as math;
 
-/// Highest multiple tried: an edge as sharp as a tenth of its period has no more.
+/// Highest multiple tried: a signal whose edges last a tenth of its period has no higher ones.
 const MOST_MULTIPLE: usize = 20;
 /// Highest multiple tried above half the frame rate: the exposure passes little of higher ones.
 const MOST_FOLDED: usize = 8;
-/// Multiples that are tried whatever the deviations are.
+/// Highest multiple that is tried whatever the probability of a random match is.
 const ALWAYS_TRIED_MULTIPLES: usize = 5;
-/// Periods of a subharmonic, beats: longer ones have never been observed.
+/// Periods of a subharmonic, cycles of the stronger component; longer ones have never been observed.
 const SUBHARMONIC_DENOMINATORS: [usize; 2] = [2, 3];
 const MOST_FRACTION: usize = 5;
-/// Sidebands on each side of a component.
+/// Number of sidebands on each side of a component.
 const SIDEBANDS: usize = 2;
-/// Deviations within which a relation is met: three relations in a record are all met in all but one record
-/// of five thousand.
+/// Number of standard deviations within which a relation is met: in all but one of five thousand records with
+/// three relations, all three are met.
 const MATCH_DEVIATIONS: f64 = 4.0;
-/// Most distance from a relation, resolutions: a wider tolerance would match by chance.
+/// Largest distance from a relation, resolutions; a wider tolerance would match by chance.
 const MATCH_RESOLUTIONS: f64 = 0.5;
-/// Chance of a random match up to which more multiples are tried.
+/// Probability of a random match up to which more multiples are tried.
 const CHANCE_MATCHES: f64 = 0.05;
-/// Least ratio of the amplitudes of two sidebands without a component at their distance.
+/// Smallest ratio of the amplitudes of two sidebands if no component has the modulation frequency.
 const SIDEBAND_RATIO: f64 = 0.5;
-/// Deviations within which a frequency is that of the mains.
+/// Number of standard deviations within which a frequency counts as a multiple of the mains frequency.
 const MAINS_DEVIATIONS: f64 = 3.0;
 const MAINS_HZ: [usize; 2] = [50, 60];
-/// Highest multiple of the mains that a lamp shows: it flickers at the second.
+/// Highest multiple of the mains frequency that a lamp shows; it flickers at the second multiple.
 const MOST_MAINS: usize = 12;
 /// Accuracy with which a frequency must be known to be compared with the mains, Hz: multiples are ten apart.
 const MAINS_WITHIN_HZ: f64 = 0.5;
@@ -66,7 +67,7 @@ pub(super) fn find_relations(components: &mut [Component], at: &RecordContext) {
     components.iter_mut().for_each(|c| c.mains = find_mains_multiple(c));
 }
 
-/// The relations of a component, in words.
+/// The relations of a component, as text.
 pub(super) fn describe_relations(c: &Component) -> [(ComponentVerdict, Option<String>); 4] {
     let multiple = |h: &Harmonic| format!("{} times {:.3} Hz", h.multiple, h.frequency_hz);
     let fraction = |s: &Subharmonic| {
@@ -90,20 +91,20 @@ pub(super) fn describe_relations(c: &Component) -> [(ComponentVerdict, Option<St
     ]
 }
 
-/// Tolerance of a relation, Hz, from the deviations of its sides.
+/// Tolerance of a relation, Hz; `sd_hz` is the standard deviation of the difference of its two sides.
 fn tolerance_hz(sd_hz: f64, at: &RecordContext) -> f64 {
     (MATCH_DEVIATIONS * sd_hz).min(MATCH_RESOLUTIONS * at.resolution_hz)
 }
 
-/// Whether `c` is `times` the frequency of `base`, also folded; adds the probability of a random match to
-/// `chance`.
+/// Whether `c` has `times` the frequency of `base`, directly or folded; adds the probability of a random
+/// match to `chance`.
 fn is_multiple(base: &Component, c: &Component, times: f64, at: &RecordContext, chance: &mut f64) -> bool {
     let within_hz = tolerance_hz(math::hypot(c.frequency_sd_hz, times * base.frequency_sd_hz), at);
     *chance += 2.0 * within_hz / base.frequency_hz;
     (alias_hz(times * base.frequency_hz, at.frame_rate_hz) - c.frequency_hz).abs() <= within_hz
 }
 
-/// `other` as a multiple of `base`, also a folded one.
+/// The relation of `other` as a multiple of `base`, directly or folded.
 fn find_harmonic(base: &Component, other: &Component, at: &RecordContext) -> Option<Harmonic> {
     let mut chance = 0.0;
     for multiple in 2..=MOST_MULTIPLE {
@@ -119,7 +120,7 @@ fn find_harmonic(base: &Component, other: &Component, at: &RecordContext) -> Opt
     None
 }
 
-/// `other` as a fraction of `base`.
+/// The relation of `other` as a fraction of `base`.
 fn find_subharmonic(base: &Component, other: &Component, at: &RecordContext) -> Option<Subharmonic> {
     let mut chance = 0.0;
     for denominator in SUBHARMONIC_DENOMINATORS {
@@ -137,8 +138,8 @@ fn find_subharmonic(base: &Component, other: &Component, at: &RecordContext) -> 
     None
 }
 
-/// Component `k` as a sideband of a larger one: at the distance of another component, or with a mirror image
-/// of similar amplitude on the other side.
+/// Component `k` as a sideband of a larger one: it lies at the frequency of another component, or twice that,
+/// from the carrier, or has a mirror image of similar amplitude on the other side.
 fn find_sideband(components: &[Component], k: usize, at: &RecordContext) -> Option<Sideband> {
     let c = &components[k];
     let carriers = components.iter().filter(|carrier| carrier.amplitude_m > c.amplitude_m);
@@ -171,7 +172,7 @@ fn find_sideband(components: &[Component], k: usize, at: &RecordContext) -> Opti
     })
 }
 
-/// The multiple of the mains whose frequency a steady component has.
+/// The multiple of the mains frequency that a steady component has.
 fn find_mains_multiple(c: &Component) -> Option<MainsMultiple> {
     let within_hz = MAINS_DEVIATIONS * c.frequency_sd_hz;
     if within_hz > MAINS_WITHIN_HZ || c.range_hz.is_some() {

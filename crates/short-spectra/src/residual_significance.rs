@@ -1,4 +1,4 @@
-//! Whether the residual of a fit is noise, or has peaks that no term explains.
+//! Tests of whether the residual of a fit is noise, or has peaks that no term explains.
 
 use super::least_squares::SineTerm;
 use super::model_selection::{ModelFit, ModelSelector, SineModel, is_in_lobe, lobe_half_width};
@@ -6,16 +6,17 @@ use super::peaks::Peak;
 use super::periodogram::upper_median;
 use super::settings::MIN_CYCLES;
 
-/// Half width of the neighbourhood whose residual is the noise of a component, resolutions: 48 independent
-/// values of the spectrum determine the noise to a tenth.
+/// Half width of the neighbourhood of a component whose residual gives its noise, resolutions; 48 independent
+/// values of the spectrum determine the noise to 10 %.
 pub(super) const NEIGHBOURHOOD: f64 = 12.0;
-/// Least half width of the neighbourhood of a slow component, resolutions, and the factor by which the
-/// detection level rises there. Six values determine the noise poorly: noise exceeds 5.8 times their rms with
-/// the chance of one in 100,000; the rms of many values it exceeds 3.4 times.
+/// Smallest half width of the neighbourhood of a slow component, resolutions, and the factor by which the
+/// detection level rises there. Six values determine the noise poorly: with a probability of one in 100,000,
+/// noise exceeds 5.8 times their rms, but only 3.4 times the rms of many values.
 const FEWEST_RESOLUTIONS: f64 = 3.0;
 const FEW_VALUES_FACTOR: f64 = 1.7;
-/// Mean square of the residual over that of the noise floor, up to which the residual is noise. The floor is
-/// a median, known to a few hundredths; a drift or a step leaves many times as much.
+/// Largest ratio of the mean square of the residual to that of the noise floor at which the residual counts
+/// as noise. The floor is a median, accurate to a few hundredths; a drift or a step leaves many times as
+/// much.
 const NOISE_RATIO_LIMIT: f64 = 1.5;
 
 impl ModelSelector<'_> {
@@ -33,15 +34,15 @@ impl ModelSelector<'_> {
         self.periodogram.amplitude_at(&parts.term_values(k), parts.terms()[k].cycles)
     }
 
-    /// The largest peak left within the lobe of a term, m; 0 where noise alone may have made it.
+    /// Largest residual peak within the lobe of a term, m; 0 if noise alone may have caused it.
     pub(super) fn largest_peak_near(&self, fit: &ModelFit, term: &SineTerm) -> f64 {
         let near = fit.peaks.accepted.iter().filter(|p| is_in_lobe(self.cycles_of_peak(p), term));
         near.fold(0.0, |largest: f64, peak| largest.max(peak.amplitude_m))
     }
 
-    /// Largest residual amplitude near a component, m, at a peak or not; 0 where noise alone may have made
-    /// it. A companion too close to be resolved leaves most at the end of the lobe, where it has no peak of
-    /// its own.
+    /// Largest residual amplitude near a component, m, at a peak or not; 0 if noise alone may have caused it.
+    /// A companion too close to be resolved leaves most at the end of the lobe, where it has no peak of its
+    /// own.
     pub(super) fn significant_residual(&self, fit: &ModelFit, term: &SineTerm) -> f64 {
         let most = self.residual_near(fit, term);
         let noise_m = self.noise_floor_near(fit, term.cycles);
@@ -55,22 +56,22 @@ impl ModelSelector<'_> {
         next_to.iter().fold(0.0, |most: f64, a| most.max(*a))
     }
 
-    /// Whether a slow term exceeds the residual near it by the detection level. Few values determine the
-    /// noise there, and they include the residuals of other slow terms.
+    /// Whether a slow term exceeds the residual near it by the factor of the detection level. The noise level
+    /// is uncertain there: few values determine it, and they include the residuals of other slow terms.
     pub(super) fn exceeds_residual(&self, fit: &ModelFit, k: usize) -> bool {
         let (parts, term) = (&fit.model, &fit.model.terms()[k]);
         let least_m = fit.peaks.detection * self.residual_near(fit, term);
         term.cycles <= NEIGHBOURHOOD && !term.is_transient() && self.windowed_amplitude_m(parts, k) > least_m
     }
 
-    /// The noise floor around a frequency, m, but no less than that of the whole spectrum: noise need not be
-    /// white.
+    /// The noise floor around a frequency, m, but no less than that of the whole spectrum; the noise need not
+    /// be white.
     pub(super) fn noise_floor_near(&self, fit: &ModelFit, cycles: f64) -> f64 {
         let near = self.noise_floor_between(fit, cycles - NEIGHBOURHOOD, cycles + NEIGHBOURHOOD);
         fit.peaks.floor_m.max(near)
     }
 
-    /// The noise floor between two frequencies, cycles in the record, m; 0 where nothing lies between them.
+    /// The noise floor between two frequencies, cycles in the record, m; 0 if no bin lies between them.
     pub(super) fn noise_floor_between(&self, fit: &ModelFit, low: f64, high: f64) -> f64 {
         let around = self.residual_between(fit, low, high).to_vec();
         upper_median(around).unwrap_or(0.0) / std::f64::consts::LN_2.sqrt()
@@ -84,7 +85,7 @@ impl ModelSelector<'_> {
         amplitude_m.get(bin(low)..bin(high)).unwrap_or_default()
     }
 
-    /// Peaks left outside the lobe of every term: no decaying oscillation explains them.
+    /// Residual peaks outside the lobe of every term, which no decaying oscillation explains.
     pub(super) fn unexplained_peaks(&self, fit: &ModelFit) -> Vec<Peak> {
         let lowest = MIN_CYCLES.max(fit.model.trend().fastest_waves() + 1.0);
         let is_unexplained = |p: &Peak| {
@@ -95,20 +96,20 @@ impl ModelSelector<'_> {
         fit.peaks.accepted.iter().copied().filter(is_unexplained).collect()
     }
 
-    /// Whether a peak stands out of the noise around it.
+    /// Whether a peak stands out from the noise around it.
     pub(super) fn stands_out(&self, fit: &ModelFit, peak: &Peak) -> bool {
         let noise_m = self.noise_floor_near(fit, self.cycles_of_peak(peak));
         peak.amplitude_m > fit.peaks.detection * noise_m
     }
 
-    /// Whether a peak stands out of the octaves around it. An oscillation that begins inside the record
+    /// Whether a peak stands out from the octaves around it; an oscillation that begins inside the record
     /// raises its own neighbourhood.
     pub(super) fn stands_out_widely(&self, fit: &ModelFit, peak: &Peak) -> bool {
         let noise_m = self.octave_noise_sd(fit, self.cycles_of_peak(peak));
         self.periodogram.noise_sd_m(peak.amplitude_m) > fit.peaks.detection * noise_m
     }
 
-    /// Deviation of the noise that a term must stand out of, m.
+    /// Standard deviation of the noise from which a term must stand out, m.
     pub(super) fn noise_sd_for_term(&self, fit: &ModelFit, term: &SineTerm) -> f64 {
         let wide_m = if term.is_transient() {
             self.octave_noise_sd(fit, term.cycles)

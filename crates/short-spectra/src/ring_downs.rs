@@ -1,9 +1,9 @@
 //! Oscillations that end soon or begin inside the record: a window that starts at zero hides them.
 //!
 //! The residual is matched with decaying oscillations that begin at any frame: `z = sum x exp(-d s - 2 pi i n
-//! s)` over the frames since. A term of this frequency, decay and beginning lowers the sum of squares by `2
-//! |z|^2 / sum exp(-2 d s)`. In white noise of variance one, half of that exceeds `q` with the chance
-//! `exp(-q)`.
+//! s)` over the frames from there on. A term of this frequency, decay and beginning lowers the sum of squares
+//! by `2 |z|^2 / sum exp(-2 d s)`. In white noise of variance one, half of that exceeds `q` with the
+//! probability `exp(-q)`.
 
 use super::least_squares::{FreeSet, SineTerm, Tolerance};
 use super::model_selection::{ModelFit, ModelSelector, STEP_CYCLES, SineModel, is_in_lobe, lobe_half_width};
@@ -14,43 +14,49 @@ use portable_math as math;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-/// Nepers over the record of the decays tried; a decay between two of them matches nine tenths of its energy.
+/// Decays over the record that are tried, nepers; a decay between two of them is matched with nine tenths of
+/// its energy.
 const DECAYS: [f64; 6] = [6.0, 12.0, 24.0, 48.0, 96.0, 192.0];
-/// Nepers after which a decay is over.
+/// Decay, nepers, after which an oscillation is over.
 const NEPERS_UNTIL_OVER: f64 = 3.5;
-/// Fewest frames in which an amplitude falls by a neper.
+/// Minimum number of frames in which an amplitude falls by a neper.
 const FRAMES_PER_NEPER: f64 = 4.0;
-/// Beginnings tried within a neper of the decay.
+/// Number of beginnings that are tried while the amplitude falls by a neper.
 const STARTS_PER_NEPER: f64 = 3.0;
-/// Chance that noise alone begins an oscillation anywhere in a record.
+/// Probability that noise alone causes an oscillation to be found anywhere in a record.
 const FALSE_ALARM: f64 = 0.01;
-/// Nepers over the record from which a window that starts at zero shows too little of a decay.
+/// Decay over the record, nepers, above which a window that starts at zero shows too little of an
+/// oscillation.
 const TRANSIENT_NEPERS: f64 = 8.0;
-/// Least width of an octave, cycles in the record: its floor is a median.
+/// Smallest width of an octave, cycles in the record, because its noise floor is a median.
 const OCTAVE: f64 = 20.0;
-/// Steps of the search for a term's placement; each halving of the step counts too.
+/// Maximum number of steps of the search for the placement of a term; each halving counts as a step.
 const MOST_MOVES: usize = 30;
-/// Cycles in the record up to which a decay may be the residue of a step: twice those of its peaks.
+/// Number of cycles in the record up to which a decay may be the residue of a step: twice that of the peaks
+/// of a step.
 const SLOW_CYCLES: f64 = 2.0 * STEP_CYCLES;
-/// Nepers lost before its apparent beginning up to which a decay may have begun with the record, its start
-/// hidden by other terms.
+/// Largest decay before the first frame of a term, nepers, with which the oscillation may have begun with the
+/// record, its start hidden by other terms.
 const MOST_NEPERS_LOST: f64 = 2.0;
-/// Share of a record's sum of squares below which a misfit is rounding: it is a difference of such sums.
+/// Fraction of the sum of squares of a record below which a misfit is rounding error, being a difference of
+/// such sums.
 const ROUNDING_SHARE: f64 = 1e-12;
-/// Rounds in which terms are placed again; each changes one.
+/// Maximum number of rounds in which terms are placed anew; each changes one term.
 const MOST_ROUNDS: usize = 6;
-/// Determinant of cosine and sine, over the product of their squares, below which they are not independent.
+/// Ratio of the determinant of cosine and sine to the product of their squares, below which they are not
+/// independent.
 const SINGULAR: f64 = 1e-3;
-/// Values of the transform in the length of a decay: bins a seventh of its width apart.
+/// Ratio of the length of a transform to that of a decay: the bins are a seventh of the width of a peak
+/// apart.
 const PADDING: usize = 4;
 
 impl SineTerm {
-    /// Whether it ends soon or begins inside the record.
+    /// Whether the term ends soon or begins inside the record.
     pub(super) fn is_transient(&self) -> bool {
         self.cycles > 0.0 && (self.first > 0 || self.nepers > TRANSIENT_NEPERS)
     }
 
-    /// Frames and envelope from its first frame until it has decayed.
+    /// Frames and envelope of the term, from its first frame until it has decayed.
     fn envelope_values(&self, frames: usize) -> impl Iterator<Item = (usize, f64)> + Clone + use<> {
         let (first, decay) = (self.first, self.nepers / frames as f64);
         let lasts = if decay > 0.0 { (NEPERS_UNTIL_OVER / decay).ceil() as usize } else { frames };
@@ -59,19 +65,20 @@ impl SineTerm {
     }
 }
 
-/// A decay tried everywhere in the residual.
+/// A decay that is tried throughout the residual.
 struct Trial {
     nepers: f64,
     /// Length of its transform, values.
     padded: usize,
-    /// Frames from one beginning to the next.
+    /// Distance of the beginnings that are tried, frames.
     step: usize,
     /// Bins of the transform to try, with the standard deviation of the noise there, m.
     bins: Vec<(usize, f64)>,
 }
 
 /// The best decays in the residual: the one that stands out most from the noise around it, and the one that
-/// lowers the sum of squares most, unless it is slow. A large decay raises the noise around itself.
+/// lowers the sum of squares most, unless it is slow. They may differ, because a large decay raises the noise
+/// around itself.
 #[derive(Default)]
 struct Decays {
     stands_out: Option<(f64, SineTerm)>,
@@ -79,8 +86,8 @@ struct Decays {
 }
 
 impl Decays {
-    /// Keeps a decay that lowers the sum of squares by twice `square`, which is `half` variances of noise, if
-    /// it is larger than those before.
+    /// Keeps a decay if it is larger than those before. It lowers the sum of squares by twice `square`;
+    /// `half` is `square` in units of the variance of the noise.
     fn keep_larger(&mut self, term: SineTerm, half: f64, square: f64) {
         if self.stands_out.is_none_or(|(least, _)| half > least) {
             self.stands_out = Some((half, term));
@@ -90,7 +97,7 @@ impl Decays {
         }
     }
 
-    /// The one that stands out, and with `both` the one that explains most, if it differs.
+    /// The decay that stands out most and, with `both`, the decay that explains most, if it differs.
     fn terms(self, both: bool) -> impl Iterator<Item = SineTerm> {
         let (first, second) = (self.stands_out.map(|met| met.1), self.explains.map(|met| met.1));
         first.into_iter().chain(second.filter(|second| both && Some(*second) != first))
@@ -125,15 +132,15 @@ impl ModelSelector<'_> {
                 (free && self.bic_of(&fitted) < least).then_some(fitted)
             };
             let met = self.match_decays(fit, &left, &noise, replacement_range(terms, out));
-            // the one that explains most may be a piece of a doubtful term
+            // the one that explains most may be a part of a doubtful term
             met.terms(doubtful.is_empty()).filter_map(fitted).collect::<Vec<SineModel>>()
         };
         places.iter().flat_map(placed).collect()
     }
 
-    /// Places brief terms anew and drops relaxations that explain nothing, while the criterion falls. The
-    /// first terms were placed while others were missing, and no fit moves a first frame. Where only rounding
-    /// is left, the criterion decides nothing.
+    /// Places brief terms anew and drops relaxations that explain nothing, as long as the criterion falls.
+    /// The first terms were placed while others were missing, and a fit does not move first frames. If only
+    /// rounding errors remain, the criterion is meaningless, and nothing is changed.
     pub(super) fn relocate_transients(&self, mut parts: SineModel) -> SineModel {
         let power: f64 = self.data.iter().zip(&self.weights).map(|(x, weight)| weight * x * x).sum();
         for _ in 0..MOST_ROUNDS {
@@ -151,8 +158,8 @@ impl ModelSelector<'_> {
         parts
     }
 
-    /// The terms with a brief one in another place, with two in the place of those in its lobe, with all
-    /// brief ones from the start of the record on, or with one relaxation less.
+    /// Variants of the terms: a brief term in another place, two terms in the place of the brief ones in a
+    /// lobe, all brief terms extended to the start of the record, or one relaxation less.
     fn transient_variants(&self, parts: &SineModel) -> Vec<Vec<SineTerm>> {
         let terms = parts.terms();
         let brief: Vec<usize> = (0..terms.len()).filter(|k| terms[*k].is_transient()).collect();
@@ -178,7 +185,7 @@ impl ModelSelector<'_> {
         again.chain(split).chain(from_start).chain(relaxed).collect()
     }
 
-    /// The term from the start of the record on, if it has lost little before its first frame.
+    /// The term extended to the start of the record, if it would lose little before its first frame.
     fn extend_to_start(&self, term: &SineTerm) -> SineTerm {
         let lost = term.nepers * term.first as f64 / self.samples.len() as f64;
         if lost < MOST_NEPERS_LOST { SineTerm { first: 0, ..*term } } else { *term }
@@ -195,8 +202,8 @@ impl ModelSelector<'_> {
         with
     }
 
-    /// Largest residual amplitude under the envelope of a term around its frequency, m; 0 where noise alone
-    /// may have made it.
+    /// Largest residual amplitude under the envelope of a term around its frequency, m; 0 if noise alone may
+    /// have caused it.
     pub(super) fn residual_in_envelope(&self, fit: &ModelFit, term: &SineTerm) -> f64 {
         let frames = self.samples.len();
         let values = term.envelope_values(frames).map(|(i, e)| e * fit.residual_m[i].unwrap_or(0.0));
@@ -212,20 +219,20 @@ impl ModelSelector<'_> {
         if most * most > least { 2.0 * most / energy } else { 0.0 }
     }
 
-    /// Amplitude of a term over the noise of its estimate under its own envelope.
+    /// Ratio of the amplitude of a term to the noise of its estimate under its own envelope.
     pub(super) fn level_in_envelope(&self, fit: &ModelFit, term: &SineTerm, amplitude_m: f64) -> f64 {
         let noise_m = self.octave_noise_sd(fit, term.cycles);
         amplitude_m * self.envelope_energy(term).1.sqrt() / (2.0 * noise_m)
     }
 
-    /// Frames of a term's envelope, and the sum of its squares over the frames present.
+    /// Number of frames of a term's envelope, and the sum of its squares over the frames present.
     fn envelope_energy(&self, term: &SineTerm) -> (usize, f64) {
         let add =
             |(count, sum): (usize, f64), (i, e): (usize, f64)| (count + 1, sum + self.weights[i] * e * e);
         term.envelope_values(self.samples.len()).fold((0, 0.0), add)
     }
 
-    /// The best decays among those that noise alone would make once in a hundred records.
+    /// The best decays above the level that noise alone reaches in one of a hundred records.
     fn match_decays(&self, fit: &ModelFit, left: &[f64], noise: &NoiseCurve, within: Range<f64>) -> Decays {
         let frames = self.samples.len();
         let tried = self.plan_trials(fit, noise, &within);
@@ -236,7 +243,7 @@ impl ModelSelector<'_> {
             let transform = RealTransform::new(padded);
             let from = |cycles: f64, first: usize| SineTerm { cycles, nepers, first, free: FreeSet::Both };
             let envelope: Vec<f64> = from(1.0, 0).envelope_values(frames).map(|(_, e)| e).collect();
-            // a decay of which less than one neper is in the record is an impulse at its end
+            // a decay of which less than one neper lies in the record is an impulse at the end of the record
             for first in (0..frames.saturating_sub(envelope.len() / 3)).step_by(step) {
                 let present = envelope.iter().zip(&self.weights[first..]);
                 let energy: f64 = present.map(|(e, weight)| weight * e * e).sum();
@@ -281,8 +288,8 @@ impl ModelSelector<'_> {
         DECAYS.into_iter().filter(|nepers| FRAMES_PER_NEPER * nepers <= frames).map(of).collect()
     }
 
-    /// Moves a term to the frequency, decay and first frame that explain most; steps are halved where none
-    /// helps.
+    /// Moves a term to the frequency, decay and first frame that explain most; steps are halved if none of
+    /// them helps.
     fn optimise_placement(&self, left: &[f64], start: SineTerm) -> SineTerm {
         let frames = self.samples.len() as f64;
         let mut best = (self.power_of_term(left, &start), start);
@@ -326,7 +333,7 @@ impl ModelSelector<'_> {
         if determinant > SINGULAR * cc * ss { power() } else { 0.0 }
     }
 
-    /// Whether more than noise is left in the lobe of a term.
+    /// Whether the residual in the lobe of a term exceeds noise.
     pub(super) fn leaves_peak(&self, fit: &ModelFit, term: &SineTerm) -> bool {
         let left_m = self.periodogram.noise_sd_m(self.residual_near(fit, term));
         left_m > fit.peaks.detection * self.octave_noise_sd(fit, term.cycles)

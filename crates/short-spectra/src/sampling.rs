@@ -1,12 +1,13 @@
-//! Effects of sampling on a motion: the exposure of a frame averages it, and the frame rate folds faster
-//! frequencies.
+//! Effects of sampling on a motion: the exposure of a frame averages it, and the frame rate folds frequencies
+//! above half of it.
 
 use portable_math as math;
 use std::f64::consts::PI;
 
-/// Frequency of half the power behind an exposure, in units of 1/exposure: the root of `sinc^2 = 1/2`.
+/// Frequency at which an exposure passes half the power, in units of 1/exposure: the root of `sinc^2 = 1/2`.
 const HALF_POWER_CYCLES: f64 = 0.442_946_47;
-/// Most frequencies listed by [`aliased_frequencies_hz`], so that a mistyped rate does not fill the memory.
+/// Maximum number of frequencies listed by [`aliased_frequencies_hz`], so that a mistyped rate does not fill
+/// the memory.
 pub(crate) const MOST_ALIASES: usize = 1000;
 
 /// Gain of an exposure of `exposure_s` at `frequency_hz`, 0 to 1: `|sin(pi f T)/(pi f T)|`, from the mean of
@@ -22,8 +23,8 @@ pub fn half_power_hz(exposure_s: f64) -> f64 {
     HALF_POWER_CYCLES / exposure_s
 }
 
-/// Frequency at which a frequency appears at `frame_rate_hz`, Hz: folded about the multiples of half the
-/// rate.
+/// Frequency at which `frequency_hz` appears at `frame_rate_hz`, Hz: it is folded about the multiples of half
+/// the rate.
 #[must_use]
 pub fn alias_hz(frequency_hz: f64, frame_rate_hz: f64) -> f64 {
     if frequency_hz <= frame_rate_hz / 2.0 {
@@ -34,8 +35,8 @@ pub fn alias_hz(frequency_hz: f64, frame_rate_hz: f64) -> f64 {
 }
 
 /// Every frequency above half of `frame_rate_hz` and up to `up_to_hz` that appears at `frequency_hz`, Hz: `k
-/// rate - f` and `k rate + f`, ascending, each once, at most 1000. Empty for a frequency outside 0 to half
-/// the rate.
+/// rate - f` and `k rate + f`, ascending, without duplicates, at most 1000. Empty for a frequency outside 0
+/// to half the rate.
 pub(crate) fn aliased_frequencies_hz(frequency_hz: f64, frame_rate_hz: f64, up_to_hz: f64) -> Vec<f64> {
     let half_hz = frame_rate_hz / 2.0;
     if !(half_hz.is_finite() && half_hz > 0.0 && (0.0..=half_hz).contains(&frequency_hz)) {

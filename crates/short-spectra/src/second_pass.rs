@@ -1,5 +1,5 @@
-//! A second pass over a decomposed record, for oscillations that begin late or end soon, and for two lines
-//! where one was found.
+//! A second pass over a decomposed record, for oscillations that begin late or end soon, and for pairs of
+//! lines that were found as one.
 
 use super::chirp_alternatives::nearby_terms;
 use super::classification::SINGLE_CYCLE_DAMPING;
@@ -7,12 +7,13 @@ use super::least_squares::{FreeSet, SineTerm, Tolerance, nepers_from_damping_rat
 use super::model_selection::{LOBE, ModelFit, ModelSelector, STEP_CYCLES, SineModel, lobe_half_width};
 use super::time_frequency::FrequencyRange;
 
-/// Most range of a drift that may be two lines that beat, resolutions. They lie at most four apart, and where
-/// they nearly cancel the frequency swings beyond both.
+/// Largest range of a drift, resolutions, that two beating lines may cause. The lines lie at most four
+/// resolutions apart, but where they nearly cancel, the frequency swings beyond both.
 const WIDEST_BEAT: f64 = 10.0;
-/// Steps by which a trend may grow in the place of a slow ring-down: together they have as many unknowns.
+/// Maximum number of steps by which a trend may grow in the place of a slow ring-down; together they have as
+/// many unknowns as the ring-down.
 const MOST_TREND_GROWTH: usize = 3;
-/// Decisive difference of two criteria: odds of a hundred to one.
+/// Difference of two criteria that is decisive: odds of a hundred to one.
 const DECISIVE_DIFFERENCE: f64 = 10.0;
 
 /// A term that leaves more than noise around it.
@@ -23,9 +24,9 @@ pub(super) struct DoubtfulTerm {
 }
 
 impl ModelSelector<'_> {
-    /// The candidate of the least criterion: a model improved otherwise, with one more ring-down, or with two
-    /// lines in the place of one. Near a doubtful term it must explain more than a drift or an even fall of
-    /// that term.
+    /// The candidate with the lowest criterion: the `improved` model, or one with another ring-down, or one
+    /// with two lines in the place of one. A candidate that changes a doubtful term must explain more than a
+    /// constant drift or linear fall of that term.
     pub(super) fn refine_candidates(&self, fit: &ModelFit, improved: Option<SineModel>) -> Option<SineModel> {
         let parts = &fit.model;
         let terms = parts.terms();
@@ -54,8 +55,8 @@ impl ModelSelector<'_> {
         Some(grown.unwrap_or(best))
     }
 
-    /// The model with a trend of a few more columns, if that explains about as much as the criterion: a slow
-    /// ring-down may be a part of the trend not described yet.
+    /// The model with a trend of a few more columns, if its criterion is about as low as `criterion`: a slow
+    /// ring-down may be a part of the trend that is not described yet.
     fn with_grown_trend(&self, parts: &SineModel, criterion: f64) -> Option<SineModel> {
         let richer = std::iter::successors(parts.trend().next_richer(), |trend| trend.next_richer());
         let grown = richer.take(MOST_TREND_GROWTH).filter_map(|trend| {
@@ -64,8 +65,8 @@ impl ModelSelector<'_> {
         self.select_best(grown).filter(|grown| self.bic_of(grown) < criterion + DECISIVE_DIFFERENCE)
     }
 
-    /// Two steady lines in the place of one that drifts over a range, if only noise is left then. A range
-    /// wider than the distance of two such lines is no pair.
+    /// The fit with two steady lines in the place of one that drifts over `range`, if it leaves only noise;
+    /// `None` for a range wider than two beating lines may cause.
     pub(super) fn split_into_pair(&self, fit: &ModelFit, range: &FrequencyRange) -> Option<ModelFit> {
         if range.high_hz - range.low_hz > WIDEST_BEAT * self.resolution_hz() {
             return None;
@@ -74,8 +75,8 @@ impl ModelSelector<'_> {
         Some(self.decompose(best)).filter(|paired| self.leaves_only_noise(paired))
     }
 
-    /// Whether only noise is left around doubtful terms once a candidate replaces them. More oscillations
-    /// would split into pieces what a sum of oscillations does not describe.
+    /// Whether only noise is left around doubtful terms if a candidate replaces them. Otherwise the motion is
+    /// not a sum of oscillations, and more of them would only split it into pieces.
     fn leaves_noise_near(
         &self,
         candidate: &SineModel,
@@ -102,13 +103,15 @@ fn are_adjacent(term: &SineTerm, other: &SineTerm) -> bool {
     (term.cycles - other.cycles).abs() < LOBE + lobe_half_width(term)
 }
 
-// Two steady oscillations in the place of one, closer than the lobe of a window that starts at zero. A
-// frequency that drifts, or an amplitude that falls linearly, can be split into two as well. So a pair is
-// accepted only if it leaves only noise around it, and if neither line explains more by growing or decaying.
+// Two steady oscillations in the place of one, closer together than the lobe of a window that starts at zero.
+// A frequency that drifts, or an amplitude that falls linearly, can be split into two as well. A pair is
+// therefore accepted only if it leaves only noise around it, and if neither line explains more by growing or
+// decaying.
 
-/// Starts of a pair, resolutions from the one term, which lies between the two or has settled on either.
+/// Initial distances of a pair from the single term, resolutions; that term lies between the two lines or has
+/// settled on one.
 const PAIR_STARTS: [[f64; 2]; 5] = [[-0.35, 0.35], [-0.6, 0.6], [-0.9, 0.9], [0.0, 1.6], [-1.6, 0.0]];
-/// Farthest distance of a line of the pair from the one term, resolutions.
+/// Largest distance of a line of the pair from the single term, resolutions.
 const PAIR_REACH: f64 = 2.0;
 
 impl ModelSelector<'_> {
@@ -124,7 +127,7 @@ impl ModelSelector<'_> {
         doubtful.iter().flat_map(tried).collect()
     }
 
-    /// The model with two terms that start at some distances from term `k`, in the place of the terms `out`.
+    /// The model with two terms at the distances `starts` from term `k`, in the place of the terms `out`.
     fn fit_pair(&self, parts: &SineModel, k: usize, out: &[usize], starts: [f64; 2]) -> Option<SineModel> {
         let one = parts.terms()[k];
         let start = |apart: f64| SineTerm::from_start(one.cycles + apart, 0.0, FreeSet::Cycles);

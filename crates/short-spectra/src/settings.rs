@@ -1,22 +1,23 @@
-//! How a record is analysed.
+//! Settings of the analysis of a record.
 
 use super::trend::Detrend;
 
-/// How a record is analysed.
+/// Settings of the analysis of a record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpectrumSettings {
     /// Trend to remove. With `None`, `SpectralAnalysis::from_record` chooses it from the record, and
-    /// `analyse_spectrum` takes a cubic.
+    /// `analyse_spectrum` removes a cubic.
     pub detrend: Option<Detrend>,
-    /// Padded length over the record's, before rounding up to a power of two. If that exceeds `LONG_PADDED`,
-    /// the record is padded to `LONG_PADDED`, or to twice its own length if that is more, and its peaks are
-    /// located between the bins from the samples.
+    /// Ratio of the padded length to the length of the record, before rounding up to a power of two. If the
+    /// padded length exceeds `LONG_PADDED`, the record is padded to `LONG_PADDED`, or to twice its own length
+    /// if that is more, and its peaks are located between the bins from the samples.
     pub zero_padding: usize,
     /// Band in which components are sought, Hz; `None` for all of the spectrum.
     pub band_hz: Option<(f64, f64)>,
-    /// Most components listed.
+    /// Maximum number of components listed.
     pub max_components: usize,
-    /// Fastest oscillation that the motion may hold, Hz; aliases of a component are sought up to it.
+    /// Fastest oscillation that the motion may contain, Hz; aliases of a component are sought up to this
+    /// frequency.
     pub fastest_hz: f64,
 }
 
@@ -32,29 +33,30 @@ impl Default for SpectrumSettings {
     }
 }
 
-// What a record and its components must have, and how finely a spectrum is made.
+// Requirements on a record and its components, and spacing of the bins of a spectrum.
 
-/// Padded length over the record's: a parabola through three such bins locates the peak of a Hann window.
+/// Default ratio of the padded length to that of the record: a parabola through three bins then locates the
+/// peak of a Hann window.
 pub(crate) const ZERO_PADDING: usize = 8;
-/// Components listed unless asked for otherwise.
+/// Default maximum number of components listed.
 pub const MAX_COMPONENTS: usize = 8;
-/// Fewest frames with a value: a cubic takes four and as many are left.
+/// Minimum number of frames with a value: a cubic takes four and leaves as many.
 pub const MIN_SAMPLES: usize = 8;
-/// Fewest cycles of a resolvable component: with fewer, the window's lobe (half width two bins) reaches its
-/// own mirror image and the trend.
+/// Minimum number of cycles of a resolvable component: with fewer, the lobe of the window, two resolutions
+/// wide on either side, reaches its own mirror image and the trend.
 pub(crate) const MIN_CYCLES: f64 = 3.0;
 /// Longest padded record, samples, limited by memory.
 pub(super) const MOST_PADDED: usize = 1 << 26;
-/// Longest padded length at the padding of the settings, samples. A transform of this length takes some 50
-/// ms; one of a million samples padded eight times takes half a second.
+/// Longest padded length for which the padding of the settings is used, samples. A transform of this length
+/// takes some 50 ms; one of a million samples padded eight times takes half a second.
 pub(crate) const LONG_PADDED: usize = 1 << 21;
 /// Padded length from which record and window are transformed in parallel, samples; a shorter transform takes
 /// less than 10 ms.
 pub(super) const PADDED_AT_ONCE: usize = 1 << 20;
-/// Amplitudes below this share of the largest sample are rounding.
+/// Fraction of the largest sample below which amplitudes are rounding errors.
 pub(super) const ROUNDING: f64 = 1e-12;
-/// Fastest oscillation that is expected, Hz, without a setting.
+/// Default frequency of the fastest expected oscillation, Hz.
 pub const FASTEST_HZ: f64 = 1300.0;
-/// Amplitude over the noise floor from which a component is clear, dB: at 18 dB the frequency is accurate to
-/// a few hundredths of a resolution.
+/// Ratio of an amplitude to the noise floor from which a component is clear, dB: at 18 dB the frequency is
+/// accurate to a few hundredths of a resolution.
 pub(crate) const CLEAR_DB: f64 = 18.0;

@@ -8,11 +8,11 @@ const TRANSITION_BOUNDS: (f64, f64) = (0.25, 0.75);
 /// Starts tried after a step, in widths of its transition: the tail of an exponential step can be described
 /// by relaxations.
 const STEP_WIDTHS_AFTER: [f64; 5] = [1.0, 2.0, 3.0, 5.0, 8.0];
-/// Least length of a record over the return from a dip. Such a record is near its level before and after
-/// a step and returns in a jump, faster than any slow wave.
+/// Smallest ratio of the length of a record to that of the return from a dip. A record with a dip is near one
+/// level before and after it and returns in a jump, faster than any slow wave.
 const DIP_FRACTION: usize = 20;
 
-/// First frames to try after a step, earliest first. None where the record changes sides repeatedly, as an
+/// First frames to try after a step, earliest first. None if the record changes sides repeatedly, as an
 /// oscillation does, or takes more than a third of its length for the step, as a trend does.
 pub(super) fn starts_after_step(samples: &[Option<f64>]) -> Vec<usize> {
     let Some((leaves, arrives)) = find_single_step(samples) else { return Vec::new() };
@@ -27,12 +27,12 @@ pub(super) fn starts_after_step(samples: &[Option<f64>]) -> Vec<usize> {
 /// Starts and ends tried next to a step, in widths of its transition; few, because a long record has many
 /// steps.
 const STEP_WIDTHS_BESIDE: [f64; 2] = [1.0, 5.0];
-/// Most steps of a piece of a record; more changes of side are an oscillation.
+/// Maximum number of steps of a piece of a record; more changes of side are an oscillation.
 const MAX_STEPS: usize = 4;
-/// Length of a record over the distance of the frames that give its slope, and over the longest step: a trend
-/// describes slower changes.
+/// Ratio of the length of a record to the distance of the frames that give its slope, and smallest ratio to
+/// the length of a step; a trend describes slower changes.
 const SLOPE_FRACTION: usize = 16;
-/// Length of a record over the shortest stretch to try.
+/// Largest ratio of the length of a record to that of a stretch to try.
 const LEAST_STRETCH_FRACTION: usize = 8;
 
 /// The stretches between the steps of a record, in order, each with the frames to try: first from near the
@@ -68,8 +68,8 @@ fn remove_median_slope(samples: &[Option<f64>]) -> Vec<Option<f64>> {
     samples.iter().enumerate().map(|(i, x)| x.map(|x| x - slope * i as f64)).collect()
 }
 
-/// Last frame on the old side and first on the new one, if the record changes sides once or returns from a
-/// dip.
+/// Last frame on the old side and first frame on the new side, if the record changes sides once or returns
+/// from a dip.
 fn find_single_step(samples: &[Option<f64>]) -> Option<(usize, usize)> {
     match find_side_changes(&classify_sides(samples))[..] {
         [change] => Some(change),
@@ -78,7 +78,7 @@ fn find_single_step(samples: &[Option<f64>]) -> Option<(usize, usize)> {
     }
 }
 
-/// The frames outside the transition, with whether they are on the upper side.
+/// The frames outside the transition, each with whether it is on the upper side.
 fn classify_sides(samples: &[Option<f64>]) -> Vec<(usize, bool)> {
     let (low, high) =
         samples.iter().flatten().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
@@ -90,7 +90,7 @@ fn classify_sides(samples: &[Option<f64>]) -> Vec<(usize, bool)> {
     samples.iter().enumerate().filter_map(|(i, x)| Some((i, side((*x)?)?))).collect()
 }
 
-/// Last frame on the old side and first on the new one, for each change.
+/// Last frame on the old side and first frame on the new side, for each change.
 fn find_side_changes(sided: &[(usize, bool)]) -> Vec<(usize, usize)> {
     sided.windows(2).filter(|w| w[0].1 != w[1].1).map(|w| (w[0].0, w[1].0)).collect()
 }

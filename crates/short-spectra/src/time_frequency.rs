@@ -9,11 +9,11 @@
 //! at the centre of the segment, and the fitted rate extrapolates it to the ends of the record, half a
 //! segment farther out.
 //!
-//! Accuracy: a chirp of 359 to 692 Hz in 0.1 to 0.6 s at 20 dB is read with that range within 2 %, also with
-//! harmonics, a residue of a ring-down, or a fifth of the frames missing. Limits: a frequency that swings
-//! within a segment (a cycle that follows a faster ring-down) reads as its mean, with larger deviations; a
-//! frequency that turns round at the very end of a record of a tenth of a second is extrapolated 2 to 3 % too
-//! far.
+//! Accuracy: the range of a chirp from 359 to 692 Hz in 0.1 to 0.6 s at 20 dB is estimated within 2 %, also
+//! with harmonics, a residue of a ring-down, or a fifth of the frames missing. Limits: for a frequency that
+//! swings within a segment (a cycle that follows a faster ring-down), the result is its mean, with larger
+//! standard deviations; a frequency that turns round at the very end of a record of a tenth of a second is
+//! extrapolated 2 to 3 % too far.
 
 mod chirp;
 pub mod course;
@@ -29,16 +29,17 @@ use portable_math as math;
 pub use ridge::{FrequencyRange, Ridge, RidgeEnd, RidgePoint};
 use std::ops::RangeInclusive;
 
-/// Most frames of a chosen segment: bounds the bins of a column.
+/// Maximum number of frames of a segment of chosen length; it limits the bins of a column.
 const LONGEST_SEGMENT_FRAMES: usize = 2048;
-/// Fewest segments side by side in a record, so that a component that lasts half of it has a course too.
+/// Minimum number of segments side by side in a record, so that a component that lasts half of it has a
+/// course too.
 const FEWEST_SEGMENTS: usize = 3;
-/// Ratio of the lengths tried.
+/// Ratio of successive lengths that are tried.
 const LENGTH_RATIO: f64 = std::f64::consts::SQRT_2;
-/// Share of the best concentration, 1.5 dB, from which a shorter segment is preferred: it follows the drift
-/// more closely.
+/// Fraction of the best concentration, -1.5 dB, from which a shorter segment is preferred: it follows the
+/// drift more closely.
 const NEARLY_BEST_CONCENTRATION: f64 = 0.7;
-/// Columns that judge a length; more would only cost time.
+/// Number of columns by which a length is judged; more would only cost time.
 const TRIED_COLUMNS: usize = 48;
 
 /// Segments of the length that shows the strongest component of the band best.
@@ -64,8 +65,8 @@ pub(super) fn choose_segment_layout(
     SegmentLayout::with_overlap(record, lengths[shortest], OVERLAP, MOST_COLUMNS)
 }
 
-/// Geometric mean of the squares of the columns' maxima, over that of noise in a bin, which falls as one over
-/// the length. The mean weighs columns with a large and a small component alike.
+/// Ratio of the geometric mean of the squared maxima of the columns to the power of noise in a bin, which is
+/// inversely proportional to the length. This mean weighs columns with a large and a small component alike.
 fn peak_concentration(
     samples: &[Option<f64>],
     layout: &SegmentLayout,
@@ -80,11 +81,13 @@ fn peak_concentration(
     layout.frames as f64 * math::exp(sum / f64::from(count.max(1)))
 }
 
-/// Fewest bins for each resolution of a spectrogram; rounding up to a power of two makes up to twice as many.
+/// Minimum number of bins per resolution of a spectrogram; rounding up to a power of two gives up to twice as
+/// many.
 pub(super) const FINE_PADDING: usize = 4;
-/// The same where only a maximum is sought: a Hann lobe sampled at half its resolution is at most 0.4 dB low.
+/// Minimum number of bins per resolution if only a maximum is sought: a Hann lobe sampled at every half
+/// resolution is at most 0.4 dB too low.
 const COARSE_PADDING: usize = 2;
-/// Share of the window's weight that must be present.
+/// Fraction of the window's weight that must be present.
 const LEAST_PRESENT: f64 = 0.5;
 
 /// The bins of a transform.
@@ -98,7 +101,7 @@ impl SegmentBins {
         Self { padded: (padding * layout.frames).next_power_of_two() }
     }
 
-    /// From zero to half the frame rate.
+    /// The bins from zero to half the frame rate.
     pub(super) fn all_bins(&self) -> RangeInclusive<usize> {
         0..=self.padded / 2
     }
@@ -110,7 +113,7 @@ impl SegmentBins {
         first..=(bin(high).floor() as usize).clamp(first, self.padded / 2)
     }
 
-    /// Amplitudes of each segment in some of the bins, m; `None` where too much is missing.
+    /// Amplitudes of each segment in some of the bins, m; `None` if too much is missing.
     pub(super) fn column_amplitudes(
         &self,
         samples: &[Option<f64>],
@@ -136,14 +139,17 @@ impl SegmentBins {
     }
 }
 
-/// Most columns of a spectrogram: a figure shows no more, and memory must not grow with the record.
+/// Maximum number of columns of a spectrogram: a figure shows no more, and memory must not grow with the
+/// record.
 pub const MOST_COLUMNS: usize = 400;
-/// Fewest cycles of the band's lower end in a segment. The lobe of a Hann window is two resolutions wide on
-/// either side, so with four cycles the component is clear of zero and of its own mirror image.
+/// Minimum number of cycles of the band's lower end in a segment. The lobe of a Hann window is two
+/// resolutions wide on either side, so with four cycles the component is clear of zero and of its own mirror
+/// image.
 pub(crate) const SEGMENT_CYCLES: f64 = 4.0;
-/// Fewest frames of a segment: three for each of the five unknowns of the fit, and one.
+/// Minimum number of frames of a segment: three for each of the five unknowns of the fit, plus one.
 pub(super) const FEWEST_FRAMES: usize = 16;
-/// Columns for each segment length: Hann windows a quarter of their length apart share most of their weight.
+/// Number of columns per segment length: Hann windows a quarter of their length apart share most of their
+/// weight.
 pub(super) const OVERLAP: usize = 4;
 
 /// Segments of a record, in frames.
@@ -157,7 +163,8 @@ pub(super) struct SegmentLayout {
 }
 
 impl SegmentLayout {
-    /// Segments a share of their length apart, farther apart where there would be too many columns.
+    /// Segments at a distance of their length divided by `overlap`, or farther apart if there would be more
+    /// than `most` columns.
     pub(super) fn with_overlap(record: usize, frames: usize, overlap: usize, most: usize) -> Self {
         let room = record.saturating_sub(frames);
         let hop = (frames / overlap).max(room.div_ceil(most - 1)).max(1);
@@ -189,24 +196,24 @@ impl SegmentLayout {
     }
 }
 
-/// Upper end of the default band, as a share of half the frame rate: a higher component is as likely an
-/// alias.
+/// Upper end of the default band, as a fraction of half the frame rate: a higher component is as likely to be
+/// an alias.
 const DEFAULT_BAND_TOP: f64 = 0.9;
-/// Lower end of the default band over the largest slow component: there a ring-down has decayed in a Hann
-/// spectrum of four of its cycles.
+/// Ratio of the lower end of the default band to the frequency of the largest slow component: at this
+/// distance, the peak of a ring-down has faded in a Hann spectrum of four of its cycles.
 const SLOW_COMPONENT_MARGIN: f64 = 4.0;
-/// Segments of `SEGMENT_CYCLES` that a record should hold at the lower end of the default band.
+/// Number of segments of `SEGMENT_CYCLES` that a record should hold at the lower end of the default band.
 const SEGMENTS_AT_LOWEST: f64 = 4.0;
 
-/// How a record is cut into short spectra.
+/// Settings for the cutting of a record into short spectra.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SpectrogramSettings {
     /// Length of a segment, s; `None` chooses it from the data. Lengths a factor of the square root of two
     /// apart are tried, from `SEGMENT_CYCLES` of the band's lower end to a third of the record (and 2048
-    /// frames). The shortest is taken whose maxima stand out of noise within 1.5 dB of the best: in longer
-    /// ones a drifting component smears, in shorter ones noise hides it.
+    /// frames). The shortest length is taken whose maxima stand out from the noise within 1.5 dB of the best:
+    /// in longer segments a drifting component smears, in shorter ones noise hides it.
     pub segment_s: Option<f64>,
-    /// Band for which the length is chosen, Hz; `None` takes [`default_band_hz`] with no slow component.
+    /// Band for which the length is chosen, Hz; `None` uses [`default_band_hz`] with no slow component.
     pub band_hz: Option<(f64, f64)>,
 }
 
@@ -215,27 +222,28 @@ pub struct SpectrogramSettings {
 pub struct Spectrogram {
     /// Centres of the segments, s from the first frame of the record.
     pub time_s: Vec<f64>,
-    /// Frequencies of the bins, Hz, from 0 to half the frame rate; four bins a resolution or more.
+    /// Frequencies of the bins, Hz, from 0 to half the frame rate; at least four bins per resolution.
     pub frequency_hz: Vec<f64>,
-    /// For each segment the amplitude in each bin, m: a steady sine of amplitude A reads A. `None` where
-    /// missing frames leave less than half the window's weight.
+    /// For each segment the amplitude in each bin, m: that of a steady sine of amplitude A is A at its peak.
+    /// `None` if missing frames leave less than half the window's weight.
     pub amplitude_m: Vec<Option<Vec<f64>>>,
     /// Length of a segment, s.
     pub segment_s: f64,
-    /// Distance of the segments, s.
+    /// Distance between neighbouring segments, s.
     pub hop_s: f64,
-    /// One over a segment's length, Hz; two components closer than two of these are one in a column.
+    /// Reciprocal of the length of a segment, Hz; two components closer than two resolutions are one in a
+    /// column.
     pub resolution_hz: f64,
     pub(super) layout: SegmentLayout,
     pub(super) frame_rate_hz: f64,
 }
 
 impl Spectrogram {
-    /// Short-time spectra of a record of displacement, m, one sample a frame (`None` where a frame has no
+    /// Short-time spectra of a record of displacement, m, one sample per frame (`None` for a frame without a
     /// value). Steps and ring-downs should be removed as far as possible.
     ///
     /// # Errors
-    /// [`SpectrumError`] when the record, the rate, the band or the segment cannot give one.
+    /// [`SpectrumError`] if the record, the frame rate, the band or the segment allows no spectra.
     pub fn new(
         samples: &[Option<f64>],
         frame_rate_hz: f64,

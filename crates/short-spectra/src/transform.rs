@@ -60,23 +60,23 @@ impl RealTransform {
 //
 // The library takes the twiddle factors of a plan from the system's sine and cosine, whose last bits depend
 // on the processor from lengths of 4,096 on, and orders additions differently for the types it knows. A type
-// of our own avoids both: from each number that it is given it finds the part of a turn, and takes the cosine
-// from libm.
+// of our own avoids both: for each number that the library passes in, it finds the part of a turn with that
+// cosine, and takes the cosine from libm instead.
 
 thread_local! {
-    /// Parts of a turn in the plan that is being made; zero outside of planning.
+    /// Number of parts of a turn in the plan that is being made; zero outside of planning.
     static TWIDDLE_DIVISIONS: Cell<usize> = const { Cell::new(0) };
 }
 
-/// Most difference of the system's cosine from ours: many last digits, and much less than two cosines of a
-/// plan differ.
+/// Largest difference of the system's cosine from ours: many units in the last place, and much less than two
+/// cosines of a plan differ.
 const COSINE_TOLERANCE: f64 = 1e-14;
 
 /// A number of a transform.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PortableReal(pub f64);
 
-/// Makes a plan with twiddle factors of `parts` parts of a turn, a power of two.
+/// Makes a plan whose twiddle factors divide a turn into `parts` parts, a power of two.
 pub(super) fn with_exact_twiddles<T>(parts: usize, plan: impl FnOnce() -> T) -> T {
     TWIDDLE_DIVISIONS.set(parts);
     let made = plan();
@@ -84,11 +84,11 @@ pub(super) fn with_exact_twiddles<T>(parts: usize, plan: impl FnOnce() -> T) -> 
     made
 }
 
-/// The exact cosine of the part of a turn that a number approximates; any other number unchanged.
+/// The exact cosine of the part of a turn whose cosine a number approximates; any other number unchanged.
 fn exact_cosine(number: f64) -> f64 {
     let parts = TWIDDLE_DIVISIONS.get() as f64;
     let (size, quarter) = (number.abs(), parts / 4.0);
-    // the transform itself uses one half in each step
+    // outside of planning no number changes: the transform itself uses one half in each step
     if size > 1.0 || parts == 0.0 {
         return number;
     }

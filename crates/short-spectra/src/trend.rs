@@ -6,15 +6,16 @@ use portable_math as math;
 use serde::Serialize;
 use std::fmt;
 
-/// Highest degree of a polynomial: a higher one fits the ends of a record by its last wave alone.
+/// Highest degree of a polynomial: the last wave of a higher one would only fit the ends of a record.
 pub(crate) const HIGHEST_DEGREE: usize = 23;
-/// Most columns of a trend; a high-pass of more cosines belongs to a longer record than a tenth of a second.
+/// Maximum number of columns of a trend; only records longer than a tenth of a second need a high-pass of
+/// more cosines.
 pub(super) const MOST_COLUMNS: usize = 48;
 
 /// A trend to remove.
 ///
-/// A trend is often far larger than the components that ride on it. Removing only its mean or a line
-/// leaves 0.9 to 1 Hz of error at 78 Hz in 0.15 s; a cubic leaves 0.03 Hz.
+/// A trend is often far larger than the components on top of it. Removing only its mean or a line leaves an
+/// error of 0.9 to 1 Hz at 78 Hz in 0.15 s; a cubic leaves 0.03 Hz.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub enum Detrend {
     /// Nothing.
@@ -29,12 +30,12 @@ pub enum Detrend {
     /// A polynomial of this degree, at most `HIGHEST_DEGREE`.
     Polynomial(usize),
     /// Everything slower than this frequency, Hz: a line and every cosine of half-waves over the record below
-    /// it. A linear projection on the frames present, so it neither delays nor, above the frequency,
-    /// attenuates; it takes at most 46 half-waves.
+    /// it. This is a linear projection on the frames present, so it does not delay, and attenuates nothing
+    /// above the frequency; it takes at most 46 half-waves.
     HighPass(f64),
 }
 
-/// A name that is no detrending.
+/// A name that does not denote a detrending.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "unknown detrending `{found}`; expected `none`, `mean`, `line`, `cubic`, `polynomial:N` (N up to {HIGHEST_DEGREE}) or `high-pass:HZ`"
@@ -49,8 +50,8 @@ impl Detrend {
     const NAMED: [(&str, Self); 4] =
         [("none", Self::None), ("mean", Self::Mean), ("line", Self::Line), ("cubic", Self::Cubic)];
 
-    /// The choice that is written like this: `none`, `mean`, `line`, `cubic`, `polynomial:7` or
-    /// `high-pass:40`.
+    /// The choice with one of the names `none`, `mean`, `line`, `cubic`, `polynomial:7` or `high-pass:40`;
+    /// the numbers may differ.
     ///
     /// # Errors
     /// [`UnknownDetrend`] with the known names.
@@ -66,7 +67,7 @@ impl Detrend {
             .ok_or_else(|| UnknownDetrend { found: text.to_owned() })
     }
 
-    /// The trend of a record of this length; `None` where it would take more columns than a fit can hold.
+    /// The trend of a record of this length; `None` if it would take more columns than a fit can hold.
     pub(super) fn to_trend(self, frames: usize, frame_rate_hz: f64) -> Option<Trend> {
         Some(match self {
             Self::None => Trend::Polynomial(0),
@@ -103,13 +104,13 @@ impl std::str::FromStr for Detrend {
     }
 }
 
-/// Columns of a line.
+/// Number of columns of a line.
 const LINE_COLUMNS: usize = 2;
 
 /// The columns of a trend.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Trend {
-    /// The first Legendre polynomials, their number; they are orthogonal over a record without gaps.
+    /// This many Legendre polynomials from degree 0 on; they are orthogonal over a record without gaps.
     Polynomial(usize),
     /// A line and this many cosines of one, two, three ... half-waves over the record.
     Cosines(usize),
@@ -138,7 +139,8 @@ impl Trend {
         }
     }
 
-    /// Fastest waves over the record that the trend itself can show: slower components are absorbed by it.
+    /// Number of waves over the record of the fastest motion that the trend can describe; it absorbs slower
+    /// components.
     pub(super) fn fastest_waves(self) -> f64 {
         let (Self::Polynomial(count) | Self::Cosines(count)) = self;
         count as f64 / 2.0
@@ -160,7 +162,7 @@ impl Trend {
         }
     }
 
-    /// The trend with some coefficients in every frame.
+    /// The trend with these coefficients in every frame.
     pub(super) fn values(self, coefficients: &[f64], frames: usize) -> Vec<f64> {
         let mut row = [0.0; MOST_COLUMNS];
         let mut value = |i: usize| {
@@ -170,13 +172,13 @@ impl Trend {
         (0..frames).map(&mut value).collect()
     }
 
-    /// The trend of the samples in every frame.
+    /// The trend fitted to the samples, in every frame.
     pub(super) fn fit_values(self, samples: &[Option<f64>]) -> Vec<f64> {
         self.fit_coefficients(samples)
             .map_or_else(|| vec![0.0; samples.len()], |c| self.values(c.as_slice(), samples.len()))
     }
 
-    /// The samples less the trend; zero for a missing sample.
+    /// The samples without the trend; zero for a missing sample.
     pub(super) fn residual(self, samples: &[Option<f64>]) -> Vec<f64> {
         samples.iter().zip(self.fit_values(samples)).map(|(x, trend)| x.map_or(0.0, |x| x - trend)).collect()
     }
@@ -190,11 +192,11 @@ impl Trend {
         }
     }
 
-    /// Coefficients by singular values of the normal equations, which clumped frames may make singular.
+    /// Coefficients by singular values of the normal equations, which frames in clumps may make singular.
     fn fit_coefficients(self, samples: &[Option<f64>]) -> Option<DVector<f64>> {
-        /// Directions of the normal matrix below this share of the number of frames are not determined.
+        /// Fraction of the number of frames below which a singular value of the normal matrix counts as zero.
         const SINGULAR: f64 = 1e-12;
-        /// Most iterations; each column takes a few.
+        /// Maximum number of iterations; each column takes a few.
         const MOST_ITERATIONS: usize = 10_000;
         let columns = self.column_count();
         if columns == 0 {

@@ -7,13 +7,14 @@ use crate::figure::Figure;
 use crate::style::{Colour, EDGE_MM, LINE_MM, Mark, SMALL_MM, TEXT_MM, UNITS_PER_MM};
 use crate::text::{WIDE_BOLD_LETTER, WIDE_LETTER, text_width, truncate_text};
 
-/// Most rows of labels above a panel; further labels are left out, but their lines stay.
+/// Maximum number of rows of labels above a panel; labels without a row are left out, but their lines are
+/// drawn.
 const MAX_LABEL_ROWS: usize = 4;
-/// Width of bold letters over that of plain ones.
+/// Ratio of the width of bold letters to that of plain letters.
 const BOLD_WIDTH_RATIO: f64 = WIDE_BOLD_LETTER / WIDE_LETTER;
 
-/// Rows of the labels of vertical lines, then of the top labels, without overlap. Top labels are next to the
-/// panel.
+/// Row of each label, first of the vertical lines, then of the top labels, without overlap; `None` if no row
+/// is free. The top labels are next to the panel.
 pub(super) fn assign_label_rows(panel: &Panel, x: &CanvasAxis) -> Vec<Option<usize>> {
     let end = |line: &str| x.from + (text_width(line, SMALL_MM) * BOLD_WIDTH_RATIO + 1.0) * UNITS_PER_MM;
     let title_ends: Vec<f64> = panel.title.lines().rev().map(end).collect();
@@ -26,8 +27,8 @@ pub(super) fn assign_label_rows(panel: &Panel, x: &CanvasAxis) -> Vec<Option<usi
     rules.into_iter().map(|row| row.map(|row| row + taken)).chain(captions).collect()
 }
 
-/// The lowest free row for every label. `title_ends` are the ends of the title's lines, the lowest first,
-/// which labels do not overlap.
+/// The lowest free row for every label. Labels do not overlap the title, whose lines end at `title_ends`, the
+/// lowest line first.
 fn stack_labels(labels: &[(&str, f64)], x: &CanvasAxis, title_ends: &[f64]) -> Vec<Option<usize>> {
     let place = |at: f64| x.canvas_position(at).filter(|at| *at >= x.from && *at <= x.to);
     let mut order: Vec<(usize, f64)> =
@@ -105,7 +106,7 @@ pub(super) fn place_legend(figure: &Figure) -> (Vec<(LegendEntry<'_>, f64, f64)>
 /// Width of the sample before an entry of the legend, mm.
 const LEGEND_SAMPLE_MM: f64 = 8.0;
 
-/// The text of a legend entry, cut at one line.
+/// The text of a legend entry, cut to one line.
 pub(crate) fn legend_text(label: &str, figure: &Figure) -> String {
     truncate_text(label, TEXT_MM, figure.width_mm - 2.0 * EDGE_MM - LEGEND_SAMPLE_MM)
 }

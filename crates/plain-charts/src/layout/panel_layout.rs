@@ -10,7 +10,7 @@ use crate::style::{
 };
 use crate::text::{LETTER, WIDE_LETTER, text_width, truncate_text, wrap_in_two_lines};
 
-/// Least number of ticks on a narrow x axis, however close they are.
+/// Number of ticks to be tried on a narrow x axis, however close they are.
 const LEAST_X_TICKS: f64 = 4.0;
 
 /// A panel with its position; areas in canvas units, lengths in mm.
@@ -25,7 +25,7 @@ pub(crate) struct PanelLayout<'a> {
     pub label_rows: Vec<Option<usize>>,
     /// Letter of the panel; `None` for a single panel.
     pub letter: Option<char>,
-    /// Left end of its column, mm.
+    /// Left end of the panel's column, mm.
     pub column_mm: f64,
     /// Height of the labels below the axes, mm.
     pub(super) under_mm: f64,
@@ -70,7 +70,7 @@ impl<'a> PanelLayout<'a> {
         placed
     }
 
-    /// Canvas coordinates of a point in the units of the axes; `None` where it has none.
+    /// Canvas coordinates of a point in the units of the axes; `None` for a point without a place on them.
     pub(crate) fn canvas_point(&self, (x, y): (f64, f64)) -> Option<CanvasPoint> {
         Some((self.x.canvas_position(x)?, self.y.canvas_position(y)?))
     }
@@ -119,7 +119,7 @@ impl<'a> PanelLayout<'a> {
         spans.windows(2).all(|pair| pair[0].1 + UNITS_PER_MM < pair[1].0)
     }
 
-    /// Removes labels that would overlap the one before or leave the figure.
+    /// Removes labels that would overlap the previous label or extend outside the figure.
     fn drop_crowded_labels(&self, ticks: &mut [Tick]) {
         let mut end = f64::NEG_INFINITY;
         let edge = self.area.right + (EDGE_MM + HALF_LABEL_MM) * UNITS_PER_MM;
@@ -139,7 +139,7 @@ impl<'a> PanelLayout<'a> {
         y_axis_ticks(self.panel, &self.y, self.names_mm)
     }
 
-    /// Height of vertical names below an x axis, mm; `None` where they are horizontal or there are none.
+    /// Height of vertical names below an x axis, mm; `None` if they are horizontal or there are no names.
     pub(crate) fn x_names_mm(&self) -> Option<f64> {
         let names = &self.panel.x.categories;
         let step_mm = (self.area.right - self.area.left) / UNITS_PER_MM / (self.x.high - self.x.low).max(1.0);
@@ -150,24 +150,25 @@ impl<'a> PanelLayout<'a> {
 
 // Ticks of a y axis and the width of their labels.
 
-/// Largest fraction of a column for names along a y axis, and of the axes' height for vertical names below an
-/// x axis.
+/// Largest fraction of the column width for names along a y axis, and of the height of the axes for vertical
+/// names below an x axis.
 pub(super) const MOST_NAMES: f64 = 0.4;
-/// Half the width of a label of five digits, mm, which is centred on the end of the axis.
+/// Half the width of a label of five digits, mm; a label may be centred on the end of the axis.
 pub(super) const HALF_LABEL_MM: f64 = 2.0;
-/// Least distance of labelled ticks on a y axis that would otherwise have only one, mm: a line of text.
+/// Smallest distance of labelled ticks, mm, on a y axis that would otherwise have fewer than two: the height
+/// of a line of text.
 const CROWDED_Y_TICKS_MM: f64 = LINE_MM;
-/// Height of a line of small letters in two lines, mm.
+/// Height of each line of a name in two lines of small letters, mm.
 pub(crate) const SMALL_LINE_MM: f64 = SMALL_MM + 0.1;
 /// Gap between names of two lines, mm.
 const BETWEEN_NAMES_MM: f64 = 0.6;
 
-/// Whether at least two ticks have labels: one alone shows no scale.
+/// Whether at least two ticks have labels; a single label shows no scale.
 pub(super) fn shows_scale(ticks: &[Tick]) -> bool {
     ticks.iter().filter(|tick| tick.label.is_some()).nth(1).is_some()
 }
 
-/// Ticks of a y axis. Names wider than `names_mm` wrap to two lines of small letters where the ticks are far
+/// Ticks of a y axis. Names wider than `names_mm` wrap to two lines of small letters if the ticks are far
 /// enough apart.
 pub(super) fn y_axis_ticks(panel: &Panel, y: &CanvasAxis, names_mm: f64) -> Vec<Tick> {
     if panel.y.categories.is_empty() {
@@ -227,7 +228,7 @@ mod tests {
         let placed =
             PanelLayout::new(&Panel::default(), (x, (x.low, x.high)), 0.0, true, Vec::new()).x_ticks();
         assert_eq!(numbers(&placed), ["0.00186", "0.00190", "0.00194"]);
-        // the last of these would leave the figure
+        // the last of these labels would extend outside the figure
         let x = CanvasAxis { high: 0.001_941, ..x };
         let placed =
             PanelLayout::new(&Panel::default(), (x, (x.low, x.high)), 0.0, true, Vec::new()).x_ticks();

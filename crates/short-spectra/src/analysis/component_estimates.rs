@@ -1,5 +1,5 @@
-//! Components with their deviations, and the evidence for and against each, from the fitted parts of a
-//! record.
+//! Components with their standard deviations, and the evidence for and against each of them, from the fitted
+//! parts of a record.
 
 use super::{Oscillation, RemovedTrend, SpectralAnalysis};
 use crate::classification::{Evidence, RecordContext, classify_components};
@@ -16,39 +16,43 @@ use crate::{Component, Detrend, Estimator, Spectrum, SpectrumSettings};
 use portable_math as math;
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
-/// Deviations from zero from which a decay is one; below, the amplitude is that of a steady oscillation.
+/// Ratio of a decay to its standard deviation from which it is significant; a smaller decay is held at zero.
 const SIGNIFICANT_DECAY: f64 = 3.0;
 
-/// An oscillation with fewer cycles than this many times the waves of a trend that could grow no further may
-/// be a piece of a step.
+/// If the trend could not grow further, an oscillation with fewer cycles than this multiple of the waves of
+/// the trend may be a part of a step.
 const EXHAUSTED_TREND_WAVES: f64 = 2.0;
-/// An oscillation of fewer cycles may be a piece of what a trend with more columns than a cubic describes: a
-/// shaking camera gives such pieces.
+/// If the trend has more than `FEWEST_COLUMNS` columns, those of a cubic, an oscillation of fewer cycles than
+/// this may be a part of what the trend describes, such as the shaking of a camera.
 const SLOW_CYCLES: f64 = 6.5;
 const FEWEST_COLUMNS: usize = 4;
-/// Others near an oscillation that make a crowd.
+/// Number of other transients near a transient from which it counts as crowded.
 const CROWD_NEIGHBOURS: usize = 2;
-/// Resolutions within which two oscillations that are not both steady may be pieces of one: the window hardly
-/// separates them, and their errors cancel.
+/// Distance, resolutions, within which two oscillations that are not both steady may be parts of one: the
+/// window hardly separates them, and their errors cancel.
 const FRAGMENT_RESOLUTIONS: f64 = 2.0;
-/// Resolutions by which an unresolved companion moves a frequency, for each part of the amplitude that is
-/// left. Of pairs half a resolution to one apart with equal amplitudes, the worst of fifty was off by 4.6.
+/// Standard deviation of the shift of a frequency by an unresolved companion, resolutions, per unit of the
+/// ratio of residual to amplitude. In fifty pairs of equal amplitudes, half a resolution to one resolution
+/// apart, the largest shift was 4.6.
 const COMPANION_SHIFT: f64 = 2.0;
-/// Deviation of a frequency that no oscillation explains, resolutions: anywhere within one of its peak.
+/// Standard deviation of a frequency that no oscillation explains, resolutions: uniform within one resolution
+/// of its peak.
 const UNEXPLAINED_SD: f64 = 0.577;
 
 /// A fitted record with the covariances of its terms.
 pub(super) struct FitReading<'a> {
     selector: &'a ModelSelector<'a>,
-    /// With every decay free: damping is read from it.
+    /// Model with every decay free, from which damping is estimated.
     free_decay_model: SineModel,
     free_decay_covariance: SineCovariance,
-    /// The same with a trend of two columns more, to see what depends on it.
+    /// The model with every decay free and a trend of two more columns, which shows what depends on the
+    /// trend.
     richer_trend_model: Option<SineModel>,
-    /// With every decay that is not significant held at zero: frequency and amplitude are read from it.
+    /// Fit in which every insignificant decay is held at zero, from which frequency and amplitude are
+    /// estimated.
     decomposition: ModelFit,
     covariance: SineCovariance,
-    /// Terms that drift or fade evenly.
+    /// Indices of terms that may be parts of one oscillation with a constant drift or linear fall.
     unsteady_terms: Vec<usize>,
 }
 
@@ -142,8 +146,8 @@ impl<'a> FitReading<'a> {
         }
     }
 
-    /// The signal of the spectrum, m: the components in every frame, so that gaps do not spread them, and the
-    /// rest in the frames that have one.
+    /// The signal whose spectrum is shown, m: the components in every frame, so that gaps do not spread them,
+    /// plus the residual in the frames that have a value.
     fn gapless_signal_m(&self, model_m: &[f64]) -> Vec<f64> {
         // the weights of a Hann window add up to half its frames
         let share = self.selector.periodogram.sums.first / (model_m.len() as f64 / 2.0);
@@ -172,7 +176,7 @@ impl<'a> FitReading<'a> {
         };
         let piece = self.nearest_fragment(k);
         let moved = piece.as_ref().map_or(0.0, |piece| piece.distance * piece.amplitude_ratio);
-        let companion = math::hypot(COMPANION_SHIFT * left, moved); // resolutions, so cycles
+        let companion = math::hypot(COMPANION_SHIFT * left, moved); // resolutions, that is cycles
         let decays = matches!(free.free, FreeSet::Both | FreeSet::Nepers);
         let damping = decays.then(|| {
             let nepers_sd = math::hypot(sd_free.nepers * noise_m, shift.nepers);
@@ -216,26 +220,26 @@ impl<'a> FitReading<'a> {
         (component, evidence)
     }
 
-    /// Whether it is as slow as the waves of a trend that had to grow.
+    /// Whether an oscillation is as slow as the waves of a trend that had to grow.
     fn is_slow(&self, k: usize) -> bool {
         let parts = &self.decomposition.model;
         let grown = parts.trend().column_count() > FEWEST_COLUMNS;
         self.selector.trend_grows && grown && parts.terms()[k].cycles < SLOW_CYCLES
     }
 
-    /// Whether it and two more near it begin inside the record or are over soon.
+    /// Whether an oscillation and at least two others near it begin inside the record or end soon.
     fn is_crowded(&self, k: usize) -> bool {
         let terms = self.decomposition.model.terms();
         let near = |t: &&SineTerm| t.is_transient() && (t.cycles - terms[k].cycles).abs() < NEIGHBOURHOOD;
         terms[k].is_transient() && terms.iter().filter(near).count() > CROWD_NEIGHBOURS
     }
 
-    /// The nearest other oscillation within two resolutions or the width of the broader peak, where one of
-    /// the two decays or begins inside the record. Two steady ones are a pair, not pieces of one.
+    /// The nearest other oscillation within two resolutions or the width of the broader peak, if one of the
+    /// two decays or begins inside the record. Two steady oscillations are a pair, not parts of one.
     fn nearest_fragment(&self, k: usize) -> Option<Fragment> {
         let (parts, terms) = (&self.decomposition.model, self.decomposition.model.terms());
         let steady = |term: &SineTerm| term.nepers == 0.0 && term.first == 0;
-        // a decaying peak is as wide as it decays
+        // the width of a peak grows with its decay
         let width = |j: usize| (terms[j].nepers.max(terms[k].nepers) / TAU).max(FRAGMENT_RESOLUTIONS);
         let piece = |j: usize| Fragment {
             distance: (terms[j].cycles - terms[k].cycles).abs(),
@@ -269,7 +273,7 @@ impl<'a> FitReading<'a> {
         }
     }
 
-    /// The component of a course that drifts.
+    /// The component of a course with a drifting frequency; `None` for a course without a frequency range.
     fn drifting_component(&self, course: &DriftCourse) -> Option<(Component, Evidence)> {
         let range = course.range?;
         let (mean, selector) = (RidgeMean::from_ridge(&course.ridge), self.selector);
@@ -318,8 +322,8 @@ impl<'a> FitReading<'a> {
         alone.cramer_rao_bound_hz(self.selector.samples.len(), self.selector.frame_rate_hz)
     }
 
-    /// Shift of a term with a richer trend: cycles, nepers, and the share of its amplitude half way through
-    /// the record.
+    /// Change of a term by a richer trend: cycles, nepers, and the relative change of its amplitude half way
+    /// through the record.
     fn shift_by_richer_trend(&self, k: usize) -> TermDeviations {
         let Some(richer) = &self.richer_trend_model else {
             return TermDeviations { cycles: 0.0, nepers: 0.0, amplitude: 0.0 };
@@ -333,7 +337,8 @@ impl<'a> FitReading<'a> {
         }
     }
 
-    /// Standard deviation of white noise that leaves as much around a frequency as the fit does, m.
+    /// Standard deviation of the white noise that would leave the same residual spectrum around a frequency,
+    /// m.
     fn noise_sd_near(&self, cycles: f64) -> f64 {
         let ModelFit { model: parts, amplitude_m, .. } = &self.decomposition;
         let bins_a_cycle = 2.0 * (amplitude_m.len() - 1) as f64 / self.selector.samples.len() as f64;
@@ -344,7 +349,7 @@ impl<'a> FitReading<'a> {
         let bin = |cycles: f64| ((cycles * bins_a_cycle) as usize).min(amplitude_m.len() - 1);
         let around = &amplitude_m[bin(low)..=bin(high)];
         let mean_square = around.iter().map(|a| a * a).sum::<f64>() / around.len() as f64;
-        // every oscillation inside has taken up to four of the values with it
+        // every oscillation in this range has removed up to four of the values
         let values = 2.0 * (high - low);
         let inside = parts.terms().iter().filter(|t| t.cycles > low && t.cycles < high);
         let taken: f64 = inside.map(|t| 2.0 + t.free.count() as f64).sum();
@@ -353,14 +358,14 @@ impl<'a> FitReading<'a> {
     }
 }
 
-/// Another oscillation that may be a piece of the same.
+/// Another oscillation that may be a part of the same motion.
 struct Fragment {
     distance: f64,
-    /// Its amplitude over that of this one, at most 1.
+    /// Ratio of its amplitude to that of the oscillation under test, at most 1.
     amplitude_ratio: f64,
 }
 
-/// Damping ratio `d / sqrt(d^2 + (2 pi n)^2)` of `d` nepers in `n` cycles, and its deviation.
+/// Damping ratio `d / sqrt(d^2 + (2 pi n)^2)` of `d` nepers in `n` cycles, and its standard deviation.
 fn damping_ratio_with_sd(term: &SineTerm, nepers_sd: f64) -> (f64, f64) {
     let angle = TAU * term.cycles;
     let size = math::hypot(term.nepers, angle);

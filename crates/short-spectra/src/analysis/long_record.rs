@@ -1,8 +1,9 @@
 //! Records too long for a fit: components from the windowed periodogram, judged by the same criteria.
 //!
-//! Decay and drift are not tried. Instead each component is read in pieces of the record. One that keeps its
-//! amplitude and phase is a steady line; the frequency of any other is known to the width of its peak only.
-//! What lasts for a short time is read from the pieces that hold it.
+//! Decay and drift are not fitted. Instead, each component is measured in pieces of the record. A component
+//! that keeps its amplitude and phase is a steady line; the frequency of any other component is known only to
+//! the width of its peak. A component that lasts only for a short time is estimated from the pieces that
+//! contain it.
 
 mod transients;
 
@@ -16,18 +17,18 @@ use rayon::prelude::*;
 use std::f64::consts::{LN_2, TAU};
 use transients::Transient;
 
-/// Pieces of the record; half-overlapping, they hold this many independent values.
+/// Number of pieces of the record, which overlap by half, and number of independent values in them.
 const PHASE_SEGMENTS: usize = 31;
 const INDEPENDENT_SEGMENTS: f64 = 16.0;
-/// Most scatter of a steady line over its pieces, as a share of its amplitude or of the noise.
+/// Largest scatter of a steady line over the pieces, as a fraction of its amplitude or of the noise.
 const STEADY_SCATTER: f64 = 0.25;
 const STEADY_SCATTER_IN_NOISE: f64 = 1.7;
-/// Width of an even distribution over its deviation, the root of twelve.
+/// Ratio of the width of a uniform distribution to its standard deviation, the square root of 12.
 const UNIFORM_WIDTH_IN_SD: f64 = 3.464_101_615_137_754_6;
 /// Half width of the neighbourhood whose median is the noise, resolutions.
 const NEIGHBOURHOOD: f64 = 40.0;
-/// Level over that noise from which a peak is a component: noise reaches it in one of a hundred spectra of a
-/// million frames.
+/// Ratio of a peak to that noise above which it is a component; noise reaches it in one of a hundred spectra
+/// of a million frames.
 const DETECTION: f64 = 4.5;
 
 pub(super) fn analyse_long_record(
@@ -60,7 +61,7 @@ pub(super) fn analyse_long_record(
     })
 }
 
-/// Lines and short-lived components in one list, each once, largest first.
+/// Lines and short-lived components in one list without duplicates, largest first.
 fn merge_components(
     mut lines: Vec<(Component, Evidence)>,
     mut brief: Vec<Transient>,
@@ -72,7 +73,7 @@ fn merge_components(
     };
     brief.retain(|b| !known(b));
     lines.retain(|(c, line)| !(line.changes && brief.iter().any(|b| b.explains_component(c))));
-    // the peaks of a step would fill the list: better known components come first
+    // the peaks of a step could fill the list: more accurate components come first
     let better = brief.len() + lines.iter().filter(|(_, line)| !line.changes).count();
     let mut room = 0..most.saturating_sub(better);
     lines.retain(|(_, line)| !line.changes || room.next().is_some());
@@ -84,7 +85,7 @@ fn merge_components(
     components
 }
 
-/// A component that stands out of the noise around it, with the evidence of the whole record.
+/// A component that stands out from the noise around it, with the evidence of the whole record.
 fn assess_component(
     spectrum: &Spectrum,
     left_m: &[Option<f64>],
@@ -111,7 +112,7 @@ fn half_maximum_width_hz(spectrum: &Spectrum, c: &Component) -> f64 {
     bins as f64 * spectrum.frequency_hz.get(1).copied().unwrap_or_default()
 }
 
-/// The noise floor around a frequency, m: noise need not be white.
+/// The noise floor around a frequency, m; the noise need not be white.
 fn local_noise_floor_m(spectrum: &Spectrum, frequency_hz: f64) -> f64 {
     let bin_hz = spectrum.frequency_hz.get(1).copied().unwrap_or(f64::INFINITY);
     let bin = |hz: f64| ((hz / bin_hz).max(0.0) as usize).min(spectrum.amplitude_m.len());
@@ -183,7 +184,7 @@ mod tests {
         SpectralAnalysis::from_record(&record, &SpectrumSettings::default()).unwrap().spectrum.components
     }
 
-    /// Those of ring-downs and a steady 900.5 Hz of 10 um.
+    /// The components of a record with ring-downs and a steady oscillation of 10 um at 900.5 Hz.
     fn listed(rings: &[Rings]) -> Vec<Component> {
         let steady = |i: usize| 1e-5 * (TAU * 900.5 * i as f64 / RATE_HZ).cos();
         components(|i| steady(i) + rings.iter().map(|r| r.at_m(i)).sum::<f64>())
@@ -222,7 +223,7 @@ mod tests {
         assert_eq!(list.len(), 2, "{list:?}");
         assert_read(near(&list, 600.0), &Rings(600.0, 0.05, 3e-5, 0));
         assert_eq!(near(&list, 600.0).begins_s, None);
-        // over in twenty frames, which every window that starts at zero hides
+        // it ends after twenty frames, which every window that starts at zero hides
         let list = listed(&[Rings(1200.0, 0.08, 3e-5, 0)]);
         assert!((near(&list, 1200.0).frequency_hz - 1200.0).abs() < 30.0, "{list:?}");
     }

@@ -8,15 +8,16 @@ use rayon::prelude::*;
 use std::f64::consts::PI;
 use std::ops::Range;
 
-/// Frames gathered before they are multiplied: a block stays in cache, and rotated sinusoids start afresh in
-/// each.
+/// Number of frames that are gathered before they are multiplied: a block fits in the cache, and each block
+/// restarts the rotation of the sinusoids.
 const BLOCK: usize = 256;
-/// Blocks that one thread sums; the sums are added in order, so the number of threads does not change a bit.
+/// Number of blocks that one thread sums; the sums are added in order, so the number of threads does not
+/// change a bit of the result.
 const BLOCKS_A_TASK: usize = 64;
 
-/// The columns of one term of `n` cycles and `d` nepers in the record: `u` runs over it from -1 to 1, the
-/// phase is `pi n u` and the envelope `exp(-d ((u + 1) / 2 - s))`, which is 1 at the share `s` of the record
-/// where the term starts, and zero before.
+/// The columns of one term of `n` cycles and `d` nepers in the record. `u` runs over the record from -1 to 1,
+/// the phase is `pi n u`, and the envelope `exp(-d ((u + 1) / 2 - s))` is 1 where the term starts, at the
+/// fraction `s` of the record, and zero before.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum TermColumn {
     Cosine,
@@ -27,13 +28,14 @@ pub(super) enum TermColumn {
     SineSlope,
 }
 
-/// Columns of each term that its amplitudes need: cosine and sine.
+/// Number of columns per term that its amplitudes need: cosine and sine.
 pub(super) const QUADRATURE_COLUMNS: usize = 2;
-/// Columns of each term that a step needs: the slopes too.
+/// Number of columns per term that a Gauss-Newton step needs: cosine, sine and their slopes.
 pub(super) const COLUMNS_WITH_SLOPES: usize = 4;
 
 impl TermColumn {
-    /// Index of the column after those of the trend, among all four of each term.
+    /// Index of this column of a term in a matrix that holds all four columns of each term after those of the
+    /// trend.
     pub(super) fn column_index(self, trend: usize, term: usize) -> usize {
         trend + COLUMNS_WITH_SLOPES * term + self as usize
     }
@@ -43,16 +45,16 @@ impl TermColumn {
 #[derive(Debug)]
 pub(super) struct FixedColumns {
     frames: usize,
-    /// Frames that take part and the root of their weight.
+    /// Frames that take part, with the square root of their weight.
     rows: Vec<(usize, f64)>,
     /// Rows of each block of frames.
     blocks: Vec<Range<usize>>,
-    /// The trend's columns and, last, the data; one row for each that takes part.
+    /// The columns of the trend and, last, the data; one row for each frame that takes part.
     columns: DMatrix<f64>,
     gram: DMatrix<f64>,
 }
 
-/// Cosine and sine with their envelope, and `pi u`, of the frames of a block.
+/// Cosine and sine, both with their envelope, and `pi u` for each frame of a block.
 type PhasorBlock = [[f64; 3]; BLOCK];
 
 impl FixedColumns {
@@ -75,8 +77,8 @@ impl FixedColumns {
         Self { frames: data.len(), rows, blocks, columns, gram }
     }
 
-    /// Inner products of the trend's columns, the first `EACH` columns of every term and the data, in this
-    /// order.
+    /// Inner products of the columns of the trend, the first `EACH` columns of every term, and the data, in
+    /// this order.
     pub(super) fn gram_matrix<const EACH: usize>(&self, terms: &[SineTerm]) -> DMatrix<f64> {
         let (trend, width) = (self.columns.ncols() - 1, EACH * terms.len());
         let tasks: Vec<&[Range<usize>]> = self.blocks.chunks(BLOCKS_A_TASK).collect();
@@ -90,7 +92,7 @@ impl FixedColumns {
         };
         let zeros = (DMatrix::zeros(trend + 1, width), DMatrix::zeros(width, width));
         let (mixed, own) = parts.into_iter().fold(zeros, |sum, part| (sum.0 + part.0, sum.1 + part.1));
-        // the data, last of the fixed columns, goes behind the terms
+        // the data, which are the last fixed column, go behind the terms
         let place = |k: usize| if k == trend { trend + width } else { k };
         let mut gram = DMatrix::zeros(trend + width + 1, trend + width + 1);
         for i in 0..=trend {
@@ -104,8 +106,8 @@ impl FixedColumns {
         gram
     }
 
-    /// Inner products of the fixed columns with those of the terms, and of these with each other, over blocks
-    /// from `first` on.
+    /// Inner products of the fixed columns with the columns of the terms, and of the latter with each other,
+    /// over blocks from `first` on.
     fn term_products<const EACH: usize>(
         &self,
         terms: &[SineTerm],
@@ -152,7 +154,7 @@ fn fill_term_columns<const EACH: usize>(
     }
 }
 
-/// A term with its cosine and sine amplitude in every frame.
+/// Values of a term in every frame, from its cosine and sine amplitudes.
 pub(super) fn term_values(term: &SineTerm, [cosine_m, sine_m]: [f64; 2], frames: usize) -> Vec<f64> {
     let mut values = Vec::with_capacity(frames);
     for first in (0..frames).step_by(BLOCK) {
@@ -163,7 +165,8 @@ pub(super) fn term_values(term: &SineTerm, [cosine_m, sine_m]: [f64; 2], frames:
     values
 }
 
-/// The frames of a block, each turned by the same angle and shrunk by the same factor from the one before.
+/// Cosine and sine of a term in the frames of a block, each frame rotated by the same angle and shrunk by the
+/// same factor from the frame before.
 fn rotate_phasors(term: &SineTerm, first: usize, frames: usize) -> PhasorBlock {
     let angle_per_cycle = |frame: usize| PI * abscissa(frame, frames);
     let mut turning = [[0.0; 3]; BLOCK];

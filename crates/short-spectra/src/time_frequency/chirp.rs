@@ -1,9 +1,9 @@
-//! A sinusoid whose frequency and amplitude change linearly, fitted to a segment by Gauss-Newton steps
-//! (damped where they do not descend).
+//! A sinusoid whose frequency and amplitude change linearly, fitted to a segment by Gauss-Newton steps, which
+//! are damped if they do not lower the misfit.
 //!
 //! Time runs over a segment as `x` from -1 to 1: `(1 + s x) (p cos phi + q sin phi)`, `phi = a x + b x^2 + c
-//! x^3`. With segments of `T` seconds the frequency is `(a + 2 b x + 3 c x^2) / (pi T)`. The amplitude's
-//! slope and the frequency are distinct because both parts of the amplitude share one slope.
+//! x^3`. With segments of `T` seconds the frequency is `(a + 2 b x + 3 c x^2) / (pi T)`. The slope of the
+//! amplitude and the frequency can be told apart because both parts of the amplitude share one slope.
 
 use crate::periodogram::{self, upper_median};
 use crate::transform::RealTransform;
@@ -11,26 +11,26 @@ use nalgebra::{SMatrix, SVector};
 use portable_math as math;
 use std::f64::consts::PI;
 
-/// Unknowns with a frequency that changes linearly: p, q, s, a, b.
+/// Number of unknowns for a frequency that changes linearly: p, q, s, a, b.
 pub(super) const LINEAR_UNKNOWNS: usize = 5;
-/// Unknowns with a rate that changes too: c is the sixth.
+/// Number of unknowns if the rate changes too: c is the sixth.
 pub(super) const CURVED_UNKNOWNS: usize = 6;
-/// Most steps; five are usual.
+/// Maximum number of steps; five are usual.
 const MOST_STEPS: usize = 20;
-/// A step that turns the phase at the ends of the segment by less, rad, is the last: the error of the next is
-/// its square.
+/// A step that changes the phase at the ends of the segment by less than this, rad, is the last: the error
+/// after it is of the order of its square.
 const SMALLEST_PHASE_STEP: f64 = 1e-3;
-/// First damping of a step that does not descend, as a share of the diagonal.
+/// First damping of a step that does not lower the misfit, as a fraction of the diagonal.
 const FIRST_DAMPING: f64 = 1e-2;
-/// Damping at which no step descends any more.
+/// Damping above which no step lowers the misfit any more.
 const LARGEST_DAMPING: f64 = 1e4;
-/// Frames for each unknown below which the fit would follow the noise.
+/// Number of frames per unknown below which the fit would follow the noise.
 const FRAMES_PER_UNKNOWN: usize = 3;
 
 /// Frames of a segment and their weights.
 pub(super) struct ChirpSegment<'a> {
     pub samples: &'a [Option<f64>],
-    /// One weight a frame; a frame without value takes no part.
+    /// One weight per frame; a frame without a value takes no part.
     pub weights: &'a [f64],
 }
 
@@ -41,7 +41,7 @@ pub(super) struct Chirp(pub [f64; CURVED_UNKNOWNS]);
 /// A fit of the first `N` unknowns.
 pub(super) struct ChirpFit<const N: usize> {
     pub parameters: Chirp,
-    /// Covariance of the unknowns for a noise of deviation 1 in each frame.
+    /// Covariance of the unknowns for noise of standard deviation 1 in each frame.
     pub covariance: SMatrix<f64, N, N>,
 }
 
@@ -62,24 +62,25 @@ impl Chirp {
         4.0 * self.0[4] / PI
     }
 
-    /// The same parameters with a rate that changes by some cycles a segment from one segment to the next.
+    /// The same parameters with a rate that changes by `cycles` cycles per segment from one segment to the
+    /// next.
     pub(super) fn with_curvature(mut self, cycles: f64) -> Self {
         self.0[5] = PI * cycles / 24.0;
         self
     }
 
-    /// Amplitude in the middle.
+    /// Amplitude in the middle of the segment.
     pub(super) fn amplitude(&self) -> f64 {
         math::hypot(self.0[0], self.0[1])
     }
 
-    /// Phase in the middle as a cosine, rad.
+    /// Phase in the middle of the segment, as a cosine, rad.
     pub(super) fn phase(&self) -> f64 {
         -math::atan2(self.0[1], self.0[0])
     }
 
-    /// `x`, cosine and sine of the phase in each frame, each rotated from the one before: third differences
-    /// of a cubic are constant.
+    /// `x`, cosine and sine of the phase in each frame, rotated from the frame before: third differences of a
+    /// cubic are constant.
     fn phases(&self, frames: usize) -> impl Iterator<Item = (f64, f64, f64)> + use<> {
         let [.., a, b, c] = self.0;
         let h = 2.0 / frames as f64;
@@ -99,7 +100,7 @@ impl Chirp {
         })
     }
 
-    /// The value at `x` where the phase has this cosine and sine.
+    /// The value at `x`, given the cosine and sine of the phase there.
     fn value_at(&self, (x, cosine, sine): (f64, f64, f64)) -> f64 {
         (1.0 + self.0[2] * x) * (self.0[0] * cosine + self.0[1] * sine)
     }
@@ -131,7 +132,7 @@ struct ChirpNormal<const N: usize> {
 }
 
 impl ChirpSegment<'_> {
-    /// Fits the first `N` unknowns from a start; `None` where the frames do not determine them.
+    /// Fits the first `N` unknowns from a start; `None` if the frames do not determine them.
     pub(super) fn fit_chirp<const N: usize>(&self, start: Chirp) -> Option<ChirpFit<N>> {
         if self.samples.iter().flatten().count() < FRAMES_PER_UNKNOWN * N {
             return None;
@@ -195,8 +196,8 @@ fn apply_step<const N: usize>(shape: Chirp, step: &SVector<f64, N>) -> Chirp {
 }
 
 impl<const N: usize> ChirpFit<N> {
-    /// Variance of the frequency at `x`, square cycles in the segment, for a noise of deviation 1 in each
-    /// frame.
+    /// Variance of the frequency at `x`, square cycles in the segment, for noise of standard deviation 1 in
+    /// each frame.
     pub(super) fn cycles_variance(&self, x: f64) -> f64 {
         let along = [1.0, 2.0 * x, 3.0 * x * x];
         let mut gradient = SVector::<f64, N>::zeros();
@@ -209,14 +210,14 @@ impl<const N: usize> ChirpFit<N> {
 
 /// Half width of the lobe of a Hann window, resolutions.
 const LOBE: f64 = 2.0;
-/// Multiples of the component that are left out, because a cycle need not be a sine.
+/// Number of multiples of the frequency that do not count as noise, because a cycle need not be a sine.
 const HARMONICS: usize = 3;
-/// The noise is a median over at least this many resolutions.
+/// Smallest width of the band whose median gives the noise, resolutions.
 const FEWEST_RESOLUTIONS: f64 = 20.0;
-/// Fewest bins of a median; with fewer left, harmonics are not left out.
+/// Minimum number of bins of a median; if fewer remain, the multiples count as noise too.
 const FEWEST_BINS: usize = 8;
-/// Neighbours on either side in the median of a column: one segment's length, so that a column's own few bins
-/// do not decide.
+/// Number of neighbours on either side in the median of a column: one segment's length, so that a column's
+/// own few bins do not decide.
 const NEIGHBOURS: usize = 4;
 
 /// Measures the noise of segments of one length.
@@ -236,7 +237,7 @@ impl SegmentNoise {
         Self { transform, window, padded, band }
     }
 
-    /// Noise of a segment less the fitted component.
+    /// Residual of a segment without the fitted component, as noise.
     pub(super) fn measure_residual(&self, segment: &[Option<f64>], shape: &Chirp) -> ResidualNoise {
         let values = segment.iter().zip(shape.values(segment.len())).zip(&self.window);
         let weighted = values.map(|((sample, value), w)| sample.map_or(0.0, |sample| w * (sample - value)));
@@ -263,12 +264,14 @@ impl SegmentNoise {
     }
 }
 
-/// Standard deviations in a frame of the white noise with the same power, m.
+/// Residual in a segment, as the standard deviation per frame of white noise of the same power, m.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ResidualNoise {
-    /// In the band, at least 20 resolutions of it, next to the component and its multiples: the noise.
+    /// The noise: the residual in the band, over at least 20 resolutions, outside the component and its
+    /// multiples.
     pub around_m: f64,
-    /// At the component's own frequency: more than the noise where it is no such sinusoid.
+    /// Residual at the component's own frequency; larger than the noise if the component is not such a
+    /// sinusoid.
     pub under_m: f64,
 }
 

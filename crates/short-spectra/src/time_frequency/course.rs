@@ -1,23 +1,25 @@
-//! The parts of a ridge that follow one component whose frequency the segments agree on.
+//! Courses: the parts of a ridge in which the frequencies of the segments agree, so that they follow one
+//! component.
 //!
 //! A ridge has points wherever the amplitude exceeds the noise by more than noise alone reaches once in a
-//! hundred records. Two kinds of points are no part of a course. In a model, which has no noise, residues at
-//! rest far below every colour of the map exceed rounding. And where the frequency of a cycle swings several
-//! times within a segment, its sidebands are as high as the carrier, and the strongest changes from segment
-//! to segment.
+//! hundred records. Two kinds of points do not belong to a course. In a simulated record, which has no noise,
+//! residues while nothing moves exceed rounding errors, although they lie far below every colour of the map.
+//! And if the frequency of a cycle swings several times within a segment, its sidebands are as high as the
+//! carrier, and the strongest line changes from segment to segment.
 
 use super::{Ridge, RidgePoint, Spectrogram};
 use portable_math as math;
 
 /// Range of amplitudes of a course, and of the colours of a spectrogram, dB.
 pub const DYNAMIC_RANGE_DB: f64 = 60.0;
-/// Largest step between segments that share three quarters of their frames, beyond the step of the fitted
-/// rates, resolutions; the neighbours of a range agree to within the same quarter. For the weakest component
-/// of a ridge noise makes less than a tenth of it, and a single component has no other reason to jump.
+/// Largest difference of frequency between segments that share three quarters of their frames, beyond the
+/// change by the fitted rates, resolutions; the neighbours of a frequency range must agree within the same
+/// quarter. In the weakest component of a ridge, noise causes less than a tenth of it, and a single component
+/// has no other reason to jump.
 const MAX_FREQUENCY_STEP: f64 = 0.25;
-/// Distance of such segments, segments.
+/// Distance of segments that share three quarters of their frames, segments.
 const USUAL_HOP: f64 = 0.25;
-/// Fewest segments of a part, where they share few frames with each other.
+/// Minimum number of segments of a part if they share few frames.
 const MIN_PART_SEGMENTS: usize = 3;
 
 /// A frequency at a speed.
@@ -27,7 +29,7 @@ pub struct SpeedPoint {
     pub speed_m_per_s: f64,
     /// Frequency, Hz.
     pub frequency_hz: f64,
-    /// Its standard deviation, Hz, where known.
+    /// Its standard deviation, Hz, if known.
     pub frequency_sd_hz: Option<f64>,
 }
 
@@ -36,14 +38,14 @@ pub fn coherent_parts(ridge: &Ridge, of: &Spectrogram) -> Vec<Vec<RidgePoint>> {
     let largest_m = of.amplitude_m.iter().flatten().flatten().fold(0.0, |most: f64, a| most.max(*a));
     let least_m = math::powf(10.0, -DYNAMIC_RANGE_DB / 20.0) * largest_m;
     let strong: Vec<RidgePoint> = ridge.points.iter().filter(|p| p.amplitude_m >= least_m).copied().collect();
-    // up to the next segment that shares no frame: fewer points are hardly more than one segment and may
-    // agree by chance
+    // up to the next segment that shares no frame with the first: fewer points cover hardly more than one
+    // segment and may agree by chance
     let fewest = MIN_PART_SEGMENTS.max((ridge.segment_s / ridge.hop_s).round() as usize + 1);
     let parts = strong.chunk_by(|a, b| is_continuous(ridge, a, b)).filter(|part| part.len() >= fewest);
     parts.map(<[RidgePoint]>::to_vec).collect()
 }
 
-/// Whether a point continues the course of the one before.
+/// Whether point `b` continues the course of point `a`.
 fn is_continuous(ridge: &Ridge, a: &RidgePoint, b: &RidgePoint) -> bool {
     let apart_s = b.time_s - a.time_s;
     let step_hz = b.frequency_hz - a.frequency_hz - apart_s * (a.rate_hz_per_s + b.rate_hz_per_s) / 2.0;
@@ -89,7 +91,7 @@ mod tests {
 
     #[test]
     fn what_lies_under_every_colour_is_not_drawn() {
-        // after 0.3 s nothing but a remainder of a millionth of the cycle
+        // after 0.3 s only a remainder of a millionth of the cycle is left
         let [followed, drawn] =
             times(|t| if t < 0.3 { 1e-5 * (TAU * 900.0 * t).sin() } else { 1e-11 * (TAU * 600.0 * t).sin() });
         assert!(followed.iter().filter(|t| **t > 0.35).count() > 20, "{followed:?}");

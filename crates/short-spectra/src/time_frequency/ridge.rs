@@ -1,4 +1,4 @@
-//! The ridge: the course of a component through the columns.
+//! The ridge: the course of a component through the columns of a spectrogram.
 
 use crate::periodogram::upper_median;
 use portable_math as math;
@@ -11,8 +11,8 @@ pub struct RidgePoint {
     pub time_s: f64,
     /// Frequency at that time, Hz.
     pub frequency_hz: f64,
-    /// Its standard deviation, Hz: from the noise next to the component or from the residual of the fit,
-    /// whichever is larger, and a five-hundredth of the resolution for leakage of other components.
+    /// Standard deviation of the frequency, Hz: from the noise next to the component or from the residual of
+    /// the fit, whichever is larger, and a five-hundredth of the resolution for leakage of other components.
     pub frequency_sd_hz: f64,
     /// Change of the frequency, Hz/s.
     pub rate_hz_per_s: f64,
@@ -20,9 +20,9 @@ pub struct RidgePoint {
     pub amplitude_m: f64,
     /// Phase of the component as a cosine, rad.
     pub phase_rad: f64,
-    /// Amplitude over that of noise in a bin of the column, `20 log10`, dB.
+    /// Ratio of the amplitude to that of noise in a bin of the column, `20 log10`, dB.
     pub snr_db: f64,
-    /// Residual of the fit at the component, as a share of its amplitude in a bin of the column.
+    /// Ratio of the residual of the fit at the component to its amplitude, in a bin of the column.
     pub residual_ratio: f64,
 }
 
@@ -41,8 +41,8 @@ pub struct RidgeEnd {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ridge {
     /// The points, in order of time. A point needs a fitted amplitude that exceeds the noise next to it by
-    /// more than noise alone reaches once in a hundred records and does not fall to zero within the segment,
-    /// three segments in a row or more. Elsewhere the ridge is interrupted.
+    /// more than noise alone reaches once in a hundred records and that does not fall to zero within the
+    /// segment. At least three consecutive segments must have points; elsewhere the ridge is interrupted.
     pub points: Vec<RidgePoint>,
     /// The frequency at the first frame, if the ridge reaches the first segment and the fit extends that far.
     pub start: Option<RidgeEnd>,
@@ -50,29 +50,29 @@ pub struct Ridge {
     pub end: Option<RidgeEnd>,
     /// Length of a segment, s.
     pub segment_s: f64,
-    /// Distance of the points where the ridge is not interrupted, s.
+    /// Distance between neighbouring points of an unbroken part, s.
     pub hop_s: f64,
 }
 
-/// Resolutions within which neighbours agree.
+/// Distance, resolutions, within which neighbours agree.
 const AGREEMENT_RESOLUTIONS: f64 = 0.25;
-/// Deviations of their difference within which neighbours agree.
+/// Number of standard deviations of their difference within which neighbours agree.
 const AGREEMENT_DEVIATIONS: f64 = 4.0;
 /// Distance of points with nearly independent noise, segments.
 const INDEPENDENT_SEGMENTS: f64 = 0.5;
-/// Deviations of a normal number that are exceeded upwards once in a thousand.
+/// Number of standard deviations that a normal number exceeds once in a thousand draws.
 const ONCE_IN_A_THOUSAND: f64 = 3.09;
 
-/// Least and greatest frequency of a course.
+/// Lowest and highest frequency of a course.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FrequencyRange {
-    /// Least frequency, Hz.
+    /// Lowest frequency, Hz.
     pub low_hz: f64,
-    /// Its standard deviation, Hz.
+    /// Standard deviation of the lowest frequency, Hz.
     pub low_sd_hz: f64,
-    /// Greatest frequency, Hz.
+    /// Highest frequency, Hz.
     pub high_hz: f64,
-    /// Its standard deviation, Hz.
+    /// Standard deviation of the highest frequency, Hz.
     pub high_sd_hz: f64,
 }
 
@@ -82,17 +82,17 @@ impl Ridge {
         self.points.chunk_by(|a, b| b.time_s - a.time_s < 1.5 * self.hop_s)
     }
 
-    /// Least and greatest frequency, including the two ends of the record if they are known to a quarter of a
-    /// resolution. A point counts only if the extrapolated frequency of a neighbour agrees with it within a
-    /// quarter of a resolution or four deviations, so that a single bad point sets neither limit. `None`
-    /// where no point is confirmed.
+    /// Lowest and highest frequency, including those at the two ends of the record if they are known to a
+    /// quarter of a resolution. A point counts only if the frequency extrapolated from a neighbour agrees
+    /// with it within a quarter of a resolution or four standard deviations, so that a single bad point sets
+    /// neither limit. `None` if no point is confirmed.
     #[must_use]
     pub fn range_hz(&self) -> Option<FrequencyRange> {
         frequency_range(self)
     }
 
     /// Whether the frequency changes: points half a segment apart scatter about their mean by more than their
-    /// deviations explain in all but one of a thousand records.
+    /// standard deviations explain in all but one of a thousand records.
     #[must_use]
     pub fn is_drifting(&self) -> bool {
         has_significant_drift(self)
@@ -100,7 +100,7 @@ impl Ridge {
 }
 
 fn frequency_range(ridge: &Ridge) -> Option<FrequencyRange> {
-    // an end extrapolated with a wide deviation bounds nothing
+    // an end extrapolated with a large standard deviation limits nothing
     let known = |end: &&RidgeEnd| end.frequency_sd_hz < AGREEMENT_RESOLUTIONS / ridge.segment_s;
     let start = ridge.start.as_ref().filter(known).zip(ridge.points.first());
     let end = ridge.end.as_ref().filter(known).zip(ridge.points.last());
@@ -125,7 +125,7 @@ fn frequency_range(ridge: &Ridge) -> Option<FrequencyRange> {
         confirmed.chain(ends).map(|(hz, sd_hz)| (hz, math::hypot(sd_hz, bent))).collect();
     let (low_hz, low_sd_hz) = all.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0))?;
     let (high_hz, high_sd_hz) = all.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0))?;
-    // two deviations of a less certain frequency may reach farther
+    // two standard deviations of a less certain frequency may reach farther
     let beyond =
         |of: &dyn Fn(f64, f64) -> f64| all.iter().map(|(hz, sd_hz)| of(*hz, *sd_hz)).fold(0.0, f64::max);
     Some(FrequencyRange {
@@ -142,22 +142,22 @@ fn change_beyond_hz(ridge: &Ridge, point: &RidgePoint) -> f64 {
     (point.rate_hz_per_s * ridge.segment_s / 2.0).abs()
 }
 
-/// A third of the distance between an end and the extrapolated rate of the point next to it, Hz, as the
-/// uncertainty of a course that bends there.
+/// A third of the difference between the frequency at an end and that extrapolated from the point next to it,
+/// Hz: the uncertainty of a course that bends there.
 fn end_mismatch_hz(end: &RidgeEnd, point: &RidgePoint) -> f64 {
     let led_hz = point.frequency_hz + point.rate_hz_per_s * (end.time_s - point.time_s);
     (end.frequency_hz - led_hz).abs() / 3.0
 }
 
-/// Half of the change of the frequency within a cycle, Hz: the frequency has no meaning at an instant within
-/// a cycle, whose form changes with it.
+/// Half of the change of the frequency within a cycle, Hz: at an instant within a cycle, whose form changes
+/// with it, the frequency has no meaning.
 fn change_within_cycle_hz(point: &RidgePoint) -> f64 {
     (point.rate_hz_per_s / point.frequency_hz / 2.0).abs()
 }
 
-/// Bias of a bending course at its turning points, Hz: a fit of a steady rate to a segment of length `T` cuts
-/// a corner of curvature `c` by up to `c T^2 / 24`. The curvature is the median change of the rate over half
-/// a segment.
+/// Bias of a bending course at its turning points, Hz: a fit of a constant rate to a segment of length `T`
+/// cuts a corner of curvature `c` by up to `c T^2 / 24`. The curvature is the median change of the rate over
+/// half a segment.
 fn curvature_bias_hz(ridge: &Ridge) -> f64 {
     let apart = (INDEPENDENT_SEGMENTS * ridge.segment_s / ridge.hop_s).round().max(1.0) as usize;
     let bend = |w: &[RidgePoint]| {
@@ -168,7 +168,7 @@ fn curvature_bias_hz(ridge: &Ridge) -> f64 {
     curvature * ridge.segment_s * ridge.segment_s / 24.0
 }
 
-/// Whether the extrapolated frequency of a neighbour agrees; a part with a single point is confirmed.
+/// Whether the frequency extrapolated from a neighbour agrees; the only point of a part is confirmed.
 fn is_confirmed(ridge: &Ridge, part: &[RidgePoint], index: usize) -> bool {
     let point = &part[index];
     let agrees = |other: &RidgePoint| {
@@ -196,7 +196,8 @@ fn has_significant_drift(ridge: &Ridge) -> bool {
     apart.len() > 1 && scatter > chi_square_limit((apart.len() - 1) as f64)
 }
 
-/// The sum of `freedom` squares exceeded once in a thousand (Wilson and Hilferty's approximation).
+/// The limit that the sum of `freedom` squares exceeds once in a thousand draws (Wilson and Hilferty's
+/// approximation).
 fn chi_square_limit(freedom: f64) -> f64 {
     let spread = 2.0 / (9.0 * freedom);
     freedom * math::powi(1.0 - spread + ONCE_IN_A_THOUSAND * spread.sqrt(), 3)

@@ -12,36 +12,40 @@ use crate::periodogram::{self, upper_median};
 use crate::settings::ROUNDING;
 use portable_math as math;
 
-/// Chance that noise alone puts one point on a ridge.
+/// Probability that noise alone causes one point of a ridge.
 const FALSE_ALARM: f64 = 0.01;
-/// Independent trials in each resolution of each segment: overlapping columns have more maxima than
+/// Number of independent trials per resolution of each segment: overlapping columns have more maxima than
 /// independent values.
 const TRIALS: f64 = 10.0;
-/// Farthest a fit moves from the path, resolutions: half way down the lobe of a Hann window.
+/// Largest distance of a fit from the path, resolutions: half way down the lobe of a Hann window.
 const FARTHEST_FROM_PATH: f64 = 1.0;
-/// Deviation of a frequency by leakage of other components into a fit, resolutions.
+/// Standard deviation of a frequency due to leakage of other components into a fit, resolutions.
 const LEAKAGE_SD: f64 = 0.002;
-/// The same at the end of a fit whose rate may change, resolutions of that fit.
+/// The same standard deviation at the end of a fit whose rate may change, resolutions of that fit.
 const END_LEAKAGE_SD: f64 = 0.01;
-/// Lengths of the fits at an end of the record, segments: the change of the rate needs a longer stretch than
-/// the rate.
+/// Lengths of the fits at an end of the record, segments: to estimate the change of the rate takes a longer
+/// stretch than to estimate the rate.
 const END_SEGMENTS: [f64; 6] = [1.75, 1.3, 1.0, 0.75, 0.55, 0.4];
-/// Fewest cycles in a fit there that is shorter than a segment: others leak into short fits.
+/// Minimum number of cycles in a fit at an end that is shorter than a segment: other components leak into
+/// short fits.
 const END_CYCLES: f64 = 8.0;
-/// Deviations of their difference from which a shorter fit contradicts a longer one.
+/// Number of standard deviations of their difference from which a shorter fit contradicts a longer one.
 const CONTRADICTS: f64 = 3.5;
-/// Bias of the fitted frequency by a changing rate with the sine weights, over the change of the rate from
-/// one segment to the next: `<x^4>/<x^2>/24`.
+/// Ratio of the bias of the fitted frequency due to a changing rate, with the sine weights, to the change of
+/// the rate from one segment to the next: `<x^4>/<x^2>/24`.
 const CURVATURE_BIAS: f64 = 0.4154 / 24.0;
-/// Deviations of the frequency by this bias from which the rate of a point may change.
+/// Ratio of this bias to the standard deviation of the frequency above which the fit of a point may change
+/// its rate.
 const SIGNIFICANT_CURVATURE: f64 = 0.5;
-/// Farthest distance of the fit at an end from the ridge in the middle of its outermost segment, resolutions.
+/// Largest difference of the fit at an end from the ridge in the middle of its outermost segment,
+/// resolutions.
 const END_AGREEMENT: f64 = 0.25;
 
 #[derive(Clone, Copy)]
 pub(super) struct SegmentFit {
     chirp: Chirp,
-    /// Deviation of the frequency for a noise of deviation 1 in each frame, cycles in the segment.
+    /// Standard deviation of the frequency for noise of standard deviation 1 in each frame, cycles in the
+    /// segment.
     unit_sd: f64,
     /// Residual in a frame next to the component and at its frequency, m.
     residual: ResidualNoise,
@@ -52,20 +56,20 @@ impl SegmentFit {
         Self { chirp: fitted.parameters, unit_sd: fitted.cycles_variance(0.0).sqrt(), residual }
     }
 
-    /// Noise that determines the deviations of the fit, m.
+    /// Noise that determines the standard deviations of the fit, m.
     fn noise_m(&self) -> f64 {
         self.residual.around_m.max(self.residual.under_m)
     }
 }
 
-/// A record and how its segments are fitted.
+/// A record and the layout of the segments that are fitted.
 pub(super) struct RidgeTracker<'a> {
     samples: &'a [Option<f64>],
     layout: SegmentLayout,
     frame_rate_hz: f64,
     resolution_hz: f64,
     band_hz: (f64, f64),
-    /// Smaller noise is rounding, m.
+    /// Lower limit of the noise, m; smaller noise is rounding error.
     least_m: f64,
 }
 
@@ -108,7 +112,7 @@ impl<'a> RidgeTracker<'a> {
         (0..path.len()).map(|c| levels[c].as_ref().map(|_| start(c))).collect()
     }
 
-    /// The columns half a segment before and after one, or the outermost ones.
+    /// The columns half a segment before and after `column`, or the outermost ones.
     fn columns_around(&self, column: usize) -> (usize, usize) {
         let near = (self.layout.frames / (2 * self.layout.hop)).max(1);
         (column.saturating_sub(near), (column + near).min(self.layout.columns - 1))
@@ -146,8 +150,8 @@ impl<'a> RidgeTracker<'a> {
         fits.into_iter().zip(starts).zip(median_filter(&around_m)).map(usable).collect()
     }
 
-    /// Adds a fit where the path led to none, starting from the neighbouring column's course: the spectrum of
-    /// a fast chirp is flat on top.
+    /// Adds a fit to a column without one, starting from the course of a neighbouring column: the spectrum of
+    /// a fast chirp is flat on top, so the path may miss it.
     pub(super) fn refit_from_neighbours(&self, fits: &[Option<SegmentFit>]) -> Vec<Option<SegmentFit>> {
         let (weights, noise) = (sine_weights(self.layout.frames), self.segment_noise());
         let from = |c: usize, near: usize, segments: f64| {
@@ -166,7 +170,7 @@ impl<'a> RidgeTracker<'a> {
         (0..fits.len()).map(mend).collect()
     }
 
-    /// Repeats fits with a changing rate where the rates half a segment before and after show a significant
+    /// Repeats a fit with a changing rate if the rates half a segment before and after it show a significant
     /// bias of the frequency.
     pub(super) fn refit_with_curvature(&self, fits: &[Option<SegmentFit>]) -> Vec<Option<SegmentFit>> {
         let (weights, noise) = (sine_weights(self.layout.frames), self.segment_noise());
@@ -192,7 +196,7 @@ impl<'a> RidgeTracker<'a> {
         (0..fits.len()).map(bent).collect()
     }
 
-    /// Ratio of amplitude to noise that noise alone reaches anywhere in band and record with the chance
+    /// Ratio of amplitude to noise that noise alone reaches anywhere in band and record with the probability
     /// [`FALSE_ALARM`].
     fn detection_threshold(&self) -> f64 {
         let resolutions = (self.band_hz.1 - self.band_hz.0) / self.resolution_hz;
@@ -221,13 +225,14 @@ impl<'a> RidgeTracker<'a> {
     }
 
     /// The frequency at the end of the record next to a column, by separate fits with a changing rate. A
-    /// straight course extrapolated by half a segment would have a smaller deviation, but a wrong frequency.
-    /// A longer stretch is more accurate while the course is smooth, so the longest is taken with which all
-    /// shorter ones agree. The shortest only confirms, because others leak into it most.
+    /// straight course extrapolated by half a segment would have a smaller standard deviation, but a wrong
+    /// frequency. A longer stretch is more accurate while the course is smooth, so the longest fit is taken
+    /// with which all shorter ones agree. The shortest fit only confirms, because other components leak into
+    /// it most.
     pub(super) fn ridge_end(&self, column: usize, fit: &SegmentFit) -> Option<RidgeEnd> {
         let end = |segments: f64| self.extrapolate_to_end(column, fit, segments);
         let ends: Vec<RidgeEnd> = END_SEGMENTS.into_iter().filter_map(end).collect();
-        // the noise of the longer one is a part of that of the shorter one
+        // the noise of the longer fit is a part of that of the shorter fit
         let agree = |longer: &RidgeEnd, shorter: &RidgeEnd| {
             let variance = math::powi(shorter.frequency_sd_hz, 2) - math::powi(longer.frequency_sd_hz, 2);
             (longer.frequency_hz - shorter.frequency_hz).abs() <= CONTRADICTS * variance.max(0.0).sqrt()
@@ -285,15 +290,15 @@ fn sine_weights(frames: usize) -> Vec<f64> {
 
 // The ridge through the columns of a spectrogram.
 
-/// Fewest consecutive points of a ridge: fewer span less than half a segment more than a single one.
+/// Minimum number of consecutive points of a ridge; fewer cover hardly more of the record than a single one.
 const FEWEST_POINTS: usize = 3;
 
 impl Spectrogram {
     /// Course of the strongest component between two frequencies, Hz; `samples` is the record of this
-    /// spectrogram. Without a component that stands out of the noise, the ridge has no points.
+    /// spectrogram. If no component stands out from the noise, the ridge has no points.
     ///
     /// # Errors
-    /// [`SpectrumError::Band`] when the band holds no frequency of the spectrogram.
+    /// [`SpectrumError::Band`] if the band contains no frequency of the spectrogram.
     pub fn find_ridge(&self, samples: &[Option<f64>], band_hz: (f64, f64)) -> Result<Ridge, SpectrumError> {
         let (low, high) = band_hz;
         let nyquist = self.frame_rate_hz / 2.0;
@@ -330,22 +335,22 @@ fn remove_short_runs(mut points: Vec<Option<RidgePoint>>) -> Vec<Option<RidgePoi
     points
 }
 
-// The path of greatest sum through the columns (Viterbi): levels less the costs of jumps.
+// The path with the largest sum through the columns (Viterbi): levels less the costs of jumps.
 
 /// Standard deviation of the change of frequency over a quarter of a segment, resolutions. A drift of half a
 /// resolution in a quarter of a segment moves the frequency by two resolutions within the segment, about the
-/// most for a segment of the chosen length.
+/// maximum for a segment of the chosen length.
 const JUMP_SD: f64 = 0.5;
 /// Farthest jump, in standard deviations: six resolutions within a segment.
 const LONGEST_JUMP: f64 = 3.0;
 
 /// Levels of the bins of the columns, and the distances of bins and columns.
 pub(super) struct PathLevels<'a> {
-    /// Amplitudes over noise for each column in the band; `None` where there is no spectrum.
+    /// Ratios of amplitude to noise for each column in the band; `None` for a column without a spectrum.
     pub levels: &'a [Option<Vec<f64>>],
-    /// Bins in the band.
+    /// Number of bins in the band.
     pub bins: usize,
-    /// Bins in one resolution.
+    /// Number of bins in one resolution.
     pub bins_per_resolution: f64,
     /// Distance of the columns, quarters of a segment.
     pub quarters: f64,
@@ -353,7 +358,8 @@ pub(super) struct PathLevels<'a> {
 
 impl PathLevels<'_> {
     /// The bin of each column on the best path. A level counts by the logarithm of its power, so that the
-    /// path keeps to a component that fades; a jump costs half the square of its size in standard deviations.
+    /// path stays with a component that fades; a jump costs half the square of its size in standard
+    /// deviations.
     pub(super) fn best_path(&self) -> Vec<usize> {
         let sd = (JUMP_SD * self.quarters * self.bins_per_resolution).max(1.0);
         let reach = ((LONGEST_JUMP * sd) as usize).clamp(1, self.bins);
@@ -416,7 +422,7 @@ mod tests {
     fn the_path_follows_a_drift_over_a_column_without_spectrum() {
         let levels: Vec<_> = (0..12).map(|c| if c == 5 { None } else { peak(10 + 3 * c, 20.0) }).collect();
         let path = best(&levels, 60);
-        // half a resolution
+        // within half a resolution of the drift
         let on_it = path.iter().enumerate().filter(|(c, bin)| bin.abs_diff(10 + 3 * c) <= 2).count();
         assert_eq!((path.len(), on_it), (12, 12), "{path:?}");
     }

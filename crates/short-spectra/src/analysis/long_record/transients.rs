@@ -1,4 +1,4 @@
-//! Oscillations that last for a short time only, read from pieces of a long record.
+//! Oscillations that last only for a short time, estimated from pieces of a long record.
 
 use crate::analysis::SpectralAnalysis;
 use crate::classification::SINGLE_CYCLE_DAMPING;
@@ -12,44 +12,46 @@ use rayon::prelude::*;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-/// Pieces of a length, frames.
+/// Pieces of one length, frames.
 struct SegmentScale {
     length: usize,
-    /// How many are taken apart.
+    /// Maximum number of pieces that are analysed.
     most: usize,
-    /// Whether the first one always is: what is over soon after a record starts is hidden by a window that
-    /// starts at zero.
+    /// Whether the first piece is always analysed: a window that starts at zero hides an oscillation that
+    /// ends soon after the start of the record.
     first: bool,
 }
 
-/// An oscillation shows best in pieces as long as it lasts. The longest take most of the time.
+/// An oscillation shows best in pieces that are as long as it lasts. The longest pieces take most of the
+/// computing time.
 const SCALES: [SegmentScale; 3] = [
     SegmentScale { length: 4096, most: 2, first: false },
     SegmentScale { length: 1024, most: 4, first: true },
     SegmentScale { length: 256, most: 4, first: true },
 ];
-/// Resolutions of a piece within which two components are one.
+/// Distance, resolutions of a piece, within which two components count as one.
 const SAME_WITHIN_RESOLUTIONS: f64 = 2.0;
-/// Deviations within which two components are one.
+/// Distance, standard deviations, within which two components count as one.
 const SAME_WITHIN_DEVIATIONS: f64 = 3.0;
-/// Nepers after which an oscillation is over: a twentieth is left.
+/// Decay, nepers, after which an oscillation is over: a twentieth of its amplitude is left.
 const NEPERS_UNTIL_OVER: f64 = 3.0;
-/// Nepers from which an oscillation ends soon and is no steady line of wavering amplitude.
+/// Decay, nepers, above which an oscillation ends soon and is not a steady line of varying amplitude.
 const NEPERS_OF_DECAY: f64 = 1.0;
 
-/// A component that was read from a piece.
+/// A component that was estimated from a piece.
 #[derive(Debug)]
 pub(super) struct Transient {
     pub component: Component,
-    /// First frame of the stretch that was taken apart.
+    /// First frame of the stretch that was analysed.
     first: usize,
     resolution_hz: f64,
-    /// Nepers by which it has decayed at the end of the stretch.
+    /// Decay of the component up to the end of the stretch, nepers.
     nepers: f64,
 }
 
 impl Transient {
-    /// Whether another component is the same within both deviations.
+    /// Whether another component has the same frequency within the accuracy of both, or within the frequency
+    /// range of one of them.
     pub(super) fn matches_component(&self, other: &Component) -> bool {
         let c = &self.component;
         let sd_hz = math::hypot(c.frequency_sd_hz, other.frequency_sd_hz);
@@ -60,8 +62,8 @@ impl Transient {
         (c.frequency_hz - other.frequency_hz).abs() < within_hz || holds(c, other) || holds(other, c)
     }
 
-    /// Whether another component that changes over the window is what this one looks like there: a line whose
-    /// width grows with the decay.
+    /// Whether another component, which changes over the window, may be this one seen over the whole window:
+    /// a line whose width grows with the decay.
     pub(super) fn explains_component(&self, other: &Component) -> bool {
         let c = &self.component;
         let width_hz = c.damping_ratio.map_or(0.0, |ratio| 2.0 * ratio * c.frequency_hz);
@@ -81,13 +83,14 @@ impl Transient {
         self
     }
 
-    /// Whether the piece describes the component better than a window over which it changes.
+    /// Whether the piece describes the component better than the whole window, over which the component
+    /// changes.
     pub(super) fn is_more_specific(&self) -> bool {
         self.nepers > NEPERS_OF_DECAY || self.component.range_hz.is_some()
     }
 }
 
-/// Every component that lasts for a short time only, once.
+/// All components that last only for a short time, each once.
 pub(super) fn find_transients(record: &SampledRecord, settings: &SpectrumSettings) -> Vec<Transient> {
     let (low_hz, high_hz) = settings.band_hz.unwrap_or((0.0, record.frame_rate_hz / 2.0));
     let band = (low_hz / record.frame_rate_hz, (high_hz / record.frame_rate_hz).min(0.5));
@@ -119,8 +122,9 @@ pub(super) fn find_transients(record: &SampledRecord, settings: &SpectrumSetting
     once
 }
 
-/// The components of a piece that are not there all the time: those whose frequency exceeds the normal power,
-/// and those that end within it. Those that end within a cycle are left out, because every step gives one.
+/// The components of a piece that do not last for the whole record: those whose power exceeds the normal
+/// power at their frequency, and those that end within the piece. Components that end within a cycle are left
+/// out, because every step gives one.
 fn read_piece(record: &SampledRecord, settings: &SpectrumSettings, piece: &UnusualPiece) -> Vec<Transient> {
     let rate_hz = record.frame_rate_hz;
     let passes = |brief: &Transient| {
@@ -136,7 +140,7 @@ fn read_piece(record: &SampledRecord, settings: &SpectrumSettings, piece: &Unusu
     found.filter(passes).map(Transient::with_persistence_doubt).collect()
 }
 
-/// The components of a stretch of a piece that begins at a frame.
+/// The components of a stretch of a piece; `start` is the first frame of the piece.
 fn stretch_transients(
     analysis: SpectralAnalysis,
     start: usize,
@@ -153,7 +157,7 @@ fn stretch_transients(
     })
 }
 
-/// Nepers by which a component decays before the end of a record; 0 where the decay is not significant.
+/// Nepers by which a component decays before the end of a record; 0 if the decay is not significant.
 fn decay_nepers(c: &Component, lasts_s: f64) -> f64 {
     let decay =
         c.damping_ratio.zip(c.damping_ratio_sd).filter(|(ratio, sd)| *ratio > SAME_WITHIN_DEVIATIONS * sd);
@@ -162,37 +166,38 @@ fn decay_nepers(c: &Component, lasts_s: f64) -> f64 {
     })
 }
 
-// Pieces whose spectrum exceeds what is normal for the record. The pieces overlap by half. In each bin a
-// quarter of them lies below `-ln(3/4)` times the mean power of noise, whatever the rest holds. So steady
-// lines and noise of any colour are normal, even where most of the pieces hold a step.
+// Pieces whose spectrum exceeds the normal spectrum of the record. The pieces overlap by half. In each bin
+// the normal power follows from the lower quartile of the powers of all pieces, which for noise is `-ln(3/4)`
+// times the mean power. Steady lines and noise of any colour are therefore normal, even if most of the pieces
+// contain a step.
 
-/// Chance that noise alone exceeds the normal power anywhere in a record.
+/// Probability that noise alone exceeds the level of a piece anywhere in a record.
 const FALSE_ALARM: f64 = 0.01;
-/// The normal power is this quantile of the pieces' powers, divided by the same quantile of noise over its
-/// mean.
+/// The normal power is the quantile 1 / `NORMAL_POWER_QUANTILE` of the powers of the pieces, divided by
+/// `QUARTER_OF_NOISE`, the ratio of this quantile to the mean power for noise.
 const NORMAL_POWER_QUANTILE: usize = 4;
 const QUARTER_OF_NOISE: f64 = 0.287_682_072_451_780_9;
-/// Half width of the neighbourhood whose median is the least noise of a bin, bins: a quarter of a few pieces
-/// is not well known.
+/// Half width of the neighbourhood whose median is the lower limit of the noise of a bin, bins; the quartile
+/// of a few pieces is inaccurate.
 const NEIGHBOURHOOD: usize = 8;
-/// Cycles in a piece below which a step, not an oscillation, exceeds the normal power.
+/// Number of cycles in a piece below which a step, not an oscillation, exceeds the normal power.
 const FEWEST_CYCLES: usize = 8;
 /// Half width of the main lobe of a Hann window, bins.
 const LOBE: usize = 2;
-/// Removed from each piece.
+/// Trend that is removed from each piece.
 const CUBIC: Trend = Trend::Polynomial(4);
 
-/// A piece of a record, and how its spectrum compares with the other pieces'.
+/// A piece of a record, and the comparison of its spectrum with those of the other pieces.
 pub(super) struct UnusualPiece {
     pub frames: Range<usize>,
-    /// Power over the normal power in each bin.
+    /// Ratio of the power to the normal power in each bin.
     excess: Vec<f64>,
     /// Excess that noise alone hardly reaches.
     level: f64,
 }
 
 impl UnusualPiece {
-    /// Whether power between two frequencies, cycles a frame, exceeds the normal.
+    /// Whether the power between two frequencies, cycles per frame, exceeds the normal power.
     pub(super) fn exceeds_normal_power(&self, low: f64, high: f64) -> bool {
         let bin = |cycles: f64| (cycles * self.frames.len() as f64).round() as usize;
         let around = bin(low).saturating_sub(LOBE)..(bin(high) + LOBE + 1).min(self.excess.len());
@@ -200,7 +205,7 @@ impl UnusualPiece {
     }
 }
 
-/// The pieces of a length that hold values in half their frames or more; `band` is in cycles a frame.
+/// The pieces of a length that have values in at least half their frames; `band` is in cycles per frame.
 pub(super) fn cut_segments(samples: &[Option<f64>], length: usize, band: (f64, f64)) -> Vec<UnusualPiece> {
     let last = samples.len() - length;
     let starts: Vec<usize> = (0..last).step_by(length / 2).chain([last]).collect();
@@ -225,7 +230,8 @@ pub(super) fn cut_segments(samples: &[Option<f64>], length: usize, band: (f64, f
     pieces
 }
 
-/// The `most` pieces that exceed the normal most, each in bins in which none before it does.
+/// Up to `most` pieces with the largest excess, each in bins in which no piece before it exceeds the normal
+/// power.
 pub(super) fn select_unusual(pieces: &[UnusualPiece], most: usize) -> Vec<usize> {
     let mut chosen = Vec::new();
     let mut open = vec![true; pieces.first().map_or(0, |piece| piece.excess.len())];
@@ -247,7 +253,7 @@ pub(super) fn select_unusual(pieces: &[UnusualPiece], most: usize) -> Vec<usize>
     chosen
 }
 
-/// Power in each bin, as the variance of white noise of that power.
+/// Power in each bin, given as the variance of white noise of the same power.
 fn segment_power_spectrum(samples: &[Option<f64>]) -> Vec<f64> {
     let periodogram = Periodogram::new(samples, samples.len());
     let amplitude_m = periodogram.amplitudes(&CUBIC.residual(samples));
