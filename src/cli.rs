@@ -1,5 +1,5 @@
-//! The command-line program: parse, run, exit code. Only this module opens files, prints and shows progress;
-//! the Python package reads files through it.
+//! The command-line program: parses the arguments, runs a command, returns the exit code. Only this module
+//! opens files, prints and shows progress; the Python package uses it to read files.
 
 #[macro_use]
 mod output;
@@ -40,7 +40,7 @@ use failure::Outcome;
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-/// How the program was built.
+/// Version and build options of the program.
 const LONG_VERSION: &str = concat!(
     env!("CARGO_PKG_VERSION"),
     "\nbuilt for ",
@@ -79,51 +79,51 @@ pub(crate) enum Command {
     Import(import::ImportArgs),
     /// Write a first scene and a first job for a recording, with comments
     Init(init::InitArgs),
-    /// Say what a recording holds and what it can show: rates, gaps, noise, doubts
+    /// Describe what a recording contains and what it can show: rates, gaps, noise, doubts
     Inspect(inspect::InspectArgs),
     /// Components of a recording's spectrum
     Spectrum(spectrum::SpectrumArgs),
     /// Run the model of a scene
     Simulate(simulate::SimulateArgs),
-    /// A scene's [blade] table from the section of a blade, or what ruler and scale show of a scene
+    /// Compute a scene's [blade] table from the section of a blade, or check a blade with ruler and scale
     ///
-    /// SECTION.toml has the length of the piece, density, modulus and loss factor of the rubber, heights and
-    /// thicknesses of neck and lip, and mass, stiffness and force of the head per metre. Prints the table
-    /// with the equation and the uncertainty of each number: an estimate for the start of a fit. With
+    /// SECTION.toml contains the length of the piece; density, modulus and loss factor of the rubber; heights
+    /// and thicknesses of neck and lip; and mass, stiffness and force of the head per metre. Prints the table
+    /// with the equation and the uncertainty of each number, as an estimate for the start of a fit. With
     /// --check, prints the natural frequencies, deflections and weights of a scene's blade.
     Blade(blade::BladeArgs),
     /// Natural frequencies and modes of a scene's blade
     Modes(modes::ModesArgs),
-    /// Speed against error of every method on a scene
+    /// Compare speed and error of every integration method on a scene
     Accuracy(accuracy::AccuracyArgs),
     /// A synthetic recording: a scene seen by a camera
     Twin(twin::TwinArgs),
-    /// A parameter study: quantities over one or two parameters of a scene
+    /// A parameter study: quantities as functions of one or two parameters of a scene
     Sweep(sweep::SweepArgs),
     /// Divide a parameter study, or a list of fits, among the machines of a cluster
     ///
-    /// Makes an array of tasks for the scheduler, each of which does a shard, and a job after them that puts
-    /// the shards together (`wiperlab collect`). All files are checked before anything is submitted. What is
-    /// missing in the end is named by that job, in DIR/shards/logs; submit those --tasks again.
+    /// Creates an array of tasks for the scheduler, each of which does one shard, and a final job that puts
+    /// the shards together (`wiperlab collect`). All files are checked before anything is submitted. If
+    /// something is missing at the end, the final job names it in DIR/shards/logs; submit those --tasks
+    /// again.
     Submit(submit::SubmitArgs),
     /// Put the shards of a parameter study together, or see which fits of a list are done
     ///
-    /// Writes the files that `wiperlab sweep` writes on one machine, byte for byte. Points that several
-    /// shards did count once. Of a list of fits, says which have a result. Exit code 3: something is missing,
-    /// and the tasks that have to be submitted again are named.
+    /// Writes the files that `wiperlab sweep` writes on one machine, byte for byte. Points that are in
+    /// several shards count only once. For a list of fits, lists those that have a result. Exit code 3:
+    /// something is missing; the tasks that must be submitted again are named.
     Collect(collect::CollectArgs),
     /// Fit a scene's parameters to recordings or published components
     ///
-    /// Every evaluation goes into journal.jsonl next to the job as it is made, and the result into
-    /// result.json at the end. A fit that was killed, or whose budgets in [search] were raised since, goes on
-    /// with
-    /// --resume and ends with the result that it would have had in one run. A fit without anything to learn
-    /// is refused before the search. Exit code 3: the evaluations allowed were used up before the search had
-    /// converged.
+    /// Every evaluation is written to journal.jsonl next to the job as it is made, and the result to
+    /// result.json at the end. A fit that was killed, or whose budgets in [search] have been raised since,
+    /// continues with --resume and ends with the result that it would have had in one run. A fit that cannot
+    /// determine anything is refused before the search. Exit code 3: the allowed evaluations were used up
+    /// before the search had converged.
     Fit(fit::FitArgs),
     /// Figures and page of a fit
     Report(report::ReportArgs),
-    /// What a shell completes, to standard output
+    /// Print a completion script for a shell
     Completions(help::CompletionsArgs),
     /// The help of every command as manual pages
     Man(help::ManArgs),
@@ -156,16 +156,15 @@ impl Command {
     }
 }
 
-/// The same as [`run`] within another process such as Python; `path` is the program to start for further
-/// tasks.
+/// Like [`run`], but within another process such as Python; `path` is the program to start for further tasks.
 #[must_use]
 pub fn run_embedded(path: PathBuf, arguments: Vec<OsString>) -> u8 {
     submit::set_executable_path(path);
     run(arguments)
 }
 
-/// Runs the program with its arguments, its name first, and returns the exit code. It handles signals and may
-/// end the process; a process may call it once.
+/// Runs the program with its arguments, beginning with the name of the program, and returns the exit code. It
+/// handles signals and may end the process; a process may call it only once.
 #[must_use]
 pub fn run(arguments: Vec<OsString>) -> u8 {
     let program = match CommandLine::try_parse_from(&arguments) {

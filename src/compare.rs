@@ -1,5 +1,5 @@
 //! Comparison of a recording with the fitted model, as data: alignment, residuals, ridges, windows,
-//! transitions and runs. Every scene is simulated once.
+//! transitions and runs. Each distinct scene is simulated only once.
 
 pub mod condition;
 pub mod friction;

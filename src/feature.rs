@@ -1,9 +1,10 @@
-//! Features: values that the same code reads from a recording and from the recording of a model, for jobs and
-//! studies. Every kind is a row of the table in `feature/reading.rs`; `docs/fits.md` and `docs/sweeps.md`
+//! Features: values that the same code computes from a recording and from the synthetic recording of a model,
+//! for jobs and studies. Every kind is a row of the table in `feature/reading.rs`; `docs/fits.md` and
+//! `docs/sweeps.md` list the kinds.
 //! list them.
 //!
 //! The instants of a window are found in each recording separately, so model and measurement need not share a
-//! clock. Readings that only a simulated run has are read from its [`RunRecord`].
+//! clock. Values that only a simulated run can give are computed from its [`RunRecord`].
 
 mod contact;
 mod deflection;
@@ -29,23 +30,24 @@ use serde::Serialize;
 pub use spectral::{ASSIGN_DB, ASSIGN_WIDTH, CycleRangeEnd, FeatureBand};
 pub use value::{FeatureUnit, FeatureValue, LengthCalibration, RunnerUpComponent, ValueComparison};
 
-/// Least relative standard deviation of a measured frequency. Without noise, a window of 0.15 s gives a peak
-/// at 78 Hz to 0.03 Hz (4e-4), and the model is read through another window of the same length.
+/// Smallest relative standard deviation of a measured frequency. Without noise, the frequency of a peak at 78
+/// Hz in a window of 0.15 s is accurate to 0.03 Hz (4e-4); the window of the model has the same length but
+/// other instants.
 pub(crate) const FREQUENCY_SD_FLOOR: f64 = 1e-3;
 
-/// A reading with its name and its condition.
+/// A reading with its name and condition.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Feature {
-    /// Name in the job.
+    /// Name of the feature in the job.
     pub name: String,
-    /// What is read.
+    /// Quantity that is evaluated, with its settings.
     pub reading: Reading,
     /// Index of the condition of the job, counted from 0.
     pub condition: usize,
 }
 
 impl Feature {
-    /// Reads it from `recording`, in which `instants` were found.
+    /// Evaluates the feature in `recording`, in which `instants` were found.
     ///
     /// # Errors
     /// [`MissingValue`] with the reason.
@@ -57,8 +59,8 @@ impl Feature {
         self.reading.read(None, &FeatureReader::new(recording, instants))
     }
 
-    /// Reads it through a reader that other features share; a frequency is that of the component assigned to
-    /// the `target`, Hz ([`Reading::read`]).
+    /// Evaluates the feature with a reader that other features share. A frequency is that of the component
+    /// assigned to the `target`, Hz ([`Reading::read`]).
     ///
     /// # Errors
     /// [`MissingValue`] with the reason.
@@ -71,7 +73,7 @@ impl Feature {
     }
 }
 
-/// Reads every feature from a set of recordings, one for each condition.
+/// Evaluates every feature in a set of recordings, one for each condition.
 #[must_use]
 pub fn read_features(
     features: &[Feature],
@@ -80,8 +82,9 @@ pub fn read_features(
     read_assigned_features(features, &[], &recordings.iter().collect::<Vec<_>>())
 }
 
-/// Reads every feature from the recordings of a model. `targets` has one value per feature, in its unit, to
-/// which components are assigned; features beyond its end have no target.
+/// Evaluates every feature in the recordings of a model. `targets` has one value per feature, in the unit of
+/// that feature; components are assigned to these values. Features beyond the end of `targets` have no
+/// target.
 #[must_use]
 pub fn read_assigned_features(
     features: &[Feature],

@@ -1,5 +1,5 @@
-//! Figures of the reports. Each file holds the data, drawing and caption of one figure and has the name of
-//! its SVG.
+//! Figures of the reports. Each file holds the data, the drawing and the caption of one figure, and is named
+//! after its SVG file.
 
 pub mod analysis;
 pub mod animation;
@@ -30,7 +30,7 @@ pub mod work_precision;
 use plain_charts as chart;
 use serde::Serialize;
 
-/// A figure of a page with its texts.
+/// A figure of a report page, with its texts.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct FigureBlock {
     /// File name in the folder of the page.
@@ -50,7 +50,7 @@ pub struct FigureBlock {
 /// The text of a figure.
 #[derive(Default)]
 pub(crate) struct FigureText {
-    /// One sentence with the result.
+    /// Caption: one sentence with the result.
     pub caption: String,
     pub details: String,
 }
@@ -81,24 +81,24 @@ impl Drawing {
     }
 }
 
-/// Two parts of a line joined with a semicolon; empty parts are dropped.
+/// Joins two parts of a line with a semicolon; an empty part is left out.
 pub(crate) fn about(name: &str, said: &str) -> String {
     [name, said].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join("; ")
 }
 
-/// Sentence on a recording whose head turns the other way than the model's.
+/// Sentence for a recording whose head turns in the opposite direction to the model's head.
 pub(crate) const OPPOSED: &str = "The recorded head turns the other way than the model's, so that nothing with a sign can \
      agree: start the scene half a period of its drive later";
 
-/// Clause where only numbers are published and no traces.
+/// Clause for a condition of which only numbers are published, not traces.
 pub(crate) const NO_TRACES: &str = "model alone: no traces are published";
 
-/// The line under a heading; for synthetic data it starts with a note.
+/// The line under a heading; for synthetic data it begins with a note that says so.
 pub(crate) fn subtitle(synthetic: bool, text: &str) -> String {
     about(if synthetic { "synthetic recording: no camera took it" } else { "" }, text)
 }
 
-/// A figure over two columns of a journal, one panel below the other.
+/// A figure as wide as two journal columns, with its panels one below another.
 pub(crate) fn full_figure(
     title: &str,
     synthetic: bool,

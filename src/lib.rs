@@ -51,7 +51,7 @@
 //! ```
 //! use wiperlab::prelude::*;
 //!
-//! // a synthetic export of a tracking program: 5,000 frames/s, 20 um a pixel, y points up
+//! // a synthetic export of a tracking program: 5,000 frames/s, 20 um per pixel, y points up
 //! let export = include_bytes!("../data/actual-blade-twin/synthetic-tracker-export.txt").to_vec();
 //! let options = ImportOptions {
 //!     frame_rate_hz: Some(5000.0),

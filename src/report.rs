@@ -1,4 +1,4 @@
-//! Results as figures and pages: plain data in, SVG, HTML and JSON as text out.
+//! Results as figures and pages: data structures in; SVG, HTML and JSON text out.
 
 pub mod assembly;
 pub mod fit_comparison;
@@ -20,50 +20,50 @@ pub(crate) use view_model::{
     CombinationLine, FailureCount, ProbeLine, Provenance, RecordingLine, SearchLine, SourceFile,
 };
 
-/// The report of one fit. Sections without content are left out of the page.
+/// The report of a fit. Sections without content are left out of the page.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Report {
-    /// Heading: what was fitted to what.
+    /// Heading: the title of the job.
     pub title: String,
-    /// How the search ended.
+    /// Outcome of the search.
     pub search: SearchLine,
-    /// How well the model explains the traces; `None` in a fit of features alone.
+    /// Misfit of the model to the traces; `None` in a fit of features alone.
     pub misfit: Option<TraceMisfit>,
-    /// Estimates of the cameras and of freed constants.
+    /// Estimated errors of the cameras, and estimates of freed constants.
     pub nuisances: Vec<NuisanceResult>,
     /// The recordings; empty if only published numbers were fitted.
     pub recordings: Vec<RecordingLine>,
-    /// Frequencies of components, measured against model.
+    /// Frequencies of components: target and model.
     pub components: Vec<TargetComparison>,
-    /// Other features, measured against model.
+    /// Other features: target and model.
     pub features: Vec<TargetComparison>,
-    /// Components and features that were predicted, not fitted.
+    /// Components and features that were held out of the fit, and so are predicted.
     pub held_out: Vec<TargetComparison>,
     /// The fitted parameters.
     pub parameters: Vec<ParameterLine>,
-    /// Friction of the best model at rest and at the tip's greatest speed.
+    /// Friction of the best model at rest and at the largest speed of the tip.
     pub friction: Vec<FrictionLine>,
-    /// Products of powers of parameters that the features determine or leave open.
+    /// Products of powers of the parameters, which the features determine or leave undetermined.
     pub combinations: Vec<CombinationLine>,
-    /// What to measure in addition, one sentence each.
+    /// Advice on additional measurements, one sentence each.
     pub advice: Vec<String>,
     /// The best model's run in each condition.
     pub runs: Vec<RunSummary>,
-    /// Each recording against the model.
+    /// Each recording compared with the model.
     pub comparison: Vec<ComparisonSummary>,
-    /// Probes of the gate before the search, one for each point.
+    /// Results of the probes of the gate before the search, one per point.
     pub gate: Vec<ProbeLine>,
     /// Notes of the gate, one sentence each.
     pub gate_notes: Vec<String>,
     /// Figures in the order of the page.
     #[serde(skip)]
     pub figures: Vec<FigureGroup>,
-    /// Columns of the comparison, as files.
+    /// Tables of the comparison, as files.
     #[serde(skip)]
     pub tables: Vec<ComparisonTable>,
     /// Reservations, one sentence each.
     pub notes: Vec<String>,
-    /// Files, version and commands behind the numbers.
+    /// Files, version and commands from which the numbers were obtained.
     pub provenance: Provenance,
 }
 
@@ -76,7 +76,7 @@ pub struct FigureGroup {
     pub figures: Vec<FigureBlock>,
 }
 
-/// Subject of a group of figures, which decides its place on the page.
+/// Subject of a group of figures, which determines its place on the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FigureSubject {
@@ -85,7 +85,7 @@ pub enum FigureSubject {
     /// All measurements compared with the model.
     #[default]
     Measured,
-    /// How the blade of the best model moves.
+    /// Motion of the blade of the best model.
     Blade,
     /// Parameters of the fit.
     Parameters,

@@ -1,5 +1,5 @@
-//! Text for pages, figures, captions and terminals: numbers with units and deviations, lists of words, and
-//! names without control characters. This layer is independent of the meaning of the numbers.
+//! Text for pages, figures, captions and terminals: numbers with units and standard deviations, lists of
+//! words, and names without control characters. This module does not depend on the meaning of the numbers.
 //!
 //! A value with its standard deviation is always written `78.40(3)`: 78.40 with a standard deviation of 0.03,
 //! in units of the last digit shown (JCGM 100:2008, 7.2.2).

@@ -1,4 +1,4 @@
-//! TOML files read into typed values. Every error names file, line, column, key and the nearest known key,
+//! Reads TOML files into typed values. Every error states file, line, column, key and the nearest known key,
 //! and all problems of a file are listed together.
 
 mod hint;
@@ -12,7 +12,7 @@ use schemars::{JsonSchema, Schema, json_schema, schema_for};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-/// Why a TOML file was refused.
+/// Reason why a TOML file was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TomlError {
     /// The text is not TOML, or a value has the wrong type.
@@ -24,7 +24,7 @@ pub enum TomlError {
         line: usize,
         /// 1-based column, in characters.
         column: usize,
-        /// What was found and what was expected.
+        /// Problem: what was found and what was expected.
         problem: String,
     },
     /// A key that the format does not have.
@@ -38,13 +38,13 @@ pub enum TomlError {
         column: usize,
         /// The key that was found.
         key: String,
-        /// The nearest known key, or the list of them.
+        /// The nearest known key, or the list of known keys.
         advice: String,
     },
     /// More than one problem, in the order of the lines.
     #[error("{}", lines(.0))]
     Several(Vec<TomlError>),
-    /// The file declares another version of the format than this program reads.
+    /// The file declares a version of the format that this program does not read.
     #[error(
         "{file}: key `format`: found {found}, expected {expected}; convert the file or use the version of wiperlab that wrote it"
     )]
@@ -61,10 +61,11 @@ pub enum TomlError {
 /// Version of every TOML format of this program.
 pub const FORMAT: u32 = 1;
 
-/// Reads `text` as `T`; `file` is the name used in errors.
+/// Reads `text` as `T`; errors call it `file`.
 ///
 /// # Errors
-/// [`TomlError`] with the places of all problems against the schema of `T`, or else of the first one.
+/// [`TomlError`] with the places of all problems that the schema of `T` shows; otherwise with the first
+/// problem.
 pub(crate) fn parse_toml<T: DeserializeOwned + JsonSchema>(file: &str, text: &str) -> Result<T, TomlError> {
     let mut problems = schema_check::find_problems(file, text, schema_for!(T).as_value());
     match problems.len() {
@@ -79,7 +80,7 @@ pub(crate) fn schema_of<T: JsonSchema>() -> serde_json::Value {
     schema_for!(T).to_value()
 }
 
-/// The schema of a table: its keys with their schemas, and the required ones.
+/// The schema of a table: the schemas of its keys, and the required keys.
 pub(crate) fn table_schema(
     keys: impl IntoIterator<Item = (String, serde_json::Value)>,
     required: &[&str],
@@ -92,7 +93,7 @@ pub(crate) fn table_schema(
     })
 }
 
-/// Reads `text` as any table.
+/// Reads `text` as a table with any keys.
 ///
 /// # Errors
 /// [`TomlError`] with the place of the first syntax error.
@@ -100,15 +101,15 @@ pub(crate) fn parse_table(file: &str, text: &str) -> Result<toml::Table, TomlErr
     toml::from_str(text).map_err(|error| error_from_toml(file, text, &error))
 }
 
-/// One problem a line; quoted control characters are escaped.
+/// One line per problem; quoted control characters are escaped.
 fn lines(problems: &[TomlError]) -> String {
     problems.iter().map(|problem| escape_controls(&problem.to_string())).collect::<Vec<_>>().join("\n")
 }
 
-/// Checks the `format` key that starts every file.
+/// Checks the key `format` at the start of every file.
 ///
 /// # Errors
-/// [`TomlError::Format`] unless it is [`FORMAT`].
+/// [`TomlError::Format`] unless the version is [`FORMAT`].
 pub(crate) fn check_format(file: &str, found: u32) -> Result<(), TomlError> {
     if found == FORMAT {
         return Ok(());
@@ -116,7 +117,8 @@ pub(crate) fn check_format(file: &str, found: u32) -> Result<(), TomlError> {
     Err(TomlError::Format { file: file.to_owned(), found, expected: FORMAT })
 }
 
-/// Two numbers, such as the ends of a band. (An array of Rust would take the first two of three.)
+/// Two numbers, such as the ends of a band.
+// not `[f64; 2]`, which would accept the first two of three numbers
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(try_from = "Vec<f64>")]
 pub struct NumberPair(pub [f64; 2]);
@@ -145,12 +147,12 @@ pub(crate) fn check_above_zero(key: impl Into<String>, found: f64) -> Result<f64
     refuse_key(key, format!("found {found}, expected a finite number above 0"))
 }
 
-/// Advice for a mistyped key: the nearest of the known ones, ignoring case, or all of them.
+/// Advice on an unknown key: the nearest known key, ignoring case, or all known keys.
 pub(crate) fn suggest_key(key: &str, known: &[&str]) -> String {
-    /// Jaro-Winkler similarity from which a known key is suggested; below it the list is shown.
+    /// Jaro-Winkler similarity above which a known key is suggested; below it, all known keys are listed.
     const SIMILAR: f64 = 0.75;
-    /// Similarity of a short key with one slip (a letter extra, missing, wrong, or two exchanged), which
-    /// Jaro-Winkler rates far too low.
+    /// Similarity assigned to a short key with one slip (a letter added, missing or wrong, or two letters
+    /// swapped), for which the Jaro-Winkler similarity is far too low.
     const ONE_SLIP: f64 = 0.9;
     let key = key.to_lowercase();
     let one_slip = |known: &str| key.chars().count() > 2 && strsim::osa_distance(&key, known) == 1;
@@ -166,8 +168,8 @@ pub(crate) fn suggest_key(key: &str, known: &[&str]) -> String {
     }
 }
 
-/// Advice on a path of a TOML file that contains a control character, because `\t` or the like was read as an
-/// escape; empty for any other path.
+/// Advice on a path in a TOML file that contains a control character because `\t` or the like was parsed as
+/// an escape; empty for any other path.
 pub(crate) fn path_hint(path: &str) -> &'static str {
     if path.chars().any(char::is_control) {
         "; a backslash between double quotes starts an escape: write the path with `/`, or between single quotes"
@@ -197,8 +199,8 @@ fn error_from_toml(file: &str, text: &str, error: &toml::de::Error) -> TomlError
     }
 }
 
-/// Splits serde's fixed wording "unknown field `a`, expected one of `b`, `c`" into the key and the known
-/// ones.
+/// Splits serde's fixed wording "unknown field `a`, expected one of `b`, `c`" into the unknown key and the
+/// known keys.
 fn split_unknown_field(message: &str) -> Option<(&str, Vec<&str>)> {
     let quoted = message.strip_prefix("unknown field ")?;
     let mut names = quoted.split('`').skip(1).step_by(2);

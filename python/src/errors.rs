@@ -1,27 +1,27 @@
-//! Failures as the exceptions of `wiperlab.errors`.
+//! Exceptions of `wiperlab.errors` for the failures of the program.
 
 use pyo3::PyErr;
 use pyo3::prelude::*;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use wiperlab::cli::read::Failure;
 
-/// An exception of `wiperlab.errors`.
+/// Makes an exception of the given class of `wiperlab.errors`.
 fn new_exception(py: Python<'_>, class: &str, message: String) -> PyErr {
     let made = py.import("wiperlab.errors").and_then(|errors| errors.getattr(class)?.call1((message,)));
     made.map_or_else(|error| error, PyErr::from_value)
 }
 
-/// Bad input.
+/// `InputError`, for bad input.
 pub fn input_error(py: Python<'_>, message: impl ToString) -> PyErr {
     new_exception(py, "InputError", message.to_string())
 }
 
-/// A defect of the program.
+/// `InternalError`, for a defect of the program.
 pub fn internal_error(py: Python<'_>, message: impl ToString) -> PyErr {
     new_exception(py, "InternalError", message.to_string())
 }
 
-/// The exception for a failure of the program.
+/// The exception that represents a failure of the program.
 pub fn failure_error(py: Python<'_>, failure: Failure) -> PyErr {
     match failure {
         Failure::Input(message) => input_error(py, message),
@@ -29,7 +29,7 @@ pub fn failure_error(py: Python<'_>, failure: Failure) -> PyErr {
     }
 }
 
-/// Runs Rust code of which no panic may reach Python.
+/// Runs Rust code; a panic of it becomes a Python exception.
 pub fn catch_panic<T>(py: Python<'_>, work: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
     catch_unwind(AssertUnwindSafe(work))
         .unwrap_or_else(|panic| Err(internal_error(py, panic_message(&*panic))))

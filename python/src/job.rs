@@ -1,4 +1,4 @@
-//! Jobs: the posterior density of their unknowns.
+//! Jobs, with the posterior density of their unknown parameters.
 
 use crate::errors;
 use crate::workers;
@@ -50,7 +50,7 @@ impl PyJob {
         let posterior = read.map_err(|failure| errors::failure_error(py, failure))?;
         let refused = |error| errors::input_error(py, format!("{}: {error}", path.display()));
         let posterior = Arc::new(posterior.map_err(refused)?);
-        // a process in another folder may read it again
+        // a process with another working directory may read the job again
         let path = std::path::absolute(&path).unwrap_or(path);
         Ok(Self { posterior, path })
     }
@@ -65,7 +65,7 @@ impl PyJob {
         &self.posterior.problem().job().title
     }
 
-    /// SHA-256 of everything that decides the cost of a point.
+    /// SHA-256 of everything on which the cost of a point depends.
     #[getter]
     fn fingerprint(&self) -> &str {
         self.posterior.problem().fingerprint()

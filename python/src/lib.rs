@@ -1,5 +1,5 @@
 //! The extension module behind the Python package `wiperlab`: thin classes and functions that exchange text
-//! and arrays with it.
+//! and arrays with that package.
 
 mod errors;
 mod job;
@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-/// Runs the program and gives its exit code.
+/// Runs the program and returns its exit code.
 #[pyfunction]
 #[pyo3(signature = (arguments, path = None))]
 fn run_program(py: Python<'_>, arguments: Vec<OsString>, path: Option<PathBuf>) -> u8 {

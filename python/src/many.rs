@@ -1,4 +1,4 @@
-//! Many runs of a scene with other values of its parameters.
+//! Runs of a scene with many sets of parameter values.
 
 use crate::errors;
 use crate::scene::{PyScene, StopFlag};
@@ -11,8 +11,8 @@ use wiperlab::simulate::scene::Scene;
 use wiperlab::simulate::scene::error::SceneError;
 use wiperlab::sweep::{PointOutcome, Study};
 
-/// Runs the scene with every row of `points` for the named parameters and reads what the maps of a study say:
-/// a row of values for each, not a number where there is none, and how each run ended.
+/// Runs the scene with the values in each row of `points` for the named parameters. Returns the values of the
+/// maps of a study, one row per point, with not-a-number for a missing value; and how each run ended.
 #[pyfunction]
 #[pyo3(signature = (scene, names, points, maps, workers = None))]
 pub fn simulate_points<'py>(
@@ -30,7 +30,7 @@ pub fn simulate_points<'py>(
     }
     let study = Study::parse_maps("read", maps).map_err(|error| errors::input_error(py, error))?;
     let scene = Arc::clone(&scene.inner);
-    // an unknown name is an error of the call; a value that the scene refuses is the outcome of its point
+    // an unknown name is an error of the call; a value that the scene refuses only fails its own point
     if let Some(name) = names.iter().find(|name| scene.value(name).is_none()) {
         let refused = scene.with_parameter(name, 1.0).err().map_or_else(String::new, |e| e.to_string());
         return Err(errors::input_error(py, format!("names: {refused}")));
@@ -46,7 +46,7 @@ pub fn simulate_points<'py>(
         let run = |row| PointOutcome::run_point_scene(&study, || at(row), || StopFlag(stop).flow());
         rows.par_iter().map(|row| StopFlag(stop).flow().is_continue().then(|| run(row))).collect()
     })?;
-    // an interrupted run has raised already
+    // an interrupted run has already raised an exception
     let outcomes = outcomes.unwrap_or_default();
     let values = outcomes.iter().flat_map(|outcome| &outcome.values);
     let values: Vec<f64> = values.map(|value| *value.as_ref().unwrap_or(&f64::NAN)).collect();

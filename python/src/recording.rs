@@ -15,14 +15,14 @@ use wiperlab::recording::{self, FrameGrid, Traces};
 #[derive(Clone)]
 pub struct PyRecording {
     pub inner: Arc<recording::Recording>,
-    /// Exposure of a frame, s, where known.
+    /// Exposure of a frame, s, if known.
     #[pyo3(get)]
     exposure_s: Option<f64>,
 }
 
 #[pymethods]
 impl PyRecording {
-    /// Reads the folder of a recording, or a trace.csv alone.
+    /// Reads the folder of a recording, or a single trace.csv.
     #[staticmethod]
     fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let loaded = workers::run_interruptible(py, None, move |_| read::read_recording(&path))?;
@@ -30,7 +30,7 @@ impl PyRecording {
         Ok(Self { inner: Arc::new(recording), exposure_s })
     }
 
-    /// A recording from columns; a position that is not a number is one that was not tracked.
+    /// Makes a recording from columns; not-a-number means that a position was not tracked.
     #[staticmethod]
     #[pyo3(signature = (name, frame_rate_hz, columns, *, start_s = 0.0, exposure_s = None, synthetic = false))]
     fn from_columns(
@@ -65,7 +65,7 @@ impl PyRecording {
         })
     }
 
-    /// Positions by column, in m, not a number where a point was not tracked.
+    /// Positions by column, m; not-a-number if a point was not tracked.
     fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let all = PyDict::new(py);
         for (name, column) in self.inner.traces().columns() {
@@ -110,7 +110,7 @@ impl PyRecording {
     }
 }
 
-/// The files that `wiperlab spectrum` writes, by name.
+/// The files that `wiperlab spectrum` writes, by file name.
 #[pyfunction]
 #[pyo3(signature = (recording, channel, window, detrend, band_hz, max_components, exposure_s))]
 #[expect(clippy::too_many_arguments, reason = "a Python function has named arguments")]

@@ -1,4 +1,4 @@
-//! Scenes, and runs of them.
+//! Scenes and their runs.
 
 use crate::errors::{self, catch_panic};
 use crate::workers;
@@ -16,10 +16,11 @@ use wiperlab::simulate::outputs::{
 use wiperlab::simulate::scene::Scene;
 use wiperlab::simulate::{ModelSample, Observer, SolutionSegment, SolverOptions, run_scene_with};
 
-/// What a scene is restored from: name and text of its file, the recording that drives it, replaced values.
+/// Parts from which a scene is restored: name and text of its file, folder of the recording that drives it,
+/// and replaced values.
 type SceneParts = (String, String, Option<PathBuf>, Vec<(String, f64)>);
 
-/// A blade, its friction, its drive and what is to be computed.
+/// A blade with its friction, its drive and the settings of its run.
 #[pyclass(module = "wiperlab", frozen, from_py_object, name = "Scene")]
 #[derive(Clone)]
 pub struct PyScene {
@@ -69,7 +70,7 @@ impl PyScene {
         catch_panic(py, || Self::from_source(py, (file.to_owned(), text.to_owned(), None, Vec::new())))
     }
 
-    /// A scene of its parts.
+    /// Restores a scene from its parts.
     #[staticmethod]
     fn of_parts(py: Python<'_>, parts: SceneParts) -> PyResult<Self> {
         catch_panic(py, || Self::from_source(py, parts))
@@ -83,12 +84,12 @@ impl PyScene {
         })
     }
 
-    /// Value of a parameter, however the file writes it.
+    /// Value of a parameter, however it is written in the file.
     fn value(&self, name: &str) -> Option<f64> {
         self.inner.value(name)
     }
 
-    /// The parameters as they are written.
+    /// The parameters with their values as they are written in the file.
     fn written_values(&self) -> Vec<(&'static str, f64)> {
         self.inner.written_values().collect()
     }
@@ -113,7 +114,7 @@ impl PyScene {
         self.inner.run.sample_rate_hz
     }
 
-    /// Numbers that are hard to believe, a sentence each.
+    /// Sentences on implausible values, one for each.
     #[getter]
     fn findings(&self) -> Vec<String> {
         self.inner.find_implausible().iter().map(ToString::to_string).collect()
@@ -123,13 +124,14 @@ impl PyScene {
         self.inner == other.inner
     }
 
-    /// What makes it again: name and text of its file, the recording that drives it, and what was replaced.
+    /// The parts from which the scene can be restored: name and text of its file, the recording that drives
+    /// it, and the replaced values.
     fn parts(&self) -> SceneParts {
         (self.file.clone(), self.text.clone(), self.driver.clone(), self.set.clone())
     }
 }
 
-/// Ends a run that was asked to stop.
+/// Observer that ends a run when asked to stop.
 pub struct StopFlag<'a>(pub &'a AtomicBool);
 
 impl StopFlag<'_> {
@@ -145,14 +147,14 @@ impl Observer for StopFlag<'_> {
     }
 }
 
-/// Names of the columns of numbers, those of trace.csv and state.csv.
+/// Names of the numeric columns: those of trace.csv and state.csv.
 const COLUMNS: &str = "time_s,tip_x_m,tip_y_m,head_x_m,head_y_m,neck_angle_rad,lip_angle_rad,neck_rate_rad_per_s,\
                        lip_rate_rad_per_s,head_drop_m,tip_velocity_m_per_s,normal_force_n,friction_force_n";
 
-/// Columns of samples, the modes among them, the columns of transitions, and the summary as JSON.
+/// Columns of the samples, contact mode of each sample, columns of the transitions, and the summary as JSON.
 type RunArrays<'py> = (Bound<'py, PyDict>, Vec<&'static str>, Bound<'py, PyDict>, String);
 
-/// Runs a scene; samples at its own rate, or at rising instants.
+/// Runs a scene; samples it at the scene's own rate, or at the given ascending instants.
 #[pyfunction]
 #[pyo3(signature = (scene, times_s = None))]
 pub fn simulate_scene<'py>(

@@ -1,4 +1,5 @@
-//! Work without the lock of the interpreter, in threads that a forked process makes anew, ended by Ctrl-C.
+//! Work that runs without the interpreter lock, in threads that a forked process creates anew, and that
+//! Ctrl-C ends.
 
 use crate::errors;
 use pyo3::prelude::*;
@@ -9,10 +10,10 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
-/// Interval at which signals are checked.
+/// Interval between checks for signals.
 const POLL: Duration = Duration::from_millis(50);
 
-/// The thread pool with the id of its process: a forked process has no threads of its parent.
+/// The thread pool, with the id of its process: a forked process has none of the threads of its parent.
 static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
 
 fn process_pool() -> Result<Arc<ThreadPool>, String> {
@@ -24,7 +25,7 @@ fn process_pool() -> Result<Arc<ThreadPool>, String> {
         return Ok(Arc::clone(pool));
     }
     let made = Arc::new(build_pool(0)?);
-    // the threads of another process cannot be ended from here
+    // a forked process cannot end the threads of its parent
     std::mem::forget(held.replace((process, Arc::clone(&made))));
     Ok(made)
 }
@@ -33,7 +34,7 @@ fn build_pool(threads: usize) -> Result<ThreadPool, String> {
     ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| error.to_string())
 }
 
-/// Runs work that cannot be interrupted, on every core, without the lock of the interpreter. After Ctrl-C it
+/// Runs work that cannot be interrupted, on every core, without the interpreter lock. After Ctrl-C the work
 /// continues in the background, and its result is dropped.
 pub fn run_detached<T: Send + 'static>(
     py: Python<'_>,
@@ -42,7 +43,7 @@ pub fn run_detached<T: Send + 'static>(
     let pool = process_pool().map_err(|error| no_threads_error(py, &error))?;
     let (send, mut receive) = mpsc::channel();
     pool.spawn(move || {
-        // fails only if nobody waits any longer
+        // fails only if the receiver has stopped waiting
         let _ = send.send(catch_unwind(AssertUnwindSafe(work)));
     });
     loop {
@@ -62,8 +63,8 @@ fn no_threads_error(py: Python<'_>, error: &str) -> PyErr {
     errors::internal_error(py, format!("no threads can be started: {error}"))
 }
 
-/// Runs work on `threads` threads (`None`: every core) without the lock of the interpreter. Ctrl-C sets the
-/// flag that the work is given.
+/// Runs work on `threads` threads (`None`: every core) without the interpreter lock. Ctrl-C sets the flag
+/// that is passed to the work.
 pub fn run_interruptible<T: Send>(
     py: Python<'_>,
     threads: Option<usize>,

@@ -26,7 +26,7 @@ pub(crate) struct AccuracyArgs {
 
 const WORK_PRECISION: &str = "work-precision.csv";
 const ACCURACY: &str = "accuracy.csv";
-/// Files of the command.
+/// File names of the outputs.
 const OUTPUTS: [&str; 5] = [
     WORK_PRECISION,
     ACCURACY,
@@ -34,9 +34,11 @@ const OUTPUTS: [&str; 5] = [
     "paper/work-precision-85mm.svg",
     "paper/work-precision-170mm.svg",
 ];
-/// Rounds in which every setting is timed once, so that other load on the machine affects all settings alike.
+/// Number of rounds; every setting is timed once per round, so that other load on the machine affects all
+/// settings alike.
 const ROUNDS: u32 = 15;
-/// Rounds that every setting takes part in, and the total time after which a setting takes part in no more.
+/// Number of rounds in which every setting takes part; after these, a setting takes part only until its total
+/// time reaches the duration given here.
 const MIN_TIMING: (u32, Duration) = (3, Duration::from_millis(250));
 
 impl AccuracyArgs {
@@ -69,7 +71,7 @@ impl AccuracyArgs {
     }
 }
 
-/// Sets the wall time of every setting to its least over the rounds.
+/// Sets the wall time of every setting to its shortest time in any round.
 fn time_settings(reference: &ReferenceRun<'_>, rows: &mut [AccuracyRow], after_round: impl Fn()) {
     let (least_rounds, long_enough) = MIN_TIMING;
     let mut taken = vec![Duration::ZERO; rows.len()];
@@ -94,7 +96,8 @@ fn work_precision_diagram(
 ) -> WorkPrecision {
     let run = reference.run_result();
     let length_s = (1e4 * (run.stopped_at_s - scene.start_s)).round() / 1e4;
-    // without transitions, or if the references disagree on them, the error is that of the deflection
+    // without transitions, or if the references disagree on the transitions, the error is that of the
+    // deflection
     let timed = run.transitions > 0 && reference.lists_agree;
     let (unit, error_label, floor) = if timed {
         (" s", "worst error of a transition time, s", reference.apart_s)
@@ -118,7 +121,7 @@ fn work_precision_diagram(
     }
 }
 
-/// The claim of the diagram: the setting with the least error, and its time.
+/// The claim of the diagram: the setting with the smallest error, and its time.
 fn diagram_title(rows: &[AccuracyRow], error: impl Fn(&AccuracyRow) -> Option<f64>, unit: &str) -> String {
     let least = rows.iter().filter_map(|row| Some((error(row)?, row))).min_by(|a, b| a.0.total_cmp(&b.0));
     let Some((error, row)) = least else { return "No setting has an error to show".to_owned() };
@@ -148,7 +151,7 @@ fn print_study(scene: &Scene, reference: &ReferenceRun<'_>, rows: &[AccuracyRow]
     );
 }
 
-/// How far the reference can be trusted.
+/// Prints how accurate the reference is.
 fn print_reference_error(reference: &ReferenceRun<'_>) {
     let (method, other) = (IntegrationMethod::default().name(), reference.checked_by.name());
     if !reference.lists_agree {

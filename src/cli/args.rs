@@ -1,4 +1,4 @@
-//! Options that several commands have.
+//! Options that several commands share.
 
 use super::failure::{Failure, Outcome};
 use super::files::{CsvDialect, FileSize, OutputCommand, Overwrite, WritePolicy};
@@ -6,7 +6,7 @@ use clap::Args;
 use std::str::FromStr;
 use std::time::Duration;
 
-/// A whole number, 1 or more; [`clap`] names the option and what was found.
+/// Parses a whole number of 1 or more; [`clap`] adds the name of the option and the text found.
 pub(crate) fn parse_count(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(count) if count > 0 => Ok(count),
@@ -22,17 +22,17 @@ pub(crate) struct GlobalArgs {
     /// Threads for parallel work, at most 1024 (default: every core); results do not depend on it
     #[arg(long, global = true, value_name = "N", value_parser = parse_threads, allow_negative_numbers = true)]
     pub threads: Option<usize>,
-    /// Largest file with data that is read, such as 500MB or 4GB; a recording takes up to four times as much
+    /// Largest data file that is read, such as 500MB or 4GB; a recording needs up to four times as much
     /// memory
     #[arg(long, global = true, value_name = "SIZE", default_value_t = FileSize::DEFAULT)]
     pub max_file_size: FileSize,
-    /// How tables are written, for a spreadsheet; trace.csv is always plain, as programs read it
+    /// How tables are written, for a spreadsheet; trace.csv is always plain, since programs read it
     #[arg(long, global = true, value_name = "DIALECT", value_enum, default_value_t)]
     pub csv_dialect: CsvDialect,
 }
 
-/// Most threads: more than a machine has cores. Each takes megabytes, so a hundred thousand would stop the
-/// machine.
+/// Maximum number of threads, more than a machine has cores. Each thread needs megabytes, so that a hundred
+/// thousand would bring down the machine.
 const MOST_THREADS: usize = 1024;
 
 fn parse_threads(text: &str) -> Result<usize, String> {
@@ -42,14 +42,14 @@ fn parse_threads(text: &str) -> Result<usize, String> {
 }
 
 impl GlobalArgs {
-    /// Applies the settings of the whole program, before anything runs.
+    /// Applies the settings that affect the whole program, before anything runs.
     pub(crate) fn apply_settings(&self) -> Outcome<()> {
         self.max_file_size.set_read_limit();
         let Some(threads) = self.threads else { return Ok(()) };
         rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(Failure::internal)
     }
 
-    /// What a command may overwrite, with its tables in the dialect that is asked for.
+    /// What a command may overwrite, and the requested dialect of its tables.
     pub(crate) fn write_policy(&self, maker: OutputCommand, overwrite: Overwrite) -> WritePolicy {
         WritePolicy { csv: self.csv_dialect, ..WritePolicy::new(maker, overwrite) }
     }
@@ -87,7 +87,7 @@ fn parse_clock_time(text: &str) -> Option<u64> {
     in_range.then_some(total.checked_add(minutes * 60 + seconds)?)
 }
 
-/// Sums numbers with their units, such as `1h30min`, s.
+/// Sum, s, of numbers with their units, such as `1h30min`.
 fn parse_unit_time(text: &str) -> Option<u64> {
     let mut rest = text;
     let mut total: u64 = 0;

@@ -13,16 +13,16 @@ pub(crate) struct BladeArgs {
     /// Section of the blade (section.toml)
     #[arg(required_unless_present = "check")]
     pub section: Option<PathBuf>,
-    /// In place of a section: a scene (scene.toml) whose blade is to be checked with ruler and scale
+    /// Instead of a section: a scene (scene.toml) whose blade is to be checked with ruler and scale
     #[arg(long, value_name = "SCENE", conflicts_with = "section")]
     pub check: Option<PathBuf>,
-    /// With --check: the length of blade that the scene's masses are for, in metres; adds masses and
-    /// force per metre
+    /// With --check: the length of blade to which the scene's masses belong, in metres; adds masses and force
+    /// per metre
     #[arg(long, value_name = "METRES", conflicts_with = "section", allow_negative_numbers = true)]
     #[arg(value_parser = parse_above_zero)]
     pub length_m: Option<f64>,
-    /// With --check: the force on the tip for which its displacement is given, in newtons; 0.0098 is
-    /// the weight of 1 g
+    /// With --check: the force on the tip for which the displacement is printed, in newtons; 0.0098 is the
+    /// weight of 1 g
     #[arg(long, value_name = "NEWTONS", conflicts_with = "section", allow_negative_numbers = true)]
     #[arg(value_parser = parse_above_zero, default_value_t = DEFAULT_FORCE_N)]
     pub force_n: f64,
@@ -33,7 +33,8 @@ pub(crate) struct BladeArgs {
     pub overwrite: Overwrite,
 }
 
-/// About the weight of 1 g, which moves the tip of a blade of some centimetres by tenths of a millimetre.
+/// Force, N: about the weight of 1 g, which moves the tip of a blade of some centimetres by tenths of a
+/// millimetre.
 const DEFAULT_FORCE_N: f64 = 0.01;
 
 fn parse_above_zero(text: &str) -> Result<f64, String> {
@@ -41,7 +42,7 @@ fn parse_above_zero(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| "expected a number above 0, without a unit".to_owned())
 }
 
-/// `blade.json` and `checks.json`: the result, and implausible values of the file.
+/// Contents of `blade.json` and `checks.json`: the result, and the implausible values of the file.
 #[derive(Serialize)]
 struct BladeJson<T> {
     #[serde(flatten)]
@@ -54,7 +55,7 @@ impl BladeArgs {
         match (&self.check, &self.section) {
             (Some(scene), _) => self.check_scene(scene, global)?,
             (None, Some(section)) => self.estimate_from_section(section, global)?,
-            (None, None) => {} // clap asks for one of the two
+            (None, None) => {} // clap requires one of the two
         }
         Ok(CommandOutcome::Done)
     }
@@ -71,7 +72,7 @@ impl BladeArgs {
         Ok(())
     }
 
-    /// Writes the files, where a folder is given.
+    /// Writes the files, if a folder is given.
     fn write_files(&self, answers: &[(&str, Vec<u8>)]) -> Outcome<()> {
         let writer = WritePolicy::new(OutputCommand::Blade, self.overwrite);
         self.out.as_ref().map_or(Ok(()), |out| files::write_outputs(out, &writer, answers))
@@ -82,7 +83,7 @@ fn to_json(computed: impl Serialize, findings: Vec<PlausibilityFinding>) -> Outc
     serde_json::to_vec_pretty(&BladeJson { computed, findings }).map_err(Failure::internal)
 }
 
-// `wiperlab blade --check`
+// `wiperlab blade --check`.
 
 impl BladeArgs {
     pub(super) fn check_scene(&self, path: &Path, global: &GlobalArgs) -> Outcome<()> {

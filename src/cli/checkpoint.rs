@@ -1,8 +1,9 @@
-//! A journal on disk. It is locked while it is written, loses nothing but a torn last line, and is kept when
-//! a new one begins.
+//! A journal on disk. It is locked while it is open, loses at most an incomplete last line, and is kept when
+//! a new journal is begun.
 //!
-//! Every append waits until the lines are on the disk (`fdatasync`), and a new file until its name is. So
-//! every record that was counted or reported survives a power failure.
+//! Every append waits until its lines are on the disk (`fdatasync`), and the creation of a journal waits
+//! until its name is on the disk. Therefore every record that was counted or reported survives a power
+//! failure.
 
 use super::prelude::*;
 use crate::checkpoint::{
@@ -15,37 +16,37 @@ use std::io::{self, BufRead, BufReader, ErrorKind, Read, Write};
 /// Name of a journal in the folder of its fit or study.
 pub(crate) const CHECKPOINT_FILE: &str = "journal.jsonl";
 
-/// Longest first line that is looked at, bytes.
+/// Largest length of a first line that is read, bytes.
 const MAX_HEADER_BYTES: u64 = 1 << 24;
 
 /// A journal on disk.
 pub(crate) struct CheckpointWriter {
     path: PathBuf,
-    /// `None` before the first line of a new journal.
+    /// The file; `None` before the first line of a new journal.
     file: Option<File>,
-    /// What happens to the existing file before the first line is appended.
+    /// Action on the existing file before the first line is appended.
     due: Option<PendingAction>,
     kind: CheckpointKind,
 }
 
-/// A journal open for writing, with its contents if it is resumed.
+/// A journal open for writing and, if it is resumed, its contents.
 type OpenedCheckpoint<T> = Outcome<(CheckpointWriter, Option<T>)>;
 
-/// Visits the records of a journal one by one.
+/// Function that visits the records of a journal one by one.
 type RecordVisitor<'a, R> = dyn FnMut(StoredRecord<R>) -> Result<(), CheckpointError> + 'a;
 
-/// What happens to an existing journal before the first line is appended.
+/// Action on an existing journal before the first line is appended.
 #[derive(Clone, Copy)]
 enum PendingAction {
-    /// It is renamed: hours of work must not be lost because `--resume` was forgotten.
+    /// Rename the journal, so that hours of work are not lost if `--resume` was forgotten.
     SetAside,
-    /// It continues after this number of bytes, and with a line end if the last line has none.
+    /// Continue after this number of bytes, and add a line end if the last line has none.
     Continue { intact_bytes: usize, unended: bool },
 }
 
 impl CheckpointWriter {
-    /// Opens the journal at `path`, with its contents if it is resumed. Nothing changes on disk before the
-    /// first line.
+    /// Opens the journal at `path` and, if it is resumed, reads its contents. Nothing on disk changes before
+    /// the first line is appended.
     pub(crate) fn open<R: CheckpointRecord>(
         path: &Path,
         resume: bool,
@@ -58,8 +59,8 @@ impl CheckpointWriter {
         })
     }
 
-    /// The same for journals larger than memory: `each` visits the records one by one, and only the header is
-    /// returned.
+    /// Like [`Self::open`], for a journal larger than memory: `each` visits the records one by one, and only
+    /// the header is returned.
     pub(crate) fn open_each<R: CheckpointRecord>(
         path: &Path,
         resume: bool,
@@ -74,7 +75,7 @@ impl CheckpointWriter {
         })
     }
 
-    /// Locks the file; `take` reads it if it is resumed and has a header.
+    /// Locks the file; if it is resumed and has a header, `take` reads it.
     fn open_with<R: CheckpointRecord, T>(
         path: &Path,
         resume: bool,
@@ -108,7 +109,7 @@ impl CheckpointWriter {
         Ok((opened, Some(taken)))
     }
 
-    /// Sets how a journal with this end continues; `None` if it has no complete header.
+    /// Plans how a journal with this end is continued; `None` if it has no complete header.
     fn plan_resume(&mut self, name: &str, is_empty: bool, end: Option<CheckpointEnd>) {
         self.due = Some(match end {
             None => {
@@ -129,7 +130,7 @@ impl CheckpointWriter {
         });
     }
 
-    /// Drops a torn last line, even if nothing was appended.
+    /// Removes an incomplete last line, even if nothing was appended.
     pub(crate) fn finish(mut self) -> Outcome<()> {
         self.apply_pending()
             .map_err(|problem| Failure::Internal(format!("{}: {problem}", self.path.display())))
@@ -169,7 +170,7 @@ impl CheckpointSink for CheckpointWriter {
     }
 }
 
-/// Creates a journal and waits until its name is on the disk.
+/// Creates a journal, and waits until its name is on the disk.
 fn create_checkpoint(path: &Path, kind: CheckpointKind) -> Result<File, String> {
     let refused = |error: io::Error| error.to_string();
     let folder = path.parent().unwrap_or(Path::new(""));
@@ -177,7 +178,7 @@ fn create_checkpoint(path: &Path, kind: CheckpointKind) -> Result<File, String> 
     let file = OpenOptions::new().create(true).append(true).open(path).map_err(refused)?;
     lock_file(&file, kind)?;
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-    let _ = File::open(folder).and_then(|folder| folder.sync_all()); // Windows opens no folder
+    let _ = File::open(folder).and_then(|folder| folder.sync_all()); // Windows cannot open folders
 
     Ok(file)
 }
@@ -199,8 +200,8 @@ fn lock_existing(path: &Path, kind: CheckpointKind) -> Outcome<Option<File>> {
     Ok(Some(file))
 }
 
-/// Two programs that append to one file would tear each other's lines. On file systems without locks nothing
-/// prevents that.
+/// Locks a journal: two programs that append to one file would mix up their lines. On file systems without
+/// locks nothing prevents that.
 fn lock_file(file: &File, kind: CheckpointKind) -> Result<(), String> {
     match file.try_lock() {
         Err(TryLockError::WouldBlock) => Err(format!(
@@ -210,8 +211,8 @@ fn lock_file(file: &File, kind: CheckpointKind) -> Result<(), String> {
     }
 }
 
-/// Only a journal of the same kind of input, whole or torn, is replaced by a new one. The journals of a fit
-/// to features and of one to traces are of the same kind.
+/// Refuses to replace the file by a new journal unless it is a journal of the same kind of input, complete or
+/// not. Journals of fits to features and to traces are of the same kind.
 fn check_same_kind(name: &str, bytes: &[u8], kind: CheckpointKind) -> Outcome<()> {
     if !has_whole_line(bytes) || detect_kind(bytes).is_some_and(|found| found.input() == kind.input()) {
         return Ok(());
@@ -226,7 +227,7 @@ fn set_aside(path: &Path) -> io::Result<PathBuf> {
     let mut number = 1;
     loop {
         let to = numbered_path(path, number);
-        // creating the file reserves the name against a second program
+        // creating the file reserves the name, in case another program wants it
         match File::create_new(&to) {
             Ok(_) => {
                 fs::rename(path, &to)?;

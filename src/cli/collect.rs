@@ -13,14 +13,13 @@ use std::fs::File;
 
 #[derive(Debug, Args)]
 pub(crate) struct CollectArgs {
-    /// Folder of the study, the --out of its shards; or the jobs of a list of fits, as they were given to
-    /// `wiperlab fit`
+    /// Folder of a study, the --out of its shards; or the jobs of a list of fits, as given to `wiperlab fit`
     #[arg(required = true, value_name = "DIR|JOB")]
     pub paths: Vec<PathBuf>,
-    /// The study (default: the one that the shards were made of, where it lay then)
+    /// The study (default: the one of which the shards are, at the path that it had then)
     #[arg(long, value_name = "STUDY")]
     pub study: Option<PathBuf>,
-    /// Number of shards for which missing tasks are named (default: the number that most shards there have)
+    /// Number of shards for which missing tasks are named (default: the most frequent one in the folder)
     #[arg(long, value_name = "N", value_parser = super::args::parse_count)]
     pub shards: Option<usize>,
     #[command(flatten)]
@@ -36,7 +35,7 @@ impl CollectArgs {
         }
     }
 
-    /// Prints which jobs of a list have no result.
+    /// Prints the jobs of a list that have no result.
     fn report_jobs(&self, jobs: &[PathBuf], global: &GlobalArgs) -> Outcome {
         check_distinct_folders(jobs)?;
         let of = self.shards.unwrap_or(jobs.len());
@@ -90,7 +89,7 @@ impl CollectArgs {
     }
 }
 
-/// The shards, of `of`, whose points are not all known; in rising order.
+/// The shards, out of `of`, of which not all points are known; in ascending order.
 fn incomplete_tasks(points: &PointCollection<File>, of: usize) -> Outcome<TaskList> {
     Shard::new(0, of).ok_or_else(|| too_many_shards(of))?;
     let mut due = vec![false; of];
@@ -98,7 +97,7 @@ fn incomplete_tasks(points: &PointCollection<File>, of: usize) -> Outcome<TaskLi
     Ok((0..of).filter(|at| due[*at]).collect())
 }
 
-/// The refusal of a single file.
+/// The failure if a single file was given.
 fn one_file_failure(file: &Path) -> Outcome<Failure> {
     let problem = if is_study(file)? {
         "found a study, expected the folder of its shards: `wiperlab collect DIR` with the --out of `wiperlab sweep`"
@@ -112,7 +111,7 @@ fn too_many_shards(of: usize) -> Failure {
     Failure::Input(format!("--shards: found {of}, expected fewer"))
 }
 
-/// Prints which of `of` tasks have to run again, and with which command.
+/// Prints which of the `of` tasks must run again, and with which command.
 fn print_missing(what: &str, tasks: &TaskList, of: usize, command: &str) {
     print_line!("missing: {what}, in {} of {of} tasks", tasks.len());
     print_line!("tasks: {tasks}");

@@ -21,7 +21,7 @@ const TWIN: &str = include_str!("../../data/actual-blade-twin/twin.toml");
 const SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
 const JOB: &str = include_str!("../../fits/actual-blade-twin/job.toml");
 
-/// Folder, channel and window of the two spectra of the demo.
+/// Folder, channel and window of each of the two spectra of the demo.
 const SPECTRA: [(&str, &str, &str); 2] =
     [("low", "head-drop", "release+0.01..release+0.2"), ("high", "deflection", "release+0.01..release+0.1")];
 
@@ -30,7 +30,8 @@ pub(crate) struct DemoArgs {
     /// Folder for everything that the demo makes
     #[arg(long, default_value = "demo", value_name = "DIR")]
     pub out: PathBuf,
-    /// Most iterates of the fit: fewer are quicker and settle less (default: as many as it takes)
+    /// Maximum number of iterates of the fit; fewer are faster but less accurate (default: until it has
+    /// converged)
     #[arg(long, value_name = "N", value_parser = parse_count, allow_negative_numbers = true)]
     pub max_evaluations: Option<usize>,
     #[command(flatten)]
@@ -75,7 +76,7 @@ impl DemoArgs {
         Ok(CommandOutcome::done_if(!missed && solved.result.status == FitStatus::Converged))
     }
 
-    /// Makes the checks of all four steps before anything is written.
+    /// Makes the checks of all four steps before any file is written.
     fn check_outputs(&self) -> Outcome<()> {
         let steps: [(OutputCommand, &str, &[&str]); 4] = [
             (OutputCommand::Import, "data", &[TRACE_FILE, DESCRIPTION_FILE, EXPORT]),
@@ -89,7 +90,7 @@ impl DemoArgs {
         })
     }
 
-    /// The bundled export, scene and job, laid out as a project has them.
+    /// Writes the bundled export, scene and job, in the layout of a project.
     fn write_bundled_files(&self) -> Outcome<()> {
         let writer = WritePolicy::new(OutputCommand::Demo, self.overwrite);
         let write = |folder: PathBuf, name: &str, text: &str| {
@@ -101,7 +102,7 @@ impl DemoArgs {
     }
 }
 
-/// Imports the bundled export as `wiperlab import` does, with its scale and rate.
+/// Imports the bundled export like `wiperlab import`, with its scale and frame rate.
 fn import_export(folder: &Path, overwrite: Overwrite) -> Outcome<()> {
     let [tip, head] = SYNTHETIC_TRACK_NAMES;
     let options = ImportOptions {

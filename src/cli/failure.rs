@@ -2,18 +2,18 @@
 
 use crate::simulate::{RunResult, RunStatus};
 
-/// Bad usage or bad input: nothing was written.
+/// Exit code: bad usage or bad input; nothing was written.
 pub(crate) const BAD_INPUT: u8 = 2;
-/// The machine or the program failed.
+/// Exit code: the machine or the program failed.
 pub(crate) const INTERNAL: u8 = 1;
-/// The command ran but stopped early; what was computed is written and says so.
+/// Exit code: the command ran but stopped early; its partial results are written and marked as such.
 pub(crate) const STOPPED_EARLY: u8 = 3;
 
-/// How a command ended that did not fail.
+/// Outcome of a command that did not fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum CommandOutcome {
     Done,
-    /// It stopped early or did not converge; what was computed is written and says so.
+    /// The command stopped early or did not converge; its partial results are written and marked as such.
     StoppedEarly,
 }
 
@@ -30,10 +30,10 @@ impl CommandOutcome {
     }
 }
 
-/// What a step of a command gives, or why the command writes nothing.
+/// Result of a step of a command, or the reason why the command writes nothing.
 pub(crate) type Outcome<T = CommandOutcome> = Result<T, Failure>;
 
-/// Why a command wrote nothing.
+/// Reason why a command wrote nothing.
 #[derive(Debug, thiserror::Error)]
 pub enum Failure {
     /// Bad usage or bad input.
@@ -45,24 +45,24 @@ pub enum Failure {
 }
 
 impl Failure {
-    /// Bad input, from a typed error of the library.
+    /// Failure due to bad input, from a typed error of the library.
     pub(crate) fn input(error: impl std::fmt::Display) -> Self {
         Self::Input(error.to_string())
     }
 
-    /// Bad input, with the file or option that has it.
+    /// Failure due to bad input, with the file or option that contains it.
     pub(crate) fn at(place: impl std::fmt::Display, problem: impl std::fmt::Display) -> Self {
         Self::Input(format!("{place}: {problem}"))
     }
 
-    /// A defect of the program or a failure of the machine.
+    /// Failure due to a defect of the program or a failure of the machine.
     pub(crate) fn internal(error: impl std::fmt::Display) -> Self {
         Self::Internal(error.to_string())
     }
 
-    /// Prints the message and gives the exit code.
+    /// Prints the message and returns the exit code.
     pub(crate) fn print_message(&self) -> u8 {
-        // each problem of a file has its own line; only the first begins at the margin
+        // each problem of a file is on its own line; only the first line begins at the margin
         for (i, line) in self.to_string().split('\n').enumerate() {
             warn_line!("{}{line}", if i == 0 { "error: " } else { "       " });
         }
@@ -73,7 +73,7 @@ impl Failure {
     }
 }
 
-/// Status, time and meaning of a run that ended early; `None` for one that completed.
+/// Status, time and meaning of a run that ended early; `None` for a complete run.
 pub(crate) fn describe_early_end(run: &RunResult) -> Option<String> {
     (run.status != RunStatus::Completed)
         .then(|| format!("{} at {} s: {}", run.status.name(), run.stopped_at_s, run.status.meaning()))

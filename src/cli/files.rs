@@ -1,5 +1,5 @@
-//! Reading and writing. Outputs of a command appear all together or not at all, and replace only files that
-//! the command made itself.
+//! Reading and writing of files. The outputs of a command appear all together or not at all, and replace only
+//! files that the same command made.
 
 mod guard;
 mod input;
@@ -24,7 +24,7 @@ use std::io::{self, BufWriter, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Result of a fit, in its folder.
+/// Name of the result of a fit, in the folder of its job.
 pub(crate) const RESULT_FILE: &str = "result.json";
 
 /// Name of a file or folder for messages and headings.
@@ -41,13 +41,13 @@ pub(crate) fn containing_folder(file: &Path) -> &Path {
     file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Resolves a path that is written in `file`: it is relative to the folder of that file, not to the working
-/// folder.
+/// Resolves a path that is written in `file`: the path is relative to the folder of that file, not to the
+/// working directory.
 pub(crate) fn resolve_path(file: &Path, named: &str) -> PathBuf {
     containing_folder(file).join(named)
 }
 
-/// The same for a path that must exist; otherwise the reason of the refusal.
+/// Like [`resolve_path`], for a path that must exist; otherwise returns the reason of the refusal.
 pub(crate) fn resolve_existing_path(file: &Path, named: &str) -> Result<PathBuf, String> {
     let path = resolve_path(file, named);
     if path.exists() {
@@ -60,13 +60,13 @@ pub(crate) fn resolve_existing_path(file: &Path, named: &str) -> Result<PathBuf,
     ))
 }
 
-/// A path relative to `folder`, or absolute if there is no relative one.
+/// A path relative to `folder`; absolute if there is no relative path.
 pub(crate) fn relative_path(folder: &Path, path: &Path) -> Outcome<String> {
     let in_full = |path: &Path| {
         std::path::absolute(path)
             .map_err(|error| Failure::at(path.display(), format!("cannot be found from here: {error}")))
     };
-    // links are followed as far as the path exists, because `..` behind a link leads elsewhere
+    // links are resolved as far as the path exists, since `..` after a link leads elsewhere
     let real = |path: &Path| -> Outcome<PathBuf> {
         let full = in_full(path)?;
         let there = full.ancestors().find(|part| part.exists()).unwrap_or(Path::new(""));
@@ -83,8 +83,8 @@ pub(crate) fn relative_path(folder: &Path, path: &Path) -> Outcome<String> {
     })
 }
 
-/// Writes every file of a command into `folder` (made if missing): all are staged next to their places first,
-/// then renamed.
+/// Writes all files of a command into `folder` (created if missing): all are first written next to their
+/// final places, then renamed.
 pub(crate) fn write_outputs(
     folder: &Path,
     writer: &WritePolicy,
@@ -94,7 +94,8 @@ pub(crate) fn write_outputs(
     commit_files(OutputStaging::new(folder, writer, &file_names(files))?, files)
 }
 
-/// The same for files that no marker lists; the caller knows that they replace nothing of value.
+/// Like [`write_outputs`], for files that no marker lists; the caller knows that they replace nothing of
+/// value.
 pub(crate) fn write_unmarked(folder: &Path, files: &[(impl AsRef<str>, Vec<u8>)]) -> Outcome<()> {
     OutputFolder::find_writable_ancestor(folder)?;
     commit_files(OutputStaging::new_unmarked(folder, &file_names(files))?, files)
@@ -111,7 +112,7 @@ fn commit_files(mut staging: OutputStaging, files: &[(impl AsRef<str>, Vec<u8>)]
     staging.commit()
 }
 
-/// A figure as files: for the screen, and under `paper/` for a journal's column and page.
+/// The files of a figure: for the screen, and under `paper/` for a column and a page of a journal.
 pub(crate) fn figure_files(name: &str, figure: &Figure) -> [(String, Vec<u8>); 3] {
     let file = |name: String, medium| (name, figure.to_svg(medium).into_bytes());
     [
@@ -121,7 +122,7 @@ pub(crate) fn figure_files(name: &str, figure: &Figure) -> [(String, Vec<u8>); 3
     ]
 }
 
-/// A reader of text that is made piece by piece.
+/// A reader of a text that is produced piece by piece.
 pub(crate) struct ChunkReader<I> {
     pieces: I,
     present: io::Cursor<Vec<u8>>,
@@ -148,19 +149,20 @@ impl<I: Iterator<Item = String>> Read for ChunkReader<I> {
     }
 }
 
-/// A folder for results that are written while they are computed. They appear when all are complete; nothing
-/// is left of them when the program is killed.
+/// A folder for results that are written while they are computed. They appear when all are complete; if the
+/// program is killed, nothing of them remains.
 #[derive(Debug)]
 pub(crate) struct OutputFolder {
     folder: PathBuf,
     writer: WritePolicy,
-    /// Where nameless files lie meanwhile: the folder, or its nearest existing parent.
+    /// Location of the nameless files until then: the folder, or its nearest existing parent.
     temporary_folder: PathBuf,
 }
 
 impl OutputFolder {
-    /// Checks before the work that `folder` exists or can be made, is writable, and holds nothing that the
-    /// files `names` must not replace. The same is checked again when they are written.
+    /// Checks before the work that `folder` exists or can be created, that it is writable, and that it
+    /// contains nothing that the files `names` must not replace. This is checked again when the files are
+    /// written.
     pub(crate) fn check(folder: &Path, writer: &WritePolicy, names: &[&str]) -> Outcome<Self> {
         let near = Self::find_writable_ancestor(folder)?;
         names.iter().chain([&MARKER_FILE]).try_for_each(|name| check_path_free(&folder.join(name)))?;
@@ -191,7 +193,8 @@ impl OutputFolder {
         Ok(near)
     }
 
-    /// A file that is written to as it grows and gets its name when all are [finished](Self::commit).
+    /// A file that is written while the results are computed; it gets its name when all files are
+    /// [finished](Self::commit).
     pub(crate) fn create_file(&self, name: &'static str) -> Outcome<PendingFile> {
         let path = self.folder.join(name);
         let file =
@@ -199,7 +202,7 @@ impl OutputFolder {
         Ok(PendingFile { name, path, to: BufWriter::new(file), failed: None })
     }
 
-    /// Puts the pending files and the others into the folder, or none of them.
+    /// Puts the pending files and the given other files into the folder, or none of them.
     pub(crate) fn commit(
         &self,
         files: Vec<PendingFile>,
@@ -216,14 +219,14 @@ impl OutputFolder {
     }
 }
 
-/// A nameless file for data that do not fit into memory, in a folder or its nearest existing parent.
+/// A nameless file for data that do not fit into memory, in a folder or in its nearest existing parent.
 pub(crate) fn create_scratch_file(folder: &Path) -> Outcome<File> {
     let near = OutputFolder::find_writable_ancestor(folder)?;
     tempfile::tempfile_in(&near).map_err(|error| write_failure(&near, &error))
 }
 
-/// A file that is being written. After its first failure nothing more is written; the failure is reported at
-/// the end.
+/// A file that is being written. After the first failure nothing more is written to it; the failure is
+/// reported at the end.
 #[derive(Debug)]
 pub(crate) struct PendingFile {
     name: &'static str,
@@ -239,7 +242,7 @@ impl PendingFile {
         }
     }
 
-    /// The whole file, rewound.
+    /// The complete file, rewound to its start.
     fn into_rewound_file(self) -> Outcome<(&'static str, File)> {
         let Self { name, path, to, failed } = self;
         let rewound = || {
@@ -258,14 +261,14 @@ fn write_failure(path: &Path, error: &io::Error) -> Failure {
 
 #[derive(Debug, Args)]
 pub(crate) struct FigureArgs {
-    /// Draw figures into a folder, each in three files: one for a screen, and below paper/ one for a column
-    /// and one for a page
+    /// Draw figures into a folder, each as three files: one for a screen, and under paper/ one for a journal
+    /// column and one for a page
     #[arg(long = "figures", value_name = "DIR")]
     pub folder: Option<PathBuf>,
 }
 
 impl FigureArgs {
-    /// Checks before the work that figures of these names can be written.
+    /// Checks before the work that the figures with these names can be written.
     pub(crate) fn check_folder(&self, names: &[&str], overwrite: Overwrite) -> Outcome<()> {
         let Some(folder) = &self.folder else { return Ok(()) };
         let files = names.iter().flat_map(|name| figure_files(name, &Figure::default()));
@@ -296,10 +299,10 @@ impl FigureArgs {
 pub(crate) struct StreamedTable {
     pub file: PendingFile,
     row: String,
-    /// Rows that are held back until there are enough of them, and how many are missing.
+    /// Rows that are held back until there are enough rows for a table, and number of rows still missing.
     held: String,
     missing: usize,
-    /// Time spent on formatting and writing, which does not count as time of the run.
+    /// Time spent on formatting and writing, which does not count towards the time of the run.
     pub spent: Duration,
 }
 

@@ -26,33 +26,33 @@ pub(crate) use summary::print_summary;
 
 #[derive(Debug, Args)]
 pub(crate) struct FitArgs {
-    /// Job of the fit (fits/NAME/job.toml), or its folder; several are fitted one after the other, each in a
-    /// folder of its own
+    /// Job of the fit (fits/NAME/job.toml), or its folder; several jobs are fitted one after the other, each
+    /// in a folder of its own
     #[arg(required = true, value_name = "JOB")]
     pub jobs: Vec<PathBuf>,
-    /// Go on from the journal next to the job; without this a new one is begun and the old one kept as
-    /// journal.previous-1.jsonl (the next free number)
+    /// Continue from the journal next to the job; without this option, a new journal is begun and the old one
+    /// is kept as journal.previous-1.jsonl (the next free number)
     #[arg(long)]
     pub resume: bool,
-    /// Most evaluations of the model, those of the journal included (default: what the job allows); of a fit
-    /// to traces most iterates of the search (default: as many as it takes)
+    /// Maximum number of evaluations of the model, including those in the journal (default: as the job says);
+    /// in a fit to traces, maximum number of iterates of the search (default: until it has converged)
     #[arg(long, value_name = "N", value_parser = parse_count, allow_negative_numbers = true)]
     pub max_evaluations: Option<usize>,
-    /// Of several jobs fit only every N-th from job K on (K from 0); each goes on from its journal, and one
-    /// whose result is there is left as it is
+    /// Of several jobs, fit only every N-th, beginning with job K (counted from 0); each continues from its
+    /// journal, and a job that has its result is skipped
     #[arg(long, value_name = "K/N")]
     pub shard: Option<Shard>,
-    /// Stop after this time with what is done (exit code 3); such as 45min, 1h30min or 02:00:00
+    /// Stop after this time and keep what is done (exit code 3); such as 45min, 1h30min or 02:00:00
     #[arg(long, value_name = "TIME")]
     pub time_limit: Option<TimeLimit>,
     #[command(flatten)]
     pub overwrite: Overwrite,
 }
 
-/// A result, and the work behind it.
+/// A result, and the work that it took.
 pub(crate) struct CompletedFit {
     pub result: FitResult,
-    /// Evaluations or iterates that were taken from the journal.
+    /// Number of evaluations or iterates that were taken from the journal.
     pub replayed: usize,
     pub wall: Duration,
 }
@@ -93,7 +93,7 @@ impl FitArgs {
 }
 
 impl LoadedJob {
-    /// Runs the search; writes the journal meanwhile and the result at the end.
+    /// Runs the search; meanwhile writes the journal, and at the end the result.
     pub(crate) fn solve(
         &self,
         global: &GlobalArgs,
@@ -128,7 +128,8 @@ impl LoadedJob {
         })
     }
 
-    /// Runs a search with its journal, whose records are called `records`; about `expected` are made.
+    /// Runs a search with its journal, whose records are called `records`; `expected` is the approximate
+    /// number of them.
     fn search<R: CheckpointRecord>(
         &self,
         global: &GlobalArgs,
@@ -167,7 +168,7 @@ impl LoadedJob {
         shown.bar.finish_and_clear();
         sink.finish()?;
         if result.status == FitStatus::Interrupted {
-            // an earlier result stays; a resumed fit goes on from the journal
+            // an earlier result is kept; a resumed fit continues from the journal
             stops.announce_stop(&kept());
         } else {
             self.write_outputs(&result, &writer)?;
@@ -175,7 +176,7 @@ impl LoadedJob {
         Ok(CompletedFit { result, replayed: shown.replayed, wall })
     }
 
-    /// About the number of evaluations: the budget, and what gate, profiles and twins take.
+    /// Approximate number of evaluations: the budget, and the evaluations for gate, profiles and twins.
     fn expected_evaluations(&self) -> usize {
         let (job, parameters) = (self.job(), self.job().parameters.len());
         let gate = crate::fit::identifiability::PROBE_COUNT * (2 * parameters + 1);
@@ -184,7 +185,7 @@ impl LoadedJob {
         gate + budget + profiles + 3 * job.intervals.bootstrap
     }
 
-    /// About the number of iterates of a fit to traces.
+    /// Approximate number of iterates of a fit to traces.
     fn expected_iterates(&self) -> usize {
         let search = STARTS * self.problem.segment_s().len() * ITERATES_A_STAGE;
         let (twins, parameters) = (self.job().intervals.bootstrap, self.job().parameters.len());
@@ -192,19 +193,19 @@ impl LoadedJob {
     }
 }
 
-/// The journal that a search goes on from, with its name.
+/// The journal from which a search continues, with its name.
 type ResumedCheckpoint<'a, R> = Option<(&'a str, &'a CheckpointFile<R>)>;
 type FitOutcome = Result<FitResult, FitError>;
 
-/// Iterates that a stage takes, about, from the recovery study: for the estimate of the time left.
+/// Approximate number of iterates per stage, from the recovery study; used to estimate the remaining time.
 const ITERATES_A_STAGE: usize = 14;
-/// Starts that most fits take: two that agree.
+/// Number of starts that most fits need: two that agree.
 const STARTS: usize = 2;
-/// Iterates that a twin takes, about, and a side of a parameter.
+/// Approximate number of iterates per twin, and per side of a parameter's profile.
 const ITERATES_A_TWIN: usize = 5;
 const ITERATES_A_SIDE: usize = 2;
 
-/// The bar of a search, and the number of records in its journal.
+/// The progress bar of a search, and the number of records in its journal.
 struct SearchDisplay {
     bar: ProgressBar,
     replayed: usize,
@@ -212,7 +213,7 @@ struct SearchDisplay {
 }
 
 impl SearchDisplay {
-    /// Moves the bar. The time left is estimated from evaluations that are computed, not from replayed ones.
+    /// Moves the bar. The remaining time is estimated from computed evaluations only, not from replayed ones.
     fn advance(&mut self, made: usize, replayed: usize, journaled: usize, words: String) -> ControlFlow<()> {
         self.bar.set_length(self.bar.length().unwrap_or(0).max(made as u64));
         self.bar.set_position(made as u64);
@@ -226,7 +227,7 @@ impl SearchDisplay {
     }
 }
 
-/// What a fit to traces is at.
+/// Describes the current stage of a fit to traces.
 fn describe_stage(now: &TraceProgress, stages: &[f64]) -> String {
     let (bad, all) = (now.bad_segments, now.segments);
     let length_ms = 1e3 * stages.get(now.stage).copied().unwrap_or_default();

@@ -17,21 +17,21 @@ use clap_mangen::Man;
 use markdown::{find_section, render_for_terminal};
 use serde_json::Value;
 
-/// Widest line of a page, characters.
+/// Maximum length of a line of a page, characters.
 const WIDTH: usize = 96;
 
 #[derive(Debug, Args)]
 pub(crate) struct HelpArgs {
-    /// A command, such as `fit`, or a page; all are listed without it
+    /// A command, such as `fit`, or a page; without it, all of them are listed
     #[arg(value_name = "COMMAND|PAGE")]
     pub word: Option<String>,
 }
 
 /// Content of a page.
 enum HelpContent {
-    /// Every key of a kind of file.
+    /// All keys of a kind of file.
     Keys(fn() -> Value),
-    /// A section of the documentation, by the text of its heading.
+    /// A section of the documentation: the page, and the text of the heading.
     Section(&'static str, &'static str),
     /// A whole page of the documentation.
     Whole(&'static str),
@@ -60,7 +60,7 @@ const PAGES: [HelpPage; 12] = [
     ("exit-codes", "what the program returns to a shell", HelpContent::Section(RELIABILITY, "Exit codes")),
 ];
 
-/// The list of the pages, below the help of the program.
+/// The list of the pages, which is printed below the help of the program.
 pub(crate) fn list_help_pages() -> String {
     let width = PAGES.iter().map(|(name, ..)| name.len()).max().unwrap_or_default();
     let rows = PAGES.iter().map(|(name, about, _)| format!("\n  {name:<width$}  {about}"));
@@ -77,7 +77,7 @@ impl HelpArgs {
         Ok(CommandOutcome::Done)
     }
 
-    /// The help of the command that is named, or of the program.
+    /// The help of the given command, or of the program if none is given.
     fn command_help(&self, program: &mut Command) -> Outcome<String> {
         program.build();
         let Some(word) = &self.word else { return Ok(program.render_long_help().to_string()) };
@@ -95,8 +95,8 @@ fn unknown_command_failure(word: &str, program: &Command) -> Failure {
     Failure::Input(format!("help: found `{word}`, expected a command or a page; {advice}"))
 }
 
-/// The page of a name. Pages of files are found with and without `.toml`, except `twin.toml`, as `twin` is a
-/// command.
+/// The page with the given name. Pages of files are found with and without `.toml`, except `twin.toml`, since
+/// `twin` is a command.
 fn find_help_page(word: &str) -> Option<&'static HelpContent> {
     let stem = word.strip_suffix(".toml").unwrap_or(word);
     PAGES.iter().find(|(name, ..)| *name == word || *name == stem).map(|(.., content)| content)
@@ -112,7 +112,7 @@ impl HelpContent {
     }
 }
 
-/// The keys of a file as a page for the terminal.
+/// The keys of a file, as a page for the terminal.
 fn render_keys(tables: &[KeyTable]) -> String {
     let mut text = String::new();
     let mut add = |line: &str| {
@@ -142,7 +142,7 @@ fn render_keys(tables: &[KeyTable]) -> String {
     text
 }
 
-// `wiperlab completions`
+// `wiperlab completions`.
 
 const COMPLETIONS_HELP: &str = "\
 For example:
@@ -155,7 +155,7 @@ For example:
 #[derive(Debug, Args)]
 #[command(after_help = COMPLETIONS_HELP)]
 pub(crate) struct CompletionsArgs {
-    /// The shell
+    /// Shell for which the script is printed
     pub shell: Shell,
 }
 
@@ -168,7 +168,7 @@ impl CompletionsArgs {
     }
 }
 
-// `wiperlab man`
+// `wiperlab man`.
 
 #[derive(Debug, Args)]
 pub(crate) struct ManArgs {
@@ -192,7 +192,7 @@ impl ManArgs {
     }
 }
 
-/// Adds the page of a command and of its subcommands.
+/// Adds the manual page of a command and those of its subcommands.
 fn add_manual_page(pages: &mut Vec<(String, Vec<u8>)>, command: &Command, name: &str) -> Outcome<()> {
     let mut page = Vec::new();
     Man::new(command.clone()).render(&mut page).map_err(Failure::internal)?;

@@ -11,7 +11,7 @@ use crate::recording::files::{DESCRIPTION_FILE, RecordingFile, TRACE_FILE, YAxis
 use clap::ValueEnum;
 use serde::Serialize;
 
-/// Names of formats in a line of the help.
+/// Number of names of formats per line of the help.
 const NAMES_A_LINE: usize = 8;
 
 fn after_help() -> String {
@@ -51,17 +51,18 @@ pub(crate) struct ImportOptionArgs {
     /// Exported tables; several are merged on one frame grid
     #[arg(value_name = "FILE", required = true)]
     pub sources: Vec<PathBuf>,
-    /// Folder of the recording, e.g. data/NAME
+    /// Folder of the recording, such as data/NAME
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// auto, or the name of a format (see below)
+    /// Format of the file: auto, or the name of a format (see below)
     #[arg(long, default_value = "auto", value_name = "FORMAT")]
     pub format: String,
-    /// Rate at which the camera recorded, frames/s (required unless the file or the camera's record has it)
+    /// Rate at which the camera recorded, frames/s (required unless the file or the camera's record states
+    /// it)
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub frame_rate_hz: Option<f64>,
-    /// Length a pixel such as 21.5um/px, or the unit of the file: m, cm, mm, um (required unless the
-    /// file names a length)
+    /// Length per pixel such as 21.5um/px, or the unit of the file: m, cm, mm, um (required unless the file
+    /// states a unit of length)
     #[arg(long, value_name = "SCALE", allow_hyphen_values = true)]
     pub scale: Option<String>,
     /// Direction of y in the file (required unless the format fixes it)
@@ -70,38 +71,39 @@ pub(crate) struct ImportOptionArgs {
     /// Track of a point: tip=NAME or head=NAME
     #[arg(long, value_name = "POINT=TRACK")]
     pub point: Vec<String>,
-    /// Columns of a plain table, e.g. time=1,tip-x=2,tip-y=3,head-x=4,head-y=5
+    /// Columns of a plain table, such as time=1,tip-x=2,tip-y=3,head-x=4,head-y=5
     #[arg(long, value_name = "KEY=COLUMN,...")]
     pub columns: Option<String>,
-    /// What the time column holds: seconds or milliseconds of the recording itself (the rate may then be left
-    /// out), numbers of frames, or times of playback (then they only count frames)
+    /// Meaning of the time column: seconds or milliseconds of the recording itself (the frame rate may then
+    /// be omitted), numbers of frames, or times of playback (these only count the frames)
     #[arg(long, value_enum)]
     pub time: Option<TimeMeaning>,
-    /// Frames from row to row where only every n-th frame was tracked and the table has no frame column
+    /// Number of frames from row to row, if only every n-th frame was tracked and the table has no frame
+    /// column
     #[arg(long, value_name = "N", value_parser = parse_count, allow_negative_numbers = true)]
     pub frame_step: Option<usize>,
     /// Exposure of a frame, s
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub exposure_s: Option<f64>,
-    /// Positions of less confidence count as missing, 0 to 1
+    /// Treat positions with a lower confidence than this as missing, 0 to 1
     #[arg(long, value_name = "P", allow_negative_numbers = true)]
     pub min_likelihood: Option<f64>,
-    /// Measure the tilt of the camera on the path of the tip and turn both tracks by it
+    /// Measure the tilt of the camera from the path of the tip, and rotate both tracks by it
     #[arg(long)]
     pub level: bool,
-    /// Text encoding if the content does not show it, e.g. shift_jis
+    /// Text encoding, if the contents do not show it, such as shift_jis
     #[arg(long, value_name = "NAME")]
     pub encoding: Option<String>,
-    /// A fact of the test for [conditions], e.g. glass=wet (repeatable)
+    /// A fact of the test for [conditions], such as glass=wet (repeatable)
     #[arg(long, value_name = "KEY=VALUE")]
     pub condition: Vec<String>,
-    /// Specification of the twin that made the export; marks the recording as synthetic
+    /// Specification of the twin from which the export was made; marks the recording as synthetic
     #[arg(long, value_name = "SPEC.toml")]
     pub twin: Option<PathBuf>,
-    /// One JSON object on standard output: format, notes, and everything that `inspect --json` says
+    /// Print one JSON object to standard output: format, notes, and everything that `inspect --json` prints
     #[arg(long)]
     pub json: bool,
-    /// Check and report only, with the first rows; write nothing
+    /// Only check and report, with the first rows; write nothing
     #[arg(long)]
     pub dry_run: bool,
     #[command(flatten)]
@@ -147,7 +149,7 @@ impl ImportOptionArgs {
         Ok(CommandOutcome::Done)
     }
 
-    /// Converts the options to those of the library.
+    /// Converts the arguments to the options of the library.
     fn import_options(&self) -> Outcome<ImportOptions> {
         let named = self.out.file_name().map(|name| name.to_string_lossy().into_owned());
         let mut options = ImportOptions {
@@ -182,7 +184,7 @@ impl ImportOptionArgs {
         Ok(options)
     }
 
-    /// What the import may overwrite: a measured recording only if it comes from the same exports.
+    /// What the import may overwrite: a measured recording only if it is from the same exports.
     fn write_policy(&self, sources: &[ImportSource]) -> WritePolicy {
         let exports = import::source::preserved_files(sources).into_iter();
         let exports = exports.map(|(_, bytes)| crate::text::sha256(bytes)).collect();
@@ -217,11 +219,11 @@ impl ImportOptionArgs {
     }
 }
 
-/// What `--json` prints of an import.
+/// Output of an import with `--json`.
 #[derive(Debug, Serialize)]
 struct ImportSummary {
     out: String,
-    /// False for a dry run.
+    /// Whether the files were written; false for a dry run.
     written: bool,
     /// Files in the folder.
     files: Vec<String>,
@@ -240,10 +242,10 @@ fn output_names(sources: &[ImportSource]) -> impl Iterator<Item = &str> {
         .chain([TRACE_FILE, DESCRIPTION_FILE])
 }
 
-/// Rows of the trace that a dry run shows.
+/// Number of rows of the trace that a dry run shows.
 const PREVIEWED_ROWS: usize = 3;
 
-/// The names of the files and the first rows of the traces.
+/// Prints the names of the files and the first rows of the traces.
 fn print_preview(imported: &Import, sources: &[ImportSource]) {
     print_line!("files: {}", output_names(sources).collect::<Vec<_>>().join(", "));
     let start: String = trace_blocks(&imported.recording).take(2).collect();
@@ -252,13 +254,13 @@ fn print_preview(imported: &Import, sources: &[ImportSource]) {
     }
 }
 
-/// Longest line of an export, bytes: a hundred thousand columns.
+/// Maximum length of a line of an export, bytes: enough for a hundred thousand columns.
 const LONGEST_LINE: usize = 1_000_000;
-/// Bytes of a line that a refusal shows.
+/// Number of bytes of the line that a refusal shows.
 const LINE_SHOWN: usize = 40;
 
-/// Reads a table. A file without line ends is refused, because its cells would fill the memory; markup may be
-/// one line.
+/// Reads a table. A file without line ends is refused, since its cells would fill the memory; a file with
+/// markup may be a single line.
 fn read_table(path: &Path) -> Outcome<Vec<u8>> {
     let bytes = files::read_data(path)?;
     let is_markup = bytes.iter().take(16).any(|byte| *byte == b'<');
@@ -276,7 +278,7 @@ fn read_table(path: &Path) -> Outcome<Vec<u8>> {
     }
 }
 
-/// A file with its companions.
+/// Reads a file with its companions.
 fn read_source(path: &Path) -> Outcome<ImportSource> {
     if files::is_standard_input(path) {
         return Ok(ImportSource::without_companions(files::display_name(path), read_table(path)?));
@@ -284,14 +286,14 @@ fn read_source(path: &Path) -> Outcome<ImportSource> {
     let name = path.display().to_string();
     let mut names = import::companion_names(&name);
     names.retain(|companion| *companion != name && Path::new(companion).is_file());
-    // on file systems that ignore case one file is found under two spellings
+    // on file systems that ignore case, one file is found under two spellings
     names.dedup_by(|a, b| a.eq_ignore_ascii_case(b));
     let read = |name: String| Ok(CompanionFile { bytes: files::read_data(Path::new(&name))?, name });
     let companions = names.into_iter().map(read).collect::<Outcome<Vec<_>>>()?;
     Ok(ImportSource { bytes: read_table(path)?, name, companions })
 }
 
-/// Imports sources into a folder.
+/// Imports the given sources into a folder.
 pub(crate) fn import_into(
     folder: &Path,
     sources: &[ImportSource],
@@ -302,8 +304,8 @@ pub(crate) fn import_into(
     write_recording(folder, &WritePolicy::new(OutputCommand::Import, overwrite), sources, &imported)
 }
 
-/// Keeps what the user wrote into a description that is replaced, unless the command line gives it: facts of
-/// the test, and the folder of the video frames.
+/// Preserves what the user wrote into a description that is about to be replaced, unless the command line
+/// gives it: facts of the test, and the folder of the video frames.
 fn keep_user_notes(folder: &Path, description: &mut RecordingFile) {
     let Ok(text) = files::read_text(&folder.join(DESCRIPTION_FILE)) else { return };
     let Ok(replaced) = RecordingFile::parse(DESCRIPTION_FILE, &text) else { return };
@@ -313,7 +315,7 @@ fn keep_user_notes(folder: &Path, description: &mut RecordingFile) {
     }
 }
 
-/// The exports as they came, the traces and the description.
+/// Writes the unchanged exports, the traces and the description.
 fn write_recording(
     folder: &Path,
     writer: &WritePolicy,

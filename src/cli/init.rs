@@ -18,19 +18,19 @@ you can measure (marked YOURS). Replace those, then:
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP)]
 pub(crate) struct InitArgs {
-    /// A recording's folder, or a trace.csv alone
+    /// Folder of a recording, or a single trace.csv
     #[arg(value_name = "RECORDING", required_unless_present = "scene", conflicts_with = "scene")]
     pub recording: Option<PathBuf>,
-    /// Only a scene, without a recording
+    /// Write only a scene, without a recording
     #[arg(long)]
     pub scene: bool,
-    /// For a blade whose neck has no shoulder to lean on
+    /// Write a scene for a blade whose neck has no shoulder to lean on
     #[arg(long)]
     pub no_shoulder: bool,
-    /// Amplitude of the head, half its stroke, m, where the head was not tracked; otherwise estimated
+    /// Amplitude of the head, half its stroke, m, if the head was not tracked; otherwise estimated
     #[arg(long, value_name = "M", requires = "recording", allow_negative_numbers = true)]
     pub amplitude_m: Option<f64>,
-    /// Strokes there and back a second, Hz, where the head was not tracked; otherwise estimated
+    /// Strokes there and back per second, Hz, if the head was not tracked; otherwise estimated
     #[arg(long, value_name = "HZ", requires = "recording", allow_negative_numbers = true)]
     pub frequency_hz: Option<f64>,
     /// Folder for scene.toml and job.toml
@@ -40,7 +40,7 @@ pub(crate) struct InitArgs {
     pub overwrite: Overwrite,
 }
 
-/// The drafted files by name, and the findings that they rest on.
+/// The drafted files by name, and the findings on which they are based.
 type DraftFiles = (Vec<(&'static str, String)>, Vec<String>);
 
 impl InitArgs {
@@ -85,7 +85,7 @@ impl InitArgs {
         Ok((vec![(SCENE, scene), (JOB, job)], found.describe()))
     }
 
-    /// The stroke as typed.
+    /// The stroke as given by the options.
     fn known_stroke(&self) -> Outcome<KnownStroke> {
         let typed = [("--amplitude-m", self.amplitude_m), ("--frequency-hz", self.frequency_hz)];
         let is_wrong = |value: &f64| !(value.is_finite() && *value > 0.0);

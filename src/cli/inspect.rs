@@ -25,14 +25,14 @@ components of the published experiment.";
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP)]
 pub(crate) struct InspectArgs {
-    /// A recording's folder, or a trace.csv alone
+    /// Folder of a recording, or a single trace.csv
     #[arg(value_name = "RECORDING")]
     pub recording: PathBuf,
-    /// Scene whose modes the recording is to show (scene.toml); otherwise the components of the published
+    /// Scene whose modes the recording should show (scene.toml); otherwise the components of the published
     /// experiment
     #[arg(long, value_name = "SCENE.toml")]
     pub scene: Option<PathBuf>,
-    /// One JSON object on standard output: measurements, findings, components, reversals
+    /// Print one JSON object to standard output: measurements, findings, components, reversals
     #[arg(long)]
     pub json: bool,
     #[command(flatten)]
@@ -42,7 +42,7 @@ pub(crate) struct InspectArgs {
 }
 
 impl InspectArgs {
-    /// `--quiet` still prints the verdict, because the command is run for it.
+    /// Prints the verdict even with `--quiet`, since the command is run for it.
     pub(crate) fn run(&self, global: &GlobalArgs) -> Outcome {
         let scene = self.scene.as_deref().map(read_scene).transpose()?;
         self.figures.check_folder(&[FIGURE], self.overwrite)?;
@@ -110,7 +110,7 @@ fn print_slope(found: &Inspection) {
     }
 }
 
-/// Turns listed in the table; a longer recording has them all in the JSON.
+/// Maximum number of turns listed in the table; the JSON lists all turns.
 const MOST_TURNS: usize = 10;
 
 fn print_reversals(turns: &[InspectedReversal]) {
@@ -131,7 +131,7 @@ fn print_components(components: &InspectedComponents) {
     }
 }
 
-/// All findings on a recording; the JSON object of `--json`.
+/// All findings on a recording; the JSON object that `--json` prints.
 #[derive(Debug, Serialize)]
 pub(crate) struct Inspection {
     pub recording: String,
@@ -141,14 +141,14 @@ pub(crate) struct Inspection {
     findings: Vec<QualityFinding>,
     #[serde(flatten)]
     pub tilt: GlassSlope,
-    /// The rotation of the import, where it was asked for.
+    /// The rotation applied by the import, if it was requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub level: Option<LevelEntry>,
     pub components: InspectedComponents,
     pub reversals: Vec<InspectedReversal>,
 }
 
-/// The slope of the glass in the picture, or why the recording shows none.
+/// The slope of the glass in the picture, or the reason why it cannot be determined.
 #[derive(Debug, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum GlassSlope {
@@ -169,7 +169,7 @@ pub(crate) struct InspectedComponent {
     pub showing: ComponentVisibility,
 }
 
-/// The instants of a turn, s; null where one is not in the recording.
+/// The instants of a reversal, s; null for an instant that the recording does not contain.
 #[derive(Debug, Serialize)]
 pub(crate) struct InspectedReversal {
     pub hold_s: Option<f64>,
@@ -178,7 +178,7 @@ pub(crate) struct InspectedReversal {
 }
 
 impl Inspection {
-    /// Inspects a recording with its description; `more` are findings on its folder.
+    /// Inspects a recording with its description; `more` are findings on the folder of the recording.
     pub(crate) fn from_folder(
         recording: &Recording,
         file: Option<&RecordingFile>,
@@ -190,7 +190,7 @@ impl Inspection {
         Self::from_measurements(recording, file, measurements, more, scene)
     }
 
-    /// Inspects a recording that was just imported, with the quality in its description.
+    /// Inspects a recording that has just been imported, with the quality from its description.
     pub(crate) fn from_import(recording: &Recording, file: &RecordingFile) -> Self {
         let measurements = file
             .quality
@@ -231,13 +231,13 @@ impl Inspection {
         }
     }
 
-    /// The verdict as lines for reading, worst first.
+    /// The verdict as lines of text, the worst first.
     pub(crate) fn verdict_lines(&self) -> Vec<String> {
         quality::verdict_lines(&self.measurements, &self.findings)
     }
 }
 
-/// Whether the recording can show the modes of the scene, or without a scene the published components.
+/// Whether the recording can show the modes of the scene or, without a scene, the published components.
 fn inspect_components(scene: Option<&Scene>, measurements: &Quality) -> InspectedComponents {
     let published = || PUBLISHED_COMPONENTS_HZ.map(|(name, hz)| (name.to_owned(), hz)).to_vec();
     let sought = scene.map_or_else(published, scene_components);
@@ -251,7 +251,8 @@ fn inspect_components(scene: Option<&Scene>, measurements: &Quality) -> Inspecte
     }
 }
 
-/// The head on its spring and the coupled modes of the links, Hz; a mode that does not oscillate is left out.
+/// Natural frequencies, Hz, of the head on its spring and of the coupled modes of the links; modes that do
+/// not oscillate are left out.
 fn scene_components(scene: &Scene) -> Vec<(String, f64)> {
     let blade = &scene.linkage;
     let mut found = vec![("head on its spring".to_owned(), body_frequencies(blade).head_hz)];

@@ -1,7 +1,7 @@
-//! SIGINT, SIGTERM and the time limit. A command that can stop early is asked to, and writes what it has. Any
-//! other command, and one that does not stop in time, is ended at once. In both cases the program prints what
-//! was computed, exits with the code of an early stop, and leaves neither a part of its files nor temporary
-//! ones.
+//! SIGINT, SIGTERM and the time limit. A command that can stop early is asked to stop, and writes the results
+//! that it has. Any other command, and a command that does not stop in time, is ended immediately. In both
+//! cases the program prints what was computed, exits with the code of an early stop, and leaves neither
+//! incomplete outputs nor temporary files.
 
 use super::failure::{Failure, Outcome, STOPPED_EARLY};
 use super::progress;
@@ -13,7 +13,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tempfile::NamedTempFile;
 
-/// Time that a command has to stop, so that the program answers within a second.
+/// Time within which a command must stop, so that the program reacts within a second.
 const GRACE: Duration = Duration::from_millis(800);
 
 /// Whether the program was asked to stop.
@@ -25,17 +25,17 @@ static LATE: AtomicBool = AtomicBool::new(false);
 static STATE: Mutex<InterruptState> =
     Mutex::new(InterruptState { kept: None, finishing: false, passing: Vec::new() });
 
-/// State that the end of the program needs.
+/// State that is needed to end the program.
 struct InterruptState {
-    /// Describes what is on the disk if the program ends now; set by commands that can stop.
+    /// Describes which results are on the disk if the program ends now; set by commands that can stop.
     kept: Option<Box<dyn Fn() -> String + Send>>,
     /// Whether the command has stopped and is writing its results.
     finishing: bool,
-    /// Temporary files that are not renamed yet, and new folders without files.
+    /// Temporary files that have not been renamed yet, and new folders that contain no files yet.
     passing: Vec<PathBuf>,
 }
 
-/// Handles signals from now on.
+/// Installs the handler of signals.
 pub(crate) fn install_handler() -> Outcome<()> {
     let mut signals = 0;
     let answer = move || {
@@ -50,7 +50,7 @@ pub(crate) fn install_handler() -> Outcome<()> {
         .map_err(|error| Failure::Internal(format!("signals cannot be answered: {error}")))
 }
 
-/// `Break` after a signal or at the time limit.
+/// `Break` after a signal or after the time limit, otherwise `Continue`.
 pub(crate) fn control_flow() -> ControlFlow<()> {
     if STOP_REQUESTED.load(Ordering::Relaxed) || LATE.load(Ordering::Relaxed) {
         ControlFlow::Break(())
@@ -59,7 +59,7 @@ pub(crate) fn control_flow() -> ControlFlow<()> {
     }
 }
 
-/// Starts the time limit, after which the command is asked to stop as by a signal.
+/// Starts the time limit; after it the command is asked to stop, as by a signal.
 pub(crate) fn set_time_limit(time: Duration) {
     std::thread::spawn(move || {
         std::thread::sleep(time);
@@ -68,18 +68,19 @@ pub(crate) fn set_time_limit(time: Duration) {
     });
 }
 
-/// Registers a command that checks [`control_flow`]; `kept` describes what is on the disk if it does not stop
-/// in time.
+/// Registers a command that checks [`control_flow`]; `kept` describes which results are on the disk if the
+/// command does not stop in time.
 pub(crate) fn register_stoppable(kept: impl Fn() -> String + Send + 'static) -> StopGuard {
     lock_state().kept = Some(Box::new(kept));
     StopGuard
 }
 
-/// Marks the command as one that can stop, until it is dropped.
+/// Until this is dropped, the command counts as one that can stop.
 pub(crate) struct StopGuard;
 
 impl StopGuard {
-    /// Announces that the command has stopped. It may then write for any time; only a second signal ends it.
+    /// Announces that the command has stopped. It may then take any time to write its results; only a second
+    /// signal ends it.
     pub(crate) fn announce_stop(&self, what: &str) {
         lock_state().finishing = true;
         progress::finish_in_words(); // the sentence replaces the bar
@@ -94,7 +95,7 @@ impl Drop for StopGuard {
     }
 }
 
-/// Makes a temporary file that is removed if the program ends before the file is renamed.
+/// Creates a temporary file, which is removed if the program ends before the file is renamed.
 pub(crate) fn track_temporary_file(
     make: impl FnOnce() -> io::Result<NamedTempFile>,
 ) -> io::Result<NamedTempFile> {
@@ -104,7 +105,7 @@ pub(crate) fn track_temporary_file(
     Ok(file)
 }
 
-/// Makes folders, outermost first, that are removed if the program ends before they hold a file.
+/// Creates folders, the outermost first, which are removed if the program ends before they contain a file.
 pub(crate) fn track_new_folders(
     folders: Vec<PathBuf>,
     make: impl FnOnce() -> io::Result<()>,
@@ -115,7 +116,7 @@ pub(crate) fn track_new_folders(
     Ok(())
 }
 
-/// While it is held the program does not end, so that files are renamed together.
+/// While the returned lock is held, the program does not end, so that files are renamed together.
 pub(crate) fn lock_renames() -> RenameLock {
     RenameLock(lock_state())
 }
@@ -123,7 +124,7 @@ pub(crate) fn lock_renames() -> RenameLock {
 pub(crate) struct RenameLock(MutexGuard<'static, InterruptState>);
 
 impl RenameLock {
-    /// To be called when every temporary file is renamed.
+    /// Call this when every temporary file has been renamed.
     pub(crate) fn forget_temporaries(mut self) {
         self.0.passing.clear();
     }
@@ -142,16 +143,16 @@ fn end_unless_it_stops() {
     }
 }
 
-/// Why the program ends before its command is done.
+/// Reason why the program ends before its command is done.
 fn why() -> &'static str {
     if STOP_REQUESTED.load(Ordering::Relaxed) { "interrupted" } else { "stopped at the time limit" }
 }
 
-/// Ends the program. The state is locked, so that nothing is renamed meanwhile.
+/// Ends the program. The state is locked, so that nothing is renamed in the meantime.
 fn end_program() -> ! {
     let state = lock_state();
     for path in state.passing.iter().rev() {
-        // the next command removes what is left; only empty folders are removed
+        // the next command removes any remaining files; only empty folders are removed
         let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir(path));
     }
     let kept = state.kept.as_ref().map_or_else(nothing_saved, |kept| kept());

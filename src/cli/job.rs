@@ -1,4 +1,4 @@
-//! A job with the scenes and recordings that it names, read from disk.
+//! A job with the scenes and recordings that it names, read from the disk.
 
 use super::load::{LoadedRecording, load_recording, read_driven_scene};
 use super::prelude::*;
@@ -7,35 +7,35 @@ use crate::fit::{MeasuredRecording, Problem};
 use crate::model::plausibility::PlausibilityFinding;
 use std::collections::BTreeMap;
 
-/// The job of a fit in its folder.
+/// Name of the job file in the folder of a fit.
 pub(crate) const JOB_FILE: &str = "job.toml";
 
-/// The file of a job that is given by the file or its folder.
+/// The job file of a job that is given by that file or by its folder.
 pub(crate) fn job_path(named: &Path) -> PathBuf {
     if named.is_dir() { named.join(JOB_FILE) } else { named.to_owned() }
 }
 
-/// A fit problem with its paths.
+/// A fit problem, with the paths of its files.
 pub(crate) struct LoadedJob {
     pub folder: PathBuf,
-    /// The file of the job, and its name in messages.
+    /// Path of the job file, and its name in messages.
     pub path: PathBuf,
     pub file: String,
     pub problem: Problem,
     /// The file of the scene of each condition.
     pub scene_files: Vec<PathBuf>,
-    /// Implausible values of the scenes, by file.
+    /// Implausible values of the scenes, by scene file.
     pub doubts: BTreeMap<PathBuf, Vec<PlausibilityFinding>>,
-    /// Where the recordings lie, one for each condition of the job that has one.
+    /// Paths of the recordings, one for each condition with a recording.
     pub recording_paths: Vec<PathBuf>,
     /// The recordings with their descriptions.
     pub measured: Vec<LoadedRecording>,
-    /// The recording that drives the scene of a condition, where the scene names one.
+    /// For each condition, the recording that drives its scene, if there is one.
     pub drivers: Vec<Option<PathBuf>>,
 }
 
 impl LoadedJob {
-    /// Reads and checks a job, named by its file or its folder, its scenes and its recordings.
+    /// Reads and checks a job (named by its file or its folder) with its scenes and recordings.
     pub(crate) fn load(named: &Path) -> Outcome<Self> {
         let path = job_path(named);
         if files::is_standard_input(&path) {
@@ -83,7 +83,7 @@ impl LoadedJob {
         self.problem.job()
     }
 
-    /// Every recording with where it lies.
+    /// Every recording with its path.
     pub(crate) fn recordings(&self) -> impl Iterator<Item = (&Path, &LoadedRecording)> {
         self.recording_paths.iter().map(PathBuf::as_path).zip(&self.measured)
     }

@@ -1,5 +1,5 @@
-//! Scenes and recordings from disk. A recording is a folder with `trace.csv` and `recording.toml`, or a
-//! `trace.csv` alone.
+//! Reads scenes and recordings from the disk. A recording is a folder with `trace.csv` and `recording.toml`,
+//! or a single `trace.csv`.
 
 use super::files::{FolderMarker, SIMULATION_SUMMARY, is_simulation_summary};
 use super::prelude::*;
@@ -10,12 +10,12 @@ use crate::recording::quality::{Check, QualityFinding, Severity};
 use crate::simulate::scene::Scene;
 use crate::text::{sha256, text_sha256};
 
-/// Reads a scene that the user named, with the recording that drives it, if one does.
+/// Reads a scene that the user named, with the recording that drives it, if there is one.
 pub(crate) fn read_scene(path: &Path) -> Outcome<Scene> {
     Ok(read_driven_scene(path)?.0)
 }
 
-/// The same, with the path of the recording that drives it, if one does.
+/// Like [`read_scene`], but also returns the path of the recording that drives the scene, if there is one.
 pub(crate) fn read_driven_scene(path: &Path) -> Outcome<(Scene, Option<PathBuf>)> {
     let mut driver = None;
     let recording = |named: &str| {
@@ -41,7 +41,7 @@ pub(crate) fn read_named_scene(file: &Path, named: &str) -> Outcome<Scene> {
     read_scene(&files::resolve_existing_path(file, named).map_err(refused)?)
 }
 
-/// A recording with its description, where it has one.
+/// A recording with its description, if it has one.
 #[derive(Debug)]
 pub(crate) struct LoadedRecording {
     pub recording: Recording,
@@ -49,11 +49,11 @@ pub(crate) struct LoadedRecording {
 }
 
 impl LoadedRecording {
-    /// Exposure of a frame, s, as its description has it.
+    /// Exposure of a frame according to the description, s.
     pub(crate) fn exposure_s(&self) -> Option<f64> {
         self.file.as_ref().and_then(|file| file.camera.exposure_s)
     }
-    /// Finding on sources in the folder of the recording at `path` that have changed since the import.
+    /// Finding on sources of the recording at `path` that have changed since the import.
     pub(crate) fn changed_sources(&self, path: &Path) -> Option<QualityFinding> {
         let source = self.file.as_ref()?.source.as_ref()?;
         let description = description_path(path);
@@ -73,8 +73,8 @@ impl LoadedRecording {
     }
 }
 
-/// Reads the recording at `path`, a folder or a trace alone, with the description next to the trace in either
-/// case.
+/// Reads the recording at `path`, which is a folder or a single trace. In either case, the description next
+/// to the trace is read too.
 pub(crate) fn load_recording(path: &Path) -> Outcome<LoadedRecording> {
     let trace = trace_path(path)?;
     let text = files::read_text(&trace)?;
@@ -94,8 +94,8 @@ pub(crate) fn load_recording(path: &Path) -> Outcome<LoadedRecording> {
     Ok(LoadedRecording { recording, file })
 }
 
-/// Whether a command such as `simulate` made the trace, according to the marker of its folder or, without a
-/// marker, the summary of a simulation.
+/// Whether a command such as `simulate` made the trace, according to the marker of its folder; without a
+/// marker, according to the summary of a simulation.
 fn is_simulated(trace: &Path, text: &str) -> Outcome<bool> {
     let folder = files::containing_folder(trace);
     let (marker, _) = FolderMarker::load(folder)?;
@@ -121,7 +121,7 @@ pub(crate) fn description_path(path: &Path) -> PathBuf {
     folder.join(DESCRIPTION_FILE)
 }
 
-/// The trace of the recording at `path`.
+/// Path of the trace of the recording at `path`.
 fn trace_path(path: &Path) -> Outcome<PathBuf> {
     if !path.is_dir() {
         return Ok(path.to_owned());
@@ -134,7 +134,7 @@ fn trace_path(path: &Path) -> Outcome<PathBuf> {
     Ok(trace)
 }
 
-/// Whether a file is a study: it has axes or maps, which no job has.
+/// Whether a file is a study, which has axes or maps; no job has these.
 pub(crate) fn is_study(file: &Path) -> Outcome<bool> {
     let table: Option<toml::Table> = files::read_toml(file)?.parse().ok();
     Ok(table.is_some_and(|table| ["axis", "map"].iter().any(|key| table.contains_key(*key))))

@@ -1,4 +1,4 @@
-//! The options that choose how a scene is integrated.
+//! Options for the integration of a scene.
 
 use super::prelude::*;
 use crate::simulate::fixed_step_scheme::{
@@ -11,31 +11,31 @@ use clap::ValueEnum;
 
 #[derive(Debug, Args)]
 pub(crate) struct MethodArgs {
-    /// Tolerated relative error of a step, instead of the scene's
+    /// Tolerated relative error of a step, instead of that of the scene
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true)]
     pub relative_tolerance: Option<f64>,
     /// Method of integration
     #[arg(long, value_enum, default_value = "adaptive")]
     pub method: MethodName,
-    /// Length of a step, s (fixed-step needs it)
+    /// Length of a step, s (required for fixed-step)
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
     pub step: Option<f64>,
-    /// Where fixed-step takes transitions (default: slack)
+    /// Point at which fixed-step makes transitions (default: slack)
     #[arg(long, value_enum, value_name = "WHERE")]
     pub transitions: Option<TransitionsAt>,
-    /// Gain with which fixed-step stabilises stick, 1/s (default: 1e4; 0 takes the tip's velocity out at the
-    /// transition instead)
+    /// Gain with which fixed-step stabilises stick, 1/s (default: 1e4; with 0 the velocity of the tip is
+    /// removed at the transition instead)
     #[arg(long, value_name = "NUMBER", allow_hyphen_values = true)]
     pub gain: Option<f64>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum MethodName {
-    /// Taylor series with error control, the default; transitions are roots of the guards' own series
+    /// Taylor series with error control, the default; transitions are roots of the series of the guards
     Adaptive,
     /// Order 8 with error control; transitions bracketed on the dense output
     RungeKutta,
-    /// The same; transitions located by the slack variable method
+    /// Order 8 with error control; transitions located by the slack variable method
     Slack,
     /// The paper's scheme: order 4 in fixed steps, stick as a stabilised constraint
     FixedStep,
@@ -49,7 +49,7 @@ pub(crate) enum TransitionsAt {
     Slack,
 }
 
-/// Most steps of a run, about an hour of computing.
+/// Maximum number of steps of a run, about an hour of computing.
 const MOST_STEPS: f64 = 1e10;
 
 impl MethodArgs {
@@ -116,7 +116,7 @@ impl MethodArgs {
     }
 }
 
-/// The fixed-step scheme has neither flight nor impacts.
+/// Refuses scenes with flight or impacts, which the fixed-step scheme does not support.
 fn refuse_flight(scene: &Scene) -> Outcome<()> {
     let (key, found) = if scene.loss == ContactLossRule::Fly {
         ("contact.loss", "fly")

@@ -44,7 +44,7 @@ impl ModesArgs {
     }
 }
 
-/// Names of the figures.
+/// File names of the figures.
 const FIGURES: [&str; 2] = ["tip-compliance", "mode-shapes"];
 
 fn print_mode(tip: &str, mode: &NaturalMode) {

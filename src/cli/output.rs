@@ -1,6 +1,6 @@
-//! Everything that the program prints passes one filter here, so that nothing from a file or the command line
-//! controls a terminal. A failure of standard output is reported at the end; a closed pipe (`| head`) is not
-//! a failure.
+//! Everything that the program prints passes through one filter here, so that no text from a file or from the
+//! command line can control the terminal. A failure of standard output is reported at the end; a closed pipe
+//! (`| head`) is not a failure.
 
 use super::failure::{Failure, Outcome};
 use crate::text::escape_controls;
@@ -9,24 +9,24 @@ use std::fmt::Arguments;
 use std::io::{self, ErrorKind, Write};
 use std::sync::{Mutex, PoisonError};
 
-/// One line of results to standard output.
+/// Prints one line of results to standard output.
 macro_rules! print_line {
     ($($words:tt)*) => {
         $crate::cli::output::write_stdout(&$crate::cli::output::escape_line(format_args!($($words)*)))
     };
 }
 
-/// One line of a message to standard error.
+/// Prints one line of a message to standard error.
 macro_rules! warn_line {
     ($($words:tt)*) => {
         $crate::cli::output::write_stderr(&$crate::cli::output::escape_line(format_args!($($words)*)))
     };
 }
 
-/// The first failure of standard output; nothing more is written after it.
+/// The first failure of standard output; after it, nothing more is written there.
 static STDOUT_FAILURE: Mutex<Option<io::Error>> = Mutex::new(None);
 
-/// A line with its line end; line ends and other control characters within it are escaped.
+/// A text as one line with its line end; control characters within it, such as line ends, are escaped.
 pub(crate) fn escape_line(words: Arguments<'_>) -> String {
     escape_controls(&words.to_string()) + "\n"
 }
@@ -45,7 +45,7 @@ pub(crate) fn write_stdout(text: &str) {
     }
 }
 
-/// Lines to standard output.
+/// Prints lines to standard output.
 pub(crate) fn print_lines(text: &str) {
     write_stdout(&escape_lines(text));
 }
@@ -64,7 +64,7 @@ pub(crate) fn check_stdout() -> Outcome<()> {
     }
 }
 
-/// Prints help of clap to standard output, and refusals, which repeat what was typed, to standard error.
+/// Prints help from clap to standard output, and refusals, which repeat what was typed, to standard error.
 pub(crate) fn print_usage(error: &clap::Error, arguments: &[OsString]) -> Outcome<()> {
     let typed = arguments.iter().any(|word| {
         let word = word.to_string_lossy();

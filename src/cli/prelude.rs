@@ -1,4 +1,4 @@
-//! What every command imports.
+//! Imports that all commands share.
 
 pub(super) use super::args::GlobalArgs;
 pub(super) use super::failure::{CommandOutcome, Failure, Outcome};

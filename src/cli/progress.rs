@@ -1,15 +1,15 @@
-//! Progress on a terminal, silence elsewhere.
+//! Shows progress on a terminal, and nothing elsewhere.
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// The bar of the current work, its name and the unit of its steps.
+/// The bar of the current work, the name of that work, and the unit of its steps.
 static CURRENT_WORK: Mutex<Option<(ProgressBar, &'static str, &'static str)>> = Mutex::new(None);
 
-/// A bar over `total` steps of a unit such as `evaluations`; drawn unless `quiet`, where standard error is a
-/// terminal.
+/// A bar for `total` steps, counted in a unit such as `evaluations`. It is drawn if standard error is a
+/// terminal, unless `quiet`.
 pub(crate) fn start_bar(total: u64, what: &'static str, unit: &'static str, quiet: bool) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(total), draw_target(quiet));
     let template =
@@ -20,7 +20,7 @@ pub(crate) fn start_bar(total: u64, what: &'static str, unit: &'static str, quie
     bar
 }
 
-/// Work in steps of unknown length.
+/// Spinner for work whose steps have unknown durations.
 pub(crate) struct StepSpinner(ProgressBar);
 
 /// Shows the steps of a command; drawn under the same conditions as [`start_bar`].
@@ -39,7 +39,7 @@ pub(crate) fn start_steps(what: &'static str, quiet: bool) -> StepSpinner {
 }
 
 impl StepSpinner {
-    /// The next step, such as `reading the recording`.
+    /// Shows the next step, such as `reading the recording`.
     pub(crate) fn show_step(&self, step: &'static str) {
         self.0.set_message(step);
     }
@@ -56,7 +56,7 @@ fn draw_target(quiet: bool) -> ProgressDrawTarget {
     if is_drawn { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() }
 }
 
-/// Ends the current bar and returns its progress in words.
+/// Ends the current bar, and returns its progress as text.
 pub(crate) fn finish_in_words() -> Option<String> {
     let present = CURRENT_WORK.lock().unwrap_or_else(PoisonError::into_inner);
     let (bar, what, unit) = present.as_ref().filter(|(bar, ..)| !bar.is_finished())?;
@@ -68,14 +68,14 @@ pub(crate) fn finish_in_words() -> Option<String> {
     Some(reached)
 }
 
-/// A line of progress to standard error, unless `quiet`.
+/// Prints a line of progress to standard error, unless `quiet`.
 pub(crate) fn print_progress(quiet: bool, line: &str) {
     if !quiet {
         warn_line!("{line}");
     }
 }
 
-/// Prints the progress of a bar that is not drawn, for example in the log of a batch system.
+/// Prints the progress of a bar that is not drawn, for example to the log of a batch system.
 pub(crate) struct ProgressReporter {
     bar: ProgressBar,
     due: Mutex<Option<Instant>>,
@@ -84,7 +84,7 @@ pub(crate) struct ProgressReporter {
 impl ProgressReporter {
     /// Interval between two lines.
     const PAUSE: Duration = Duration::from_secs(60);
-    /// Time to the first line, short so that a mistake shows early.
+    /// Time until the first line; short, so that a mistake shows early.
     const FIRST: Duration = Duration::from_secs(10);
 
     /// Prints nothing if `says` is false or the bar is drawn.
@@ -107,7 +107,7 @@ impl ProgressReporter {
     }
 }
 
-/// A time in its largest fitting unit.
+/// A time in the largest suitable unit.
 fn format_duration(time_s: f64) -> String {
     match time_s {
         time_s if time_s < 90.0 => format!("{time_s:.0} s"),

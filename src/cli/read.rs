@@ -1,4 +1,4 @@
-//! Readers for other programs: the same files, checks and messages as on the command line.
+//! Functions for other programs that read files with the same checks and messages as the command line.
 
 pub use super::failure::Failure;
 use super::load::{load_recording, read_driven_scene};
@@ -8,7 +8,7 @@ use crate::recording::Recording;
 use crate::simulate::scene::Scene;
 use std::path::{Path, PathBuf};
 
-/// A scene, with the path of the recording that drives it, if one does.
+/// Reads a scene; also returns the path of the recording that drives it, if there is one.
 ///
 /// # Errors
 /// [`Failure::Input`] with file, key, what was found, what was expected and what to do.
@@ -16,8 +16,8 @@ pub fn read_scene(path: &Path) -> Result<(Scene, Option<PathBuf>), Failure> {
     read_driven_scene(path)
 }
 
-/// A recording: a folder with `trace.csv`, or a trace alone; with the exposure of a frame, s, where that is
-/// known.
+/// Reads a recording, a folder with `trace.csv` or a single trace; also returns the exposure of a frame, s,
+/// if known.
 ///
 /// # Errors
 /// As [`read_scene`].
@@ -27,7 +27,7 @@ pub fn read_recording(path: &Path) -> Result<(Recording, Option<f64>), Failure> 
     Ok((loaded.recording, exposure_s))
 }
 
-/// A job with its scenes and recordings.
+/// Reads a job with its scenes and recordings.
 ///
 /// # Errors
 /// As [`read_scene`].
@@ -35,7 +35,7 @@ pub fn read_problem(path: &Path) -> Result<Problem, Failure> {
     Ok(super::job::LoadedJob::load(path)?.problem)
 }
 
-/// Resolves a path that is written in a file, from the folder of that file.
+/// Resolves a path that is written in a file and is relative to the folder of that file.
 ///
 /// # Errors
 /// A message if nothing exists there.
@@ -43,7 +43,7 @@ pub fn resolve_existing_path(file: &Path, named: &str) -> Result<PathBuf, String
     super::files::resolve_existing_path(file, named)
 }
 
-/// Text of a TOML file, which people write.
+/// Reads a TOML file as text.
 ///
 /// # Errors
 /// As [`read_scene`].
@@ -54,15 +54,15 @@ pub fn read_toml_text(path: &Path) -> Result<String, Failure> {
 /// Options of `wiperlab spectrum`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpectrumOptions {
-    /// Its channel, such as `head-drop`.
+    /// Channel, such as `head-drop`.
     pub channel: String,
-    /// Its window, such as `after`.
+    /// Window, such as `after`.
     pub window: String,
-    /// Trend that is removed first; `auto` chooses it from the record.
+    /// Trend to be removed first; `auto` chooses it from the record.
     pub detrend: String,
     /// Band in which components are sought, Hz; `None` for all frequencies.
     pub band_hz: Option<(f64, f64)>,
-    /// Most components that are listed; `None` for the default.
+    /// Maximum number of listed components; `None` for the default.
     pub max_components: Option<usize>,
     /// Exposure of a frame, s.
     pub exposure_s: Option<f64>,

@@ -1,4 +1,4 @@
-//! `wiperlab report`: the page of a fit, or of several side by side.
+//! `wiperlab report`: the page of a fit, or the comparison of several fits.
 
 mod fit_comparison;
 mod provenance;
@@ -20,13 +20,13 @@ use video::FramePictures;
 
 #[derive(Debug, Args)]
 pub(crate) struct ReportArgs {
-    /// Folder of a fit (fits/NAME), with its job.toml and result.json, or its job; several are compared
+    /// Folder of a fit (fits/NAME) with its job.toml and result.json, or its job; several fits are compared
     #[arg(required = true, value_name = "FIT")]
     pub fits: Vec<PathBuf>,
-    /// Folder of the report (default: reports/NAME next to the fits, of several reports/A-and-B)
+    /// Folder of the report (default: reports/NAME next to the fits; for several fits reports/A-and-B)
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Exit with 3 when the model does not explain the recording or misses a component, in any of the fits
+    /// Exit with code 3 if the model does not explain the recording or misses a component, in any of the fits
     #[arg(long)]
     pub check: bool,
     #[command(flatten)]
@@ -49,18 +49,18 @@ impl ReportArgs {
     }
 }
 
-/// The folder `reports` next to the folder `fits` that holds `fits/NAME`.
+/// The folder `reports` next to the folder `fits` in which `fits/NAME` is.
 fn default_reports_folder(fit: &Path) -> PathBuf {
     let full = fit.canonicalize().unwrap_or_else(|_| fit.to_owned());
     full.parent().and_then(Path::parent).unwrap_or(Path::new("")).join("reports")
 }
 
-/// A fit with its result, checked to belong to the job as it is now.
+/// A fit with its result, which has been checked to belong to the present job.
 struct ReportedFit {
     name: String,
     problem: LoadedJob,
     result: FitResult,
-    /// Pictures of the frames of every recording that has some.
+    /// Pictures of the frames, for every recording that has some.
     videos: Vec<Option<FramePictures>>,
 }
 
@@ -114,8 +114,8 @@ impl ReportedFit {
         Ok(best)
     }
 
-    /// The report, made by [`assembly::build_report`] or [`assembly::build_report_without_figures`], with its
-    /// provenance.
+    /// The report with its provenance, made by [`assembly::build_report`] or
+    /// [`assembly::build_report_without_figures`].
     fn build_report(&self, made: ReportBuilder, best: &[ModelRun]) -> Outcome<Report> {
         let mut report = made(self.problem.job(), &self.measured_recordings(), best, &self.result);
         self.videos.iter().flatten().try_for_each(FramePictures::check_pictures)?;
@@ -127,7 +127,8 @@ impl ReportedFit {
     }
 }
 
-/// Writes the report of a fit. True if the model does not explain the recording or misses a component.
+/// Writes the report of a fit. Returns true if the model does not explain the recording or misses a
+/// component.
 pub(crate) fn write_report(
     fit: &Path,
     out: &Path,
@@ -158,7 +159,7 @@ pub(crate) fn write_report(
 const JSON_FILE: &str = "report.json";
 const PAGE_FILE: &str = "index.html";
 
-/// Contents of the folder of a report.
+/// Contents of a report folder.
 pub(crate) struct ReportFiles<'a> {
     pub figures: Vec<&'a FigureBlock>,
     pub json: String,
@@ -168,7 +169,7 @@ pub(crate) struct ReportFiles<'a> {
 }
 
 impl ReportFiles<'_> {
-    /// Writes everything or nothing.
+    /// Writes all files or none.
     pub(crate) fn write_to_folder(
         &self,
         folder: &Path,

@@ -1,11 +1,11 @@
-//! The observer of a run that a user waits for.
+//! Observer of a run for which a user waits.
 
 use super::{interrupt, progress};
 use crate::simulate::{Observer, SolutionSegment};
 use indicatif::ProgressBar;
 use std::ops::ControlFlow;
 
-/// Segments between two updates of the bar; each takes microseconds.
+/// Number of segments between two updates of the bar; each segment takes microseconds.
 const PIECES_A_LOOK: u32 = 64;
 
 /// Shows the progress of a run, and stops it on request.
@@ -16,7 +16,7 @@ pub(crate) struct ProgressObserver {
 }
 
 impl ProgressObserver {
-    /// For a run between two instants, s.
+    /// Observer of a run between two instants, s.
     pub(crate) fn new([start_s, stop_s]: [f64; 2], command: &'static str, quiet: bool) -> Self {
         let bar = progress::start_bar(to_milliseconds(stop_s - start_s), command, "ms of the model", quiet);
         Self { bar, start_s, pieces: 0 }

@@ -27,14 +27,14 @@ const COLUMNS: [(Channel, &str); 7] = [
     (Channel::TipVelocity, "tip_velocity_m_per_s"),
 ];
 
-/// Parameters that a run is differentiated with respect to.
+/// Parameters with respect to which a run is differentiated.
 pub(crate) struct SensitivityRequest {
     names: Vec<String>,
     seeds: TangentSeeds,
 }
 
 impl SensitivityRequest {
-    /// Checks the names; `None` if there are none.
+    /// Checks the names of the parameters; `None` if there are none.
     pub(crate) fn parse(scene: &Scene, names: &[String], effort: &SolverOptions) -> Outcome<Option<Self>> {
         if names.is_empty() {
             return Ok(None);
@@ -63,7 +63,7 @@ impl SensitivityRequest {
         Ok(Some(Self { names: names.to_vec(), seeds }))
     }
 
-    /// Runs the scene again with derivatives, and writes them row by row.
+    /// Runs the scene again with derivatives, and writes these row by row.
     pub(crate) fn run_to_tables(
         &self,
         scene: &Scene,
@@ -88,7 +88,7 @@ impl SensitivityRequest {
     }
 }
 
-/// Writes derivatives to the two tables.
+/// Writes derivatives to the tables of samples and of events.
 struct SensitivityTables<I: Iterator<Item = f64>> {
     samples: StreamedTable,
     events: StreamedTable,

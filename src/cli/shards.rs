@@ -1,4 +1,5 @@
-//! Shards on disk: `FOLDER/shards/K-of-N.jsonl` next to the results of a study, each written by one program.
+//! Shards on the disk: `FOLDER/shards/K-of-N.jsonl` next to the results of a study; each shard is written by
+//! one program.
 
 use super::prelude::*;
 use crate::checkpoint::{
@@ -8,15 +9,15 @@ use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::BufReader;
 
-/// Folder of the shards in that of the results.
+/// Name of the folder of the shards within the folder of the results.
 pub(crate) const SHARDS_FOLDER: &str = "shards";
 
-/// Journal of a shard.
+/// Path of the journal of a shard.
 pub(crate) fn shard_checkpoint(folder: &Path, shard: Shard) -> PathBuf {
     folder.join(SHARDS_FOLDER).join(shard.file_stem() + ".jsonl")
 }
 
-/// The shards in a folder of results, by number of shards and number.
+/// The shards in a folder of results, sorted by their number of shards, then by their own number.
 pub(crate) fn shard_files(folder: &Path) -> Outcome<Vec<(Shard, PathBuf)>> {
     let folder = folder.join(SHARDS_FOLDER);
     if !folder.is_dir() {
@@ -34,8 +35,8 @@ pub(crate) fn shard_files(folder: &Path) -> Outcome<Vec<(Shard, PathBuf)>> {
     Ok(shards)
 }
 
-/// Calls `each` with the records of another shard, if they are `wanted`. A shard of another problem or
-/// version is refused; a damaged one is left to `wiperlab collect`.
+/// Calls `each` with those records of another shard that are `wanted`. A shard of another problem or version
+/// is refused; a damaged shard is left to `wiperlab collect`.
 pub(crate) fn scan_shard<R: CheckpointRecord>(
     path: &Path,
     header: &CheckpointHeader<R::Body>,
@@ -66,7 +67,7 @@ pub(crate) fn scan_shard<R: CheckpointRecord>(
     }
 }
 
-/// The number of shards that most files have; of two equally frequent ones the larger.
+/// The number of shards that occurs most often among the files; if two occur equally often, the larger one.
 pub(crate) fn usual_shard_count(shards: &[(Shard, PathBuf)]) -> usize {
     let mut counts: BTreeMap<usize, usize> = BTreeMap::new();
     shards.iter().for_each(|(shard, _)| *counts.entry(shard.total()).or_default() += 1);

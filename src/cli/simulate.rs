@@ -30,8 +30,8 @@ pub(crate) struct SimulateArgs {
     pub overwrite: Overwrite,
     #[command(flatten)]
     pub method: MethodArgs,
-    /// Parameters by which sensitivities.csv and event_sensitivities.csv have derivatives, such as
-    /// friction.a,start.neck_angle_rad,drive.scale
+    /// Parameters with respect to which sensitivities.csv and event_sensitivities.csv contain derivatives,
+    /// such as friction.a,start.neck_angle_rad,drive.scale
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     pub sensitivities: Vec<String>,
     #[command(flatten)]
@@ -53,7 +53,7 @@ impl SimulateArgs {
         if !global.quiet {
             print_summary(&summary, &self.out);
         }
-        // the figure needs a run of its own, because the tables keep only one row in memory
+        // the figure needs a run of its own, since the tables keep only one row in memory
         let drawn = || vec![(FIGURE, motion::draw_figure(scene.title(), &RunMotion::simulate(&scene)))];
         self.figures.write_figures(self.overwrite, global.quiet, drawn)?;
         Ok(CommandOutcome::done_if(summary.status == RunStatus::Completed))
@@ -62,21 +62,21 @@ impl SimulateArgs {
 
 const FIGURE: &str = "motion";
 
-/// The tables of a run with their file names.
+/// The tables of a run, with their file names.
 const TABLES: [(OutputTable, &str); 3] = [
     (OutputTable::Trace, "trace.csv"),
     (OutputTable::State, "state.csv"),
     (OutputTable::Events, "events.csv"),
 ];
 
-/// Files that the scene asks for.
+/// Names of the files that the scene requests.
 fn output_names(scene: &Scene, sensitivities: bool) -> Vec<&'static str> {
     let asked = TABLES.into_iter().filter(|(output, _)| scene.run.outputs.contains(output));
     let derivatives = sensitivities::SENSITIVITY_FILES.into_iter().filter(|_| sensitivities);
     asked.map(|(_, name)| name).chain(derivatives).chain([SIMULATION_SUMMARY]).collect()
 }
 
-/// Runs the scene and writes every row as soon as it is known.
+/// Runs the scene, and writes every row as soon as it is known.
 fn run_to_files(
     scene: &Scene,
     effort: SolverOptions,
@@ -88,7 +88,7 @@ fn run_to_files(
         let new = || Ok(StreamedTable::new(place.create_file(name)?, header, least_rows));
         scene.run.outputs.contains(&output).then(new).transpose()
     };
-    // a trace of one row would have no frame rate
+    // a trace with only one row would have no frame rate
     let mut trace = table(OutputTable::Trace, "trace.csv", HEADER, 2)?;
     let mut state = table(OutputTable::State, "state.csv", STATE_HEADER, 1)?;
     let mut events = table(OutputTable::Events, "events.csv", EVENTS_HEADER, 1)?;

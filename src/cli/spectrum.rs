@@ -15,44 +15,44 @@ use plain_charts::Figure;
 use short_spectra::{Detrend, FASTEST_HZ, MAX_COMPONENTS, SampledRecord, SpectralAnalysis, SpectrumSettings};
 use std::ops::Range;
 
-/// The tables of a spectrum.
+/// File names of the tables.
 const TABLES: [&str; 4] = ["components.json", "spectrum.json", "spectrum.csv", "ridge.csv"];
-/// Option value that chooses the trend from the record.
+/// Value of the option `--detrend` with which the trend is chosen from the record.
 const AUTO: &str = "auto";
-/// Seed of the tracking noise with which a simulated trace is filmed.
+/// Seed of the tracking noise that is added when a simulated trace is filmed.
 const FILM_SEED: u64 = 0;
 
 #[derive(Debug, Args)]
 pub(crate) struct SpectrumArgs {
-    /// A recording's folder, or a trace.csv alone
+    /// Folder of a recording, or a single trace.csv
     #[arg(value_name = "RECORDING")]
     pub recording: PathBuf,
     /// Quantity: deflection, head-drop, tip-x or head-x
     #[arg(long, default_value = "deflection", value_name = "CHANNEL")]
     pub channel: String,
-    /// Window: before, stick, flip or after (`after[2]`), seconds (`0.10..0.25`), or from found instants
-    /// (`release+0.02..release[2]-0.1`); default: all
+    /// Window: before, stick, flip or after (`after[2]`), seconds (`0.10..0.25`), or relative to found
+    /// instants (`release+0.02..release[2]-0.1`); default: all
     #[arg(long, default_value = "..", value_name = "A..B", allow_hyphen_values = true)]
     pub window: String,
-    /// What is removed first: auto, none, mean, line, cubic, polynomial:N or high-pass:HZ
+    /// Trend to be removed first: auto, none, mean, line, cubic, polynomial:N or high-pass:HZ
     #[arg(long, default_value = AUTO, value_name = "TREND")]
     pub detrend: String,
     /// Band in which components are sought, Hz; default: all
     #[arg(long, value_name = "LO..HI", allow_hyphen_values = true)]
     pub band: Option<String>,
-    /// Most components listed
+    /// Maximum number of components listed
     #[arg(long, default_value_t = MAX_COMPONENTS, value_name = "N", value_parser = parse_count,
         allow_negative_numbers = true)]
     pub max_components: usize,
-    /// Exposure of a frame, s (default: as recording.toml says)
+    /// Exposure of a frame, s (default: that in recording.toml)
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub exposure_s: Option<f64>,
-    /// Fastest oscillation that the blade may show, Hz: what could fold onto a component is looked for up to
-    /// it
+    /// Fastest oscillation that the blade may show, Hz; faster oscillations that fold onto a component are
+    /// sought up to this frequency
     #[arg(long, default_value_t = FASTEST_HZ, value_name = "HZ", allow_negative_numbers = true)]
     pub fastest_hz: f64,
-    /// A recording whose camera the trace is seen through first: its rate, exposure, noise and lost frames;
-    /// both are analysed alike
+    /// A recording: the trace is first filmed with its rate, exposure, noise and lost frames, and both are
+    /// then analysed in the same way
     #[arg(long, value_name = "RECORDING")]
     pub like: Option<PathBuf>,
     /// Folder for components.json, spectrum.json, the tables and the figures
@@ -62,7 +62,7 @@ pub(crate) struct SpectrumArgs {
     pub overwrite: Overwrite,
 }
 
-/// The checked command line.
+/// The command line after its checks.
 struct SpectrumRequest {
     channel: Channel,
     window: Window,
@@ -75,14 +75,14 @@ struct StudiedWindow {
     exposure_s: Option<f64>,
     frames: Range<usize>,
     analysis: SpectralAnalysis,
-    /// What was done, in words.
+    /// The analysed frames and what was removed from them, as text.
     note: String,
-    /// What to try instead, where the window asks for it.
+    /// Advice on a better window, if this one contains a whole flip.
     hint: Option<String>,
 }
 
 impl SpectrumArgs {
-    /// The command with default options.
+    /// The arguments of the command, with default options.
     pub(crate) fn new(
         recording: &Path,
         channel: &str,
@@ -105,7 +105,7 @@ impl SpectrumArgs {
         }
     }
 
-    /// The files of a recording in memory.
+    /// The files that the command would write, for a recording in memory.
     pub(crate) fn output_files(&self, recording: Recording) -> Outcome<Vec<(String, Vec<u8>)>> {
         let request = self.parse_request()?;
         let exposure_s = self.given_exposure_s()?;
@@ -162,7 +162,7 @@ impl SpectrumArgs {
         global.write_policy(OutputCommand::Spectrum, self.overwrite)
     }
 
-    /// Exposure as given, or as the recording says.
+    /// The exposure given on the command line, otherwise that of the recording.
     fn exposure_for(&self, loaded: &LoadedRecording) -> Outcome<Option<f64>> {
         Ok(self.given_exposure_s()?.or_else(|| loaded.exposure_s()))
     }
@@ -200,7 +200,7 @@ impl SpectrumRequest {
         let frames = self.window.resolve_frames(&recording, &instants).map_err(Failure::input)?;
         let grid = recording.grid();
         let samples = self.channel.samples(&recording);
-        let inside = samples.get(frames.clone()).unwrap_or_default(); // a resolved window lies inside
+        let inside = samples.get(frames.clone()).unwrap_or_default(); // a resolved window lies inside the recording
         let record = SampledRecord { samples: inside, frame_rate_hz: grid.frame_rate_hz, exposure_s };
         let refuse = |error| {
             Failure::Input(format!("{}, {} in `{}`: {error}", recording.name(), self.channel, self.window))
@@ -252,7 +252,7 @@ impl SpectrumRequest {
     }
 }
 
-/// Advice if the window contains a whole flip: no smooth trend describes both sides of it.
+/// Advice for a window that contains a whole flip: no smooth trend fits the motion on both sides of the flip.
 fn flip_hint(instants: &ReversalInstants, (from_s, to_s): (f64, f64)) -> Option<String> {
     let mut flips = (1..).zip(&instants.reversals).filter_map(|(k, reversal)| Some((k, reversal.flip?)));
     let (k, flip) = flips.find(|(_, flip)| from_s < flip.start_s && flip.end_s < to_s)?;

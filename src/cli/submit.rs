@@ -14,7 +14,7 @@ use std::process::Command;
 use std::sync::OnceLock;
 pub(crate) use tasks::TaskList;
 
-/// Who runs the tasks.
+/// The scheduler that runs the tasks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Scheduler {
     Slurm,
@@ -23,32 +23,32 @@ pub(crate) enum Scheduler {
 
 #[derive(Debug, Args)]
 pub(crate) struct SubmitArgs {
-    /// Study to run (sweep.toml), or jobs of fits (fits/NAME/job.toml), each of which one task does whole
+    /// Study to run (sweep.toml), or jobs of fits (fits/NAME/job.toml), each of which is fitted by a single
+    /// task
     #[arg(required = true, value_name = "STUDY|JOB")]
     pub files: Vec<PathBuf>,
-    /// Folder for the results of a study, which every machine sees under the same path; scripts go into
-    /// DIR/shards/submit, logs into DIR/shards/logs (default for jobs, whose results lie next to them: the
-    /// folder in which all of them are)
+    /// Folder for the results of a study, which must have the same path on every machine; scripts are written
+    /// to DIR/shards/submit, logs to DIR/shards/logs (default for jobs, whose results are written next to
+    /// them: the folder that contains all of them)
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Who runs the tasks; `local` is this machine, without a scheduler
+    /// Scheduler that runs the tasks; `local` is this machine, without a scheduler
     #[arg(long, value_enum)]
     pub scheduler: Scheduler,
-    /// Number of tasks that the work is divided into, at most 1000; --threads is the number of cores of each
-    /// (default: 1)
+    /// Number of tasks into which the work is divided, at most 1000; --threads is the number of cores of each
+    /// task (default: 1)
     #[arg(long, value_name = "N", value_parser = tasks::parse_shard_count, allow_negative_numbers = true)]
     pub shards: usize,
-    /// Walltime of a task, such as 01:30:00 or 45min, at least a minute; the task ends by itself shortly
-    /// before
+    /// Walltime of a task, such as 01:30:00 or 45min, at least a minute; the task ends itself shortly before
     #[arg(long, value_name = "TIME", value_parser = plan::parse_walltime)]
     pub time: Option<TimeLimit>,
-    /// Only these tasks, as `wiperlab collect` names them, such as 3,7-12 (default: all)
+    /// Submit only these tasks, as named by `wiperlab collect`, such as 3,7-12 (default: all)
     #[arg(long, value_name = "LIST")]
     pub tasks: Option<TaskList>,
-    /// A further line for Slurm, such as --directive=--partition=short; may be given again
+    /// An additional directive for Slurm, such as --directive=--partition=short; repeatable
     #[arg(long = "directive", value_name = "TEXT", allow_hyphen_values = true)]
     pub directives: Vec<String>,
-    /// Show scripts and commands on standard output; write and run nothing
+    /// Print scripts and commands to standard output; write and run nothing
     #[arg(long)]
     pub print: bool,
     #[command(flatten)]
@@ -104,7 +104,7 @@ impl SubmitArgs {
         local::run_tasks(plan, global)
     }
 
-    /// Writes the scripts and hands them over.
+    /// Writes the scripts, and submits them.
     fn submit_scripts(&self, plan: &SubmissionPlan, global: &GlobalArgs) -> Outcome {
         let scripts = slurm::slurm_scripts(plan);
         if self.print {
@@ -141,14 +141,14 @@ impl SubmitArgs {
     }
 }
 
-/// Options with which the tasks read the same files.
+/// Options with which the tasks read files in the same way as this command.
 fn task_options(global: &GlobalArgs) -> Vec<String> {
     let size = global.max_file_size;
     let words = ["--max-file-size".to_owned(), size.to_string().replace(' ', "")];
     if size == FileSize::DEFAULT { Vec::new() } else { words.to_vec() }
 }
 
-/// Scripts on standard output.
+/// Prints the scripts to standard output.
 fn print_scripts(scripts: &[(&str, String)]) {
     for (place, (name, text)) in scripts.iter().enumerate() {
         if place > 0 {
@@ -159,7 +159,7 @@ fn print_scripts(scripts: &[(&str, String)]) {
     }
 }
 
-/// The failure of a submission of which nothing, or a part, was submitted.
+/// The failure of a submission that submitted nothing, or only a part.
 fn submission_failure(script: &str, submitted: &str, complaint: &str) -> Failure {
     let state = if submitted.trim().is_empty() {
         "nothing was submitted: correct the cause and submit again"
@@ -171,7 +171,7 @@ fn submission_failure(script: &str, submitted: &str, complaint: &str) -> Failure
     Failure::Internal(format!("{script}: `{}` failed: {complaint}; {state}", slurm::SBATCH))
 }
 
-/// Path of the program, if it runs within another process.
+/// Path of the program to start for tasks, if this code runs within another process.
 static EXECUTABLE_PATH: OnceLock<PathBuf> = OnceLock::new();
 
 /// Sets the path of the program; only the first call counts.
@@ -184,9 +184,9 @@ fn executable_path() -> Outcome<PathBuf> {
     EXECUTABLE_PATH.get().map_or_else(|| std::env::current_exe().map_err(unknown), |path| Ok(path.clone()))
 }
 
-// POSIX shell
+// POSIX shell.
 
-/// A word quoted for the shell, where needed.
+/// A word, quoted for the shell if needed.
 pub(crate) fn quote_word(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "/._-+:,=@".contains(c);
     if !word.is_empty() && word.chars().all(plain) {

@@ -18,22 +18,22 @@ use std::io::BufReader;
 
 #[derive(Debug, Args)]
 pub(crate) struct SweepArgs {
-    /// Study to run (sweep.toml): a scene, the parameters that are varied, and what is mapped
+    /// Study to run (sweep.toml): a scene, the parameters to vary, and the quantities to map
     pub sweep: PathBuf,
-    /// Folder for sweep.csv, summary.json, one SVG a map, and journal.jsonl, which grows with every point
+    /// Folder for sweep.csv, summary.json, one SVG per map, and journal.jsonl, to which every point is added
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     #[command(flatten)]
     pub overwrite: Overwrite,
-    /// Go on from the journal in DIR; without it a study starts over and the old journal is kept as
-    /// journal.previous-1.jsonl (the next free number)
+    /// Continue from the journal in DIR; without this option a study starts anew, and the old journal is kept
+    /// as journal.previous-1.jsonl (the next free number)
     #[arg(long)]
     pub resume: bool,
-    /// Do only every N-th point from point K on (K from 0), into DIR/shards/K-of-N.jsonl; goes on from what
-    /// is there, and `wiperlab collect DIR` puts the shards together
+    /// Run only every N-th point, beginning with point K (counted from 0), into DIR/shards/K-of-N.jsonl;
+    /// continues from what that file contains, and `wiperlab collect DIR` puts the shards together
     #[arg(long, value_name = "K/N", conflicts_with = "force")]
     pub shard: Option<Shard>,
-    /// Stop after this time with what is done (exit code 3); such as 45min, 1h30min or 02:00:00
+    /// Stop after this time and keep what is done (exit code 3); such as 45min, 1h30min or 02:00:00
     #[arg(long, value_name = "TIME")]
     pub time_limit: Option<TimeLimit>,
 }
@@ -78,17 +78,17 @@ impl LoadedStudy {
         Ok(Self { study, scene, fingerprint })
     }
 
-    /// First line of every journal of the study.
+    /// The first line of every journal of the study.
     pub(crate) fn header(&self) -> SweepHeader {
         study_header(&self.study, &self.fingerprint)
     }
 
-    /// An empty collection; its temporary file lies in `out` or its nearest existing parent.
+    /// An empty collection, whose temporary file is in `out` or its nearest existing parent.
     pub(crate) fn new_collection(&self, out: &Path) -> Outcome<PointCollection<File>> {
         Ok(PointCollection::new(self.header(), files::create_scratch_file(out)?))
     }
 
-    /// Adds the points of a journal.
+    /// Adds the points of a journal to a collection.
     pub(crate) fn add_checkpoint(&self, points: &mut PointCollection<File>, journal: &Path) -> Outcome<()> {
         let name = journal.display().to_string();
         let refused = |problem: String| Failure::Input(format!("{name}: {problem}"));
@@ -103,7 +103,7 @@ impl LoadedStudy {
     }
 }
 
-/// Why points cannot be collected.
+/// The failure that reports why points cannot be collected.
 pub(crate) fn collection_failure(error: CollectError) -> Failure {
     match error {
         CollectError::Journal(refused) => Failure::input(refused),

@@ -73,7 +73,7 @@ impl TwinArgs {
             CommandOutcome::StoppedEarly
         }))
     }
-    /// Draws the figure, if wanted. It needs another run, for the motion between the frames.
+    /// Draws the figure, if requested. This needs another run, for the motion between the frames.
     fn draw_figure(
         &self,
         spec: &TwinSpec,
@@ -104,19 +104,19 @@ impl TwinArgs {
     }
 }
 
-/// Name of the figure.
+/// File name of the figure.
 const FIGURE: &str = "twin";
-/// The twin as an export of Tracker, and its specification with the truth.
+/// File names of the twin as an export of Tracker, and of its specification with the true values.
 const EXPORT_FILE: &str = "synthetic-tracker-export.txt";
 const SPEC_FILE: &str = "twin.toml";
 
-/// Files that the specification asks for.
+/// Names of the files that the specification requests.
 fn output_names(spec: &TwinSpec) -> Vec<&'static str> {
     let export = if spec.tracker_export { &[EXPORT_FILE, SPEC_FILE][..] } else { &[] };
     [&[TRACE_FILE, DESCRIPTION_FILE], export].concat()
 }
 
-/// `recording.toml` with the whole specification and the truth behind it.
+/// Contents of `recording.toml`, with the whole specification and the true values.
 fn describe_recording(
     spec: &TwinSpec,
     scene: &Scene,

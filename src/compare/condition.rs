@@ -1,4 +1,4 @@
-//! A condition of a job: its recording, and the model at the estimates through the same camera.
+//! A condition of a job: its recording, and the model at the estimates as the same camera would record it.
 
 use super::model_run::{ModelRun, RunSummary, summarize_run};
 use super::ridge::RidgePair;
@@ -17,8 +17,8 @@ use rayon::prelude::*;
 use short_spectra::Target;
 use std::ops::Range;
 
-/// Channels by which a model is judged, in order of preference. The deflection shows stick and slip best,
-/// but it needs the head.
+/// Channels by which a model is judged, in order of preference. The deflection shows stick and slip best, but
+/// it can be computed only if the head is tracked.
 const JUDGED: [Channel; 3] = [Channel::Deflection, Channel::TipX, Channel::HeadX];
 
 /// A fitted recording with its description and its video.
@@ -26,9 +26,9 @@ const JUDGED: [Channel; 3] = [Channel::Deflection, Channel::TipX, Channel::HeadX
 pub struct FittedRecording<'a> {
     /// The traces.
     pub recording: &'a Recording,
-    /// Contents of `recording.toml`, where there is one.
+    /// Contents of `recording.toml`; `None` without that file.
     pub file: Option<&'a RecordingFile>,
-    /// Pictures of its frames, where there are any.
+    /// The video of the recording, if there is one.
     pub film: Option<RecordingVideo<'a>>,
 }
 
@@ -40,25 +40,26 @@ pub struct ConditionComparison<'a> {
     pub result: &'a FitResult,
     /// Index of the condition.
     pub condition: usize,
-    /// The recording; `None` where only numbers are published.
+    /// The recording; `None` if only published numbers are known.
     pub measured: Option<FittedRecording<'a>>,
     /// The model's run at the estimates.
     pub model: &'a ModelRun,
     /// Shift of the model's clock and origin to those of the recording; zero without a recording.
     pub alignment: Alignment,
-    /// Later conditions with the same run of the model; `None` where an earlier condition has the same run.
+    /// Later conditions that share this run of the model; `None` if an earlier condition has the same run.
     pub same_run: Option<Vec<usize>>,
     /// Measured minus model, at the times of the recording.
     pub residual: Option<MotionTraces>,
-    /// Frequency over time of both sides.
+    /// Ridges of recording and model: frequency against time.
     pub ridges: RidgePair,
     noise: Option<RecordingNoise>,
     measured_instants: Option<ReversalInstants>,
-    /// On the model's own clock.
+    /// Instants on the model's own clock.
     model_instants: ReversalInstants,
 }
 
-/// A recording, or the model's view, with the instants of its reversals. Times are on its own clock.
+/// A recording, or the model's view, with the instants of its reversals. All times are on the clock of that
+/// recording.
 #[derive(Debug, Clone, Copy)]
 pub struct TimedRecording<'a> {
     /// The traces.
@@ -74,7 +75,8 @@ impl<'a> ConditionComparison<'a> {
         self.model.view.stick_s.iter().map(|[from, to]| (from + shift_s, to + shift_s)).collect()
     }
 
-    /// Compares the conditions of a job, in order. `measured` has the recordings of the first conditions.
+    /// Compares the conditions of a job, in order. `measured` holds the recordings, which belong to the first
+    /// conditions.
     #[must_use]
     pub fn compare_conditions(
         job: &'a Job,
@@ -107,17 +109,17 @@ impl<'a> ConditionComparison<'a> {
         models.par_iter().enumerate().map(compare).collect()
     }
 
-    /// The recording, where there is one.
+    /// The recording; `None` if there is none.
     pub(crate) fn recording(&self) -> Option<&'a Recording> {
         self.measured.map(|m| m.recording)
     }
 
-    /// Whether there is a synthetic recording.
+    /// Whether the condition has a recording that is synthetic.
     pub(crate) fn is_synthetic(&self) -> bool {
         self.recording().is_some_and(Recording::is_synthetic)
     }
 
-    /// The recording with its instants, where there is one.
+    /// The recording with its instants; `None` without a recording.
     pub(crate) fn measured_side(&self) -> Option<TimedRecording<'_>> {
         let instants = self.measured_instants.as_ref()?;
         self.recording().map(|recording| TimedRecording { recording, instants })
@@ -128,14 +130,14 @@ impl<'a> ConditionComparison<'a> {
         TimedRecording { recording: &self.model.view.recording, instants: &self.model_instants }
     }
 
-    /// The recording, otherwise the model.
+    /// The recording with its instants; without a recording, the model.
     pub(crate) fn measured_or_model(&self) -> TimedRecording<'_> {
         self.measured_side().unwrap_or_else(|| self.model_side())
     }
 
-    /// Noise of a recorded channel, m, as a trace fit measures it: against the smooth head and the glass,
-    /// because stick and slip move the tip as fast as noise does. Where neither is tracked, the scatter
-    /// between frames. `None` without a recording or without noise.
+    /// Noise of a recorded channel, m, measured as in a fit to traces: from the smooth path of the head and
+    /// from the tip on the glass, since stick and slip move the tip as fast as noise does. If that is not
+    /// possible, it is the scatter between frames. `None` without a recording or without noise.
     pub(crate) fn noise_m(&self, channel: Channel) -> Option<f64> {
         let noise = self.noise.as_ref()?;
         let along_m = noise.along_sweep.as_ref().map(|found| found.noise.sd());
@@ -147,8 +149,8 @@ impl<'a> ConditionComparison<'a> {
         known_m.or_else(|| noise_floor(&channel.samples(self.recording()?))).filter(|noise_m| *noise_m > 0.0)
     }
 
-    /// The channel by which the model is judged, and its noise, m. `None` without a recording, with opposite
-    /// turns of the heads, or with unknown noise.
+    /// The channel by which the model is judged, and its noise, m. `None` without a recording, if the heads
+    /// turn in opposite directions, or if the noise is unknown.
     pub(crate) fn judged_channel(&self) -> Option<(Channel, f64)> {
         let residual = self.residual.as_ref().filter(|_| !self.alignment.opposite_turn)?;
         let is_known = |channel: &Channel| residual.column(*channel).iter().any(Option::is_some);
@@ -156,7 +158,7 @@ impl<'a> ConditionComparison<'a> {
         Some((channel, self.noise_m(channel)?))
     }
 
-    /// Exposure time of a frame, s, where known.
+    /// Exposure time of a frame, s; `None` if unknown.
     pub(crate) fn exposure_s(&self) -> Option<f64> {
         match self.measured {
             Some(measured) => measured.file?.camera.exposure_s,
@@ -164,7 +166,7 @@ impl<'a> ConditionComparison<'a> {
         }
     }
 
-    /// The frequencies that the job targets in the condition.
+    /// The target frequencies of the condition, each with the model's frequency.
     pub(crate) fn frequency_comparisons(&self) -> impl Iterator<Item = FrequencyComparison> + '_ {
         self.targets().filter_map(|aim| compare_frequency(aim, self.result))
     }
@@ -186,7 +188,7 @@ impl<'a> ConditionComparison<'a> {
     }
 }
 
-/// The later conditions with the same run; `None` where an earlier condition has the same run.
+/// The later conditions with the same run; `None` if an earlier condition has the same run.
 fn later_same_runs(runs: &[ModelRun], condition: usize) -> Option<Vec<usize>> {
     let scene = &runs.get(condition)?.scene;
     let mut same = (0..runs.len()).filter(|i| runs.get(*i).is_some_and(|other| other.scene == *scene));
@@ -194,7 +196,7 @@ fn later_same_runs(runs: &[ModelRun], condition: usize) -> Option<Vec<usize>> {
 }
 
 impl TimedRecording<'_> {
-    /// Time of an instant of the first turn, s.
+    /// Time of the given instant of the first reversal, s.
     pub(crate) fn instant_s(&self, anchor: InstantKind) -> Option<f64> {
         self.instants.time_s(anchor, 1).ok()
     }
@@ -204,12 +206,12 @@ impl TimedRecording<'_> {
         channel.samples(self.recording)
     }
 
-    /// Frames of a window; `None` where the recording does not include it.
+    /// Frames of a window; `None` if the recording does not contain it.
     pub(crate) fn window_frames(&self, window: &Window) -> Option<Range<usize>> {
         window.resolve_frames(self.recording, self.instants).ok()
     }
 
-    /// Frames between two of its own times.
+    /// Frames between two times on the clock of the recording.
     pub(crate) fn frames_between(&self, (from_s, to_s): (f64, f64)) -> Range<usize> {
         let grid = self.recording.grid();
         let frame =
@@ -225,24 +227,24 @@ impl TimedRecording<'_> {
 pub(crate) struct FitWindow<'a> {
     pub channel: Channel,
     pub window: Window,
-    /// The first band in it, which decides the trend that is removed.
+    /// The first band of a target in the window; it determines the trend that is removed.
     pub band: Option<&'a FeatureBand>,
-    /// Its targets, in the order of the job.
+    /// The targets in the window, in the order of the job.
     pub targets: Vec<&'a FitTarget>,
 }
 
-/// A target frequency against the model's.
+/// A target frequency compared with the frequency of the model.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FrequencyComparison {
     /// Measured or published frequency.
     pub target: Target,
-    /// Frequency of the model at the estimates, Hz; `None` where the model has none.
+    /// Frequency of the model at the estimates, Hz; `None` if the model has no such component.
     pub model_hz: Option<f64>,
     /// Whether the model's frequency is within the job's tolerance.
     pub met: bool,
 }
 
-/// The band of a target that is read from a spectrum.
+/// The band of a target, if it is measured from a spectrum.
 pub(crate) fn spectral_band(aim: &FitTarget) -> Option<&FeatureBand> {
     aim.feature.reading.band()
 }
@@ -254,7 +256,7 @@ pub(crate) fn group_fit_windows(job: &Job, condition: usize) -> Vec<FitWindow<'_
         let Some(&window) = aim.feature.reading.window() else { continue };
         let own = spectral_band(aim);
         let channel = own.map_or(Channel::Deflection, |band| band.channel);
-        // spectra of one window with different trends are different windows
+        // windows with different detrending are kept apart, since their spectra differ
         let same = |l: &&mut FitWindow| {
             (l.channel, l.window) == (channel, window)
                 && l.band.zip(own).is_none_or(|(a, b)| a.detrend == b.detrend)
@@ -271,18 +273,18 @@ pub(crate) fn group_fit_windows(job: &Job, condition: usize) -> Vec<FitWindow<'_
 }
 
 impl FitWindow<'_> {
-    /// Names of its targets.
+    /// Names of the targets in the window.
     pub(crate) fn feature_names(&self) -> Vec<String> {
         self.targets.iter().map(|aim| aim.feature.name.clone()).collect()
     }
 
-    /// The target frequencies in it.
+    /// The target frequencies in the window, each with the model's frequency.
     pub(crate) fn frequency_comparisons(&self, result: &FitResult) -> Vec<FrequencyComparison> {
         self.targets.iter().filter_map(|aim| compare_frequency(aim, result)).collect()
     }
 }
 
-/// Target and model of a target that is a frequency; `None` for other targets.
+/// Target frequency and frequency of the model; `None` for a target that is not a frequency.
 pub(crate) fn compare_frequency(aim: &FitTarget, result: &FitResult) -> Option<FrequencyComparison> {
     let name = &aim.feature.name;
     if aim.feature.reading.unit() != FeatureUnit::HERTZ {

@@ -1,9 +1,9 @@
-//! Friction measured on a recording, from the deflection of the blade.
+//! Friction measured from the deflection of the blade in a recording.
 //!
-//! A blade whose links turn slowly is in equilibrium, and the deflection `tip_x - head_x` determines both
-//! angles, the normal force and the coefficient of friction. In stick-slip, inertia cancels over whole
-//! cycles, so the mean deflection gives a mean coefficient. That is not a value of the friction law, so it
-//! is compared with the same mean of the model.
+//! A blade whose links turn slowly is in equilibrium, so that the deflection `tip_x - head_x` determines both
+//! angles, the normal force and the coefficient of friction. During stick-slip, inertia averages out over
+//! whole cycles, so the mean deflection gives a mean coefficient. This mean is not a value of the friction
+//! law, so it is compared with the mean coefficient of the model.
 
 use super::condition::{ConditionComparison, TimedRecording};
 use crate::fit::job::Job;
@@ -14,41 +14,42 @@ use crate::simulate::equilibrium::static_deflections;
 use portable_math as math;
 use std::array;
 
-/// A coefficient at a speed.
+/// Coefficient of friction at a speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct FrictionPoint {
     /// Mean speed of the tip, m/s.
     pub speed_m_per_s: f64,
-    /// Friction over normal force.
+    /// Ratio of friction force to normal force.
     pub coefficient: f64,
 }
 
 /// Coefficients of friction from a recording.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct MeasuredFriction {
-    /// Values in steady sliding.
+    /// Coefficients in steady sliding.
     pub steady_sliding: Vec<FrictionPoint>,
-    /// Means over stick-slip cycles.
+    /// Mean coefficients over stick-slip cycles.
     pub over_cycles: Vec<FrictionPoint>,
-    /// Means of the model over stick-slip cycles.
+    /// Mean coefficients of the model over stick-slip cycles.
     pub model_over_cycles: Vec<FrictionPoint>,
 }
 
-/// Length of a block for steady sliding, s.
+/// Length of a block of steady sliding, s.
 const STEADY_BLOCK_S: f64 = 5e-3;
-/// Fewest frames of a block.
+/// Minimum number of frames in a block.
 const MIN_BLOCK_FRAMES: usize = 8;
-/// Least length of a block of stick-slip cycles, s: a dozen cycles of the fast frequency.
+/// Smallest length of a block of stick-slip cycles, s: a dozen cycles of the fast frequency.
 const CYCLE_BLOCK_S: f64 = 0.02;
 /// Length of a block of stick-slip cycles, in cycles of the slowest target frequency.
 const SLOW_CYCLES: f64 = 2.0;
-/// Largest scatter about a parabola, relative to the noise, in steady sliding.
+/// Largest scatter about a parabola that counts as steady sliding, in units of the noise.
 const MAX_SCATTER_OVER_NOISE: f64 = 1.2;
-/// Largest change of the speed within a block, relative to its mean.
+/// Largest change of the speed within a block, as a fraction of its mean.
 const MAX_SPEED_CHANGE: f64 = 0.4;
-/// Least speed of a moving tip, in standard deviations of the speed of a resting tip.
+/// Smallest speed at which the tip counts as moving, in standard deviations of the measured speed of a tip at
+/// rest.
 const MIN_SPEED_SD: f64 = 5.0;
-/// Most points of each of the three kinds.
+/// Maximum number of points of each of the three kinds.
 const MAX_POINTS: usize = 60;
 
 impl MeasuredFriction {
@@ -80,7 +81,7 @@ impl MeasuredFriction {
     }
 }
 
-/// A block of frames in which the tip moves one way.
+/// A block of frames in which the tip moves in one direction.
 #[derive(Debug, Clone, Copy)]
 struct FrictionBlock {
     start_s: f64,
@@ -91,8 +92,8 @@ struct FrictionBlock {
 }
 
 impl FrictionBlock {
-    /// The coefficient of friction for which the deflection is in equilibrium. `deflections` are coefficients
-    /// with their static deflections, m, in rising order.
+    /// The coefficient of friction for which the deflection is in equilibrium. `deflections` holds
+    /// coefficients with their static deflections, m, in ascending order.
     fn friction_point(&self, deflections: &[(f64, f64)]) -> Option<FrictionPoint> {
         let after = deflections.partition_point(|(_, deflection_m)| *deflection_m < self.deflection_m);
         let (a, b) = (deflections.get(after.checked_sub(1)?)?, deflections.get(after)?);
@@ -102,7 +103,7 @@ impl FrictionBlock {
     }
 }
 
-/// The blocks in which the tip moves one way at nearly constant speed.
+/// The blocks in which the tip moves in one direction at nearly constant speed.
 fn one_way_blocks(side: &TimedRecording, length_s: f64, noise_m: f64) -> Vec<FrictionBlock> {
     let grid = side.recording.grid();
     let frames = ((length_s * grid.frame_rate_hz).round() as usize).max(MIN_BLOCK_FRAMES);
@@ -128,7 +129,7 @@ fn one_way_blocks(side: &TimedRecording, length_s: f64, noise_m: f64) -> Vec<Fri
     pairs.filter_map(|(i, (tip, deflection))| block(i, tip, deflection)).collect()
 }
 
-/// A parabola through the frames of a block.
+/// Parabola fitted to the positions of the tip in a block.
 struct TipParabola {
     velocity_m_per_s: f64,
     curvature_m_per_s2: f64,
@@ -136,7 +137,7 @@ struct TipParabola {
 }
 
 impl TipParabola {
-    /// Least squares; `None` with too few frames.
+    /// Least-squares fit; `None` with too few frames.
     fn fit(samples: &[Option<f64>], frame_s: f64) -> Option<Self> {
         let middle = 0.5 * (samples.len() as f64 - 1.0);
         let samples = samples.iter().enumerate();
@@ -174,7 +175,7 @@ pub(crate) struct LawCoefficient {
     pub name: &'static str,
     /// Symbol in the law.
     pub symbol: &'static str,
-    /// Derivative of the law by the coefficient, at a speed.
+    /// Derivative of the law with respect to the coefficient, at a given speed.
     slope: fn(&FrictionLaw, f64) -> f64,
 }
 
@@ -189,12 +190,12 @@ pub(crate) const COEFFICIENTS: [LawCoefficient; 3] = [
     LawCoefficient { name: "friction.c", symbol: "C", slope: |_, _| 1.0 },
 ];
 
-/// Half width of an interval, as a function of the tip's speed, m/s.
+/// Half width of an interval, as a function of the speed of the tip, m/s.
 pub(crate) type HalfInterval = Box<dyn Fn(f64) -> f64>;
 
-/// Half width of the 95 % interval of the coefficient of friction, propagated linearly from the intervals
-/// of the fitted coefficients with their correlations. `None` where no coefficient is fitted, an interval
-/// is open, or the linear model does not determine a fitted coefficient.
+/// Half width of the 95 % interval of the coefficient of friction, propagated linearly from the intervals and
+/// correlations of the fitted coefficients. `None` if no coefficient is fitted, if one of the intervals is
+/// open, or if the linear model does not determine a fitted coefficient.
 pub(crate) fn friction_half_95(job: &Job, result: &FitResult, law: &FrictionLaw) -> Option<HalfInterval> {
     let half = |coefficient: &LawCoefficient| {
         if !is_fitted(job, coefficient) {

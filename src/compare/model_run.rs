@@ -15,7 +15,7 @@ use serde::{Serialize, Serializer};
 /// A run of the model at the estimates in one condition.
 #[derive(Debug, Clone)]
 pub struct ModelRun {
-    /// The scene with the estimates in it.
+    /// The scene with the estimates as its values.
     pub scene: Scene,
     /// The run as the condition's camera records it.
     pub view: TwinView,
@@ -23,10 +23,10 @@ pub struct ModelRun {
     pub motion: RunMotion,
 }
 
-/// Runs the model at the estimates in every condition, at the tolerance of its scene.
+/// Runs the model at the estimates in every condition, with the tolerance of its scene.
 ///
 /// # Errors
-/// [`RunFailure`] when a run ends before its camera took two frames.
+/// [`RunFailure`] if a run ends before its camera has taken two frames.
 pub fn run_conditions(
     job: &Job,
     model: &SceneModel,
@@ -48,20 +48,20 @@ pub fn run_conditions(
 pub struct RunSummary {
     /// Name of the condition.
     pub name: String,
-    /// How it ended; serialized as `status` and, as a sentence, `meaning`.
+    /// How the run ended; serialized as `status` and, as a sentence, `meaning`.
     #[serde(flatten, serialize_with = "with_meaning")]
     pub status: RunStatus,
     /// Start of the run, s.
     pub started_at_s: f64,
     /// End of the run, s.
     pub stopped_at_s: f64,
-    /// Changes of mode.
+    /// Number of changes of contact mode.
     pub transitions: usize,
     /// Number of sticks.
     pub sticks: usize,
     /// The longest stick, s.
     pub longest_stick_s: Option<f64>,
-    /// Fraction of the run in stick.
+    /// Fraction of the run for which the tip sticks.
     pub stick_share: Option<f64>,
     /// Number of losses of contact.
     pub contact_losses: usize,
@@ -69,16 +69,16 @@ pub struct RunSummary {
     pub impacts: usize,
     /// Number of jams of the tip (Painlevé paradox).
     pub jams: usize,
-    /// Whether it ended because more than one mode of contact was consistent with the forces.
+    /// Whether the run ended because more than one contact mode was consistent with the forces.
     pub indeterminate: bool,
-    /// Whether it ended because transitions accumulated in no time.
+    /// Whether the run ended because too many transitions followed each other within a very short time.
     pub chattering: bool,
-    /// Whether the recorded head turns opposite to the model's.
+    /// Whether the recorded head turns in the opposite direction to the model's.
     #[serde(rename = "opposed")]
     pub opposite_turn: bool,
-    /// Least normal force in contact, N.
+    /// Smallest normal force in contact, N.
     pub least_normal_force_n: Option<f64>,
-    /// Least Painlevé indicator in slip.
+    /// Smallest Painlevé indicator in slip.
     pub least_painleve_indicator: Option<f64>,
 }
 
@@ -91,14 +91,14 @@ fn with_meaning<S: Serializer>(status: &RunStatus, to: S) -> Result<S::Ok, S::Er
     StatusWithMeaning { status: *status, meaning: status.meaning() }.serialize(to)
 }
 
-/// Summary of the run of the condition `name`.
+/// Summary of the run of the condition with the given name.
 pub(super) fn summarize_run(name: &str, started_at_s: f64, motion: &RunMotion) -> RunSummary {
     let run = &motion.run;
     let lasted_s = run.stopped_at_s - started_at_s;
     let sticks = motion.stick_s.iter().map(|[from, to]| to - from);
     let stuck_s: f64 = sticks.clone().fold(0.0, |all, one| all + one); // (an empty `sum` is -0)
     let changes = |is: fn(&Transition) -> bool| motion.transitions.iter().filter(|t| is(t)).count();
-    // an event that stops the run is not among the transitions
+    // the event that stops a run is not among its transitions
     let stopped = |status: RunStatus| usize::from(run.status == status);
     RunSummary {
         name: name.to_owned(),
@@ -129,7 +129,7 @@ mod tests {
     const SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
     const FLY: &str = "\n[contact]\nloss = \"fly\"\njam = \"impact\"\n";
 
-    /// The actual blade pressed with another force and wiped faster than any wiper.
+    /// The actual blade, pressed with another force and driven faster than any wiper.
     fn ran(preload_n: f64, frequency_hz: f64, contact: &str) -> RunSummary {
         let text = SCENE.replace("preload_force_n = 0.126", &format!("preload_force_n = {preload_n}"));
         let text = text.replace("frequency_hz = 0.749", &format!("frequency_hz = {frequency_hz:?}"));

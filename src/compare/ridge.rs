@@ -1,4 +1,4 @@
-//! Spectrograms of the deflection of both sides, with the ridges that follow the stick-slip cycle.
+//! Spectrograms of the deflection of recording and model, with the ridges that follow the stick-slip cycle.
 
 use super::condition::{ConditionComparison, TimedRecording, spectral_band};
 use crate::feature::{FeatureBand, Reading};
@@ -9,30 +9,30 @@ use short_spectra::time_frequency::{
 use short_spectra::{Oscillation, SampledRecord, SpectralAnalysis, SpectrumSettings};
 use std::ops::Range;
 
-/// Segment lengths that are tried, relative to the default length, in rising order.
+/// Segment lengths to try, relative to the default length, in ascending order.
 const SEGMENT_LENGTH_FACTORS: [f64; 8] = [0.15, 0.2, 0.3, 0.45, 0.7, 1.0, 1.4, 2.0];
-/// Fewest adjoining segments of a record, so that there is a course.
+/// Number of adjoining segments that a record must be long enough for; with fewer, the ridge has no course.
 const MIN_SEGMENTS: f64 = 3.0;
-/// Fraction of the longest course that counts as equally long.
+/// Fraction of the longest course above which a course counts as equally long.
 const NEARLY_BEST: f64 = 0.95;
-/// Most points of a ridge over speed, so that they do not overlap in a figure.
+/// Maximum number of points of a ridge against speed, so that they do not overlap in a figure.
 const MAX_SPEED_POINTS: usize = 40;
 
 /// The ridges of a condition.
 #[derive(Debug, Clone, Default)]
 pub struct RidgePair {
-    /// Ridge of the recording; `None` where no segment has enough frames.
+    /// Ridge of the recording; `None` if no segment has enough frames.
     pub measured: Option<TrackedRidge>,
-    /// Ridge of the model with segments of the same length, on the model's clock.
+    /// Ridge of the model, with segments of the same length; times are on the model's clock.
     pub model: Option<TrackedRidge>,
 }
 
-/// Spectrogram of a deflection with its strongest component over time.
+/// Spectrogram of a deflection, with its strongest component as a function of time.
 #[derive(Debug, Clone)]
 pub struct TrackedRidge {
     /// Origin of the times of `spectrogram` and `ridge`, s.
     pub start_s: f64,
-    /// Amplitudes over time and frequency.
+    /// Amplitudes as a function of time and frequency.
     pub spectrogram: Spectrogram,
     /// The strongest component of each segment.
     pub ridge: Ridge,
@@ -40,7 +40,7 @@ pub struct TrackedRidge {
     pub courses: Vec<Vec<RidgePoint>>,
     /// Band of the search, Hz.
     pub band_hz: (f64, f64),
-    /// A selection of the points of the courses, with the speed of the tip.
+    /// A selection of the points of the courses, each with the speed of the tip.
     pub over_speed: Vec<SpeedPoint>,
 }
 
@@ -57,7 +57,7 @@ impl RidgePair {
     }
 }
 
-/// From the release of the tip to its next hold; an end that is not found is open.
+/// Window from the release of the tip to its next hold; open at an end that is not found.
 fn release_window(side: &TimedRecording) -> Window {
     let end = |anchor, reversal| match side.instants.time_s(anchor, reversal) {
         Ok(_) => WindowEnd::Found { anchor, reversal, offset_s: 0.0 },
@@ -66,7 +66,8 @@ fn release_window(side: &TimedRecording) -> Window {
     Window { from: end(InstantKind::Release, 1), to: end(InstantKind::Hold, 2) }
 }
 
-/// The model from its own release; where the recording has no release, the time of the recording.
+/// Frames of the model from its own release on; if the recording has no release, the frames within the time
+/// of the recording.
 fn model_frames(case: &ConditionComparison, model: &TimedRecording) -> Option<Range<usize>> {
     let Some(side) = case.measured_side().filter(|side| side.instant_s(InstantKind::Release).is_none())
     else {
@@ -86,7 +87,7 @@ fn fastest_band<'a>(case: &ConditionComparison<'a>) -> Option<&'a FeatureBand> {
         .max_by(|a, b| a.band_hz.0.total_cmp(&b.band_hz.0))
 }
 
-/// Length of the segments in which the job reads cycles, s.
+/// Length of the segments in which the job measures the frequency of cycles, s.
 fn job_segment_s(case: &ConditionComparison) -> Option<f64> {
     case.targets().find_map(|aim| match aim.feature.reading {
         Reading::CycleFrequency { segment_s, .. } => Some(segment_s),
@@ -94,8 +95,8 @@ fn job_segment_s(case: &ConditionComparison) -> Option<f64> {
     })
 }
 
-/// Least length of a segment, s: two cycles of the slowest target frequency, because a segment of about one
-/// cycle shows its swing as a slower component.
+/// Smallest length of a segment, s: two cycles of the slowest target frequency. In a segment of about one
+/// cycle, the oscillation appears as a slower component.
 fn min_segment_s(case: &ConditionComparison) -> f64 {
     const CYCLES: f64 = 2.0;
     case.frequency_comparisons().map(|sought| CYCLES / sought.target.frequency_hz).fold(0.0, f64::max)
@@ -131,8 +132,9 @@ fn track_ridge(
     Some(TrackedRidge { start_s, spectrogram, ridge, courses, band_hz, over_speed })
 }
 
-/// The ridge in segments of a given length. Without a length, the shortest segments whose courses are
-/// nearly as long as the longest: short segments resolve changes, but too short ones break the courses.
+/// The ridge in segments of the given length. If no length is given, the shortest segments are used whose
+/// courses are nearly as long as the longest: short segments resolve changes, but segments that are too short
+/// interrupt the courses.
 fn choose_ridge(
     fast: &[Option<f64>],
     rate_hz: f64,
@@ -159,12 +161,12 @@ fn choose_ridge(
     all.into_iter().find(|(share, _)| *share >= NEARLY_BEST * most).or(Some(first)).map(|(_, ridge)| ridge)
 }
 
-/// Decay in nepers per cycle above which an oscillation ends within a cycle: a damping ratio of 0.22.
+/// Decay in nepers per cycle above which an oscillation dies out within a cycle: a damping ratio of 0.22.
 const MAX_DECAY_PER_CYCLE: f64 = 1.4;
 
-/// The record without its trend and without oscillations below a frequency, m.
+/// The record without its trend and without the oscillations below a frequency, m.
 fn remove_slow_components(analysis: &SpectralAnalysis, rate_hz: f64, low_hz: f64) -> Vec<Option<f64>> {
-    // an oscillation that ends within a cycle belongs to the flip
+    // an oscillation that dies out within a cycle belongs to the flip
     let rings =
         |o: &&Oscillation| o.frequency_hz >= low_hz && o.decay_per_s < MAX_DECAY_PER_CYCLE * o.frequency_hz;
     let kept: Vec<_> = analysis.oscillations.iter().filter(rings).collect();
@@ -174,7 +176,7 @@ fn remove_slow_components(analysis: &SpectralAnalysis, rate_hz: f64, low_hz: f64
     analysis.residual_m.iter().enumerate().map(at).collect()
 }
 
-/// Points of the courses with the mean speed of the tip in each segment.
+/// Points of the courses, each with the mean speed of the tip in its segment.
 fn ridge_over_speed(
     side: &TimedRecording,
     first: usize,
@@ -197,7 +199,7 @@ fn ridge_over_speed(
 }
 
 impl TrackedRidge {
-    /// Least and greatest frequency of the courses, Hz.
+    /// Lowest and highest frequency of the courses, Hz.
     pub(crate) fn frequency_range_hz(&self) -> Option<(f64, f64)> {
         let all = || self.courses.iter().flatten().map(|p| p.frequency_hz);
         all().reduce(f64::min).zip(all().reduce(f64::max))

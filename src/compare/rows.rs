@@ -1,54 +1,54 @@
-//! Rows of the report: numbers of the experiment against the model's, and the parameters.
+//! Rows of the report: targets compared with the model, and fitted parameters.
 
 use crate::fit::uncertainty::ParameterVerdict;
 use serde::Serialize;
 
-/// A number of the experiment against the model's.
+/// A target, measured or published, compared with the model.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct TargetComparison {
-    /// Name.
+    /// Name of the target.
     pub name: String,
-    /// Name of the condition, where the job has several.
+    /// Name of the condition, if the job has several.
     pub condition: Option<String>,
     /// Unit; empty for a plain number.
     pub unit: String,
     /// Target value.
     pub target: f64,
-    /// Standard deviation of the target, where known.
+    /// Standard deviation of the target, if known.
     pub target_sd: Option<f64>,
-    /// Whether the job gives the target, as a published or an assumed number; otherwise it is measured.
+    /// Whether the job states the target, as a published or assumed number; otherwise it is measured.
     pub given: bool,
     /// Whether the target was measured on a synthetic recording.
     pub synthetic: bool,
-    /// Value of the model, including the estimated errors of the camera; `None` where the model has none.
+    /// Value of the model, including the estimated errors of the camera; `None` if the model has no value.
     pub model: Option<f64>,
-    /// Value of the model without offset and scale of an estimated camera.
+    /// Value of the model without the estimated offset and scale of the camera.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub without_camera: Option<f64>,
     /// `model / target - 1`.
     pub relative_error: Option<f64>,
-    /// Largest relative error that passes; `None` where the 95 % interval of the target decides.
+    /// Largest relative error that passes; `None` if the 95 % interval of the target decides.
     pub tolerance_relative: Option<f64>,
     /// Whether the target is met.
     pub pass: bool,
-    /// Standard deviation over twins of the best model, where there are any.
+    /// Standard deviation of the value among twins of the best model, if there are twins.
     pub twin_sd: Option<f64>,
-    /// Scatter of the model's value between neighbouring parameter values, where there is any.
+    /// Scatter of the model's value between neighbouring parameter values, if there is any.
     pub model_scatter: Option<f64>,
-    /// Level of the model's peak below the strongest peak of its band, dB.
+    /// Level of the model's peak below that of the strongest peak in its band, dB.
     pub below_db: Option<f64>,
-    /// The model's next candidate for the target.
+    /// The model's second-best candidate for the target.
     pub next_peak: Option<NextPeak>,
-    /// Why the model has no value.
+    /// Reason why the model has no value.
     pub missing: Option<String>,
 }
 
-/// A peak of the model that no target is assigned to.
+/// A peak of the model that is not assigned to a target.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct NextPeak {
-    /// Its frequency, Hz.
+    /// Frequency of the peak, Hz.
     pub frequency_hz: f64,
-    /// Its level below the strongest peak of the band, dB.
+    /// Level of the peak below that of the strongest peak in the band, dB.
     pub below_db: f64,
 }
 
@@ -63,49 +63,50 @@ pub struct ParameterLine {
     pub unit: String,
     /// Estimate.
     pub estimate: f64,
-    /// Lower end of the widest 95 % interval; `None` where it is open.
+    /// Lower end of the widest 95 % interval; `None` if it is open.
     pub lower_95: Option<f64>,
-    /// Upper end of the widest 95 % interval; `None` where it is open.
+    /// Upper end of the widest 95 % interval; `None` if it is open.
     pub upper_95: Option<f64>,
     /// Whether the data determine the parameter.
     pub verdict: ParameterVerdict,
-    /// Why it is not identified, as a sentence; `None` where it is.
+    /// Reason why the parameter is not identified, as a sentence; `None` if it is identified.
     pub why: Option<String>,
     /// Bounds of the search.
     pub bounds: [f64; 2],
     /// Whether the job gives a prior.
     pub prior: bool,
-    /// Interval of the linear model, where it determines the parameter.
+    /// 95 % interval of the linear model, if that determines the parameter.
     pub linear_95: Option<[f64; 2]>,
-    /// Ends of the profile likelihood; `None` where it does not cross the threshold within the bounds.
+    /// Ends of the 95 % interval of the profile likelihood; `None` if the profile does not cross the
+    /// threshold within the bounds.
     pub profile_95: [Option<f64>; 2],
-    /// Interval of refitted twins of the best model, where there are any.
+    /// 95 % interval from refitted twins of the best model, if there are twins.
     pub bootstrap_95: Option<[f64; 2]>,
-    /// The true value, where the data are synthetic.
+    /// The true value, if the data are synthetic.
     pub truth: Option<TrueValue>,
 }
 
-/// The true value of synthetic data.
+/// The true value of a parameter, from which synthetic data were made.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TrueValue {
     /// The value, in the parameter's unit.
     pub value: f64,
-    /// Whether the 95 % interval holds it; an open end holds everything beyond.
+    /// Whether the 95 % interval contains the value; an interval with an open end has no limit on that side.
     pub inside_95: bool,
 }
 
 impl ParameterLine {
-    /// Whether the 95 % interval holds a value; an open end holds everything beyond.
+    /// Whether the 95 % interval contains a value; an interval with an open end has no limit on that side.
     pub(crate) fn holds(&self, value: f64) -> bool {
         self.lower_95.is_none_or(|lower| lower <= value) && self.upper_95.is_none_or(|upper| value <= upper)
     }
 
-    /// Whether the interval has an end; without one it holds every value.
+    /// Whether at least one end of the interval is closed; otherwise it contains every value.
     pub(crate) fn is_bounded(&self) -> bool {
         self.lower_95.is_some() || self.upper_95.is_some()
     }
 
-    /// Whether the data determine it.
+    /// Whether the data determine the parameter.
     pub(crate) fn is_identified(&self) -> bool {
         self.verdict == ParameterVerdict::Identified
     }

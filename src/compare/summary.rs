@@ -1,4 +1,4 @@
-//! Numbers of a comparison, as in `report.json`.
+//! Numbers of a comparison, as written to `report.json`.
 
 use super::condition::{ConditionComparison, FitWindow, TimedRecording, group_fit_windows};
 use super::ridge::TrackedRidge;
@@ -7,35 +7,36 @@ use crate::recording::channel::Channel;
 use crate::recording::motion_traces::MOTION_CHANNELS;
 use serde::Serialize;
 
-/// A recording against the model at the estimates; without a recording, the model alone.
+/// A recording compared with the model at the estimates; without a recording, the model alone.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct ComparisonSummary {
     /// Name of the condition.
     pub condition: String,
-    /// Name of its recording.
+    /// Name of the recording.
     pub recording: Option<String>,
     /// Shift added to the model's times, s.
     pub clock_shift_s: Option<f64>,
-    /// Standard deviation of the shift, s; infinite where the path does not determine it, `None` where no
+    /// Standard deviation of the shift, s; infinite if the path does not determine the shift, `None` if no
     /// path was aligned.
     pub clock_shift_sd_s: Option<f64>,
-    /// Offset added to the model's head and tip along the sweep, m.
+    /// Offset added to the positions of the model's head and tip along the sweep, m.
     pub along_m: Option<f64>,
     /// Offset added to the model's head drop, m.
     pub drop_m: Option<f64>,
     /// The point whose path was aligned.
     pub followed: Option<AlignmentPoint>,
-    /// Whether the recorded head turns opposite to the model's.
+    /// Whether the recorded head turns in the opposite direction to the model's.
     pub opposite_turn: bool,
-    /// Residuals, channel by channel.
+    /// Residuals, one for each channel.
     pub residuals: Vec<ResidualSummary>,
-    /// The channel by which the model is judged; `None` with opposite turns or unknown noise.
+    /// The channel by which the model is judged; `None` if the heads turn in opposite directions or the noise
+    /// is unknown.
     pub judged: Option<&'static str>,
     /// The windows of the job's targets.
     pub windows: Vec<WindowSummary>,
     /// The ridges of the deflection after the release of the tip.
     pub ridge: RidgeSummaries,
-    /// Changes of mode in the model's run.
+    /// Number of changes of contact mode in the model's run.
     pub transitions: usize,
 }
 
@@ -52,10 +53,11 @@ pub struct ResidualSummary {
     pub rms_over_noise: Option<f64>,
 }
 
-/// A window of the job's targets, as start of the first frame and end of the last, s.
+/// A window of the job's targets. Each interval is from the start of its first frame to the end of its last
+/// frame, s.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct WindowSummary {
-    /// Names of its targets.
+    /// Names of the targets in the window.
     pub features: Vec<String>,
     /// Name of the channel.
     pub channel: &'static str,
@@ -65,7 +67,7 @@ pub struct WindowSummary {
     pub model_s: Option<[f64; 2]>,
 }
 
-/// The ridges of both sides.
+/// The ridges of recording and model.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct RidgeSummaries {
     /// Ridge of the recording.
@@ -85,9 +87,9 @@ pub struct RidgeSummary {
     pub segments: usize,
     /// Number of segments with a component above the noise.
     pub points: usize,
-    /// Number of segments whose components form a course.
+    /// Number of segments whose components belong to a course.
     pub course_points: usize,
-    /// Least and greatest frequency of the courses, Hz.
+    /// Lowest and highest frequency of the courses, Hz.
     pub range_hz: Option<[f64; 2]>,
 }
 

@@ -1,4 +1,4 @@
-//! Tables of a comparison as CSV, on the clocks of the recordings.
+//! Tables of a comparison as CSV; times are on the clocks of the recordings.
 
 use super::condition::{ConditionComparison, FittedRecording};
 use super::model_run::ModelRun;
@@ -11,7 +11,7 @@ use crate::recording::motion_traces::{MOTION_CHANNELS, MotionTraces};
 use crate::simulate::Transition;
 use short_spectra::time_frequency::RidgePoint;
 
-/// File of [`comparison_table`].
+/// File name of [`comparison_table`].
 pub(crate) const COMPARISON_FILE: &str = "comparison.csv";
 
 /// A CSV file of a comparison.
@@ -23,8 +23,8 @@ pub struct ComparisonTable {
     pub text: String,
 }
 
-/// Residuals, ridges and transitions of every condition, in the order of the job. The first two columns are
-/// the condition and the kind of its recording.
+/// Tables of residuals, ridges and transitions of every condition, in the order of the job. The first two
+/// columns are the condition and the kind of its recording.
 pub(crate) fn comparison_tables(cases: &[ConditionComparison]) -> Vec<ComparisonTable> {
     let table = |file, header: &str, rows: fn(&ConditionComparison) -> Vec<Vec<String>>| {
         let rows = cases.iter().flat_map(|case| {
@@ -42,8 +42,8 @@ pub(crate) fn comparison_tables(cases: &[ConditionComparison]) -> Vec<Comparison
     ]
 }
 
-/// Every recording and the model at its frames, aligned with its clock and origin, in the order of the job;
-/// `None` without a recording.
+/// Table of every recording with the model at its frames, aligned to the clock and origin of the recording,
+/// in the order of the job; `None` without a recording.
 pub(crate) fn comparison_table(
     job: &Job,
     measured: &[FittedRecording<'_>],
@@ -85,13 +85,13 @@ fn recording_kind(recording: Option<&Recording>) -> &'static str {
     }
 }
 
-/// Cell of a channel in frame `i`, m; empty where the value is missing.
+/// Cell of a channel in frame `i`, m; empty if the value is missing.
 fn trace_cell(traces: &MotionTraces, channel: Channel, i: usize) -> String {
     let value_m = traces.column(channel).get(i).copied().flatten();
     value_m.map_or_else(String::new, |m| format!("{m:e}"))
 }
 
-/// Measured minus model.
+/// Rows of measured minus model.
 fn residual_rows(case: &ConditionComparison) -> Vec<Vec<String>> {
     let Some(residual) = &case.residual else { return Vec::new() };
     let row = |(i, time_s): (usize, &f64)| {
@@ -109,7 +109,8 @@ fn ridge_rows(case: &ConditionComparison) -> Vec<Vec<String>> {
     [measured, rows("model", &case.ridges.model, case.alignment.shift_s)].concat()
 }
 
-/// Every point of a ridge with the number of its course, from 1; empty outside courses.
+/// Rows of all points of a ridge, each with the number of its course, counted from 1; the number is empty
+/// outside courses.
 fn tracked_ridge_rows(source: &str, followed: &TrackedRidge, shift_s: f64) -> Vec<Vec<String>> {
     let row = |point: &RidgePoint| {
         let course = followed.courses.iter().position(|course| course.contains(point));

@@ -1,4 +1,4 @@
-//! Readings of the contact that only a simulated run has: stick, changes of mode, forces.
+//! Readings of the contact that only a simulated run can give: stick, changes of contact mode, forces.
 
 use super::missing::MissingValue;
 use super::reader::{FeatureReader, RunRecord};
@@ -11,24 +11,24 @@ use serde::Serialize;
 /// A reading of the contact.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub enum ContactReading {
-    /// Share of a window in which the tip sticks.
+    /// Fraction of a window for which the tip sticks.
     StickFraction(Window),
     /// Longest uninterrupted stick in a window, s.
     LongestStick(Window),
-    /// Changes of mode in a window.
+    /// Number of changes of contact mode in a window.
     Transitions(Window),
-    /// When the normal force first reaches zero, s.
+    /// Time at which the normal force first reaches zero, s.
     ContactLoss,
-    /// Least normal force in contact, N.
+    /// Smallest normal force in contact, N.
     LeastNormalForce,
-    /// When the Painlevé condition first fails, s.
+    /// Time at which the Painlevé condition is first violated, s.
     Jam,
-    /// Least Painlevé indicator in slip.
+    /// Smallest Painlevé indicator in slip.
     LeastPainleveIndicator,
 }
 
 impl ContactReading {
-    /// Name of its kind in a study.
+    /// Name of the kind of reading in a study.
     pub(crate) fn kind(self) -> &'static str {
         match self {
             Self::StickFraction(_) => "stick-fraction",
@@ -41,7 +41,7 @@ impl ContactReading {
         }
     }
 
-    /// The window that it is read from, where it has one.
+    /// The window of the reading, if it has one.
     pub(crate) fn window(&self) -> Option<&Window> {
         match self {
             Self::StickFraction(w) | Self::LongestStick(w) | Self::Transitions(w) => Some(w),
@@ -49,8 +49,8 @@ impl ContactReading {
         }
     }
 
-    /// Whether a run that ended early with this status still gives its value. A count or a share would need
-    /// the rest of the run.
+    /// Whether the value is known although the run ended early with this status. A count or a fraction would
+    /// need the rest of the run.
     pub(super) fn is_known_after(self, end: RunStatus) -> bool {
         match self {
             Self::ContactLoss | Self::LeastNormalForce => end == RunStatus::ContactLost,
@@ -59,12 +59,12 @@ impl ContactReading {
         }
     }
 
-    /// Whether it needs the extremes over a run, which cost time.
+    /// Whether the reading needs the extrema over the run, which take time to compute.
     pub(super) fn needs_audit(self) -> bool {
         matches!(self, Self::LeastNormalForce | Self::LeastPainleveIndicator)
     }
 
-    /// Its value, in its unit.
+    /// Value of the reading, in its unit.
     pub(super) fn value(self, reader: &FeatureReader) -> Result<f64, MissingValue> {
         let run = reader.run.ok_or(MissingValue::NoRun)?;
         match self {
@@ -83,14 +83,14 @@ impl ContactReading {
             }
             Self::ContactLoss => first_time_s(run, |t| t.to == TipMode::Flight, RunStatus::ContactLost),
             Self::Jam => first_time_s(run, |t| t.cause == TransitionCause::JamImpact, RunStatus::Jammed),
-            // rounding may make the force negative where contact is lost
+            // rounding may make the force negative at the loss of contact
             Self::LeastNormalForce => extreme(run, |audit| audit.min_normal_force_n).map(|n| n.max(0.0)),
             Self::LeastPainleveIndicator => extreme(run, |audit| audit.min_painleve_indicator),
         }
     }
 }
 
-/// Start and end of a window, s: exact for seconds and instants, to a frame for a phase.
+/// Start and end of a window, s: exact for times and for instants, accurate to a frame for a phase.
 fn window_ends_s(window: &Window, reader: &FeatureReader, run: &RunRecord) -> Result<[f64; 2], MissingValue> {
     let frames = reader.window_frames(window)?;
     let end = |end: WindowEnd, open_s: f64, frame: usize| {
@@ -112,7 +112,8 @@ fn stick_lengths_s(run: &RunRecord, [from, to]: [f64; 2]) -> impl Iterator<Item 
     run.stick_s.iter().map(move |[start, end]| end.min(to) - start.max(from)).filter(|length| *length > 0.0)
 }
 
-/// Time of the first transition that `is` selects, or of the end of a run with the status `end`, s.
+/// Time, s, of the first transition for which `is` is true, or of the end of a run that ended with the status
+/// `end`.
 fn first_time_s(
     run: &RunRecord,
     is: impl Fn(&Transition) -> bool,

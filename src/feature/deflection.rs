@@ -1,5 +1,5 @@
-//! Mean deflections: over a window, and over the frames with a given speed of the head. Over a stroke the
-//! latter is the friction curve.
+//! Mean deflections: over a window, and over those of its frames in which the head has a given speed. Over
+//! the speeds of a stroke, the latter form the friction curve.
 
 use super::missing::{FEWEST_AT_SPEED, MissingValue};
 use super::reader::FeatureReader;
@@ -19,7 +19,8 @@ pub(super) fn read_mean_deflection(
     Ok(FeatureValue::new(sum / count as f64, None))
 }
 
-/// Mean over the frames of a window in which the head's speed is within a share of the given one.
+/// Mean over the frames of a window in which the speed of the head is within a given fraction of a given
+/// speed.
 pub(super) fn read_deflection_at_speed(
     window: &Window,
     speed_m_per_s: f64,
@@ -45,21 +46,21 @@ pub(super) fn read_deflection_at_speed(
     Err(MissingValue::Speed { found: count, low_m_per_s, high_m_per_s, least_m_per_s, most_m_per_s })
 }
 
-/// Length of the blocks over which the head's speed is measured, s. At 5,000 frames/s a tenth of a pixel of
-/// 20 um is an error of 4e-5 m/s. Between two blocks the speed of a stroke at 1 Hz deviates from a line by
-/// less than a thousandth of its maximum.
+/// Length of the blocks in which the speed of the head is measured, s. At 5,000 frames/s, an error of a tenth
+/// of a pixel of 20 um causes an error of 4e-5 m/s. Between two blocks, the speed during a stroke at 1 Hz
+/// deviates from a straight line by less than a thousandth of its maximum.
 pub(crate) const SPEED_BLOCK_S: f64 = 0.02;
-/// Fewest tracked frames of a block.
+/// Minimum number of tracked frames in a block.
 const FEWEST_IN_BLOCK: usize = 5;
 
-/// The head's speed in every frame, m/s; `None` with fewer than two blocks. It is interpolated linearly
-/// between the slopes of blocks that overlap by half, and extrapolated beyond the first and the last. Exact
-/// where the head's path is a parabola.
+/// The speed of the head in every frame, m/s; `None` with fewer than two blocks. The slopes of blocks that
+/// overlap by half are interpolated linearly, and extrapolated before the first and after the last block. The
+/// result is exact if the path of the head is a parabola.
 pub(super) fn head_speeds_m_per_s(head: &[Option<f64>], frame_rate_hz: f64) -> Option<Vec<f64>> {
     let half = ((SPEED_BLOCK_S * frame_rate_hz / 2.0).round() as usize).max(FEWEST_IN_BLOCK.div_ceil(2));
     let block = |k: usize| block_slope(head, k * half..((k + 2) * half).min(head.len()), frame_rate_hz);
     let mut blocks: Vec<(f64, f64)> = (0..(head.len() / half).saturating_sub(1)).filter_map(block).collect();
-    // two blocks with the same middle have the same frames, those between two gaps
+    // two blocks with the same middle contain the same frames: those between two gaps
     blocks.dedup_by(|later, earlier| later.0 <= earlier.0);
     let mut pairs = blocks.windows(2).peekable();
     let mut pair = pairs.next()?;
@@ -74,7 +75,7 @@ pub(super) fn head_speeds_m_per_s(head: &[Option<f64>], frame_rate_hz: f64) -> O
     Some((0..head.len()).map(speed).collect())
 }
 
-/// Mean of the tracked frames and least-squares slope through them, m/s.
+/// Mean index of the tracked frames, and slope of the least-squares line through them, m/s.
 fn block_slope(
     head: &[Option<f64>],
     frames: std::ops::Range<usize>,

@@ -1,4 +1,4 @@
-//! Times between two instants of a reversal.
+//! Time intervals between two instants of a reversal.
 
 use super::missing::MissingValue;
 use super::reader::FeatureReader;
@@ -6,7 +6,7 @@ use super::value::FeatureValue;
 use crate::recording::channel::InstantKind;
 use serde::Serialize;
 
-/// Two instants of a reversal.
+/// A time interval between two instants of a reversal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum ReversalInterval {
     /// From the head's turn to the tip's release.
@@ -20,7 +20,7 @@ pub enum ReversalInterval {
 }
 
 impl ReversalInterval {
-    /// Name of its kind in a job or a study.
+    /// Name of the kind of reading in a job or a study.
     pub(crate) const fn kind(self) -> &'static str {
         match self {
             Self::ReleaseAfterReversal => "release-after-reversal",
@@ -30,7 +30,7 @@ impl ReversalInterval {
         }
     }
 
-    /// Its length at the `reversal`-th turn of the head, counted from 1, s.
+    /// Length of the interval at the `reversal`-th turn of the head, counted from 1, s.
     pub(super) fn length_s(
         self,
         reversal: usize,

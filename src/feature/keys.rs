@@ -1,14 +1,14 @@
-//! The keys of a job's `[[feature]]` and a study's `[[map]]` that select what is read, and their checks.
+//! The keys of a job's `[[feature]]` and of a study's `[[map]]` that select a reading, and their checks.
 
 use super::spectral::FeatureBand;
 use crate::recording::channel::{Channel, Window};
 use crate::toml_file::{KeyRefusal, NumberPair, check_above_zero, refuse_key};
 use short_spectra::Detrend;
 
-/// Default relative half width of the range of speeds around a given speed: several cycles of chatter pass
-/// within it, and friction hardly changes.
+/// Default relative half width of the range of speeds around a given speed. Within this range, several cycles
+/// of chatter occur, and friction hardly changes.
 pub const WIDTH_RELATIVE: f64 = 0.15;
-/// Largest relative half width of that range.
+/// Largest value that the relative half width may have.
 const WIDEST_RELATIVE: f64 = 0.5;
 
 /// The list of keys from which [`Keys`] and the structs of TOML tables are made.
@@ -35,12 +35,12 @@ macro_rules! with_reading_keys {
 
 macro_rules! define_keys {
     ({} $(#[doc = $doc:literal] $key:ident: $type:ty),*) => {
-        /// The keys of an entry that select what is read.
+        /// The keys of an entry that select a reading.
         #[derive(Debug, Default)]
         pub struct Keys { $(pub $key: Option<$type>),* }
 
         impl Keys {
-            /// Names of the keys that are given.
+            /// Names of the keys that the entry has.
             fn given_keys(&self) -> impl Iterator<Item = &'static str> {
                 let keys = [$(self.$key.is_some().then_some(stringify!($key))),*];
                 keys.into_iter().flatten()
@@ -58,7 +58,7 @@ macro_rules! define_entry {
         #[derive(Debug, serde::Deserialize, schemars::JsonSchema)]
         #[serde(deny_unknown_fields)]
         pub struct $name {
-            /// What is read.
+            /// Kind of the reading.
             pub kind: String,
             $(#[doc = $own_doc] pub $own: $own_type,)*
             $(#[doc = $doc] pub $key: Option<$type>),*
@@ -73,15 +73,15 @@ macro_rules! define_entry {
 }
 pub(crate) use {define_entry, with_reading_keys};
 
-/// An entry of a file that selects what is read.
+/// An entry of a file that selects a reading.
 pub struct ReadingEntry<'a> {
-    /// Its name in messages: "feature `x` (rms)".
+    /// Name of the entry in messages: "feature `x` (rms)".
     pub name: &'a str,
     /// Name of the table in the file: `feature` or `map`.
     pub noun: &'a str,
-    /// Its keys.
+    /// The keys of the entry.
     pub keys: &'a Keys,
-    /// Half the camera's frame rate, Hz, where it is known.
+    /// Half the frame rate of the camera, Hz, if known.
     pub nyquist_hz: Option<f64>,
     /// Whether the recording may have noise.
     pub noisy: bool,
@@ -97,7 +97,7 @@ impl ReadingEntry<'_> {
         refuse_key(self.describe_key(key), problem)
     }
 
-    /// Checks that each key that is given has a meaning.
+    /// Checks that every key of the entry has a meaning for its kind.
     pub(crate) fn check_keys(&self, known: &[&str]) -> Result<(), KeyRefusal> {
         let Some(key) = self.keys.given_keys().find(|key| !known.contains(key)) else { return Ok(()) };
         let takes = if known.is_empty() { "none of its own".to_owned() } else { known.join(", ") };
@@ -107,7 +107,7 @@ impl ReadingEntry<'_> {
         )
     }
 
-    /// A required number above 0.
+    /// The value of a required key, which must be above 0.
     pub(crate) fn require_positive(
         &self,
         key: &str,
@@ -129,7 +129,7 @@ impl ReadingEntry<'_> {
         }
     }
 
-    /// A window; the whole run where none is given.
+    /// The window; if none is given, the whole run.
     pub(crate) fn window_or_whole(&self) -> Result<Window, KeyRefusal> {
         Ok(self.window_if_given()?.unwrap_or(Window::WHOLE))
     }
@@ -150,7 +150,7 @@ impl ReadingEntry<'_> {
         }
     }
 
-    /// A band of the deflection, unless another channel is given.
+    /// The band; its channel is the deflection unless another one is given.
     pub(crate) fn band_of_deflection(&self) -> Result<FeatureBand, KeyRefusal> {
         self.parse_band_of_channel(self.keys.channel.as_deref().unwrap_or(Channel::Deflection.name()))
     }
@@ -200,7 +200,7 @@ impl ReadingEntry<'_> {
         }
     }
 
-    /// The window in which a speed is sought: the `part` of a reversal, or `window`.
+    /// The window in which a speed is sought: the key `part` (of a reversal) or `window`.
     pub(crate) fn stroke_window(&self) -> Result<Window, KeyRefusal> {
         match (self.keys.part.as_deref(), &self.keys.window) {
             (Some(part @ ("before" | "after")), None) => {

@@ -1,17 +1,17 @@
-//! Why a recording or a run does not give a value.
+//! Reasons why a recording or a run does not give a value.
 
 use crate::recording::channel::{InstantNotFound, WindowError};
 use crate::simulate::RunStatus;
 use serde::{Deserialize, Serialize};
 use short_spectra::SpectrumError;
 
-/// Fewest cycles in each half of a window: with fewer, the main lobe of the Hann window overlaps its mirror
-/// image at negative frequencies.
+/// Minimum number of cycles in each half of a window; with fewer, the main lobe of the Hann window overlaps
+/// its mirror image at negative frequencies.
 pub(crate) const LEAST_CYCLES: f64 = 3.0;
-/// Fewest tracked frames with the requested speed.
+/// Minimum number of tracked frames in which the head has the requested speed.
 pub(crate) const FEWEST_AT_SPEED: usize = 8;
 
-/// Why a recording or a run does not give a value.
+/// Reason why a recording or a run does not give a value.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MissingValue {
     /// The window is not in the recording.
@@ -34,11 +34,11 @@ pub enum MissingValue {
          {least_m:e} m"
     )]
     TooSmall {
-        /// Its amplitude, m.
+        /// Amplitude of the component, m.
         amplitude_m: f64,
-        /// Its frequency, Hz.
+        /// Frequency of the component, Hz.
         frequency_hz: f64,
-        /// Least amplitude that counts, m.
+        /// Smallest amplitude requested, m.
         least_m: f64,
     },
     /// The component does not decay.
@@ -54,7 +54,7 @@ pub enum MissingValue {
         /// Amplitude in the second half, m.
         second_m: f64,
     },
-    /// The component decays into the noise.
+    /// The component decays to the level of the noise.
     #[error(
         "the component at {frequency_hz:.1} Hz has decayed to {second_m:.2e} m, into the noise, in the \
          second half of the window; shorten it"
@@ -65,7 +65,7 @@ pub enum MissingValue {
         /// Amplitude in the second half, m.
         second_m: f64,
     },
-    /// The window holds too few cycles for a decay.
+    /// The window contains too few cycles to measure a decay.
     #[error(
         "found {cycles:.1} cycles of {frequency_hz:.1} Hz in each half of the window, expected at \
          least {}; widen it",
@@ -74,10 +74,10 @@ pub enum MissingValue {
     FewCycles {
         /// Frequency, Hz.
         frequency_hz: f64,
-        /// Cycles in half of the window.
+        /// Number of cycles in half of the window.
         cycles: f64,
     },
-    /// A segment does not fit into the window, or is too short.
+    /// A segment is longer than the window, or too short.
     #[error(
         "a segment of {segment_s} s has {frames} frames, expected {} to the {window} of the window",
         short_spectra::MIN_SAMPLES
@@ -85,62 +85,62 @@ pub enum MissingValue {
     Segment {
         /// Length of the segment, s.
         segment_s: f64,
-        /// Frames of the segment.
+        /// Number of frames in the segment.
         frames: usize,
-        /// Frames of the window.
+        /// Number of frames in the window.
         window: usize,
     },
     /// The channel was not tracked in the window.
     #[error("no frame of the window has both points tracked")]
     NoFrames,
-    /// The head does not have the speed in the window.
+    /// The head does not have the requested speed in the window.
     #[error(
         "found {found} tracked frames with the head at {low_m_per_s:.4} to {high_m_per_s:.4} \
          m/s, expected at least {}; the window shows {least_m_per_s:.4} to {most_m_per_s:.4} m/s",
         FEWEST_AT_SPEED
     )]
     Speed {
-        /// Frames with that speed.
+        /// Number of frames with the requested speed.
         found: usize,
-        /// Lowest speed that counts, m/s.
+        /// Lower limit of the requested speed, m/s.
         low_m_per_s: f64,
-        /// Highest speed that counts, m/s.
+        /// Upper limit of the requested speed, m/s.
         high_m_per_s: f64,
-        /// Lowest speed of the window, m/s.
+        /// Lowest speed in the window, m/s.
         least_m_per_s: f64,
-        /// Highest speed of the window, m/s.
+        /// Highest speed in the window, m/s.
         most_m_per_s: f64,
     },
-    /// The head was tracked too little to have a speed.
+    /// The head is tracked in too few frames for its speed to be measured.
     #[error("the head is tracked in too few frames of the window to have a speed")]
     NoSpeed,
-    /// An instant is not in the recording.
+    /// An instant was not found in the recording.
     #[error(transparent)]
     Instant(InstantNotFound),
-    /// There is no such recording.
+    /// The feature belongs to a recording that is not given.
     #[error("there is no recording number {number}")]
     NoRecording {
         /// Number of the recording, counted from 1.
         number: usize,
     },
-    /// Only a simulated run shows it.
+    /// The value exists only for a simulated run.
     #[error("only a simulated run shows it, not a recording")]
     NoRun,
     /// The run ended early.
     #[error("the run ended as {} at {stopped_at_s} s", .status.name())]
     Ended {
-        /// How it ended.
+        /// Status with which the run ended.
         status: RunStatus,
-        /// Time of its end, s.
+        /// Time at which the run ended, s.
         stopped_at_s: f64,
     },
-    /// The run does not show it.
+    /// The event does not occur in the run.
     #[error("it does not happen in the run")]
     Never,
 }
 
 impl MissingValue {
-    /// The reason without its numbers, as tables and legends name it.
+    /// The reason without its numbers, as named in tables and legends.
     #[must_use]
     pub fn reason(&self) -> MissingReason {
         match self {
@@ -163,14 +163,14 @@ impl MissingValue {
 
 macro_rules! reasons {
     ($($reason:ident $name:literal $meaning:literal;)*) => {
-        /// Why there is no value: the run failed, or it does not show the feature.
+        /// Reason why there is no value: the run failed, or it does not show the feature.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
         #[allow(missing_docs)] // `meaning` explains each
         pub enum MissingReason {
             $(#[serde(rename = $name)] $reason),*
         }
 
-        /// Every reason with its name in files and its meaning in a legend.
+        /// All reasons, each with its name in files and its meaning in a legend.
         const REASONS: &[(MissingReason, &str, &str)] = &[$((MissingReason::$reason, $name, $meaning)),*];
     };
 }
@@ -201,7 +201,7 @@ reasons! {
 }
 
 impl MissingReason {
-    /// Why a run ended before its stop time; `None` for a complete one.
+    /// The reason why a run ended before its stop time; `None` for a complete run.
     pub(crate) fn from_status(status: RunStatus) -> Option<Self> {
         match status {
             RunStatus::Completed => None,

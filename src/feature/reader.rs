@@ -1,4 +1,4 @@
-//! A reader of many features of one recording: it computes each channel, transform and speed once.
+//! A reader shared by many features of a recording: it computes each channel, transform and speed only once.
 
 use super::deflection::head_speeds_m_per_s;
 use super::missing::MissingValue;
@@ -12,7 +12,8 @@ use std::cell::{OnceCell, RefCell};
 use std::ops::Range;
 use std::rc::Rc;
 
-/// A recording with its instants and the channels, transforms and speeds that were computed from it.
+/// A recording with its instants, and with the channels, transforms and speeds that have been computed from
+/// it.
 pub struct FeatureReader<'a> {
     pub(super) recording: &'a Recording,
     pub(super) instants: &'a ReversalInstants,
@@ -24,14 +25,14 @@ pub struct FeatureReader<'a> {
 }
 
 impl<'a> FeatureReader<'a> {
-    /// Reader of `recording`; `instants` are those of the same recording.
+    /// Reader of `recording`, in which `instants` were found.
     #[must_use]
     pub fn new(recording: &'a Recording, instants: &'a ReversalInstants) -> Self {
         let (transforms, segments, speeds) = (RefCell::default(), RefCell::default(), RefCell::default());
         Self { recording, instants, run: None, channels: Default::default(), transforms, segments, speeds }
     }
 
-    /// Reader of a simulated run and of the recording that a camera took of it.
+    /// Reader of a simulated run and of the recording that a camera would take of it.
     pub(crate) fn with_run(
         recording: &'a Recording,
         instants: &'a ReversalInstants,
@@ -63,7 +64,7 @@ impl<'a> FeatureReader<'a> {
         })
     }
 
-    /// The component of a band in each segment; both ends of its frequency range are read from it.
+    /// The component of a band in each segment; both ends of its frequency range are determined from these.
     pub(super) fn cycle_segments(
         &self,
         band: &FeatureBand,
@@ -75,7 +76,7 @@ impl<'a> FeatureReader<'a> {
         })
     }
 
-    /// The head's speed in every frame of a window, m/s; all points of a friction curve are read from it.
+    /// The speed of the head in every frame of a window, m/s; shared by all points of a friction curve.
     pub(super) fn head_speeds_m_per_s(&self, frames: &Range<usize>) -> Result<Rc<Vec<f64>>, MissingValue> {
         compute_once(&self.speeds, frames.clone(), |frames| {
             let head = self.channel_frames(Channel::HeadX, frames.clone());
@@ -84,10 +85,10 @@ impl<'a> FeatureReader<'a> {
     }
 }
 
-/// Values that were computed, each with its key.
+/// Values computed so far, each with its key.
 type KeyedValues<K, V> = RefCell<Vec<(K, Rc<V>)>>;
 
-/// The value of a key, computed when it is first asked for.
+/// The value for a key; computed when it is first requested.
 fn compute_once<K: PartialEq, V>(
     known: &KeyedValues<K, V>,
     key: K,
@@ -101,17 +102,17 @@ fn compute_once<K: PartialEq, V>(
     Ok(found)
 }
 
-/// The part of a simulated run that its recording does not show.
+/// The part of a simulated run that its recording does not contain.
 #[derive(Debug, Clone)]
 pub struct RunRecord {
-    /// Start and stop time of its scene, s.
+    /// Start and stop time of the scene, s.
     pub span_s: [f64; 2],
-    /// How the run ended, and when.
+    /// The status with which the run ended, and the time of its end.
     pub run: RunResult,
     /// Start and end of each stick interval, s.
     pub stick_s: Vec<[f64; 2]>,
-    /// Changes of the tip's mode, in order of time.
+    /// Changes of the contact mode, in order of time.
     pub transitions: Vec<Transition>,
-    /// Extremes over the run, where a reading needs them.
+    /// Extrema over the run, if a reading needs them.
     pub audit: Option<EnergyAudit>,
 }

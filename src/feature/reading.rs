@@ -1,4 +1,4 @@
-//! Readings, and the table of their kinds that jobs and studies share.
+//! Readings, and the table of kinds of readings that jobs and studies share.
 
 use super::contact::ContactReading;
 use super::deflection;
@@ -13,83 +13,85 @@ use crate::toml_file::{KeyRefusal, suggest_key};
 use portable_math as math;
 use serde::Serialize;
 
-/// Scale of a time that may be zero or negative, s: a tenth of a stick of half a second.
+/// Scale of the difference between two times that may be zero or negative, s: a tenth of a stick of half a
+/// second.
 pub(crate) const TIME_SCALE_S: f64 = 0.05;
-/// Default number of bands of a log-spectrum: over an octave, each is as wide as the change of a stick-slip
-/// frequency by friction.
+/// Default number of bands of a log-spectrum. Over an octave, the width of each is about the change of a
+/// stick-slip frequency due to friction.
 const DEFAULT_LINES: usize = 12;
-/// Most bands of a log-spectrum and most speeds of a friction curve: each is a feature of its own.
+/// Maximum number of bands of a log-spectrum and of speeds of a friction curve: each becomes a separate
+/// feature.
 const MAX_SERIES_LENGTH: usize = 100;
 
-/// A value that can be read from a recording or a simulated run.
+/// A quantity that can be evaluated in a recording or in a simulated run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub enum Reading {
-    /// Frequency of a component in a band, Hz: the largest, or the one assigned to a target.
+    /// Frequency of a component in a band, Hz: the strongest component, or the one assigned to a target.
     Frequency(FeatureBand),
-    /// Amplitude of the largest component in a band, m.
+    /// Amplitude of the strongest component in a band, m.
     Amplitude(FeatureBand),
     /// Root mean square of a band, m.
     Rms(FeatureBand),
-    /// Level of one band of a log-spectrum: root mean square of the band with a floor, m.
+    /// Level of one band of a log-spectrum, m: root mean square of the band and of a floor, in quadrature.
     BandLevel {
         /// The band.
         band: FeatureBand,
-        /// Root mean square that is added in quadrature, m, so that noise is not fitted.
+        /// Floor: a root mean square that is added in quadrature, m, so that noise is not fitted.
         floor_m: f64,
     },
-    /// Damping ratio of the ring-down of the largest component in a band.
+    /// Damping ratio of the ring-down of the strongest component in a band.
     DampingRatio(FeatureBand),
-    /// Lowest or highest frequency over which a drifting component runs, Hz.
+    /// Lowest or highest frequency of a drifting component, Hz.
     CycleFrequency {
         /// Band of the component.
         band: FeatureBand,
-        /// Length of the segments in which it is followed, s.
+        /// Length of the segments in which the component is tracked, s.
         segment_s: f64,
-        /// End of its frequency range.
+        /// The end of its frequency range that is evaluated.
         end: CycleRangeEnd,
     },
     /// Mean of the deflection `tip_x - head_x` over a window, m.
     MeanDeflection(Window),
-    /// Mean of the deflection over the frames of a window in which the head has a speed, m.
+    /// Mean of the deflection over the frames of a window in which the head has a given speed, m.
     DeflectionAtSpeed {
-        /// Window of frames.
+        /// Window from which the frames are selected.
         window: Window,
-        /// The speed, m/s, above 0, in either direction.
+        /// The speed, m/s, above 0; in either direction.
         speed_m_per_s: f64,
-        /// Relative half width of the range of speeds that counts.
+        /// Relative half width of the range of speeds that is used.
         width_relative: f64,
     },
     /// Time between two instants of a reversal, s.
     Interval {
-        /// The two instants.
+        /// The two instants, as a kind of interval.
         interval: ReversalInterval,
         /// Number of the reversal, counted from 1.
         reversal: usize,
     },
-    /// A reading of the contact, which only a simulated run has.
+    /// A reading of the contact, which only a simulated run can give.
     Contact(ContactReading),
 }
 
 /// One kind of reading.
 pub(crate) struct ReadingKind {
-    /// Its name in files.
+    /// Name of the kind in files.
     pub word: &'static str,
     unit: FeatureUnit,
-    /// Keys that have a meaning for it.
+    /// Keys that have a meaning for this kind.
     keys: &'static [&'static str],
     make: ReadingConstructor,
 }
 
 type SeriesConstructor = fn(&ReadingEntry) -> Result<Vec<(String, Reading)>, KeyRefusal>;
 
-/// Makes readings of an entry.
+/// Makes the readings of an entry.
 enum ReadingConstructor {
     One(fn(&ReadingEntry) -> Result<Reading, KeyRefusal>),
-    /// Several readings, each with a suffix of the name of the entry.
+    /// Several readings; the name of each is the name of the entry with a suffix.
     Series(SeriesConstructor),
-    /// A time of a reversal.
+    /// A time interval at a reversal.
     Interval(ReversalInterval),
-    /// Of a run, not of a recording.
+    /// A reading of a simulated run, which no recording can give.
     OfRun(fn(&ReadingEntry) -> Result<ContactReading, KeyRefusal>),
 }
 
@@ -105,8 +107,8 @@ const NONE: &[&str] = &[];
 
 macro_rules! kinds {
     ($($word:literal $unit:ident $keys:ident $make:ident $of:expr;)*) => {
-        /// Every kind. A new one is a variant of [`Reading`], a row here, its word in [`Reading::kind`] and
-        /// its value in [`Reading::read`].
+        /// Every kind. To add a kind, add a variant of [`Reading`], a row here, its name in [`Reading::kind`]
+        /// and its evaluation in [`Reading::read`].
         const KINDS: &[ReadingKind] = &[$(ReadingKind {
             word: $word, unit: FeatureUnit::$unit, keys: $keys, make: ReadingConstructor::$make($of),
         }),*];
@@ -138,31 +140,31 @@ kinds! {
 }
 
 impl ReadingKind {
-    /// The kind of that name.
+    /// The kind with the given name.
     ///
     /// # Errors
-    /// What was found, and the nearest name.
+    /// A message with the unknown name and the nearest known name.
     pub(crate) fn find(word: &str) -> Result<&'static Self, String> {
         let words: Vec<&str> = KINDS.iter().map(|kind| kind.word).collect();
         let unknown = || format!("unknown kind `{word}`; {}", suggest_key(word, &words));
         KINDS.iter().find(|kind| kind.word == word).ok_or_else(unknown)
     }
 
-    /// Whether an entry has several readings.
+    /// Whether an entry of this kind has several readings.
     pub(crate) fn is_series(&self) -> bool {
         matches!(self.make, ReadingConstructor::Series(_))
     }
 
-    /// Whether only a simulated run shows it.
+    /// Whether only a simulated run can give a reading of this kind.
     pub(crate) fn is_of_run(&self) -> bool {
         matches!(self.make, ReadingConstructor::OfRun(_))
     }
 
-    /// Readings of an entry with their names: that of the entry, with a suffix where the entry has several
+    /// Readings of an entry with their names: the name of the entry, with a suffix if the entry has several
     /// readings.
     ///
     /// # Errors
-    /// The key at fault, what was found and what was expected.
+    /// The key at fault, the value found and the value expected.
     pub(crate) fn make_readings(
         &self,
         name: &str,
@@ -234,7 +236,7 @@ fn log_spectrum_readings(entry: &ReadingEntry) -> Result<Vec<(String, Reading)>,
     Ok(split_band(band.band_hz, lines).map(level).collect())
 }
 
-/// Bands of equal width; of equal ratio where together they span more than an octave.
+/// Bands of equal width or, if together they span more than an octave, with edges of equal ratio.
 fn split_band((low, high): (f64, f64), count: usize) -> impl Iterator<Item = (f64, f64)> {
     let share = move |k: usize| k as f64 / count as f64;
     let edge = move |k: usize| {
@@ -245,7 +247,7 @@ fn split_band((low, high): (f64, f64), count: usize) -> impl Iterator<Item = (f6
 }
 
 impl Reading {
-    /// Name of its kind in a job or a study.
+    /// Name of the kind of reading in a job or a study.
     pub(crate) fn kind(&self) -> &'static str {
         match self {
             Self::Frequency(_) => "frequency",
@@ -262,13 +264,13 @@ impl Reading {
         }
     }
 
-    /// Unit of its value.
+    /// Unit of the value.
     pub(crate) fn unit(&self) -> FeatureUnit {
         let row = KINDS.iter().find(|kind| kind.word == self.kind());
         row.map_or(FeatureUnit::DIMENSIONLESS, |kind| kind.unit)
     }
 
-    /// Comparison of two of its values.
+    /// Way of comparing two values of the reading.
     pub(crate) fn comparison(&self) -> ValueComparison {
         match self {
             Self::Interval { interval: ReversalInterval::FlipAfterReversal, .. } => {
@@ -278,7 +280,7 @@ impl Reading {
         }
     }
 
-    /// The band that it is read from, where it has one.
+    /// The band of the reading, if it has one.
     pub(crate) fn band(&self) -> Option<&FeatureBand> {
         match self {
             Self::Frequency(band)
@@ -291,7 +293,7 @@ impl Reading {
         }
     }
 
-    /// The window that it is read from, where it has one.
+    /// The window of the reading, if it has one.
     pub(crate) fn window(&self) -> Option<&Window> {
         match self {
             Self::MeanDeflection(window) | Self::DeflectionAtSpeed { window, .. } => Some(window),
@@ -300,7 +302,7 @@ impl Reading {
         }
     }
 
-    /// How it depends on the calibration of the camera; `None` for a reading that is no length.
+    /// Effect of the camera's calibration on the value; `None` for a reading that is not a length.
     pub(crate) fn length_calibration(&self) -> Option<LengthCalibration> {
         match self {
             Self::MeanDeflection(_) | Self::DeflectionAtSpeed { .. } => Some(LengthCalibration::Position),
@@ -310,17 +312,16 @@ impl Reading {
         }
     }
 
-    /// Whether it needs the extremes over a run, [`RunRecord::audit`](super::RunRecord::audit).
+    /// Whether the reading needs the extrema over a run, [`RunRecord::audit`](super::RunRecord::audit).
     pub(crate) fn needs_audit(&self) -> bool {
         matches!(self, Self::Contact(contact) if contact.needs_audit())
     }
 
-    /// Its value. A frequency is that of the component assigned to `target`, Hz, by [`super::ASSIGN_WIDTH`]
-    /// and [`super::ASSIGN_DB`], or of the strongest component without a target.
+    /// Evaluates the reading. A frequency is that of the component assigned to `target`, Hz, according to
+    /// [`super::ASSIGN_WIDTH`] and [`super::ASSIGN_DB`]; without a target, that of the strongest component.
     ///
     /// # Errors
-    /// [`MissingValue`] with the reason. A run that ended early gives only the readings that describe its
-    /// end.
+    /// [`MissingValue`] with the reason. A run that ended early has only those values that describe its end.
     pub fn read(&self, target: Option<f64>, reader: &FeatureReader) -> Result<FeatureValue, MissingValue> {
         self.check_end(reader)?;
         match self {

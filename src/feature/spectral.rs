@@ -1,5 +1,5 @@
-//! Readings of a band of a window's spectrum: the component of a target, the size of the strongest, the
-//! power.
+//! Readings from a band in the spectrum of a window: frequency of the component assigned to a target, size of
+//! the strongest component, and power.
 
 use super::missing::{LEAST_CYCLES, MissingValue};
 use super::reader::FeatureReader;
@@ -10,10 +10,11 @@ use serde::Serialize;
 use short_spectra::{Component, Detrend, SpectrumError, SpectrumSettings, WindowedTransform};
 use std::f64::consts::TAU;
 
-/// Distance `ln(f / target)` with the same weight as [`ASSIGN_DB`]: near the best point of a fit, the model's
-/// peak is within 10 % of its target.
+/// Distance `ln(f / target)` that has the same weight as a level of [`ASSIGN_DB`]. Near the best point of a
+/// fit, the model's peak is within 10 % of its target.
 pub const ASSIGN_WIDTH: f64 = 0.1;
-/// Level below the strongest component with the same weight as [`ASSIGN_WIDTH`], dB: half the amplitude.
+/// Level below the strongest component that has the same weight as a distance of [`ASSIGN_WIDTH`], dB: half
+/// the amplitude.
 pub const ASSIGN_DB: f64 = 6.0;
 
 /// An end of the frequency range of a drifting component.
@@ -25,7 +26,7 @@ pub enum CycleRangeEnd {
     High,
 }
 
-/// Frequency of the component that is assigned to a target, or of the strongest.
+/// Frequency of the component that is assigned to a target; without a target, of the strongest component.
 pub(super) fn read_frequency(
     band: &FeatureBand,
     target: Option<f64>,
@@ -33,7 +34,7 @@ pub(super) fn read_frequency(
 ) -> Result<FeatureValue, MissingValue> {
     let (low, high) = band.band_hz;
     let found = reader.band_transform(band)?.components(band.band_hz)?;
-    // strongest first, as they are listed
+    // the strongest first, as in the list
     let inside: Vec<&Component> = found.iter().filter(|c| c.is_resolvable()).collect();
     let (chosen, runner_up) = assign_component(&inside, target).ok_or(MissingValue::NoPeak { low, high })?;
     check_amplitude(chosen, band)?;
@@ -56,8 +57,8 @@ pub(super) fn read_rms(band: &FeatureBand, reader: &FeatureReader) -> Result<Fea
     read_band_level(band, 0.0, reader)
 }
 
-/// Root mean square of a band plus a floor, in quadrature: differences far below the floor have no weight in
-/// a fit.
+/// Root mean square of a band and of a floor, added in quadrature, so that differences far below the floor
+/// have no weight in a fit.
 pub(super) fn read_band_level(
     band: &FeatureBand,
     floor_m: f64,
@@ -69,7 +70,7 @@ pub(super) fn read_band_level(
     Ok(FeatureValue::new(math::hypot(transformed.rms_in_band_m(low, high), floor_m), None))
 }
 
-/// Lowest or highest frequency of the component of a band over the segments.
+/// Lowest or highest frequency that the component of a band has in any segment.
 pub(super) fn read_cycle_frequency(
     band: &FeatureBand,
     segment_s: f64,
@@ -110,9 +111,9 @@ fn level_below_strongest_db(inside: &[&Component], component: &Component) -> f64
     20.0 * math::log10(strongest_m / component.amplitude_m)
 }
 
-/// The best and the second best component for a target: those with the least `(ln(f / target) /
-/// ASSIGN_WIDTH)^2 + (dB below the strongest / ASSIGN_DB)^2`. A weaker peak is chosen only where it is much
-/// nearer.
+/// The best and the second-best component for a target: those with the smallest `(ln(f / target) /
+/// ASSIGN_WIDTH)^2 + (dB below the strongest / ASSIGN_DB)^2`. A weaker peak is chosen only if it is much
+/// nearer to the target.
 fn assign_component<'a>(
     inside: &[&'a Component],
     target: Option<f64>,
@@ -126,38 +127,39 @@ fn assign_component<'a>(
     Some((ranked.first()?.1, ranked.get(1).map(|(_, second)| *second)))
 }
 
-/// A band of the spectrum of a window of a channel.
+/// A frequency band in the spectrum of a window of a channel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FeatureBand {
     /// Channel that is transformed.
     pub channel: Channel,
     /// Window of frames.
     pub window: Window,
-    /// Lower and upper end, Hz.
+    /// Lower and upper end of the band, Hz.
     pub band_hz: (f64, f64),
     /// Trend that is removed before the transform.
     pub detrend: Detrend,
-    /// Least amplitude of the strongest component, m. In a trace without noise, remains of the trend and of
-    /// an old ring-down would count otherwise, although no camera resolves them.
+    /// Smallest amplitude of the strongest component, m. In a trace without noise, remains of the trend and
+    /// of an earlier ring-down would otherwise count as components, although no camera resolves them.
     pub least_amplitude_m: f64,
 }
 
 // The frequency of a stick-slip cycle drifts with the speed of the tip, so it is measured in short segments.
-// A segment gives the mean over its own time. Therefore the range is narrower than the drift, by the drift of
-// half a segment at either end, for model and measurement alike.
+// The frequency in a segment is its mean over the segment. The measured range is therefore narrower than the
+// true one, at either end by the drift within half a segment; this holds for model and measurement alike.
 
-/// Least amplitude of a segment as a share of the largest: below it the cycle has not started or has decayed.
+/// Ratio of the amplitude in a segment to the largest amplitude of all segments, below which the cycle has
+/// not started or has decayed.
 pub(crate) const LEAST_SEGMENT_AMPLITUDE: f64 = 0.2;
 
-/// The component of every segment with a sufficient amplitude.
+/// The component in every segment in which its amplitude is sufficient.
 pub(super) struct CycleSegments {
-    /// Frequency and its standard deviation, Hz.
+    /// Frequencies, each with its standard deviation, Hz.
     pub frequencies: Vec<(f64, f64)>,
 }
 
 impl CycleSegments {
-    /// Measures the samples of a band's window. Segments overlap by at least half; the first and the last
-    /// reach the ends of the window.
+    /// Measures the component in the samples of a band's window. Segments overlap by at least half; the first
+    /// begins and the last ends with the window.
     pub(super) fn from_samples(
         band: &FeatureBand,
         segment_s: f64,
@@ -178,7 +180,7 @@ impl CycleSegments {
     }
 }
 
-/// The strongest component of a segment; `None` without one, or where too few frames are tracked.
+/// The strongest component of a segment; `None` if there is none or if too few frames are tracked.
 fn strongest_in_segment(
     band: &FeatureBand,
     segment: &[Option<f64>],
@@ -191,7 +193,7 @@ fn strongest_in_segment(
     }
 }
 
-/// First frames of the segments of a window; `None` where a segment has too few frames or more than the
+/// First frames of the segments of a window; `None` if a segment has too few frames, or more frames than the
 /// window.
 fn segment_starts(window: usize, frames: usize) -> Option<impl Iterator<Item = usize>> {
     if frames < short_spectra::MIN_SAMPLES {
@@ -202,13 +204,14 @@ fn segment_starts(window: usize, frames: usize) -> Option<impl Iterator<Item = u
     Some((0..=steps).map(move |k| (k * room).checked_div(steps).unwrap_or(0)))
 }
 
-// Damping from the logarithmic decrement between the halves of a window. In the second half a decaying
-// sinusoid is `exp(-d T/2)` times that of the first, with another phase. The amplitudes through the same Hann
-// window, at any frequency near its own, have exactly this ratio: `d = 2 ln(a1 / a2) / T` and `zeta = d /
-// sqrt(d^2 + (2 pi f)^2)`. Errors come from the trend, neighbouring components and noise.
+// Damping from the logarithmic decrement between the two halves of a window of length T. A decaying sinusoid
+// in the second half is `exp(-d T/2)` times that in the first half, with another phase. Its amplitudes in the
+// two halves, measured with the same Hann window at any frequency near its own, have exactly this ratio: `d =
+// 2 ln(a1 / a2) / T` and `zeta = d / sqrt(d^2 + (2 pi f)^2)`. Errors come from the trend, neighbouring
+// components and noise.
 
-/// Least amplitude in the second half, in standard deviations of the noise: at 3 its error is a third, and
-/// noise alone seldom reaches it.
+/// Smallest amplitude in the second half, in standard deviations of the noise. At 3, the relative error of
+/// the amplitude is a third, and noise alone seldom reaches that level.
 pub(crate) const LEAST_FINAL_AMPLITUDE: f64 = 3.0;
 
 /// Damping ratio of the strongest component of a band.
@@ -225,8 +228,8 @@ pub(super) fn read_damping_ratio(
         return Err(MissingValue::FewCycles { frequency_hz, cycles });
     }
     let [first_m, second_m] = transformed.half_amplitudes_m(frequency_hz);
-    // a half has twice the noise power in a bin, so the standard deviation of an amplitude in it equals the
-    // noise floor of the whole window
+    // a half window has twice the noise power in a bin, so that the standard deviation of an amplitude in it
+    // equals the noise floor of the whole window
     let noise_m = component.amplitude_m / math::powf(10.0, component.snr_db / 20.0);
     if second_m < LEAST_FINAL_AMPLITUDE * noise_m {
         return Err(MissingValue::Faded { frequency_hz, second_m });

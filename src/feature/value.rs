@@ -1,58 +1,59 @@
 //! Values of readings, their units and their comparison.
 
-/// A value read from a recording or a run.
+/// A value computed from a recording or a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FeatureValue {
     /// The value, in the reading's unit.
     pub value: f64,
-    /// Its standard deviation, where the reading gives one.
+    /// Standard deviation of the value, if the reading gives one.
     pub sd: Option<f64>,
-    /// Level below the strongest component of the band, dB; 0 for the strongest and for readings without a
-    /// choice.
+    /// Level of the chosen component below the strongest component of the band, dB; 0 for the strongest
+    /// component, and for readings that do not choose among components.
     pub below_db: f64,
-    /// The second best component, where there is a choice.
+    /// The second-best component, if the reading chooses among components.
     pub runner_up: Option<RunnerUpComponent>,
 }
 
-/// A component that was not chosen.
+/// The best component that was not chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RunnerUpComponent {
-    /// Its frequency, Hz.
+    /// Frequency of the component, Hz.
     pub frequency_hz: f64,
     /// Level below the strongest component of the band, dB.
     pub below_db: f64,
 }
 
 impl FeatureValue {
-    /// A value of a reading without a choice of components.
+    /// Value of a reading that does not choose among components.
     pub(super) fn new(value: f64, sd: Option<f64>) -> Self {
         Self { value, sd, below_db: 0.0, runner_up: None }
     }
 }
 
-/// Effect of the camera's calibration on a value that is a length.
+/// Effect of the camera's calibration on a length.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LengthCalibration {
-    /// A mean position of the tip relative to the head: it depends on the offset of the markers and on the
-    /// scale.
+    /// The value is a mean position of the tip relative to the head; it depends on the scale and on the
+    /// offset of the markers.
     Position,
-    /// The size of a motion: it depends on the scale, except for a floor that was added in quadrature.
+    /// The value is the size of a motion; it depends on the scale, except for a floor that was added in
+    /// quadrature.
     Size {
         /// Root mean square of the floor, m.
         floor_m: f64,
     },
 }
 
-/// A unit in files and in figures.
+/// Unit of a value in files and in figures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FeatureUnit {
     /// Name in files; `1` for a plain number.
     pub name: &'static str,
-    /// Suffix of a column's name.
+    /// Suffix of the name of a column.
     pub suffix: &'static str,
     /// Name in figures; empty for a plain number.
     pub shown: &'static str,
-    /// Factor from the unit in files to that in figures.
+    /// Factor from the unit in files to the unit in figures.
     pub factor: f64,
 }
 
@@ -66,14 +67,14 @@ impl FeatureUnit {
     pub(crate) const DIMENSIONLESS: Self = Self { name: "1", suffix: "", shown: "", factor: 1.0 };
 }
 
-/// How two values are compared.
+/// Way in which two values are compared.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ValueComparison {
     /// By the logarithm of their ratio.
     Log,
-    /// By their difference: values may be zero or change sign.
+    /// By their difference, since the values may be zero or change sign.
     Linear {
-        /// Difference that counts as large, in the unit of the reading.
+        /// Unit of the difference, in the unit of the reading; a difference of this size counts as large.
         scale: f64,
     },
 }

@@ -32,12 +32,12 @@ impl AnalysedWindow<'_> {
 
 // Spectra of a recording and of a model in the same window.
 
-/// Components of the model below this fraction of its largest are dropped.
+/// Ratio to the amplitude of the model's largest component below which a component of the model is left out.
 const LEAST_OF_MODEL: f64 = 1e-3;
 
-/// The spectra and components of a recording and of a model in the same window. Components of the model that
-/// no recording could show are dropped: those below the noise floor of the recording, or below 0.1 % of the
-/// largest. The caller sets heading, note and targets.
+/// The spectra and components of a recording and of a model in the same window. Leaves out components of the
+/// model that no recording could show: those below the noise floor of the recording, or below 0.1 % of the
+/// model's largest component. The caller sets heading, note and targets.
 #[must_use]
 pub fn compare_spectra(measured: Option<&SpectralAnalysis>, model: Option<&SpectralAnalysis>) -> SpectraPlot {
     let components = |analysis: &SpectralAnalysis| -> Vec<LabelledComponent> {
@@ -91,15 +91,15 @@ pub(super) fn spectrum_curve(analysis: &SpectralAnalysis) -> SpectrumCurve {
     }
 }
 
-/// Amplitudes over the frequencies of the spectrum; `None` where the lengths differ.
+/// A level at the frequencies of the spectrum; `None` if the two lengths differ.
 pub(super) fn spectrum_level(analysis: &SpectralAnalysis, amplitude_m: &[f64]) -> Option<SpectrumLevel> {
     let frequency_hz = &analysis.spectrum.frequency_hz;
     (amplitude_m.len() == frequency_hz.len())
         .then(|| SpectrumLevel { frequency_hz: frequency_hz.clone(), amplitude_m: amplitude_m.to_vec() })
 }
 
-/// A component with the amplitude that the spectrum has at its frequency. Its own amplitude may be that at
-/// the start of a decay, or the mean of a drifting component, and then lies above the peak.
+/// A component with the amplitude of the spectrum at its frequency. The fitted amplitude may lie above the
+/// peak of the spectrum: it may be that at the start of a decay, or the mean of a drifting component.
 pub(super) fn label_component(c: &Component, spectrum: &Spectrum) -> LabelledComponent {
     let bin_hz = spectrum.frequency_hz.get(1).copied().unwrap_or(f64::INFINITY);
     let height_m = spectrum.amplitude_m.get((c.frequency_hz / bin_hz).round() as usize).copied();
@@ -115,7 +115,7 @@ pub(super) fn label_component(c: &Component, spectrum: &Spectrum) -> LabelledCom
     }
 }
 
-// The ridge of the strongest component over time and over tip speed.
+// Frequency of the strongest component against time and against tip speed.
 
 /// A point of a ridge, with the mean speeds of tip and head in its segment.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -187,7 +187,7 @@ impl AnalysedWindow<'_> {
         }
     }
 
-    /// The parts of the ridge that are drawn, their points over tip speed, and a note on the number of
+    /// The parts of the ridge that are drawn, their points against tip speed, and a note on the number of
     /// segments.
     fn drawn_ridge(&self, of: &Spectrogram) -> (Vec<Vec<RidgePoint>>, Vec<SpeedPoint>, String) {
         let Some(ridge) = &self.analysis.ridge else { return Default::default() };
@@ -232,17 +232,17 @@ impl AnalysedWindow<'_> {
     }
 }
 
-// A window as the sum of trend, components and residual.
+// A window decomposed into trend, components and residual.
 
-/// Points per cycle of the fastest oscillation, for a smooth line.
+/// Points per cycle of the fastest oscillation; enough for a smooth line.
 const POINTS_A_CYCLE: f64 = 12.0;
-/// Upper limit of the points of a fitted line: more would be closer than pixels.
+/// Maximum number of points of a fitted line; more would lie closer together than pixels.
 const MOST_POINTS: f64 = 40_000.0;
-/// A damping ratio counts as a decay from this many standard deviations on.
+/// A component decays if its damping ratio exceeds this many standard deviations.
 const DECAYS: f64 = 3.0;
 
 impl AnalysedWindow<'_> {
-    /// The window as the sum of trend, components and residual.
+    /// The window decomposed into trend, components and residual.
     pub(crate) fn ring_down(&self) -> RingDown {
         let grid = self.recording.grid();
         let time_s: Vec<f64> = self.frames.clone().map(|i| grid.time_s(i)).collect();
@@ -251,7 +251,7 @@ impl AnalysedWindow<'_> {
         let analysis = self.analysis;
         let samples = analysis.residual_m.iter().zip(&analysis.model_m).zip(&analysis.removed_m);
         let samples = samples.map(|((left, m), removed)| left.map(|left| left + m + removed));
-        // white noise of density 2 s^2 / rate has this root mean square in a bin
+        // root mean square of white noise whose noise floor in the spectrum is `noise_floor_m`
         let noise_m = analysis.spectrum.noise_floor_m
             * (grid.frame_rate_hz / (4.0 * analysis.spectrum.noise_bandwidth_hz)).sqrt();
         RingDown {
@@ -274,7 +274,7 @@ impl AnalysedWindow<'_> {
         }
     }
 
-    /// The largest component that decays, with the residual added to its data.
+    /// The largest component that decays; its data are the component plus the residual.
     fn largest_decay(&self, time_s: &[f64]) -> Option<ComponentDecay> {
         let analysis = self.analysis;
         let decays = |c: &&Component| {
@@ -298,7 +298,7 @@ impl AnalysedWindow<'_> {
         })
     }
 
-    /// The removed trend at a time from the first frame, m; linear between frames.
+    /// The removed trend at a time after the first frame, m; linear between frames.
     fn removed_trend_m(&self, time_s: f64) -> f64 {
         let place = time_s * self.recording.grid().frame_rate_hz;
         let before = (place.max(0.0) as usize).min(self.analysis.removed_m.len().saturating_sub(1));
@@ -308,7 +308,7 @@ impl AnalysedWindow<'_> {
         value(before) + (place - before as f64) * (value(before + 1) - value(before))
     }
 
-    /// A function of the time from the first frame, sampled more finely than the frames.
+    /// A function of the time after the first frame, sampled for a smooth line.
     fn fine_trace(&self, value: impl Fn(f64) -> f64) -> RingDownTrace {
         let grid = self.recording.grid();
         let (start_s, length_s) =
@@ -324,7 +324,7 @@ impl AnalysedWindow<'_> {
     }
 }
 
-// A window of a recording's channel with its analysis.
+// A window of a channel with its analysis.
 
 /// A window of a channel and its analysis.
 pub(crate) struct AnalysedWindow<'a> {
@@ -332,7 +332,7 @@ pub(crate) struct AnalysedWindow<'a> {
     pub channel: Channel,
     pub frames: Range<usize>,
     pub analysis: &'a SpectralAnalysis,
-    /// How the window was analysed, for the line under the heading.
+    /// Description of the analysis, for the line under the heading.
     pub note: String,
 }
 
@@ -343,7 +343,7 @@ impl AnalysedWindow<'_> {
     }
 }
 
-/// Named instants between two times, s.
+/// Named instants within a time interval, s.
 pub(super) fn named_instants(recording: &Recording, (from_s, to_s): (f64, f64)) -> Vec<(String, f64)> {
     let found = ReversalInstants::find_instants(recording);
     let all = (1..=found.reversals.len()).flat_map(|k| InstantKind::ALL.map(|anchor| (anchor, k)));
@@ -364,7 +364,8 @@ mod tests {
 
     const RATE_HZ: f64 = 5000.0;
 
-    /// A record with noise, one frame in so many lost, as it is drawn, and its curve without noise.
+    /// The plotted spectrum of a record with noise and with one frame in `lost` missing, and the spectrum of
+    /// the record without noise.
     fn drawn(of_m: impl Fn(f64) -> f64, noise_m: f64, lost: usize) -> (SpectraPlot, SpectrumCurve) {
         let mut seed = 7_u64;
         let mut draw = || {
@@ -404,7 +405,7 @@ mod tests {
         (window.spectra(), spectrum_curve(&analysed(&quiet)))
     }
 
-    /// Share of the bins above the lowest frequency whose interval holds an amplitude.
+    /// Fraction of the bins above the lowest frequency whose interval contains the given amplitude.
     fn covered(shown: &SpectraPlot, amplitude_m: &[f64]) -> f64 {
         let interval = shown.interval_95.as_ref().unwrap();
         let bins = interval.lower_m.iter().zip(&interval.upper_m).zip(amplitude_m);

@@ -1,9 +1,9 @@
-//! The linkage in motion through a reversal, slowed down: a figure with what moves drawn over it, as SVG with
-//! SMIL (no script).
+//! Animation of the linkage through a reversal in slow motion: a still figure with moving elements drawn over
+//! it, as SVG with SMIL (no script).
 //!
-//! The still parts are a [`Figure`] like any other: a drawing to scale with the poses of a few instants, an
-//! enlarged one of the tip, and the deflection and the tip's velocity over time. Over it move head, neck and
-//! lip, the measured points, a word for the state of contact, and a line for the time.
+//! The still part is a [`Figure`] like any other: a drawing to scale with the poses at a few instants, an
+//! enlarged drawing of the tip, and plots of deflection and tip velocity against time. The moving elements
+//! are head, neck and lip, the measured points, the name of the contact mode, and a time cursor.
 
 mod drawing;
 mod smil;
@@ -24,7 +24,7 @@ use portable_math as math;
 /// Data of an animation; all times are on one clock.
 #[derive(Debug, Clone)]
 pub struct Animation {
-    /// Subject, such as the name of the job; part of the line under the heading.
+    /// Subject, such as the title of the job; part of the line under the heading.
     pub title: String,
     /// Whether the measured motion is synthetic.
     pub synthetic: bool,
@@ -32,39 +32,38 @@ pub struct Animation {
     pub turns: bool,
     /// The links of the model.
     pub linkage: Linkage,
-    /// States of the model over the shown part, close enough for linear interpolation.
+    /// States of the model in the shown part, close enough together for linear interpolation.
     pub samples: Vec<ModelSample>,
-    /// Contact modes of the model, each with its start, s; the first starts at the first shown instant.
+    /// Contact modes of the model, each with its start, s; the first one starts at the first shown instant.
     pub modes: Vec<(f64, TipMode)>,
     /// Intervals in which the model's tip sticks, s.
     pub stick_s: Vec<[f64; 2]>,
-    /// First and last instant of the stick around the reversal, s; of the longest stick where the head does
-    /// not turn.
+    /// Start and end of the longest stick of the model's tip (the hold), s.
     pub hold_s: [f64; 2],
-    /// Measured motion; `None` where there is no recording.
+    /// Measured motion; `None` without a recording.
     pub measured: Option<TrackedMotion>,
     /// The shown parts and their slow-down factors.
     pub pace: PlaybackPace,
 }
 
-/// Measured motion, one value per frame; `None` where a point was not tracked.
+/// Measured motion, one value per frame; `None` if a point is not tracked in a frame.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TrackedMotion {
     /// Instants of the frames, s.
     pub time_s: Vec<f64>,
-    /// Lip tip along the sweep, m.
+    /// Position of the lip tip along the sweep, m.
     pub tip_x_m: Vec<Option<f64>>,
-    /// Head along the sweep, m.
+    /// Position of the head along the sweep, m.
     pub head_x_m: Vec<Option<f64>>,
     /// Drop of the head, m.
     pub head_drop_m: Vec<Option<f64>>,
 }
 
-/// Hides the moving elements from readers who prefer reduced motion; the poses of the named instants stay.
+/// Style that hides the moving elements from readers who prefer reduced motion; the drawn poses stay.
 const LESS_MOTION: &str = "<style>@media (prefers-reduced-motion:reduce){svg .moves{display:none}}</style>\n";
 
-/// The animation as SVG; the same data always give the same bytes. It starts at the hold. Print shows that
-/// state with the poses of other instants.
+/// The animation as SVG; the same data always give the same bytes. The animation starts with the hold. A
+/// print shows this first state together with the drawn poses.
 #[must_use]
 pub fn render_svg(animation: &Animation) -> String {
     draw_still(animation).svg_with_overlay(|plots| {
@@ -93,7 +92,7 @@ impl Animation {
     }
 }
 
-/// Everything that does not move.
+/// The part of the figure that does not move.
 fn draw_still(animation: &Animation) -> Figure {
     let source = if animation.measured.is_none() { NO_TRACES } else { "" };
     let note = about(source, &describe_pace(&animation.pace));
@@ -114,7 +113,7 @@ fn draw_still(animation: &Animation) -> Figure {
     }
 }
 
-/// "100 times slower than the motion, then 500 times".
+/// The slow-down factors as text: "100 times slower than the motion, then 500 times".
 pub(crate) fn describe_pace(pace: &PlaybackPace) -> String {
     let factors: Vec<String> = pace.parts.iter().map(|p| format!("{} times", p.slower)).collect();
     let [first, rest @ ..] = factors.as_slice() else { return String::new() };
@@ -122,13 +121,14 @@ pub(crate) fn describe_pace(pace: &PlaybackPace) -> String {
     format!("{first} slower than the motion{rest}")
 }
 
-// The animation of a condition: the model's reversal in fine steps, with what was measured on the same
+// The animation of a condition: the model's reversal in fine steps, and the measured motion on the same
 // clock.
 
-/// Most states of an animation: a reversal with its release takes about 0.1 s, so a cycle of 1 kHz has 25.
+/// Maximum number of states of an animation. A reversal with its release takes about 0.1 s, so that a cycle
+/// of 1 kHz has 25 states.
 const MOST_SAMPLES: usize = 2500;
 
-/// The animation of a condition; `None` where the model's tip never sticks.
+/// The animation of a condition; `None` if the model's tip never sticks.
 pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     let shown = build_animation(case)?;
     let drawing = Drawing::Moving(render_svg(&shown));
@@ -157,7 +157,8 @@ fn build_animation(case: &ConditionComparison) -> Option<Animation> {
     })
 }
 
-/// At most [`MOST_SAMPLES`] states of a span, with their times shifted by `shift_s`.
+/// At most [`MOST_SAMPLES`] states of a time interval (plus its last state), with their times shifted by
+/// `shift_s`.
 fn thin_samples(motion: &RunMotion, span_s: [f64; 2], shift_s: f64) -> Vec<ModelSample> {
     let fine = motion.fine_samples_between(span_s);
     let every = fine.len().div_ceil(MOST_SAMPLES).max(1);
@@ -166,7 +167,7 @@ fn thin_samples(motion: &RunMotion, span_s: [f64; 2], shift_s: f64) -> Vec<Model
     chosen.map(|s| ModelSample { time_s: s.time_s + shift_s, ..*s }).collect()
 }
 
-/// The frames of a span and one more on either side, in the coordinates of the model.
+/// The frames in a time interval and the nearest frame on either side of it, in the coordinates of the model.
 fn tracked_motion(recording: &Recording, alignment: &Alignment, [from_s, to_s]: [f64; 2]) -> TrackedMotion {
     let grid = recording.grid();
     let place = |t: f64| ((t - grid.start_s) * grid.frame_rate_hz).clamp(0.0, grid.frames as f64);
@@ -183,14 +184,14 @@ fn tracked_motion(recording: &Recording, alignment: &Alignment, [from_s, to_s]: 
     }
 }
 
-/// The contact modes in a span, each with its first instant, s.
+/// The contact modes in a time interval, each with its start, s; the first starts with the interval.
 fn contact_modes(motion: &RunMotion, [from_s, to_s]: [f64; 2]) -> Vec<(f64, TipMode)> {
     let first = motion.samples.iter().rfind(|s| s.time_s <= from_s).map(|s| (from_s, s.mode));
     let inside = motion.transitions.iter().filter(|t| t.time_s > from_s && t.time_s <= to_s);
     first.into_iter().chain(inside.map(|t| (t.time_s, t.to))).collect()
 }
 
-/// Sentence on the tracked points that are drawn and on their alignment.
+/// Sentence on the tracked points that are drawn, and on how they are aligned with the model.
 fn describe_crosses(recording: &Recording, case: &ConditionComparison) -> String {
     let traces = recording.traces();
     let head = is_tracked(&traces.head_x_m) && is_tracked(&traces.head_y_m);
@@ -236,48 +237,48 @@ fn figure_text(shown: &Animation, case: &ConditionComparison) -> FigureText {
     FigureText { caption, details }
 }
 
-// Playback pace: the parts of the motion and their slow-down factors.
+// Playback pace: parts of the motion, each with its slow-down factor.
 
 /// A part of the motion with one slow-down factor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlaybackPart {
-    /// First instant of the motion, s.
+    /// Start of the part, on the clock of the motion, s.
     pub from_s: f64,
-    /// Last instant of the motion, s.
+    /// End of the part, on the clock of the motion, s.
     pub to_s: f64,
     /// Slow-down factor.
     pub slower: f64,
 }
 
 impl PlaybackPart {
-    /// The part, slowed down by a round factor so that it lasts about `wanted_s`.
+    /// The part, slowed down by a round factor such that its playback takes about `wanted_s`.
     fn with_duration(from_s: f64, to_s: f64, wanted_s: f64) -> Self {
         Self { from_s, to_s, slower: round_to_125(wanted_s / (to_s - from_s)).max(1.0) }
     }
 }
 
-/// Consecutive parts without gaps; the last picture then rests for a second.
+/// Consecutive parts without gaps; after the last part, its final picture stays for a second.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PlaybackPace {
     /// The parts, in order of time.
     pub parts: Vec<PlaybackPart>,
 }
 
-/// How long the last picture stays before the animation starts again, s.
+/// Time for which the final picture stays before the animation starts again, s.
 const REST_S: f64 = 1.0;
 /// Playback time of the hold and its lead-in, s.
 const HOLD_SHOWN_S: f64 = 7.0;
 /// Playback time of the release and the motion after it, s.
 const RELEASE_SHOWN_S: f64 = 10.0;
-/// Parts of the motion in units of the length of the hold: shown before it, counted as release at its end,
-/// and shown after it.
+/// Durations in units of the duration of the hold: the motion shown before the hold, the end of the hold that
+/// belongs to the release part, and the motion shown after the hold.
 const LEAD_IN: f64 = 0.06;
 const RELEASE_LEAD: f64 = 0.02;
 const FOLLOW_UP: f64 = 0.3;
 
 impl PlaybackPace {
-    /// The hold of the tip, then its release with some cycles, slower still; limited to `within`. `None`
-    /// where no time is left.
+    /// The hold of the tip, and then, still slower, its release with some cycles; both are limited to
+    /// `within`. `None` if nothing is left within that limit.
     #[must_use]
     pub fn around_hold([hold_s, release_s]: [f64; 2], within: [f64; 2]) -> Option<Self> {
         let length = release_s - hold_s;
@@ -291,13 +292,13 @@ impl PlaybackPace {
         (!parts.is_empty()).then_some(Self { parts })
     }
 
-    /// First and last instant of the motion, s.
+    /// Start and end of the shown motion, s.
     #[must_use]
     pub fn span_s(&self) -> [f64; 2] {
         [self.parts.first().map_or(0.0, |p| p.from_s), self.parts.last().map_or(1.0, |p| p.to_s)]
     }
 
-    /// First and last instant of the last part, s.
+    /// Start and end of the last part, s.
     pub(crate) fn last_part_s(&self) -> [f64; 2] {
         self.parts.last().map_or(self.span_s(), |p| [p.from_s, p.to_s])
     }
@@ -309,12 +310,12 @@ impl PlaybackPace {
         Self { parts: self.parts.into_iter().map(later).collect() }
     }
 
-    /// Playback time with the rest at the end, s.
+    /// Playback time, including that of the final picture, s.
     pub(crate) fn duration_s(&self) -> f64 {
         self.parts.iter().map(|p| (p.to_s - p.from_s) * p.slower).sum::<f64>() + REST_S
     }
 
-    /// When an instant of the motion is shown, as a fraction of the playback time.
+    /// Playback time at which an instant of the motion is shown, as a fraction of the total playback time.
     pub(crate) fn playback_fraction(&self, time_s: f64) -> f64 {
         let shown_s: f64 =
             self.parts.iter().map(|p| (time_s.clamp(p.from_s, p.to_s) - p.from_s) * p.slower).sum();
@@ -322,7 +323,7 @@ impl PlaybackPace {
     }
 }
 
-/// The nearest of 1, 2 and 5 times a power of ten on a logarithmic scale.
+/// The nearest number of the form 1, 2 or 5 times a power of ten, on a logarithmic scale.
 pub(super) fn round_to_125(value: f64) -> f64 {
     let power = math::powf(10.0, math::log10(value).floor());
     let apart = |candidate: &f64| math::ln(candidate / value).abs();
@@ -331,18 +332,18 @@ pub(super) fn round_to_125(value: f64) -> f64 {
     nearest.unwrap_or(value)
 }
 
-// Strip charts under the drawings: deflection over the shown part, tip velocity over its last part.
+// Strip charts under the drawings: deflection throughout the shown motion, tip velocity in its last part.
 
 const HEIGHT_MM: f64 = 27.0;
 const MM: f64 = 1e3;
 
-/// A quantity of the model's states over time.
+/// A quantity of the model plotted against time.
 struct StripChart {
     label: &'static str,
-    /// Legend entry and line style of the model.
+    /// Legend entry and line style of the model's curve.
     line: (&'static str, Mark),
     of: fn(&ModelSample) -> f64,
-    /// First and last instant of the strip, s.
+    /// Start and end of the time axis, s.
     span_s: fn(&PlaybackPace) -> [f64; 2],
 }
 
@@ -361,7 +362,7 @@ const STRIPS: [StripChart; 2] = [
     },
 ];
 
-/// The strip charts; the first also holds the measured deflection.
+/// The strip charts; the first one also shows the measured deflection.
 pub(super) fn draw_strips(animation: &Animation) -> Vec<Panel> {
     let mut panels: Vec<Panel> = STRIPS.iter().map(|strip| draw_strip(animation, strip)).collect();
     if let (Some(first), Some(measured)) = (panels.first_mut(), &animation.measured) {
@@ -373,7 +374,7 @@ pub(super) fn draw_strips(animation: &Animation) -> Vec<Panel> {
     panels
 }
 
-/// First and last instant of each strip, s.
+/// Start and end of the time axis of each strip, s.
 pub(super) fn strip_spans_s(animation: &Animation) -> [[f64; 2]; 2] {
     STRIPS.map(|strip| (strip.span_s)(&animation.pace))
 }
@@ -418,7 +419,7 @@ mod tests {
     fn shares_follow_the_parts_and_leave_a_rest() {
         let part = |from_s, to_s, slower| PlaybackPart { from_s, to_s, slower };
         let pace = PlaybackPace { parts: vec![part(1.0, 1.02, 100.0), part(1.02, 1.03, 500.0)] };
-        assert!((pace.duration_s() - 8.0).abs() < 1e-9); // 2 s, 5 s and the rest of 1 s
+        assert!((pace.duration_s() - 8.0).abs() < 1e-9); // 2 s, 5 s, and 1 s for the final picture
         for (time_s, expected) in [
             (0.5, 0.0),
             (1.01, 1.0 / 8.0),

@@ -1,5 +1,5 @@
-//! Corner plot: joint regions of every pair of parameters, and the likelihood of each parameter with profile,
-//! bounds, prior, true value and stated interval.
+//! Corner plot: joint regions of every pair of parameters, and for each parameter its likelihood and profile,
+//! its bounds and prior, its true value and its stated interval.
 
 use super::figure_text::parameter_symbol;
 use crate::compare::ParameterLine;
@@ -12,7 +12,7 @@ use crate::text::{choose_prefix, format_digits, format_interval, join_with_and};
 use plain_charts::{ChartAxis, Colour, Figure, Mark, Panel, Ribbon, Series};
 use portable_math as math;
 
-/// One parameter; values are in the unit scale of the search, 0 and 1 at the bounds.
+/// A parameter; values are in the unit scale of the search, with 0 and 1 at the bounds.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct CornerParameter {
     /// Symbol in the equations.
@@ -27,11 +27,11 @@ pub struct CornerParameter {
     pub sd: Option<f64>,
     /// Mean and standard deviation of the prior.
     pub prior: Option<(f64, f64)>,
-    /// True value, where the data are synthetic.
+    /// True value, if the data are synthetic.
     pub truth: Option<f64>,
-    /// Values of the parameter, and the likelihood over its greatest value.
+    /// Values of the parameter, each with the ratio of its profile likelihood to the largest likelihood.
     pub profile: Vec<(f64, f64)>,
-    /// Ends of local searches with a cost within the threshold.
+    /// Values at which local searches ended with a cost within the threshold of the least cost.
     pub optima: Vec<f64>,
 }
 
@@ -44,32 +44,33 @@ pub struct CornerPlot {
     pub synthetic: bool,
     /// The parameters.
     pub parameters: Vec<CornerParameter>,
-    /// Correlation matrix of the estimates; `None` where unknown.
+    /// Correlation matrix of the estimates; `None` for an unknown correlation.
     pub correlations: Vec<Vec<Option<f64>>>,
 }
 
 /// Height of a row, mm.
 const ROW_MM: f64 = 24.0;
-/// Most parameters that are drawn; of more the first.
+/// Maximum number of parameters drawn; of a longer list only the first ones are drawn.
 const MOST: usize = 8;
-/// Half widths of the joint regions, standard deviations: roots of chi-square with two degrees of freedom at
-/// 68.3 and 95.4 %.
+/// Half widths of the joint regions, standard deviations: square roots of the 95.4 and 68.3 % quantiles of
+/// chi-square with two degrees of freedom.
 const REGIONS: [(&str, Colour, Mark, f64); 2] = [
     ("95 % of a pair", Colour::Blue, Mark::Thin, 2.486),
     ("68 % of a pair", Colour::Blue, Mark::Line, 1.515),
 ];
-/// Points of a region's outline and of a curve.
+/// Number of intervals in the outline of a region and in a curve.
 const POINTS: u32 = 48;
-/// Half width of a cell, half width of its contents, and height of its curve.
+/// Half width of a cell, half width of its contents, and height of the likelihood curve in it.
 const HALF: f64 = 0.5;
 const INSIDE: f64 = 0.44;
 const CURVE: f64 = 0.72;
-/// Least range of a cell to either side, standard deviations, and its margin as a fraction of the range.
+/// Smallest range that a cell shows on either side of the estimate, standard deviations, and margin of the
+/// cell as a fraction of its range.
 const SHOWN_SD: f64 = 2.8;
 const ROOM: f64 = 0.06;
-/// Least margin of a cell in units of the search: smaller ranges are rounding.
+/// Smallest margin of a cell, in the unit scale of the search; a smaller range is rounding error.
 const LEAST: f64 = 1e-9;
-/// Standard deviations of a two-sided 95 % interval.
+/// Half width of a two-sided 95 % interval, standard deviations.
 const Z_95: f64 = 1.96;
 
 impl CornerPlot {
@@ -115,7 +116,7 @@ fn corner_parameter(
     let (found, bounds) = (result.parameters.get(&free.name)?, &free.bounds);
     let line = lines.iter().find(|line| line.name == free.name);
     let estimate = bounds.unit_coordinate(found.estimate);
-    // an end may have been cut at a bound: the longer half counts
+    // an end may have been cut at a bound, so the longer half is used
     let half = found.linear_95.map(|ends| {
         ends.iter().map(|end| (bounds.unit_coordinate(*end) - estimate).abs()).fold(0.0, f64::max)
     });
@@ -141,7 +142,7 @@ fn corner_parameter(
     })
 }
 
-/// Mean and standard deviation of a prior in the search scale, linearised at the mean.
+/// Mean and standard deviation of a prior in the unit scale of the search, linearised at the mean.
 fn prior_in_search_scale(prior: &Prior, bounds: &Bounds) -> Option<(f64, f64)> {
     let (mean, sd) = match *prior {
         Prior::Linear { mean, sd } => (mean, sd),
@@ -215,7 +216,8 @@ fn draw_cells(shown: &CornerPlot) -> Vec<Series> {
     let pairs = || (0..count).flat_map(|i| (0..i).map(move |j| (i, j)));
     let pair = |(i, j): (usize, usize)| (&shown.parameters[i], &shown.parameters[j]);
     let diagonal = || shown.parameters.iter().enumerate();
-    // `point` takes the values of column and row, `upright` a value and a height in a diagonal cell
+    // `point` needs the values of the column's and the row's parameter, `upright` a value and a height in a
+    // diagonal cell
     let point = |(i, j): (usize, usize), x: f64, y: f64| {
         clip_to_cell((cell_position(x, spans[j]), cell_position(y, spans[i])), cell_centre(shown, i, j))
     };
@@ -290,12 +292,12 @@ fn draw_cells(shown: &CornerPlot) -> Vec<Series> {
     all
 }
 
-/// Height of a relative likelihood in a cell.
+/// Height in a cell at which a relative likelihood is drawn.
 fn likelihood_height(share: f64) -> f64 {
     -INSIDE + CURVE * share
 }
 
-/// A point relative to a cell's centre, in axis coordinates; `None` outside the cell.
+/// A point given relative to the centre of its cell, in axis coordinates; `None` outside the cell.
 fn clip_to_cell((x, y): (f64, f64), at: (f64, f64)) -> Option<(f64, f64)> {
     (x.abs() <= HALF && y.abs() <= HALF).then_some((at.0 + x, at.1 + y))
 }
@@ -322,7 +324,7 @@ const DETAILS: &str = "Below the diagonal: every pair of estimates with the regi
     likelihood over its greatest value, by the linear model and, where it was made, by the profile, with the \
     interval that the table states. Every cell is as wide as what is known; scales are those of the search.";
 
-/// Caption: what the figure shows, with its number.
+/// Caption: contents of the figure, and its main number.
 pub(crate) fn figure_caption(shown: &CornerPlot) -> String {
     let all = shown.parameters.len();
     let bounded = shown.parameters.iter().filter(|p| p.stated.iter().all(Option::is_some)).count();

@@ -1,5 +1,5 @@
-//! Frequency of the stick-slip cycle over tip speed, measured and of the model, with natural frequencies and
-//! targets as lines.
+//! Frequency of the stick-slip cycle against tip speed, measured and of the model, with natural frequencies
+//! and targets as lines.
 
 use super::spectrogram::speed_series;
 use super::{FigureBlock, FigureText};
@@ -32,13 +32,14 @@ pub struct CycleOverSpeed {
 
 /// Height of the panel, mm.
 const HEIGHT_MM: f64 = 72.0;
-/// Ends of the axes over the largest shown value.
+/// Ratio of the ends of the axes to the largest shown value.
 const AXIS_MARGIN: f64 = 1.12;
-/// Positions of names along their lines, fractions of the width; close lines use them in turn.
+/// Positions of the names along their lines, fractions of the width; the names of lines that lie close
+/// together use these positions in turn.
 const LABEL_POSITIONS: [f64; 3] = [0.24, 0.52, 0.79];
-/// Letters after which the name of a target is cut.
+/// Number of letters after which the name of a target is cut.
 const MAX_LABEL_LETTERS: usize = 12;
-/// Lines closer than this have their names at different positions, fraction of the height.
+/// Lines closer together than this have their names at different positions; fraction of the height.
 const CLOSE_LEVELS: f64 = 0.09;
 /// Distance of a name from its line, fraction of the height.
 const LABEL_OFFSET: f64 = 0.022;
@@ -81,7 +82,7 @@ pub fn draw_figure(shown: &CycleOverSpeed) -> Figure {
     )
 }
 
-/// Lines across the axes.
+/// Horizontal lines across the axes.
 fn level_lines(lines: &[(String, f64, Colour)], right: f64) -> impl Iterator<Item = Series> {
     lines.iter().map(move |(_, hz, colour)| {
         let (label, mark) = match colour {
@@ -92,14 +93,14 @@ fn level_lines(lines: &[(String, f64, Colour)], right: f64) -> impl Iterator<Ite
     })
 }
 
-/// Two standard deviations either side of a target.
+/// Band of two standard deviations on either side of a target.
 fn deviation_ribbon(target: &Target, right: f64) -> Option<Ribbon> {
     let sd_hz = target.frequency_sd_hz?;
     let (low, high) = (target.frequency_hz - 2.0 * sd_hz, target.frequency_hz + 2.0 * sd_hz);
     Some(Ribbon::new("target \u{b1} 2 sd", Colour::Blue, [(0.0, low, high), (right, low, high)]))
 }
 
-/// The names above their lines; those of close lines stand side by side.
+/// The names above their lines; the names of lines that lie close together stand side by side.
 fn level_names(lines: &[(String, f64, Colour)], (right, top): (f64, f64)) -> Vec<TextAnnotation> {
     let (mut place, mut before) = (0, f64::NEG_INFINITY);
     let mut named = Vec::new();
@@ -112,24 +113,24 @@ fn level_names(lines: &[(String, f64, Colour)], (right, top): (f64, f64)) -> Vec
     named
 }
 
-/// Both cycles, the recording's on top.
+/// The cycles of model and recording; the recording's is drawn on top.
 fn cycle_series(shown: &CycleOverSpeed) -> impl Iterator<Item = Series> {
     let model = speed_series("model", Colour::Vermilion, MarkerShape::Square, &shown.model);
     let measured = speed_series("measured", Colour::Black, MarkerShape::Disc, &shown.measured);
     [model, measured].into_iter().filter(|s| !s.points.is_empty())
 }
 
-// The cycle of a condition over the speed of the tip.
+// The cycle of a condition against the speed of the tip.
 
-/// Neighbouring frequencies with a larger ratio belong to different components.
+/// Neighbouring frequencies whose ratio is larger belong to different components.
 const COMPONENT_RATIO: f64 = 2.5;
-/// A cycle is called constant when its range is below this fraction of its mean.
+/// A cycle is called constant if its frequency range is below this fraction of its mean frequency.
 const CONSTANT_TOLERANCE: f64 = 0.03;
-/// The cycle follows the speed when the means of the faster and the slower half differ by more than this
-/// fraction of the range.
+/// The cycle depends on the speed if the mean frequencies at the faster and at the slower half of the speeds
+/// differ by more than this fraction of the frequency range.
 const MIN_SPEED_TREND: f64 = 0.2;
 
-/// The figure of a condition; `None` where neither side shows a cycle.
+/// The figure of a condition; `None` if neither recording nor model shows a cycle.
 pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     let (measured, model) = (&case.ridges.measured, &case.ridges.model);
     let all = [measured, model].into_iter().flatten().flat_map(|ridge| ridge.courses.iter().flatten());
@@ -163,16 +164,16 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     Some(case.figure_block("cycle", words, draw_figure(&shown)))
 }
 
-/// Lowest frequency of the stick-slip cycle, Hz. A ridge that jumps between the cycle and the slow swing of
-/// the head leaves a wide gap between the two.
+/// Lowest frequency of the stick-slip cycle, Hz. If a ridge jumps between the cycle and the slow swing of the
+/// head, there is a wide gap between their frequencies.
 fn cycle_threshold_hz(mut all: Vec<f64>) -> f64 {
     all.sort_by(f64::total_cmp);
     let gap = all.windows(2).rev().find(|pair| pair[1] > COMPONENT_RATIO * pair[0]);
     gap.map_or(0.0, |pair| pair[1])
 }
 
-/// The main result, from the recording where it shows a cycle. A component below the neck's natural frequency
-/// may be the swing of the head, so it is not called a cycle.
+/// The main result, from the recording if it shows a cycle, else from the model. A component below the neck's
+/// natural frequency may be the swing of the head, so it is not called a cycle.
 fn claim_sentence(shown: &CycleOverSpeed, (low, high): (f64, f64)) -> String {
     let neck_hz = shown.natural_hz.iter().find(|(name, _)| name == "neck").map_or(0.0, |(_, hz)| *hz);
     let what = if high < neck_hz { "strongest component" } else { "cycle" };
@@ -193,12 +194,12 @@ fn claim_sentence(shown: &CycleOverSpeed, (low, high): (f64, f64)) -> String {
     }
 }
 
-/// The measured cycle; the model's where there is none.
+/// The measured cycle, or the model's if none was measured.
 fn cycle_points(shown: &CycleOverSpeed) -> &[SpeedPoint] {
     if shown.measured.is_empty() { &shown.model } else { &shown.measured }
 }
 
-/// Mean frequency of the faster half less that of the slower half, Hz.
+/// Mean frequency at the faster half of the points minus that at the slower half, Hz.
 fn frequency_rise_hz(points: &[SpeedPoint]) -> f64 {
     let mut by_speed = points.to_vec();
     by_speed.sort_by(|a, b| a.speed_m_per_s.total_cmp(&b.speed_m_per_s));

@@ -1,5 +1,5 @@
-//! Evidence of a fit: measured and model over time with the residual in units of the noise, whole and
-//! enlarged at the release and at the worst part.
+//! Evidence for a fit: recording and model against time, with the residual in units of the noise; the whole
+//! recording, and enlarged parts at the release and at the worst misfit.
 
 use super::history::{length_unit, symmetric_axis, thin_points};
 use super::{FigureBlock, FigureText, history};
@@ -18,7 +18,7 @@ pub(crate) type TimeCurve = Vec<Option<(f64, f64)>>;
 /// A part of the recording.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct EvidencePart {
-    /// What it shows, such as "release".
+    /// Name, such as "release".
     pub name: String,
     /// Start and end, s.
     pub span_s: (f64, f64),
@@ -49,12 +49,13 @@ pub struct EvidencePlot {
     pub parts: Vec<EvidencePart>,
 }
 
-/// Residual over noise up to which only noise is left: the noise is known to a few per cent.
+/// A residual whose ratio to the noise is at most this counts as noise only; the noise is known to a few per
+/// cent.
 pub(crate) const NOTHING_LEFT: f64 = 1.1;
 /// Heights of the panels, mm.
 const HEIGHT_MM: f64 = 30.0;
 const RESIDUAL_HEIGHT_MM: f64 = 15.0;
-/// Standard deviations within which 95 % of the noise lies.
+/// Half width of the interval that contains 95 % of the noise, standard deviations.
 const NOISE_95: f64 = 1.96;
 
 /// Draws the figure.
@@ -82,7 +83,7 @@ fn draw_panels(shown: &EvidencePlot, index: usize, part: &EvidencePart) -> [Pane
         let scaled: TimeCurve = course.iter().map(|p| p.map(|(t, x)| (t, x * factor))).collect();
         Series::new(label, colour, mark, thin_points(&scaled, part.span_s))
     };
-    // single frames are dots when enlarged, and a line over the whole recording
+    // frames are dots in an enlarged part, and a line for the whole recording
     let (frames, measured) =
         if whole { (Mark::Thin, "measured") } else { (Mark::Dots, "measured, frame by frame") };
     let details = |of: &[(&TimeCurve, f64)]| {
@@ -120,10 +121,11 @@ fn draw_panels(shown: &EvidencePlot, index: usize, part: &EvidencePart) -> [Pane
     [upper, lower]
 }
 
-/// Most frames of a curve that a page holds in full; longer curves would exceed its size limit of 1 MB.
+/// Maximum number of frames of a curve that a page holds in full; longer curves would exceed the page's size
+/// limit of 1 MB.
 const MOST_FRAMES: usize = 15_000;
 
-/// All frames of a curve; `None` for fewer than two known values or more than [`MOST_FRAMES`].
+/// All frames of a curve; `None` for fewer than two known values or more than [`MOST_FRAMES`] frames.
 fn sample_curve(course: &TimeCurve, factor: f64) -> Option<SampledSeries> {
     let known = || course.iter().enumerate().filter_map(|(i, p)| p.map(|(t, _)| (i, t)));
     let ((i, from), (j, to)) = (known().next()?, known().next_back()?);
@@ -136,16 +138,18 @@ fn sample_curve(course: &TimeCurve, factor: f64) -> Option<SampledSeries> {
     })
 }
 
-// Evidence of a condition: whole recording, release, and worst part after the release.
+// Evidence for a condition: whole recording, release, and worst part after the release.
 
-/// The enlarged part starts and ends this long before and after the release, s.
+/// Times by which the enlarged part begins before and ends after the release, s.
 const AROUND_RELEASE_S: (f64, f64) = (0.005, 0.03);
 /// Length of the worst part, s: a dozen cycles of the high component.
 const LATE_S: f64 = 0.015;
-/// Least fraction of frames with a value: a part with fewer scatters more and could be the worst by chance.
+/// Smallest fraction of frames with a value that the worst part needs; in a part with fewer values the mean
+/// square scatters more, and could be the largest by chance.
 const LEAST_PRESENT: f64 = 0.5;
 
-/// The figure of a condition; `None` without a recording, or where the signs of the two motions differ.
+/// The figure of a condition; `None` without a recording, or if recording and model move in opposite
+/// directions.
 pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     let residual = case.residual.as_ref()?;
     let (channel, noise_m) = case.judged_channel()?;
@@ -187,8 +191,8 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     Some(case.figure_block("evidence", figure_text(case, &shown, channel, noise_m), draw_figure(&shown)))
 }
 
-/// Start and end of the part of length [`LATE_S`] with the largest mean square residual between two instants,
-/// s. A shorter interval is returned whole; `None` without a value.
+/// Start and end, s, of the part of length [`LATE_S`] with the largest mean square residual, within a time
+/// interval. An interval shorter than that is returned whole; `None` if it contains no value.
 fn worst_s(residual: &MotionTraces, channel: Channel, (from_s, to_s): (f64, f64)) -> Option<(f64, f64)> {
     let first = residual.time_s.partition_point(|t| *t < from_s);
     let end = residual.time_s.partition_point(|t| *t <= to_s);
@@ -200,7 +204,7 @@ fn worst_s(residual: &MotionTraces, channel: Channel, (from_s, to_s): (f64, f64)
     if frames >= times.len() || frames < 2 {
         return Some((start_s, last_s));
     }
-    // sums of squares and counts of the values before each frame
+    // cumulative sum of squares and number of values before each frame
     let mut sums = vec![(0.0, 0usize)];
     for value in column {
         let (square, count) = sums.last().copied().unwrap_or_default();
@@ -222,7 +226,7 @@ fn channel_between(motion: &MotionTraces, channel: Channel, (from_s, to_s): (f64
     all.filter(|(t, _)| **t >= from_s && **t <= to_s).map(|(t, x)| x.map(|x| (*t, x))).collect()
 }
 
-/// A smooth line from the states of the model; `None` where its frames are as close.
+/// A smooth curve from the states of the model; `None` if its frames are at least as close together.
 fn model_states_curve(
     case: &ConditionComparison,
     channel: Channel,
@@ -294,7 +298,7 @@ fn figure_text(
     FigureText { caption, details }
 }
 
-/// For a fit to traces: the misfit of its longest restarted segments.
+/// For a fit to traces: sentence on the misfit of the longest segments, at each of which the model restarts.
 fn describe_segments(case: &ConditionComparison) -> Option<String> {
     let misfit = case.result.misfit.as_ref()?;
     let own = |found: &&ChannelMisfit| found.recording == case.name();

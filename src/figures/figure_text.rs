@@ -6,35 +6,37 @@ use crate::model::parameters;
 use crate::text::{join_with_and, truncate_text};
 use plain_charts::Figure;
 
-/// Letters after which a title and a name are cut in a heading, so that room for the figure is left.
+/// Number of letters after which a title and a name are cut in a heading, so that room for the figure is
+/// left.
 const TITLE_LETTERS: usize = 120;
 const NAME_LETTERS: usize = 50;
 
 impl ConditionComparison<'_> {
-    /// Name of the condition; `None` where the job has only one.
+    /// Name of the condition; `None` if it is the only one of its job.
     fn distinct_name(&self) -> Option<&str> {
         Some(self.name()).filter(|_| self.job.conditions.len() > 1)
     }
 
-    /// Title of the job, with the condition where there are several.
+    /// Title of the job, followed by the condition if the job has several.
     pub(crate) fn figure_title(&self) -> String {
         let name = |name| format!(", {}", truncate_text(name, NAME_LETTERS));
         let of = self.distinct_name().map_or_else(String::new, name);
         format!("{}{of}", truncate_text(&self.job.title, TITLE_LETTERS))
     }
 
-    /// The line under a heading; it says where no traces are published.
+    /// The line under a heading, which says if no traces are published.
     pub(crate) fn heading_note(&self, text: &str) -> String {
         about(if self.recording().is_none() { NO_TRACES } else { "" }, text)
     }
 
-    /// "the synthetic recording `twin`", or "the model alone".
+    /// Name of the data source: "the synthetic recording `twin`", "the recording ..." or "the fitted model
+    /// alone, ...".
     pub(crate) fn source_name(&self) -> String {
         let kind = self.source_kind();
         self.recording().map_or_else(|| kind.to_owned(), |r| format!("{kind} {}", r.name()))
     }
 
-    /// As [`Self::source_name`], without the name of the recording.
+    /// Kind of the data source: [`Self::source_name`] without the name of the recording.
     pub(crate) fn source_kind(&self) -> &'static str {
         match self.recording() {
             Some(r) if r.is_synthetic() => "the synthetic recording",
@@ -43,13 +45,14 @@ impl ConditionComparison<'_> {
         }
     }
 
-    /// A figure of recording and model.
+    /// The block of a figure that shows recording and model.
     pub(crate) fn figure_block(&self, name: &str, words: FigureText, figure: Figure) -> FigureBlock {
         let figure = Figure { subtitle: about(&self.figure_title(), &figure.subtitle), ..figure };
         self.drawing_block(name, words, Drawing::Chart(figure))
     }
 
-    /// A figure of the model alone. Conditions with the same run share it, so its details name the condition.
+    /// The block of a figure of the model alone. Conditions with the same run share this figure, so its
+    /// details name the condition.
     pub(crate) fn model_figure_block(&self, name: &str, words: FigureText, drawing: Drawing) -> FigureBlock {
         let of = self.distinct_name().map_or_else(String::new, |name| format!("{name}: "));
         let details = format!("{of}{}{}", words.details, self.sharing_note());
@@ -71,7 +74,7 @@ impl ConditionComparison<'_> {
         FigureBlock { file, caption, details, drawing, condition: Some(self.condition) }
     }
 
-    /// Sentence on other conditions with the same run; empty for none.
+    /// Sentence on other conditions with the same run; empty if there are none.
     pub(crate) fn sharing_note(&self) -> String {
         let same = self.same_run.iter().flatten().filter_map(|i| self.job.conditions.get(*i));
         let names: Vec<String> = same.map(|c| truncate_text(&c.name, NAME_LETTERS)).collect();
@@ -83,7 +86,7 @@ impl ConditionComparison<'_> {
     }
 }
 
-/// Numbers repeated file names: names that differ only in punctuation give the same file.
+/// Appends numbers to repeated file names: names that differ only in punctuation give the same file name.
 pub(crate) fn make_file_names_unique(mut blocks: Vec<FigureBlock>) -> Vec<FigureBlock> {
     for i in 1..blocks.len() {
         let (before, rest) = blocks.split_at_mut(i);
@@ -96,22 +99,23 @@ pub(crate) fn make_file_names_unique(mut blocks: Vec<FigureBlock>) -> Vec<Figure
     blocks
 }
 
-/// Most letters of a name in a file name: file systems take about 255 bytes in all.
+/// Maximum number of letters of a name in a file name; file systems allow about 255 bytes for the whole file
+/// name.
 const LONGEST_WORD: usize = 60;
 
-/// A name as part of a file name: letters and digits in lower case, hyphens for the rest, cut at
-/// [`LONGEST_WORD`].
+/// A name as part of a file name: letters and digits in lower case, a hyphen for any other character, cut at
+/// [`LONGEST_WORD`] letters.
 pub(crate) fn file_name_part(name: &str) -> String {
     let letter = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' };
     let word: String = name.chars().map(letter).take(LONGEST_WORD).collect();
-    // a name in another script leaves only hyphens
+    // a name in a non-Latin script gives only hyphens
     if word.chars().all(|c| c == '-') { "window".to_owned() } else { word }
 }
 
-/// Letters of a name that replace a missing symbol.
+/// Number of letters of a parameter's name that replace a missing symbol.
 const LETTERS: usize = 10;
 
-/// Symbol of a parameter in the equations; the start of its name where it has none.
+/// Symbol of a parameter in the equations, or the first letters of its name if it has no symbol.
 pub(super) fn parameter_symbol(name: &str) -> String {
     parameters::find_parameter(name).map_or_else(|| truncate_text(name, LETTERS), |row| row.symbol.to_owned())
 }

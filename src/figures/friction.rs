@@ -1,5 +1,5 @@
-//! Stribeck curve: the fitted friction law over tip speed, friction measured on the recording, and the time
-//! spent at each speed.
+//! Stribeck curve: the fitted friction law against tip speed, friction measured from the recording, and the
+//! fraction of slip time at each speed.
 
 use super::{FigureBlock, FigureText};
 use crate::compare::friction::{COEFFICIENTS, LawCoefficient, friction_half_95, is_fitted};
@@ -15,11 +15,11 @@ use serde::Serialize;
 /// Friction coefficient of the fitted law at one speed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FrictionLine {
-    /// Speed of the tip, m/s; zero is rest.
+    /// Speed of the tip, m/s; zero means rest.
     pub speed_m_per_s: f64,
     /// Coefficient of friction.
     pub coefficient: f64,
-    /// Half width of its 95 % interval; `None` where the fit does not determine it.
+    /// Half width of the 95 % interval of the coefficient; `None` if the fit does not determine it.
     pub half_95: Option<f64>,
 }
 
@@ -30,23 +30,24 @@ pub struct FrictionPlot {
     pub title: String,
     /// Further text for the line under the heading; empty for none.
     pub note: String,
-    /// Whether a recording behind the fit is synthetic.
+    /// Whether one of the recordings of the fit is synthetic.
     pub synthetic: bool,
-    /// Speeds, ascending, and coefficients of the fitted law.
+    /// Fitted law: speeds, ascending, and coefficients.
     pub curve: Vec<(f64, f64)>,
-    /// Least and greatest speed of the tip in slip.
+    /// Smallest and largest speed of the slipping tip.
     pub visited: Option<(f64, f64)>,
-    /// Speeds with the ends of the 95 % interval of the coefficient; empty for none.
+    /// Speeds, each with the lower and upper end of the coefficient's 95 % interval; empty if there is no
+    /// interval.
     pub interval_95: Vec<(f64, f64, f64)>,
-    /// The true law of a synthetic blade; empty where unknown.
+    /// True law of a synthetic blade: speeds and coefficients; empty if unknown.
     pub truth: Vec<(f64, f64)>,
-    /// Speeds and coefficients where the recorded tip slides steadily.
+    /// Speeds and coefficients measured while the recorded tip slides steadily.
     pub even: Vec<(f64, f64)>,
-    /// Speeds and coefficients as means over stick-slip cycles of the recording.
+    /// Speeds and coefficients, averaged over stick-slip cycles of the recording.
     pub over_cycles: Vec<(f64, f64)>,
-    /// The same means of the model.
+    /// Speeds and coefficients, averaged over stick-slip cycles of the model.
     pub of_model: Vec<(f64, f64)>,
-    /// Speed bins, from and to, with the fraction of slip time in each.
+    /// Speed bins: lower edge, upper edge, and fraction of the slip time.
     pub shares: Vec<(f64, f64, f64)>,
     /// Mean speed of the head.
     pub head: Option<f64>,
@@ -94,7 +95,7 @@ pub fn draw_figure(law: &FrictionPlot) -> Figure {
     )
 }
 
-/// The law over all speeds and over those of the run, the truth, and what was measured.
+/// The law at all speeds, the law at the speeds of the run, the true law, and the measured points.
 fn law_series(law: &FrictionPlot) -> Vec<Series> {
     let series = |label: &str, colour, mark, points: &[(f64, f64)]| {
         Series::new(
@@ -120,7 +121,7 @@ fn law_series(law: &FrictionPlot) -> Vec<Series> {
     drawn.into_iter().filter(|s| !s.points.is_empty()).collect()
 }
 
-/// The axis of the coefficients; points far off the law do not widen it.
+/// The axis of the coefficients; points far from the law do not widen it.
 fn coefficient_axis(law: &FrictionPlot) -> ChartAxis {
     const FAR: f64 = 0.5;
     const ROOM: f64 = 0.06;
@@ -140,10 +141,10 @@ fn coefficient_axis(law: &FrictionPlot) -> ChartAxis {
 
 // The friction law of a condition.
 
-/// Points of the curve and number of speed bins.
+/// Number of intervals of the curve, and number of speed bins.
 const CURVE_POINTS: usize = 200;
 const SPEED_BINS: usize = 30;
-/// End of the curve over the greatest speed.
+/// Ratio of the end of the curve to the largest tip speed.
 const SPEED_MARGIN: f64 = 1.15;
 
 /// The figure of a condition; `None` for a model that never slips.
@@ -190,7 +191,7 @@ fn claim_sentence(law: &FrictionLaw, fastest: f64) -> String {
     format!("Friction {how} from {rest} at rest to {moving} at {}", format_speed(fastest))
 }
 
-/// The true law of a synthetic blade; `None` where its file holds none.
+/// The true law of a synthetic blade; `None` if its file contains none.
 fn true_law(case: &ConditionComparison) -> Option<FrictionLaw> {
     let twin = case.measured.and_then(|m| m.file).and_then(|file| file.twin.as_ref())?;
     let known = twin.get("truth").and_then(toml::Value::as_table)?;
@@ -198,7 +199,7 @@ fn true_law(case: &ConditionComparison) -> Option<FrictionLaw> {
     Some(FrictionLaw { a: a?, b_s_per_m: b_s_per_m?, c: c? })
 }
 
-/// Speeds, ascending, and friction coefficients of the slip states.
+/// Speeds, ascending, and friction coefficients of the model's slip states.
 fn slip_speeds(case: &ConditionComparison) -> Vec<(f64, f64)> {
     let slip =
         |s: &&ModelSample| matches!(s.mode, TipMode::SlipForward | TipMode::SlipBackward) && s.normal_n > 0.0;
@@ -208,7 +209,7 @@ fn slip_speeds(case: &ConditionComparison) -> Vec<(f64, f64)> {
     slips
 }
 
-/// Friction at rest and at the greatest speed of the tip.
+/// Friction coefficient at rest and at the largest speed of the tip.
 pub(crate) fn friction_lines(case: &ConditionComparison) -> Vec<FrictionLine> {
     let law = case.model.scene.linkage.friction;
     let half = friction_half_95(case.job, case.result, &law);
@@ -221,7 +222,7 @@ pub(crate) fn friction_lines(case: &ConditionComparison) -> Vec<FrictionLine> {
     speeds.map(line).collect()
 }
 
-/// Fraction of slip time in each bin; the states are equally spaced in time.
+/// Fraction of the slip time in each speed bin; the states are equally spaced in time.
 fn slip_time_shares(slips: &[(f64, f64)], top: f64) -> Vec<(f64, f64, f64)> {
     let below = |v: f64| slips.partition_point(|s| s.0 < v) as f64;
     let edge = |i: usize| top * i as f64 / SPEED_BINS as f64;
@@ -230,7 +231,7 @@ fn slip_time_shares(slips: &[(f64, f64)], top: f64) -> Vec<(f64, f64, f64)> {
         .collect()
 }
 
-/// Mean of `|v|` of the head over the run, m/s.
+/// Mean speed (magnitude) of the head during the run, m/s.
 fn mean_head_speed(case: &ConditionComparison) -> f64 {
     let samples = &case.model.motion.samples;
     let speed = |s: &ModelSample| case.model.scene.drive.motion_at(s.time_s).velocity_m_per_s.abs();
@@ -281,7 +282,7 @@ fn largest_deviation(law: &FrictionLaw, points: &[FrictionPoint]) -> Option<(usi
     points.iter().map(off).reduce(f64::max).map(|most| (points.len(), most))
 }
 
-/// Sentence on the measured points and on their distance from the law.
+/// Sentences on the measured points and on their deviation from the law.
 fn describe_points(
     case: &ConditionComparison,
     law: &FrictionLaw,
@@ -336,7 +337,7 @@ fn describe_uncertainty(
             let is_open =
                 |c: &LawCoefficient| case.result.parameters.get(c.name).is_none_or(|p| !p.has_interval());
             let open: Vec<_> = free.iter().copied().filter(|c| is_open(c)).collect();
-            // the linear model may determine each of them but not their correlation
+            // the linear model may determine each of the coefficients but not their correlation
             let which = if open.is_empty() { symbols(&free) } else { symbols(&open) };
             let separately = if open.is_empty() { "" } else { " separately" };
             format!(

@@ -1,4 +1,4 @@
-//! Time histories around a reversal: tip, head, deflection and head drop, measured and of the model, with
+//! Time histories around a reversal: tip, head, deflection and head drop of recording and model, with
 //! residuals.
 
 pub(crate) mod caption;
@@ -18,7 +18,7 @@ pub struct TimeHistory {
     pub enlarged_title: String,
     /// Whether the measured motion is synthetic.
     pub synthetic: bool,
-    /// Measured motion; `None` where only published numbers are known.
+    /// Measured motion; `None` if only published numbers are known.
     pub measured: Option<MotionTraces>,
     /// Motion of the model.
     pub model: Option<MotionTraces>,
@@ -28,9 +28,9 @@ pub struct TimeHistory {
     pub stick_s: Vec<(f64, f64)>,
     /// Named instants, s.
     pub instants: Vec<(String, f64)>,
-    /// Named windows, s, from the first to the last.
+    /// Named windows: name, start, s, and end, s, in order of time.
     pub windows: Vec<(String, f64, f64)>,
-    /// Interval that the enlarged figure shows, s.
+    /// Time interval of the enlarged figure, s.
     pub zoom_s: Option<(f64, f64)>,
 }
 
@@ -38,13 +38,14 @@ pub struct TimeHistory {
 const HEIGHT_MM: f64 = 24.0;
 const ENLARGED_HEIGHT_MM: f64 = 32.0;
 const RESIDUAL_HEIGHT_MM: f64 = 13.0;
-/// Height of a window's row, and least height of the panel (its label), mm.
+/// Height of a window's row, and smallest height of the panel of windows, which leaves room for its label,
+/// mm.
 const ROW_MM: f64 = 3.0;
 const LEAST_ROWS_MM: f64 = 12.0;
-/// Below this span, m, a quantity is drawn in micrometres.
+/// A quantity whose values span less than this, m, is drawn in micrometres.
 const MICROMETRES_BELOW_M: f64 = 2e-4;
 
-/// Channels of the enlarged figure; the head's path is only a parabola there.
+/// Channels of the enlarged figure; the head's path is omitted, since it is only a parabola there.
 const ENLARGED: [Channel; 3] = [Channel::TipX, Channel::Deflection, Channel::HeadDrop];
 
 /// Draws the whole motion.
@@ -52,7 +53,7 @@ const ENLARGED: [Channel; 3] = [Channel::TipX, Channel::Deflection, Channel::Hea
 pub fn draw_figure(history: &TimeHistory) -> Figure {
     let mut panels = stack_panels(history, &MOTION_CHANNELS, motion_span_s(history), HEIGHT_MM);
     if let Some((from, to)) = history.zoom_s.filter(|(from, to)| from < to) {
-        // outlined, as a third shade could not be told from the other two in grey
+        // outlined, since in grey a third shade could not be told from the other two
         let marked = ShadedSpan::outline("enlarged", Colour::Black, from, to);
         panels.iter_mut().for_each(|panel| panel.shaded_spans.push(marked.clone()));
     }
@@ -84,7 +85,7 @@ fn compose_figure(history: &TimeHistory, panels: Vec<Panel>, part: &str) -> Figu
     )
 }
 
-/// First and last instant of the measured motion, or of the model's where nothing is measured, s.
+/// Start and end of the measured motion, or of the model's motion if none is measured, s.
 fn motion_span_s(history: &TimeHistory) -> (f64, f64) {
     let times = history.measured.as_ref().or(history.model.as_ref()).map_or(&[][..], |m| &m.time_s);
     match (times.first(), times.last()) {
@@ -108,7 +109,7 @@ fn stack_panels(
     channels.iter().flat_map(pair).collect()
 }
 
-/// The values within a span, thinned to what a figure can show.
+/// The values within a time interval, thinned to what a figure can show.
 fn points_within(motion: &MotionTraces, channel: Channel, (from, to): (f64, f64)) -> Vec<Option<(f64, f64)>> {
     let inside = |t: &f64| *t >= from && *t <= to;
     let all = motion.time_s.iter().zip(motion.column(channel)).filter(|(t, _)| inside(t));
@@ -134,7 +135,7 @@ fn draw_channel_panel(
     let series = lines.into_iter().zip(styles).filter_map(|(points, (label, colour, mark))| {
         points.map(|points| Series::new(label, colour, mark, scale_points(points, factor)))
     });
-    // only the topmost panel has labels; the lines run through all panels
+    // only the topmost panel has labels; the lines cross all panels
     let rule = |(label, at): &(String, f64)| {
         VerticalLine::new(if labelled { label } else { "" }, Colour::Blue, Mark::Dashed, *at)
     };
@@ -147,10 +148,10 @@ fn draw_channel_panel(
     }
 }
 
-/// The panel of measured minus model; `None` without a value.
+/// The panel of measured minus model; `None` if there is no value.
 fn draw_residual_panel(history: &TimeHistory, channel: Channel, shown_s: (f64, f64)) -> Option<Panel> {
     let points = points_within(history.residual.as_ref()?, channel, shown_s);
-    points.iter().flatten().next()?; // (empty axes say nothing)
+    points.iter().flatten().next()?; // (empty axes would show nothing)
     let (unit, factor) = length_unit(points.iter().flatten().map(|(_, x)| *x));
     let points = scale_points(points, factor);
     let x = ChartAxis::time().with_ends(Some(shown_s));
@@ -159,8 +160,8 @@ fn draw_residual_panel(history: &TimeHistory, channel: Channel, shown_s: (f64, f
     Some(Panel::new(x, y, RESIDUAL_HEIGHT_MM, [series]))
 }
 
-/// An axis symmetric about zero that ends just beyond 1, 2 or 5 times a power of ten, so that a low panel has
-/// a tick on each side.
+/// An axis symmetric about zero that ends slightly beyond 1, 2 or 5 times a power of ten, so that even a low
+/// panel has a tick on either side of zero.
 pub(super) fn symmetric_axis(axis: ChartAxis, points: &[Option<(f64, f64)>]) -> ChartAxis {
     const BEYOND: f64 = 1.2;
     const MOST: f64 = 1.15;
@@ -170,7 +171,7 @@ pub(super) fn symmetric_axis(axis: ChartAxis, points: &[Option<(f64, f64)>]) -> 
     axis.with_ends(end.filter(|end| end.is_normal()).map(|end| (-BEYOND * end, BEYOND * end)))
 }
 
-/// The windows of the fit as bars, the first on top.
+/// The windows of the fit as bars, the first one at the top.
 fn draw_window_panel(history: &TimeHistory) -> Option<Panel> {
     let rows = || history.windows.iter().rev();
     let bar = |(row, (_, start, end)): (usize, &(String, f64, f64))| {
@@ -184,7 +185,7 @@ fn draw_window_panel(history: &TimeHistory) -> Option<Panel> {
     (!history.windows.is_empty()).then(|| Panel::new(x, y, height_mm, [series]))
 }
 
-/// Display unit for lengths of this range, and the factor from metres.
+/// Display unit for lengths in this range, and the factor from metres to that unit.
 pub(super) fn length_unit(values: impl Iterator<Item = f64>) -> (&'static str, f64) {
     let (low, high) = value_span(values);
     if high - low < MICROMETRES_BELOW_M && high.abs().max(low.abs()) < 10.0 * MICROMETRES_BELOW_M {
@@ -194,25 +195,26 @@ pub(super) fn length_unit(values: impl Iterator<Item = f64>) -> (&'static str, f
     }
 }
 
-// Shaded spans of sticks.
+// Shaded spans of the stick intervals.
 
-/// Sticks with a shorter gap are drawn as one band, fraction of the span: less than a millimetre on a page.
+/// Smallest gap between short sticks that are drawn separately, as a fraction of the shown time; it is less
+/// than a millimetre on a page.
 const MIN_STICK_GAP: f64 = 0.005;
 
 const STICKS_LABEL: &str = "tip sticks (model)";
 const CYCLES_LABEL: &str = "stick-slip cycles (model)";
 
-/// Shaded spans of long sticks, and of groups of short ones that are too close to be told apart.
+/// Shaded spans of long sticks, and of groups of short sticks that are too close together to be told apart.
 pub(crate) fn stick_spans(stick_s: &[(f64, f64)], (from, to): (f64, f64)) -> Vec<ShadedSpan> {
     let shown: Vec<(f64, f64)> =
         stick_s.iter().filter(|s| s.1 > from && s.0 < to).map(|s| (s.0.max(from), s.1.min(to))).collect();
     let apart = MIN_STICK_GAP * (to - from);
     let long = |s: &(f64, f64)| s.1 - s.0 > apart;
-    // a stick that is long enough to be seen has its own band
+    // a stick that is long enough to be seen has a span of its own
     let groups = shown.chunk_by(|a, b| b.0 - a.1 < apart && !long(a) && !long(b));
     let band = |group: &[(f64, f64)]| {
         let (first, last) = (group.first()?, group.last()?);
-        // black is darker than orange in grey too
+        // black is darker than orange in a grey print too
         let (label, colour) =
             if group.len() > 1 { (CYCLES_LABEL, Colour::Orange) } else { (STICKS_LABEL, Colour::Black) };
         Some(ShadedSpan::new(label, colour, first.0, last.1))
@@ -222,12 +224,13 @@ pub(crate) fn stick_spans(stick_s: &[(f64, f64)], (from, to): (f64, f64)) -> Vec
 
 // Thinning of long lines.
 
-/// Number of parts of a span in a thinned line: on a page each is a third of a millimetre wide, about a line
-/// width.
+/// Number of parts into which a thinned line is divided; on a page, each is a third of a millimetre wide,
+/// about a line width.
 const THINNING_PARTS: usize = 400;
 
-/// The lowest and highest point of each of [`THINNING_PARTS`] parts of a span, in order. Lines with at most
-/// two points per part stay as they are. Gaps narrower than a part are closed, wider ones stay.
+/// The lowest and the highest point in each of [`THINNING_PARTS`] parts of a time interval, in order of time.
+/// Lines with at most two points per part are returned unchanged. Gaps narrower than a part are closed; wider
+/// gaps are kept.
 pub(crate) fn thin_points(points: &[Option<(f64, f64)>], (from, to): (f64, f64)) -> Vec<Option<(f64, f64)>> {
     if points.len() <= 2 * THINNING_PARTS || from >= to {
         return points.to_vec();
@@ -256,9 +259,9 @@ pub(crate) fn thin_points(points: &[Option<(f64, f64)>], (from, to): (f64, f64))
 /// Motions with at most this many frames are not thinned.
 const MAX_FULL_FRAMES: usize = 20_000;
 
-/// The frames of a long motion that its figures show: all frames of the enlarged part, and of each of
-/// [`THINNING_PARTS`] parts of the span those with the extremes of each column. Three full motions of a
-/// million frames would take more memory than the rest of a report.
+/// The frames of a long motion that its figures show: all frames of the enlarged part and, in each of
+/// [`THINNING_PARTS`] parts of the whole interval, the frames with the extrema of each column. Three
+/// unthinned motions of a million frames would need more memory than the rest of a report.
 pub(super) fn thin_frames(
     motion: MotionTraces,
     (from, to): (f64, f64),
@@ -425,7 +428,7 @@ mod tests {
 
     #[test]
     fn extremes_and_wide_gaps_stay() {
-        // a spike in part 100 and a hole of ten parts behind it
+        // a spike in part 100, followed by a gap of ten parts
         let spike = |i: usize| if i == 2505 { 9.0 } else { 0.0 };
         let points: Vec<_> = (0..10_000)
             .map(|i| (!(3000..3250).contains(&i) && i % 7 != 3).then(|| (i as f64, spike(i))))

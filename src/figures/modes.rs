@@ -1,4 +1,4 @@
-//! Natural modes of a blade: compliance of the tip over frequency, and mode shapes.
+//! Natural modes of a blade: compliance of the tip against frequency, and mode shapes.
 
 use crate::model::Linkage;
 use crate::model::modes::{NaturalMode, TipConstraint, natural_modes, tip_compliance};
@@ -8,19 +8,19 @@ use plain_charts::{
 };
 use portable_math as math;
 
-/// Number of frequencies of the compliance.
+/// Number of frequencies of the compliance curve.
 const POINTS: usize = 600;
-/// Factor by which the axis extends beyond the lowest and the highest mode.
+/// Factor by which the frequency axis extends beyond the lowest and the highest mode.
 const BEYOND: f64 = 4.0;
-/// Heights of the compliance and of a mode shape, mm.
+/// Heights of the panels of the compliance and of a mode shape, mm.
 const ANSWER_MM: f64 = 52.0;
 const SHAPE_MM: f64 = 44.0;
 /// Largest angle of a drawn shape, rad.
 const SWING: f64 = 0.35;
-/// Half the width of a shape, in lengths of the blade.
+/// Half width of the panel of a mode shape, in lengths of the blade.
 const HALF_WIDTH: f64 = 0.5;
 
-/// The compliance of the tip, and the mode shapes.
+/// The figures of the compliance of the tip and of the mode shapes.
 pub(crate) fn draw_figures(title: &str, blade: &Linkage) -> [Figure; 2] {
     let sides: &[bool] = if blade.shoulder.is_some() { &[false, true] } else { &[false] };
     let of = |on: bool| natural_modes(blade, TipConstraint::Free, on);
@@ -51,7 +51,7 @@ pub(crate) fn draw_figures(title: &str, blade: &Linkage) -> [Figure; 2] {
     [Figure { columns: 1, ..answer }, figure(swing, "The links at both ends of a swing", shapes.collect())]
 }
 
-/// The main result with its numbers; without a stable mode the same for both figures.
+/// The main result with its numbers; the same for both figures if there is no stable mode.
 fn claim_sentence(numbers: Vec<String>, before: &str, after: &str) -> String {
     if numbers.is_empty() {
         return "The blade has no stable mode".to_owned();
@@ -63,7 +63,7 @@ fn side_name(on_shoulder: bool) -> &'static str {
     if on_shoulder { "neck on the shoulder" } else { "neck free" }
 }
 
-/// Tip compliance (displacement over force) over frequency.
+/// Tip compliance (ratio of displacement to force) against frequency.
 fn draw_receptance_panel(blade: &Linkage, sides: &[bool], (low, high): (f64, f64)) -> Panel {
     let at = |i: usize| low * math::powf(high / low, i as f64 / (POINTS - 1) as f64);
     let mm_per_n = |on: bool, hz: f64| {
@@ -85,7 +85,7 @@ fn draw_receptance_panel(blade: &Linkage, sides: &[bool], (low, high): (f64, f64
     Panel { vertical_lines: rules.collect(), ..Panel::new(x, y, ANSWER_MM, series) }
 }
 
-/// The links at both ends of a swing, over the upright blade, to scale.
+/// The links at both ends of a swing, drawn to scale over the upright blade.
 fn draw_mode_shape(blade: &Linkage, on_shoulder: bool, number: usize, mode: &NaturalMode) -> Panel {
     let largest = mode.lip_over_neck.abs().max(1.0);
     let (neck, lip) = (SWING / largest, SWING * mode.lip_over_neck / largest);

@@ -1,4 +1,4 @@
-//! A simulated run: motion of head and tip, deflection, and normal force.
+//! Figure of a simulated run: motion of head and tip, deflection, and normal force.
 
 use super::history;
 use super::history::TimeHistory;
@@ -9,7 +9,7 @@ use crate::simulate::RunMotion;
 use crate::text::{format_short, pluralise};
 use plain_charts::{ChartAxis, Colour, Figure, Mark, Panel, Series, VerticalLine};
 
-/// Height of the normal force's panel, mm.
+/// Height of the panel of the normal force, mm.
 const FORCE_MM: f64 = 24.0;
 
 pub(crate) fn draw_figure(title: &str, motion: &RunMotion) -> Figure {
@@ -25,7 +25,7 @@ pub(crate) fn draw_figure(title: &str, motion: &RunMotion) -> Figure {
     figure.subtitle = format!("simulation; {title}");
     figure.description = format!("A simulated run: {}.", figure.title);
     figure.panels.extend(draw_force_panel(motion, &history));
-    // thick lines are only for what lies under a measurement
+    // thin lines, since there is no measurement on top
     figure.panels.iter_mut().flat_map(|panel| &mut panel.series).for_each(|series| series.mark = Mark::Thin);
     figure
 }
@@ -53,7 +53,7 @@ fn summarise_motion(motion: &RunMotion) -> String {
     format!("{sticks} in {} % of the time{force}", format_short(share))
 }
 
-/// The normal force over time, with impacts as lines.
+/// The normal force against time, with impacts as vertical lines.
 fn draw_force_panel(motion: &RunMotion, history: &TimeHistory) -> Option<Panel> {
     let span_s = (motion.samples.first()?.time_s, motion.samples.last()?.time_s);
     let points: Vec<_> = motion.samples.iter().map(|s| Some((s.time_s, s.normal_n))).collect();

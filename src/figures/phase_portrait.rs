@@ -1,4 +1,4 @@
-//! Phase portraits: tip velocity over deflection, measured and of the model.
+//! Phase portraits: tip velocity against deflection, measured and of the model.
 
 use super::{FigureBlock, FigureText};
 use crate::compare::{ConditionComparison, TimedRecording};
@@ -18,9 +18,9 @@ pub(crate) type PhasePoint = Option<(f64, f64)>;
 pub struct PortraitPart {
     /// Title of the panel.
     pub name: String,
-    /// Measured states in order of time; empty for none.
+    /// Measured states in order of time; empty if there are none.
     pub measured: Vec<PhasePoint>,
-    /// States of the model in order of time, close enough for a line.
+    /// States of the model in order of time, close enough together for a line.
     pub model: Vec<PhasePoint>,
 }
 
@@ -37,7 +37,7 @@ pub struct PhasePortrait {
     pub parts: Vec<PortraitPart>,
 }
 
-/// Height of a panel, mm: two panels side by side are square.
+/// Height of a panel, mm; with it, two panels side by side are square.
 const HEIGHT_MM: f64 = 62.0;
 
 /// Draws the figure.
@@ -55,11 +55,12 @@ pub fn draw_figure(shown: &PhasePortrait) -> Figure {
     }
 }
 
-/// Up to this many measured states are circles; more are dots, which do not overlap in a narrow figure.
+/// Maximum number of measured states that are drawn as circles; more states are drawn as dots, which do not
+/// overlap in a narrow figure.
 const MOST_CIRCLES: usize = 80;
 
-/// Symbol of the measured states, the same in all parts. A line from frame to frame would show the noise of
-/// the differences.
+/// Symbol of the measured states, the same in all parts. A line from frame to frame would mostly show the
+/// noise of the velocity.
 fn frame_mark(parts: &[PortraitPart]) -> Mark {
     let most = parts.iter().map(|part| part.measured.iter().flatten().count()).max();
     if most.is_none_or(|most| most <= MOST_CIRCLES) { Mark::Circles } else { Mark::Dots }
@@ -77,42 +78,44 @@ fn draw_panel(part: &PortraitPart, frames: Mark) -> Panel {
     Panel { title: part.name.clone(), ..Panel::new(x, y, HEIGHT_MM, drawn) }
 }
 
-/// Ends of the deflection axis of a part, mm. Each part has its own, so that stacked panels share no axis.
+/// Ends of the deflection axis of a part, mm. Each part has its own limits, so that stacked panels share no
+/// axis.
 fn deflection_limits_mm(part: &PortraitPart) -> (f64, f64) {
     const AXIS_MARGIN: f64 = 0.05;
-    const LEAST_SPAN: f64 = 1e-4; // of the values: less is rounding, and labels would have no digits for it
+    const LEAST_SPAN: f64 = 1e-4; // ratio to the values; a smaller span is rounding error, and too small for tick labels
     let all = part.measured.iter().chain(&part.model).flatten().map(|(x, _)| x * 1e3);
     let (low, high) = value_span(all.filter(|x| x.is_finite()));
     let room = (AXIS_MARGIN * (high - low)).max(LEAST_SPAN * low.abs().max(high.abs()));
     (low - room, high + room)
 }
 
-/// Upper limit of the velocity noise (standard deviation) over the velocity range of a part: neighbouring
-/// cycles stay distinct.
+/// Upper limit of the ratio of the velocity noise (standard deviation) to the velocity range of a part, so
+/// that neighbouring cycles remain distinct.
 pub(crate) const MAX_VELOCITY_NOISE: f64 = 0.1;
-/// Longest time between the two frames of a difference, periods of the fastest component. A fifth reduces the
-/// amplitude by 6 % in recording and model alike. At 900 Hz and 2 um of noise it leaves 13 mm/s of velocity
-/// noise; a twentieth would reduce it by 0.4 % and leave 51 mm/s, a quarter of a usual range.
+/// Longest time between the two frames of a central difference, in periods of the fastest component. A fifth
+/// of a period reduces the velocity amplitude by 6 %, in recording and model alike. At 900 Hz with 2 um of
+/// position noise, it gives a velocity noise of 13 mm/s; a twentieth of a period would reduce the amplitude
+/// by 0.4 % but give 51 mm/s, a quarter of a typical velocity range.
 const MAX_DIFFERENCE_PERIODS: f64 = 0.2;
 
-/// Central difference: velocity from the positions in two frames at equal distance before and after.
+/// Central difference: velocity from the positions in two frames, equally far before and after.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CentralDifference {
-    /// Frames to either side.
+    /// Number of frames from the middle to either of the two frames.
     pub half_frames: usize,
-    /// Frames per second, 1/s.
+    /// Frame rate, 1/s.
     pub frame_rate_hz: f64,
 }
 
 impl CentralDifference {
-    /// The difference of the neighbouring frames.
+    /// The difference between the frames directly before and after.
     pub(crate) fn of_neighbouring_frames(frame_rate_hz: f64) -> Self {
         Self { half_frames: 1, frame_rate_hz }
     }
 
-    /// The shortest difference that keeps the velocity noise below [`MAX_VELOCITY_NOISE`] of the velocity
-    /// range, m/s, given white noise of the position, m. At most a fifth of a period of the fastest
-    /// component, Hz; the shortest of all where that is unknown.
+    /// The shortest difference that keeps the velocity noise below [`MAX_VELOCITY_NOISE`] times the velocity
+    /// range, m/s, for white position noise, m. It spans at most a fifth of a period of the fastest
+    /// component, Hz; if that frequency is unknown, it is the difference between neighbouring frames.
     pub(crate) fn for_noise(rate_hz: f64, noise_m: f64, swing_m_per_s: f64, fastest_hz: Option<f64>) -> Self {
         let shortest = Self::of_neighbouring_frames(rate_hz);
         let least = (shortest.noise_m_per_s(noise_m) / (MAX_VELOCITY_NOISE * swing_m_per_s)).ceil();
@@ -126,13 +129,13 @@ impl CentralDifference {
         2.0 * self.half_frames as f64 / self.frame_rate_hz
     }
 
-    /// Standard deviation of the velocity, m/s, for white position noise, m: `sqrt(2)` times the noise over
-    /// the time between the frames.
+    /// Standard deviation of the velocity, m/s, for white position noise, m: `sqrt(2)` times the noise,
+    /// divided by the time between the frames.
     pub(crate) fn noise_m_per_s(&self, noise_m: f64) -> f64 {
         noise_m * std::f64::consts::SQRT_2 / self.frame_gap_s()
     }
 
-    /// Gain at a frequency, Hz: `sin(x)/x`, where `x` is pi times the frequency and the time between the
+    /// Gain at a frequency, Hz: `sin(x)/x`, where `x` is pi times the frequency times the time between the
     /// frames.
     pub(crate) fn velocity_gain(&self, frequency_hz: f64) -> f64 {
         let x = std::f64::consts::PI * frequency_hz * self.frame_gap_s();
@@ -144,8 +147,8 @@ impl CentralDifference {
         self.half_frames as f64 / self.frame_rate_hz
     }
 
-    /// Deflection and tip velocity of each frame with a frame at the half width before and after; `None`
-    /// where a value is missing.
+    /// Deflection and tip velocity of each frame that has a frame `half_frames` before and after it; `None`
+    /// if a value is missing.
     pub(crate) fn phase_points(
         &self,
         deflection_m: &[Option<f64>],
@@ -160,40 +163,41 @@ impl CentralDifference {
     }
 }
 
-/// Velocity range (peak to peak), m/s; `None` without a state.
+/// Velocity range (peak to peak), m/s; `None` if there is no state.
 pub(crate) fn swing_m_per_s(states: &[PhasePoint]) -> Option<f64> {
     let velocities = || states.iter().flatten().map(|(_, v)| *v).filter(|v| v.is_finite());
     velocities().reduce(f64::max).zip(velocities().reduce(f64::min)).map(|(high, low)| high - low)
 }
 
-// Parts of the portrait: after the release, and at the top speed of the head, or of the tip where it rests
-// there.
+// Parts of the portrait: one after the release, and one at the top speed of the head, or at that of the tip
+// if it sticks then.
 
-/// Number of cycles that stay readable: few of the low component, whose loops shift, more of the high one,
-/// whose loops repeat.
+/// Numbers of cycles that remain readable: few of the low component, whose loops shift, and more of the high
+/// component, whose loops repeat.
 const LOW_CYCLES: f64 = 3.0;
 const HIGH_CYCLES: f64 = 12.0;
-/// Longest part, and its length where no frequency is known, s: some tens of cycles of the high component.
+/// Longest part, s, and length of a part if no frequency is known: some tens of cycles of the high component.
 const LONGEST_S: f64 = 0.06;
-/// Fewest samples of the model in half a difference, so that linear interpolation follows its path.
+/// Minimum number of samples of the model in half a difference, so that linear interpolation follows its
+/// path.
 const SAMPLES_APART: f64 = 2.0;
-/// Largest fraction of a part in which the tip may stick.
+/// Largest fraction of a part for which the tip may stick.
 const MOST_STUCK: f64 = 0.8;
 
-/// Smaller noise is rounding, m: far below the resolution of a camera.
+/// Noise below this, m, is rounding error: it is far below the resolution of a camera.
 const ROUNDING_M: f64 = 1e-12;
 
-/// A part of the motion: its name in the panel and in the caption, start and end, s.
+/// A part of the motion: its name in the panel, its name in the caption, start and end, s.
 struct PortraitSpan {
     name: String,
     said: String,
     from_s: f64,
     to_s: f64,
-    /// Frequency of its cycles, Hz.
+    /// Frequency of the cycles in the part, Hz.
     cycles_hz: Option<f64>,
 }
 
-/// The figure of a condition; empty where the motion is too short.
+/// The figure of a condition; empty if the motion is too short.
 pub(crate) fn figure_blocks(case: &ConditionComparison) -> Vec<FigureBlock> {
     let spans = portrait_spans(case);
     let taken = estimate_velocities(case, &spans);
@@ -250,7 +254,7 @@ fn portrait_spans(case: &ConditionComparison) -> Vec<PortraitSpan> {
         let starts = |at_s: f64| (at_s - length_s / 2.0).clamp(rest_s.0, rest_s.1 - length_s);
         let of_head =
             peak_velocity(case, rest_s, |s| case.model.scene.drive.motion_at(s.time_s).velocity_m_per_s)?;
-        // a tip that rests there shows no cycles
+        // a tip that sticks there shows no cycles
         let rests = stick_duration_s(case, starts(of_head.0), length_s) > MOST_STUCK * length_s;
         let (whose, (at_s, top)) = if rests {
             ("tip", peak_velocity(case, rest_s, |s| s.tip_velocity_m_per_s)?)
@@ -276,7 +280,7 @@ fn portrait_spans(case: &ConditionComparison) -> Vec<PortraitSpan> {
     std::iter::once(first).chain(late).filter(|span| span.to_s > span.from_s).collect()
 }
 
-/// Instant, s, and value, m/s, of the greatest velocity of the model between two instants.
+/// Instant, s, and magnitude, m/s, of the largest velocity of the model between two instants.
 fn peak_velocity(
     case: &ConditionComparison,
     (from_s, to_s): (f64, f64),
@@ -287,19 +291,19 @@ fn peak_velocity(
     inside.max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Duration of sticking within `length_s` from an instant on, s.
+/// Total duration of stick within `length_s` after an instant, s.
 fn stick_duration_s(case: &ConditionComparison, from_s: f64, length_s: f64) -> f64 {
     let from_s = from_s - case.alignment.shift_s;
     let inside_s = |[start, end]: &[f64; 2]| (end.min(from_s + length_s) - start.max(from_s)).max(0.0);
     case.model.motion.stick_s.iter().map(inside_s).sum()
 }
 
-/// The chosen difference and the values that it follows from.
+/// The chosen difference, and the values from which it was chosen.
 struct VelocityEstimate {
     difference: CentralDifference,
     /// Noise of the recorded tip, m.
     noise_m: Option<f64>,
-    /// Least velocity range of the model in a part, m/s; that of a recording would include noise.
+    /// Smallest velocity range of the model in any part, m/s; the range of a recording would include noise.
     swing_m_per_s: Option<f64>,
     fastest_hz: Option<f64>,
 }
@@ -344,8 +348,8 @@ fn build_part(
     PortraitPart { name: span.name.clone(), measured: measured.unwrap_or_default(), model }
 }
 
-/// States of the model at every sample, with velocities from the same difference as for the recording; `None`
-/// where the samples are too far apart.
+/// States of the model at every sample, with velocities from the same difference as those of the recording;
+/// `None` if the samples are too far apart.
 fn differenced_states(
     case: &ConditionComparison,
     (from_s, to_s): (f64, f64),
@@ -408,7 +412,7 @@ fn figure_text(
 }
 
 impl VelocityEstimate {
-    /// Sentences on the difference and on the velocity noise.
+    /// Sentences on the difference used and on the velocity noise.
     fn describe(&self) -> String {
         let CentralDifference { half_frames, .. } = self.difference;
         let frames = if half_frames == 1 {
@@ -468,7 +472,7 @@ mod tests {
         };
         assert_eq!(states(1, &deflection, &tip)[..3], expected[..3]);
         assert_eq!(states(1, &deflection, &tip)[4..], expected[4..]);
-        // the frame itself is missing: no state, although its neighbours would give a velocity
+        // the frame itself is missing, so it has no state, although its neighbours would give a velocity
         assert_eq!(states(1, &deflection, &tip)[3], None);
         assert_eq!(states(2, &deflection, &tip), [None, Some((3.0, 60.0)), None, Some((5.0, 100.0))]);
         assert_eq!(states(1, &[Some(0.0); 2], &[Some(0.0); 2]), []);
@@ -476,8 +480,8 @@ mod tests {
 
     const FASTEST_HZ: f64 = 900.0;
 
-    /// A tip that swings over a number of frames by an amplitude, with white noise, m, and its exact
-    /// velocity.
+    /// Position of a tip that oscillates with the given amplitude, m, in the given number of frames, with
+    /// white noise, m; and its exact velocity.
     fn swinging(rate_hz: f64, amplitude_m: f64, noise_m: f64, frames: u32) -> (Vec<Option<f64>>, Vec<f64>) {
         let mut state = 7_u64;
         let mut draw = || {
@@ -490,7 +494,7 @@ mod tests {
         (tip, (0..frames).map(|i| amplitude_m * angular * phase(i).cos()).collect())
     }
 
-    /// Standard deviation of the velocities from a share of the exact ones, m/s.
+    /// Standard deviation of the velocities from `share` times the exact velocities, m/s.
     fn off(difference: CentralDifference, tip: &[Option<f64>], exact: &[f64], share: f64) -> f64 {
         let found = difference.phase_points(tip, tip);
         let squares: Vec<f64> = found
@@ -533,8 +537,8 @@ mod tests {
                 "{noise} of {swing}"
             );
         }
-        // of a component of a tenth of that amplitude no difference that follows it is quiet enough, and it
-        // stays as short as it has to
+        // for a component of a tenth of that amplitude, no difference that follows it is quiet enough, so the
+        // longest permitted difference is used
         let drowned = CentralDifference::for_noise(2e5, NOISE_M, 0.1, Some(FASTEST_HZ));
         assert_eq!(drowned.half_frames, 22);
         assert!(drowned.noise_m_per_s(NOISE_M) > MAX_VELOCITY_NOISE * 0.1);

@@ -1,4 +1,4 @@
-//! The linkage drawn to scale at chosen instants through the reversal: how the blade flips over.
+//! The linkage drawn to scale at selected instants of the reversal; it shows how the blade flips over.
 
 use super::about;
 use crate::compare::ConditionComparison;
@@ -19,7 +19,7 @@ use portable_math as math;
 pub struct ReversalPose {
     /// Name of the event, such as `upright`.
     pub name: &'static str,
-    /// Time from the reversal of the head, s.
+    /// Time after the reversal of the head, s.
     pub after_turn_s: f64,
     /// State of the model.
     pub sample: ModelSample,
@@ -27,12 +27,12 @@ pub struct ReversalPose {
     pub head_m_per_s: f64,
 }
 
-/// Largest distance of a hold from the reversal, fraction of the run.
+/// Largest distance in time between a hold and the reversal, as a fraction of the run.
 const NEAR_TURN: f64 = 0.05;
-/// Fraction of the initial deflection at the pose between hold and upright.
+/// Ratio of the deflection at the pose `half way` to the deflection at the start of the hold.
 const HALF_WAY: f64 = 0.5;
 
-/// Poses before, during and after the first reversal; empty where the head does not turn.
+/// Poses before, during and after the first reversal; empty if the head does not turn.
 pub(crate) fn reversal_poses(motion: &RunMotion) -> Vec<ReversalPose> {
     let samples = &motion.samples;
     let Some(turn) = motion.turn() else { return Vec::new() };
@@ -45,7 +45,7 @@ pub(crate) fn reversal_poses(motion: &RunMotion) -> Vec<ReversalPose> {
         chosen.extend([("before", from(hold_s - length).min(last)), ("tip stops", held.min(last))]);
         chosen.extend(head_over_tip_index(samples, held, HALF_WAY).map(|at| ("half way", at)));
         chosen.extend(head_over_tip_index(samples, held, 0.0).map(|at| ("upright", at)));
-        // a tip that rests until the run ends is not released
+        // a tip that sticks until the run ends is not released
         if samples.get(released).is_some_and(|s| released < last || s.mode != TipMode::Stick) {
             let (slip, after) = (first_slip(motion, released), from(release_s + length).min(last));
             chosen.push(("stick ends", released.saturating_sub(1)));
@@ -69,7 +69,7 @@ fn build_pose(samples: &[ModelSample], name: &'static str, at: usize, turn_s: f6
     }
 }
 
-/// The longest stick at or near the reversal, s.
+/// Start and end of the longest stick at or near the reversal, s.
 fn rest_span_s(motion: &RunMotion, turn_s: f64) -> Option<[f64; 2]> {
     let span = motion.samples.last()?.time_s - motion.samples.first()?.time_s;
     let near =
@@ -77,7 +77,7 @@ fn rest_span_s(motion: &RunMotion, turn_s: f64) -> Option<[f64; 2]> {
     motion.stick_s.iter().filter(near).max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0]))).copied()
 }
 
-/// Index of the first sample with a deflection of at most `share` times that at `from`.
+/// Index of the first sample from `from` on whose deflection is at most `share` times that at `from`.
 fn head_over_tip_index(samples: &[ModelSample], from: usize, share: f64) -> Option<usize> {
     let deflection = |s: &ModelSample| s.tip_x_m - s.head_x_m;
     let after = samples.get(from..)?;
@@ -85,7 +85,7 @@ fn head_over_tip_index(samples: &[ModelSample], from: usize, share: f64) -> Opti
     after.iter().position(|s| deflection(s) * first <= share * first * first).map(|at| from + at)
 }
 
-/// Index of the fastest sample between the release and the next stick or flight.
+/// Index of the fastest slipping sample between the release and the next stick or flight.
 fn first_slip(motion: &RunMotion, released: usize) -> Option<usize> {
     let samples = &motion.samples;
     let slips = |at: &usize| matches!(samples[*at].mode, TipMode::SlipForward | TipMode::SlipBackward);
@@ -95,7 +95,7 @@ fn first_slip(motion: &RunMotion, released: usize) -> Option<usize> {
     (released..again.unwrap_or(samples.len())).take_while(slips).max_by(|a, b| speed(a).total_cmp(&speed(b)))
 }
 
-/// Head, hinge and tip: position along the sweep and height above the glass, m.
+/// Head, hinge and tip: each with its position along the sweep and its height above the glass, m.
 pub(crate) fn joint_positions(linkage: &Linkage, sample: &ModelSample) -> [(f64, f64); 3] {
     let head = (sample.head_x_m, linkage.l1_m + linkage.l2_m - sample.head_drop_m);
     let below = |(x, y): (f64, f64), angle: f64, length: f64| {
@@ -118,13 +118,13 @@ pub struct PoseSequence {
     pub poses: Vec<ReversalPose>,
     /// Start and end of the stick around the reversal, s.
     pub rest_s: Option<[f64; 2]>,
-    /// Release time after the reversal, s, as a fit reads it: the tip has left its place by more than the
-    /// noise. `None` where that is not read.
+    /// Time from the reversal to the release, s, by the definition that a fit uses: the tip has left its
+    /// position by more than the noise. `None` if it was not determined.
     pub released_after_s: Option<f64>,
 }
 
 impl PoseSequence {
-    /// The poses of a motion; `None` where its head does not turn.
+    /// The poses of a motion; `None` if its head does not turn.
     #[must_use]
     pub fn from_motion(motion: &RunMotion, title: &str, subtitle: String) -> Option<Self> {
         Some(Self {
@@ -138,7 +138,7 @@ impl PoseSequence {
     }
 }
 
-/// The figure of a condition; `None` where the head of its model does not turn.
+/// The figure of a condition; `None` if the head of its model does not turn.
 pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     let subtitle = subtitle(case.is_synthetic(), "drawn from the fitted model");
     let model = case.model_side();
@@ -163,7 +163,7 @@ fn claim_sentence(shown: &PoseSequence) -> String {
     }
 }
 
-/// One sentence on the figure.
+/// Caption: one sentence on the figure.
 pub(crate) fn figure_caption(shown: &PoseSequence) -> String {
     let at = |name: &str| shown.poses.iter().find(|p| p.name == name);
     let rest = |(time, way)| format!(": its tip rests for {time} while the head moves by {way}");
@@ -180,7 +180,7 @@ pub(crate) fn figure_caption(shown: &PoseSequence) -> String {
     )
 }
 
-/// Duration of the rest, and path of the head in it.
+/// Duration of the stick around the reversal, and path of the head during it.
 fn describe_rest(shown: &PoseSequence) -> Option<(String, String)> {
     let at = |name: &str| shown.poses.iter().find(|p| p.name == name);
     let ([from, to], (stops, leaves)) = shown.rest_s.zip(at("tip stops").zip(at("stick ends")))?;
@@ -221,9 +221,10 @@ pub(crate) fn figure_details(shown: &PoseSequence) -> String {
 /// Height of a drawing, mm.
 const HEIGHT_MM: f64 = 40.0;
 
-// The next constants are in lengths of the upright blade, so that every blade fits its drawing.
+// The following constants are in lengths of the upright blade, so that every blade fits its drawing.
 
-/// Half width of a drawing; margin beside the tip of a blade that leans farther; half width of the glass.
+/// Smallest half width of a drawing; margin beside the tip of a blade that leans farther; half width of the
+/// glass.
 const HALF_WIDTH: f64 = 0.5;
 const BESIDE_TIP: f64 = 0.1;
 const GLASS: f64 = 0.85;
@@ -232,19 +233,20 @@ const FOOT: f64 = -0.5;
 const TOP: f64 = 1.34;
 /// Half width and height of the head.
 const HEAD: (f64, f64) = (0.16, 0.14);
-/// Length of the longest arrow, size of its barbs, and heights of the arrows of velocity and friction.
+/// Length of the longest arrow, size of its barbs, and heights at which the arrows of velocity and friction
+/// are drawn.
 const ARROW: f64 = 0.36;
 const BARB: f64 = 0.06;
 const VELOCITY_AT: f64 = 1.24;
 const FRICTION_AT: f64 = -0.13;
-/// Height of the time label, and distance of the state label below it at the least width.
+/// Height of the time label, and distance of the state label below it in a drawing of the smallest width.
 const TEXT_AT: f64 = -0.28;
 const TEXT_APART: f64 = 0.13;
-/// Greatest length of the scale bar, its height, and the distance of its label above it.
+/// Largest length of the scale bar, its height, and the distance of its label above it.
 const SCALE_BAR: (f64, f64, f64) = (0.4, 0.55, 0.09);
 /// Spacing and depth of the hatching of the glass.
 const HATCHING: (f64, f64) = (0.08, 0.06);
-/// Arrows shorter than this fraction of the longest are not drawn: only their barbs would show.
+/// Arrows shorter than this fraction of the longest arrow are not drawn; only their barbs would show.
 const LEAST_ARROW: f64 = 0.25;
 
 /// Draws the figure.
@@ -266,7 +268,7 @@ pub fn draw_figure(shown: &PoseSequence) -> Figure {
     }
 }
 
-/// Values of the longest arrows.
+/// Velocity and force of the longest arrows.
 pub(super) struct ArrowScale {
     pub speed_m_per_s: f64,
     pub force_n: f64,
@@ -296,7 +298,7 @@ fn draw_panel(shown: &PoseSequence, longest: &ArrowScale, pose: &ReversalPose, f
     let along = |value: f64, most: f64| if most > 0.0 { ARROW * value / most } else { 0.0 };
     let velocity = arrow_points((0.0, VELOCITY_AT), along(pose.head_m_per_s, longest.speed_m_per_s));
     let force = along(pose.sample.friction_n, longest.force_n);
-    let friction = arrow_points((tip.0 - force, FRICTION_AT), force); // it ends where it acts
+    let friction = arrow_points((tip.0 - force, FRICTION_AT), force); // the arrow ends where the force acts
     let mut series = vec![
         line("", Colour::Grey, Mark::Thin, head_hatch_lines()),
         line("", Colour::Black, Mark::Line, vec![Some((-GLASS, 0.0)), Some((GLASS, 0.0))]),
@@ -319,7 +321,7 @@ fn draw_panel(shown: &PoseSequence, longest: &ArrowScale, pose: &ReversalPose, f
     if first {
         let (most, height, over) = SCALE_BAR;
         let bar_mm = scale_bar_mm(most * unit_mm);
-        let end = -HALF_WIDTH.copysign(tip.0); // where the blade does not lean
+        let end = -HALF_WIDTH.copysign(tip.0); // on the side to which the blade does not lean
         let bar = (end, end - (bar_mm / unit_mm).copysign(end));
         series.push(line("", Colour::Black, Mark::Thick, vec![Some((bar.0, height)), Some((bar.1, height))]));
         texts.push(text(format!("{} mm", format_short(bar_mm)), ((bar.0 + bar.1) / 2.0, height + over)));
@@ -335,13 +337,13 @@ fn draw_panel(shown: &PoseSequence, longest: &ArrowScale, pose: &ReversalPose, f
     }
 }
 
-/// The largest length of 1, 2 or 5 times a power of ten up to `most_mm`.
+/// The largest length of the form 1, 2 or 5 times a power of ten that is at most `most_mm`.
 fn scale_bar_mm(most_mm: f64) -> f64 {
     let power = math::powi(10.0, math::log10(most_mm).floor() as i32);
     [5.0, 2.0, 1.0].into_iter().map(|m| m * power).find(|bar| *bar <= most_mm).unwrap_or(power)
 }
 
-/// A horizontal arrow; empty where it would be too short.
+/// A horizontal arrow; empty if it would be too short.
 fn arrow_points((x, y): (f64, f64), length: f64) -> Vec<Option<(f64, f64)>> {
     if length.abs() < LEAST_ARROW * ARROW {
         return Vec::new();

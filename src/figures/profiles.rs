@@ -1,5 +1,5 @@
-//! Profile likelihoods: rise of the cost along each parameter with the others refitted, and the intervals
-//! that follow.
+//! Profile likelihoods: rise of the cost along each parameter with the other parameters refitted, and the
+//! intervals that follow from it.
 
 use super::figure_text::parameter_symbol;
 use crate::compare::ParameterLine;
@@ -17,7 +17,7 @@ use plain_charts::{
 /// Profile and intervals of one parameter, in its SI unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParameterProfile {
-    /// Symbol in the equations, or its name where it has none.
+    /// Symbol in the equations, or the parameter's name if it has no symbol.
     pub symbol: String,
     /// Unit; empty or `1` for a plain number.
     pub unit: String,
@@ -27,11 +27,12 @@ pub struct ParameterProfile {
     pub bounds: (f64, f64),
     /// Estimate.
     pub estimate: f64,
-    /// True value, where the data are synthetic.
+    /// True value, if the data are synthetic.
     pub truth: Option<f64>,
-    /// Values of the parameter, ascending, and the rise of the least cost there.
+    /// Values of the parameter, ascending, each with the rise of the least cost at that value.
     pub points: Vec<(f64, f64)>,
-    /// The same from the linear model at the estimate; empty where that does not determine the parameter.
+    /// Values of the parameter, each with the rise of the cost by the linear model at the estimate; empty if
+    /// that model does not determine the parameter.
     pub linear: Vec<(f64, f64)>,
     /// The 95 % interval that the page states; `None` for an open end.
     pub stated: [Option<f64>; 2],
@@ -48,7 +49,7 @@ pub struct ProfilePlot {
     pub synthetic: bool,
     /// Least cost.
     pub least_cost: f64,
-    /// Rise in cost that bounds a 95 % interval.
+    /// Rise of the cost at the ends of a 95 % interval.
     pub threshold: f64,
     /// The parameters, in the order of the job.
     pub parameters: Vec<ParameterProfile>,
@@ -56,9 +57,10 @@ pub struct ProfilePlot {
 
 /// Height of a panel, mm.
 const HEIGHT_MM: f64 = 29.0;
-/// Upper end of the cost axis in units of the threshold: higher costs are excluded anyway.
+/// Upper end of the cost axis, in units of the threshold; values with a higher cost are excluded anyway.
 const SHOWN: f64 = 3.0;
-/// Names, looks and heights (in thresholds) of the intervals; they lie inside the cup of the profile.
+/// Names, symbols and heights (in units of the threshold) of the intervals; they lie inside the cup of the
+/// profile.
 const STATED: (&str, f64) = ("95 % interval, as stated", 1.2);
 const INTERVALS: [(&str, Colour, MarkerShape, f64); 3] = [
     ("profile", Colour::Blue, MarkerShape::Disc, 1.6),
@@ -81,7 +83,7 @@ impl ProfilePlot {
         }
     }
 
-    /// The figure with its caption; `None` where no parameter has a profile.
+    /// The figure with its caption; `None` if no parameter has a profile.
     pub(crate) fn figure_block(&self) -> Option<FigureBlock> {
         let figure = draw_figure(self);
         (!figure.panels.is_empty()).then(|| FigureBlock {
@@ -119,20 +121,22 @@ fn parameter_profile(
     })
 }
 
-/// Points of a parabola: a smooth line in a panel of 70 mm.
+/// Number of intervals of a parabola; enough for a smooth line in a panel of 70 mm.
 const PARABOLA: u32 = 60;
 
-/// Ends of the profile's interval; an end at a bound counts as open, as values beyond were not tried.
+/// Ends of the profile's interval. An end at a bound counts as open, since values beyond the bound were not
+/// tried.
 fn closed_interval(parameter: &FreeParameter, found: &ParameterResult) -> [Option<f64>; 2] {
     let inside = |end: &f64| (AT_BOUND..=1.0 - AT_BOUND).contains(&parameter.bounds.unit_coordinate(*end));
     found.profile_95.map(|end| end.filter(inside))
 }
 
-/// Half width of the parabola in half widths of the linear interval: it leaves the axes at the top.
+/// Half width of the drawn parabola, in half widths of the linear interval; the parabola reaches the top of
+/// the axes.
 const REACH: f64 = 2.0;
 
-/// The cost of the linear model: a parabola in the search scale through the threshold at the ends of the
-/// linear interval. An end may have been cut at a bound, so the longer half counts; empty where both ends are
+/// The cost by the linear model: a parabola in the search scale that crosses the threshold at the ends of the
+/// linear interval. An end may have been cut at a bound, so the longer half is used; empty if both ends are
 /// at bounds.
 fn linear_model_parabola(
     parameter: &FreeParameter,
@@ -152,7 +156,7 @@ fn linear_model_parabola(
     inside.map(|offset| (bounds.value_at_unit(centre + offset * half), threshold * offset * offset)).collect()
 }
 
-/// Draws the figure; without panels where no parameter has a profile.
+/// Draws the figure; it has no panels if no parameter has a profile.
 #[must_use]
 pub fn draw_figure(shown: &ProfilePlot) -> Figure {
     Figure {
@@ -201,7 +205,7 @@ fn draw_panel(shown: &ProfilePlot, profile: &ParameterProfile) -> Panel {
     }
 }
 
-/// The stated interval as a thick line; an open end runs out of the axes. `None` where both ends are open.
+/// The stated interval as a thick line; an open end extends beyond the axes. `None` if both ends are open.
 fn stated_interval_line(
     shown: &ProfilePlot,
     profile: &ParameterProfile,
@@ -216,7 +220,8 @@ fn stated_interval_line(
     Some(Series::new(label, Colour::Black, Mark::Thick, ends.map(|end| (end, height * shown.threshold))))
 }
 
-/// An interval as a bar with a symbol at the estimate; an open end runs out of the axes.
+/// An interval as a bar with a symbol at the estimate; an open end extends beyond the axes. `None` if both
+/// ends are open.
 fn interval_bar(
     shown: &ProfilePlot,
     (name, colour, shape, height): &(&str, Colour, MarkerShape, f64),
@@ -243,7 +248,7 @@ fn interval_bar(
     })
 }
 
-/// The shown ranges outside the bounds.
+/// Shaded spans of the shown ranges outside the bounds.
 fn out_of_bounds_spans(profile: &ParameterProfile, factor: f64, (low, high): (f64, f64)) -> Vec<ShadedSpan> {
     let (lower, upper) = (profile.bounds.0 * factor, profile.bounds.1 * factor);
     let band = |from, to| ShadedSpan::new("out of bounds", Colour::Grey, from, to);
@@ -254,7 +259,7 @@ fn out_of_bounds_spans(profile: &ParameterProfile, factor: f64, (low, high): (f6
 /// Ends of the x axis: they enclose the shown profile, the intervals and the true value, with a margin.
 fn x_limits(profile: &ParameterProfile, top: f64) -> (f64, f64) {
     let rises = |at: usize| profile.points.get(at).is_some_and(|(_, rise)| *rise <= top);
-    // a point above the top counts where a neighbour lies inside
+    // a point above the top counts if one of its neighbours lies below the top
     let reached = |at: usize| rises(at) || at.checked_sub(1).is_some_and(rises) || rises(at + 1);
     let inside = profile.points.iter().enumerate().filter(|(at, _)| reached(*at));
     let inside =
@@ -267,7 +272,7 @@ fn x_limits(profile: &ParameterProfile, top: f64) -> (f64, f64) {
     (low - room, high + room)
 }
 
-/// Where the line from the inner neighbour to a point above the top crosses the top.
+/// Value at which the line from the neighbour below the top to a point above the top crosses the top.
 fn crossing_at_top(profile: &ParameterProfile, at: usize, (value, rise): (f64, f64), top: f64) -> f64 {
     let neighbours =
         [at.checked_sub(1), at.checked_add(1)].into_iter().flatten().filter_map(|i| profile.points.get(i));
@@ -278,7 +283,7 @@ fn crossing_at_top(profile: &ParameterProfile, at: usize, (value, rise): (f64, f
         .unwrap_or(value)
 }
 
-/// Caption: what the figure shows, with its number.
+/// Caption: contents of the figure, and its main number.
 pub(crate) fn figure_caption(shown: &ProfilePlot) -> String {
     format!("Rise of the cost along each parameter while the others are refitted: {}.", claim_sentence(shown))
 }
@@ -290,7 +295,7 @@ fn claim_sentence(shown: &ProfilePlot) -> String {
     format!("{count} of {all} profiles cross the 95 % threshold on both sides")
 }
 
-/// How to read the figure, and its numbers.
+/// Instructions for reading the figure, with its numbers.
 pub(crate) fn figure_details(shown: &ProfilePlot) -> String {
     let drawn = drawn_profiles(shown);
     let mut sentences = vec![
@@ -337,12 +342,12 @@ fn title_word(verdict: ParameterVerdict) -> String {
     verdict.name().replace('-', " ")
 }
 
-/// Whether the interval by the profile has two ends.
+/// Whether both ends of the profile's interval are known.
 fn is_closed(profile: &ParameterProfile) -> bool {
     profile.intervals[0].is_some_and(|ends| ends.iter().all(Option::is_some))
 }
 
-/// Clause such as "A from 0.1 to 0.2", or which end is open.
+/// Clause such as "A from 0.1 to 0.2", or on the end that is open.
 fn describe_interval(profile: &ParameterProfile) -> String {
     let [lower, upper] = profile.intervals[0].unwrap_or_default();
     let (unit, factor) = choose_prefix(&profile.unit, [profile.estimate]);
@@ -356,7 +361,7 @@ fn describe_interval(profile: &ParameterProfile) -> String {
     format!("{} {ends} {unit}", profile.symbol).trim_end().to_owned()
 }
 
-/// Whether the cost crosses the threshold on a side on which the interval is open.
+/// Whether the cost exceeds the threshold on a side on which the interval is open.
 fn is_open_but_rising(profile: &ParameterProfile, threshold: f64) -> bool {
     let [lower, upper] = profile.intervals[0].unwrap_or_default();
     let rises = |below: bool| {
@@ -373,7 +378,7 @@ fn describe_undetermined(drawn: &[&ParameterProfile]) -> Option<String> {
     })
 }
 
-/// Sentence on the number of true values inside their intervals.
+/// Sentence on the number of true values that their intervals contain.
 fn describe_truths(drawn: &[&ParameterProfile]) -> Option<String> {
     let known: Vec<(&&ParameterProfile, f64)> = drawn.iter().filter_map(|p| Some((p, p.truth?))).collect();
     let holds = |(p, truth): &&(&&ParameterProfile, f64)| {
@@ -422,7 +427,7 @@ mod tests {
 
     #[test]
     fn the_axis_ends_where_the_line_leaves_the_panel() {
-        // the line from (1.8e-3, 4) to (1e-3, 20) reaches 12 half way, at 1.4e-3
+        // the line from (1.8e-3, 4) to (1e-3, 20) reaches 12 halfway, at 1.4e-3
         let (low, high) = x_limits(&profile(), 12.0);
         let room = ROOM * (2.2e-3 - 1.4e-3);
         assert!(
@@ -527,7 +532,7 @@ mod tests {
         }
     }
 
-    /// Rise of a parabola where it comes nearest to a value.
+    /// Rise of a parabola at its point nearest to a value.
     fn at(parabola: &[(f64, f64)], value: f64) -> f64 {
         parabola.iter().min_by(|a, b| (a.0 - value).abs().total_cmp(&(b.0 - value).abs())).unwrap().1
     }

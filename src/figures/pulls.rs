@@ -1,4 +1,4 @@
-//! Pulls: deviation of the model from each feature of a fit, in standard deviations of the target.
+//! Pulls: deviation of the model from each target of a fit, in standard deviations of the target.
 
 use crate::compare::TargetComparison;
 use crate::figures::{Drawing, FigureBlock, about, full_figure, subtitle};
@@ -12,7 +12,7 @@ pub struct Pull {
     pub name: String,
     /// Model minus target, in standard deviations of the target.
     pub deviations: f64,
-    /// Whether the feature was predicted, not fitted.
+    /// Whether the feature was held out of the fit, and so is predicted.
     pub held_out: bool,
 }
 
@@ -25,22 +25,22 @@ pub struct PullPlot {
     pub synthetic: bool,
     /// The features in the order of the job.
     pub pulls: Vec<Pull>,
-    /// Names of features without a model value, or whose target has no standard deviation.
+    /// Names of features without a model value, or without a standard deviation of the target.
     pub without: Vec<String>,
 }
 
-/// Height of a row, and least height of the axes, mm.
+/// Height of a row, and smallest height of the axes, mm.
 const ROW_MM: f64 = 5.0;
 const LEAST_MM: f64 = 14.0;
-/// Standard deviations within which a correct model lies in 95 % of all cases.
+/// Half width of the interval in which a correct model lies in 95 % of all cases, standard deviations.
 const WITHIN_95: f64 = 1.96;
-/// Letters after which a name is cut in the heading.
+/// Number of letters after which a name is cut in the heading.
 const LETTERS: usize = 16;
-/// Least end of the axis, standard deviations.
+/// Smallest value at which the axis ends, standard deviations.
 const LEAST_END: f64 = 3.0;
 
 impl PullPlot {
-    /// The pulls of the rows of a report.
+    /// The pulls of the compared targets of a report.
     pub(crate) fn from_comparisons(
         title: &str,
         fitted: &[&[TargetComparison]],
@@ -136,7 +136,7 @@ fn claim_sentence(shown: &PullPlot) -> String {
     }
 }
 
-/// Caption: what the figure shows, with its number.
+/// Caption: contents of the figure, and its main number.
 pub(crate) fn figure_caption(shown: &PullPlot) -> String {
     let without = match shown.without.len() {
         0 => String::new(),

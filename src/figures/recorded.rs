@@ -1,4 +1,4 @@
-//! A tracked recording: its motion, gaps and reversals.
+//! Figure of a tracked recording: its motion, gaps and reversals.
 
 use super::history::{self, TimeHistory};
 use super::subtitle;
@@ -7,14 +7,14 @@ use crate::recording::motion_traces::MotionTraces;
 use crate::text::{format_percent, format_short, pluralise};
 use plain_charts::{Colour, Figure, ShadedSpan};
 
-/// Most reversals that are named in a figure.
+/// Maximum number of reversals that are named in a figure.
 const MOST_NAMED: usize = 6;
-/// Most gaps that are marked, the longest first.
+/// Maximum number of gaps that are marked; these are the longest ones.
 const MOST_GAPS: usize = 20;
-/// Shortest marked gap, frames: shorter ones would not be seen.
+/// Shortest marked gap, frames; a shorter one would not be seen.
 const LEAST_GAP: usize = 3;
 
-/// Draws the figure; `reversals` are instants, s, and `said` ends the line under the heading.
+/// Draws the figure; `reversals` are instants, s, and `said` is the end of the line under the heading.
 pub(crate) fn draw_figure(recording: &Recording, reversals: &[f64], said: &str) -> Figure {
     let name = |(number, at): (usize, &f64)| (format!("reversal {}", number + 1), *at);
     let named = reversals.iter().enumerate().take(MOST_NAMED).map(name);
@@ -50,7 +50,7 @@ fn claim_sentence(recording: &Recording, reversals: usize) -> String {
     format!("{} s with {turns}, head and tip tracked in {tracked}", format_short(span_s))
 }
 
-/// Whether head or tip is missing in each frame.
+/// For each frame, whether head or tip is missing.
 fn lost_frames(recording: &Recording) -> Vec<bool> {
     let traces = recording.traces();
     traces.tip_x_m.iter().zip(&traces.head_x_m).map(|(tip, head)| tip.is_none() || head.is_none()).collect()

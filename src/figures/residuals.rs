@@ -1,5 +1,5 @@
-//! Residual of a model against white noise: size, autocorrelation, spectrum, and growth with the length of a
-//! run.
+//! Comparison of the residual of a model with white noise: size, autocorrelation, spectrum, and growth with
+//! the length of a run.
 
 use super::{FigureBlock, FigureText};
 use crate::compare::ConditionComparison;
@@ -18,22 +18,22 @@ pub struct ResidualDiagnostics {
     pub note: String,
     /// Whether the recording is synthetic.
     pub synthetic: bool,
-    /// Bins of residual over noise, from and to, with the density of the frames in each.
+    /// Bins of the histogram of residual over noise: lower edge, upper edge, and density of the frames.
     pub histogram: Vec<(f64, f64, f64)>,
     /// Lags, s, and the autocorrelation of the residual.
     pub correlation: Vec<(f64, f64)>,
-    /// Bound of the autocorrelation of white noise in 95 % of the lags.
+    /// Value below which the autocorrelation of white noise lies in size at 95 % of the lags.
     pub white_95: f64,
-    /// Frequencies, Hz, and power density of the residual over that of the noise.
+    /// Frequencies, Hz, each with the ratio of the power density of the residual to that of the noise.
     pub spectrum: Vec<(f64, f64)>,
-    /// Lengths of segments, s, and chi2 per degree of freedom; empty where none were fitted.
+    /// Lengths of segments, s, each with chi2 per degree of freedom; empty if no segments were fitted.
     pub growth: Vec<(f64, f64)>,
 }
 
 /// Height of a panel, mm.
 const HEIGHT_MM: f64 = 40.0;
 const MILLISECONDS: f64 = 1e3;
-/// Points of the curve of the noise.
+/// Number of intervals of the noise curve.
 const POINTS: u32 = 60;
 
 /// Draws the figure.
@@ -114,26 +114,28 @@ fn draw_growth(shown: &ResidualDiagnostics) -> Option<Panel> {
     Some(Panel { title: "growth".to_owned(), ..panel })
 }
 
-// The residual of a condition against white noise.
+// Comparison of the residual of a condition with white noise.
 
-/// Number of bins, and least end of the histogram, standard deviations.
+/// Number of bins of the histogram, and its smallest half width, standard deviations of the noise.
 const HISTOGRAM_BINS: usize = 40;
 const MIN_HISTOGRAM_RANGE: f64 = 4.0;
-/// Longest lag, frames, and its largest fraction of the recording.
+/// Longest lag, in frames and as a fraction of the recording.
 const MAX_LAGS: usize = 60;
 const MAX_LAG_FRACTION: f64 = 0.25;
-/// Fewest frames of a figure.
+/// Minimum number of frames that a figure needs.
 const MIN_FRAMES: usize = 50;
-/// Most points of the spectrum; neighbours are averaged.
+/// Maximum number of points of the spectrum; neighbouring frequencies are averaged.
 const MAX_SPECTRUM_POINTS: usize = 300;
 /// Number of tapers of the spectrum.
 const TAPERS: usize = 9;
-/// Deviations of a two-sided 95 % interval.
+/// Half width of a two-sided 95 % interval, standard deviations.
 const Z_95: f64 = 1.96;
-/// Largest excess of size and of neighbour correlation with which a residual counts as white noise.
+/// A residual counts as white noise if its root mean square, in units of the noise, is below 1 plus this
+/// value and the correlation of neighbouring frames is below this value in size.
 const WHITE_NOISE_TOLERANCE: f64 = 0.1;
 
-/// The figure of a condition; `None` without a recording, or where the signs of the two motions differ.
+/// The figure of a condition; `None` without a recording, with too few frames, or if recording and model move
+/// in opposite directions.
 pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     let residual = case.residual.as_ref()?;
     let (channel, noise_m) = case.judged_channel()?;
@@ -188,7 +190,7 @@ fn claim_sentence(rms: f64, neighbours: f64) -> String {
     format!("The residual is {is} noise: {size} times its size, correlation {r}")
 }
 
-/// Histogram density over a range symmetric about zero.
+/// Density of the values in bins of a range symmetric about zero.
 fn histogram_bins(values: &[f64]) -> Vec<(f64, f64, f64)> {
     let end = values.iter().map(|x| x.abs()).filter(|x| x.is_finite()).fold(MIN_HISTOGRAM_RANGE, f64::max);
     let width = 2.0 * end / HISTOGRAM_BINS as f64;
@@ -204,7 +206,7 @@ fn histogram_bins(values: &[f64]) -> Vec<(f64, f64, f64)> {
     counts.into_iter().enumerate().map(bin).collect()
 }
 
-/// Autocorrelation at lags from one frame on, over pairs of frames that both have a value.
+/// Autocorrelation at lags of one frame and more, from the pairs of frames in which both have a value.
 fn autocorrelation(left: &[Option<f64>], rate_hz: f64) -> Vec<(f64, f64)> {
     let values = || left.iter().flatten();
     let count = values().count().max(1) as f64;
@@ -220,7 +222,8 @@ fn autocorrelation(left: &[Option<f64>], rate_hz: f64) -> Vec<(f64, f64)> {
     (1..=longest).filter_map(at).collect()
 }
 
-/// Power density relative to white noise of unit variance, averaged to few points.
+/// Ratio of the power density to that of white noise of unit variance, averaged to a limited number of
+/// points.
 fn power_density(left: &[Option<f64>], rate_hz: f64) -> Vec<(f64, f64)> {
     let Ok(found) = Multitaper::new(left, rate_hz, left.len(), TAPERS) else { return Vec::new() };
     let white = 2.0 / rate_hz;

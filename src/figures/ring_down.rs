@@ -1,4 +1,4 @@
-//! Ring-down: data with fit, residual, and the decaying component alone.
+//! Ring-down: data with the fit, the residual, and the decaying component alone.
 
 pub mod caption;
 
@@ -8,12 +8,12 @@ use crate::text::format_with_sd;
 use plain_charts::{ChartAxis, Colour, Figure, Mark, Panel, Ribbon, Series};
 use short_spectra::Component;
 
-/// Displacement over time; both columns have the same length.
+/// Displacement as a function of time; both columns have the same length.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RingDownTrace {
-    /// Instants, s, in the time of the recording.
+    /// Instants, s, on the clock of the recording.
     pub time_s: Vec<f64>,
-    /// Displacement, m; `None` interrupts it.
+    /// Displacement, m; `None` interrupts the curve.
     pub displacement_m: Vec<Option<f64>>,
 }
 
@@ -26,7 +26,7 @@ pub struct ComponentDecay {
     pub fitted: RingDownTrace,
     /// Upper envelope of the component.
     pub envelope: RingDownTrace,
-    /// The data without trend and other components.
+    /// The data without the trend and the other components.
     pub data: RingDownTrace,
 }
 
@@ -37,7 +37,7 @@ pub struct RingDown {
     pub title: String,
     /// Quantity, such as "deflection".
     pub quantity: String,
-    /// Window and fitted terms; empty for none.
+    /// Window and fitted terms, for the line under the heading; empty for none.
     pub note: String,
     /// Whether the motion is synthetic.
     pub synthetic: bool,
@@ -88,14 +88,14 @@ pub(crate) fn figure_title(quantity: &str, component: &Component) -> String {
     format!("The {quantity} rings at {frequency} Hz{damping}")
 }
 
-/// First and last instant of data and fit.
+/// Start and end of data and fit, s.
 fn time_span(shown: &RingDown) -> Option<(f64, f64)> {
     let times = || shown.data.time_s.iter().chain(&shown.fitted.time_s).copied().filter(|t| t.is_finite());
     let (first, last) = (times().reduce(f64::min)?, times().reduce(f64::max)?);
     (first < last).then_some((first, last))
 }
 
-/// A panel of traces in the unit in which they read best, with the factor from metres to that unit.
+/// A panel of traces in a suitable unit, with the factor from metres to that unit.
 fn draw_traces(name: &str, height_mm: f64, traces: &[(&str, Colour, Mark, &RingDownTrace)]) -> (Panel, f64) {
     let values = traces.iter().flat_map(|(.., t)| t.displacement_m.iter().flatten().copied());
     let (unit, factor) = length_unit(values.filter(|x| x.is_finite()));
@@ -107,7 +107,7 @@ fn draw_traces(name: &str, height_mm: f64, traces: &[(&str, Colour, Mark, &RingD
     (Panel::new(ChartAxis::default(), y, height_mm, drawn), factor)
 }
 
-/// The points in the unit of the axis, no more than a figure can show.
+/// The points in the unit of the axis, thinned to what a figure can show.
 fn thin_trace(trace: &RingDownTrace, factor: f64) -> Vec<Option<(f64, f64)>> {
     let points = trace.time_s.iter().zip(&trace.displacement_m);
     let points: Vec<_> = points.map(|(t, x)| x.map(|x| (*t, x * factor))).collect();
@@ -117,7 +117,7 @@ fn thin_trace(trace: &RingDownTrace, factor: f64) -> Vec<Option<(f64, f64)>> {
     }
 }
 
-/// Dots where they stay apart in a journal column, otherwise a line, which also takes fewer bytes.
+/// Dots if they are distinct in a journal column; otherwise a line, which also needs fewer bytes.
 fn frame_mark(trace: &RingDownTrace) -> Mark {
     const MOST_DOTS: usize = 400;
     if trace.time_s.len() > MOST_DOTS { Mark::Thin } else { Mark::Dots }
@@ -126,14 +126,14 @@ fn frame_mark(trace: &RingDownTrace) -> Mark {
 fn draw_whole_panel(shown: &RingDown) -> Panel {
     let traces = [
         ("data", Colour::Grey, frame_mark(&shown.data), &shown.data),
-        // not called a fit: the sum is no model of the blade
+        // not called a fit, since the sum is not a model of the blade
         ("trend + oscillations", Colour::Vermilion, Mark::Line, &shown.fitted),
         ("trend", Colour::Blue, Mark::ThinDashed, &shown.trend),
     ];
     draw_traces(&shown.quantity, HEIGHT_MM, &traces).0
 }
 
-/// Data minus fit, with the band of the noise.
+/// Data minus fit, with a band for the noise.
 fn draw_residual_panel(shown: &RingDown) -> Panel {
     let trace = ("", Colour::Grey, frame_mark(&shown.residual), &shown.residual);
     let (mut panel, factor) = draw_traces("rest", RESIDUAL_HEIGHT_MM, &[trace]);
@@ -145,7 +145,7 @@ fn draw_residual_panel(shown: &RingDown) -> Panel {
     panel
 }
 
-/// The component alone, between its envelopes.
+/// The component alone, between its two envelopes.
 fn draw_decay_panel(shown: &ComponentDecay) -> Panel {
     let below = RingDownTrace {
         displacement_m: shown.envelope.displacement_m.iter().map(|x| x.map(|x| -x)).collect(),
@@ -159,8 +159,6 @@ fn draw_decay_panel(shown: &ComponentDecay) -> Panel {
     ];
     draw_traces("component", DECAY_HEIGHT_MM, &traces).0
 }
-
-// Decomposition of the window with the lowest sought frequency.
 
 #[cfg(test)]
 mod tests {

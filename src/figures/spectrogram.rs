@@ -1,4 +1,5 @@
-//! Spectrogram: amplitude over time and frequency as colours, with the ridge over time and over tip speed.
+//! Spectrogram: amplitude against time and frequency as colours, with the ridge against time and against tip
+//! speed.
 
 pub mod caption;
 mod comparison;
@@ -21,7 +22,7 @@ use short_spectra::time_frequency::course::DYNAMIC_RANGE_DB;
 pub struct SpectrogramRidgePoint {
     /// Instant, s.
     pub time_s: f64,
-    /// Frequency, Hz; `None` where no ridge stands out.
+    /// Frequency, Hz; `None` if no ridge stands out.
     pub frequency_hz: Option<f64>,
 }
 
@@ -32,7 +33,7 @@ pub struct TargetFrequency {
     pub name: String,
     /// Frequency, Hz.
     pub frequency_hz: f64,
-    /// Its standard deviation, Hz, where known.
+    /// Standard deviation of the frequency, Hz; `None` if unknown.
     pub frequency_sd_hz: Option<f64>,
     /// Start and end of the window, s.
     pub span_s: (f64, f64),
@@ -47,16 +48,16 @@ pub struct SpectrogramPlot {
     pub title: String,
     /// Quantity, such as "deflection".
     pub quantity: String,
-    /// How it was made, such as the length of the sliding window; empty for none.
+    /// How the spectrogram was made, such as the length of the sliding window; empty for none.
     pub note: String,
     /// Whether the motion is synthetic.
     pub synthetic: bool,
-    /// Middles of the sliding window, ascending, s.
+    /// Centres of the sliding window, ascending, s.
     pub time_s: Vec<f64>,
     /// Frequencies, ascending, Hz.
     pub frequency_hz: Vec<f64>,
-    /// Amplitude of a sine, m: one list per instant, one value per frequency; `None` where too few frames are
-    /// tracked.
+    /// Amplitude of a sine, m: one list per instant, with one value per frequency; `None` if too few frames
+    /// are tracked.
     pub amplitude_m: Vec<Vec<Option<f64>>>,
     /// Whether the frequency axis is logarithmic.
     pub log_frequency: bool,
@@ -68,16 +69,16 @@ pub struct SpectrogramPlot {
     pub instants: Vec<(String, f64)>,
     /// The target frequencies, each with its window.
     pub targets: Vec<TargetFrequency>,
-    /// The ridge over the speed of the tip; empty for no such panel.
+    /// The ridge against the speed of the tip; if empty, this panel is left out.
     pub over_speed: Vec<SpeedPoint>,
 }
 
 /// Heights of the two panels, mm.
 const HEIGHT_MM: f64 = 72.0;
 const SPEED_HEIGHT_MM: f64 = 38.0;
-/// Fraction of the cells below the first colour: they hold only noise.
+/// Fraction of the cells that lie below the first colour; these cells contain only noise.
 const UNDER_COLOURS: f64 = 0.1;
-/// The colours start and end at multiples of this, dB.
+/// The range of colours begins and ends at multiples of this, dB.
 const STEP_DB: f64 = 5.0;
 /// Amplitude of 0 dB, m.
 const REFERENCE_M: f64 = 1e-6;
@@ -107,7 +108,7 @@ pub fn draw_figure(shown: &SpectrogramPlot) -> Figure {
     )
 }
 
-/// All amplitudes in dB.
+/// All amplitudes in dB; see [`amplitude_decibels`].
 fn decibel_map(amplitude_m: &[Vec<Option<f64>>]) -> Vec<Vec<Option<f64>>> {
     amplitude_m.iter().map(|column| column.iter().map(|a| a.and_then(amplitude_decibels)).collect()).collect()
 }
@@ -126,7 +127,7 @@ fn draw_map(shown: &SpectrogramPlot) -> Panel {
     let y = if shown.log_frequency { ChartAxis::log } else { ChartAxis::linear }("frequency, Hz");
     let y = y.with_ends(shown.shown_hz.or_else(|| frequency_range(shown)));
     let rule = |(label, at): &(String, f64)| VerticalLine::new(label, Colour::White, Mark::Dashed, *at);
-    // edged lines are visible on every colour
+    // lines with an edge are visible on every colour
     let targets = target_lines(&shown.targets, "target \u{b1} 2 sd", Colour::Black, Mark::Edged);
     let ridge = Series::new("ridge", Colour::Vermilion, Mark::Edged, ridge_points(&shown.ridge));
     let lines = [targets, ridge].into_iter().filter(|s| s.points.iter().any(Option::is_some));
@@ -138,7 +139,7 @@ fn draw_map(shown: &SpectrogramPlot) -> Panel {
     }
 }
 
-/// An amplitude, m, in dB re 1 um; zero lies below every colour.
+/// An amplitude, m, in dB re 1 um; zero gives a value below every colour.
 fn amplitude_decibels(amplitude_m: f64) -> Option<f64> {
     (amplitude_m.is_finite() && amplitude_m >= 0.0)
         .then(|| 20.0 * math::log10((amplitude_m / REFERENCE_M).max(f64::MIN_POSITIVE)))
@@ -155,13 +156,13 @@ fn colour_range_db(values: &[Vec<Option<f64>>]) -> Option<(f64, f64)> {
     Some((low, high.max(low + STEP_DB)))
 }
 
-/// Start of the first column and end of the last, s; `None` for fewer than two columns.
+/// Start of the first column and end of the last column, s; `None` for fewer than two columns.
 fn time_span(middles: &[f64]) -> Option<(f64, f64)> {
     let ([first, second, ..], [.., before, last]) = (middles, middles) else { return None };
     Some((first - (second - first) / 2.0, last + (last - before) / 2.0))
 }
 
-/// Least and greatest frequency, above zero on a logarithmic axis.
+/// Lowest and highest frequency; the lowest is above zero on a logarithmic axis.
 fn frequency_range(shown: &SpectrogramPlot) -> Option<(f64, f64)> {
     let lowest = shown.frequency_hz.iter().find(|f| **f > 0.0 || !shown.log_frequency)?;
     Some((*lowest, *shown.frequency_hz.last()?))
@@ -171,7 +172,7 @@ fn ridge_points(ridge: &[SpectrogramRidgePoint]) -> impl Iterator<Item = Option<
     ridge.iter().map(|p| p.frequency_hz.map(|f| (p.time_s, f)))
 }
 
-/// Frequencies over the speed of the tip, mm/s, as symbols with two standard deviations either side.
+/// Frequencies against the speed of the tip, mm/s, as symbols with error bars of two standard deviations.
 pub(super) fn speed_series(label: &str, colour: Colour, shape: MarkerShape, points: &[SpeedPoint]) -> Series {
     let place = |p: &SpeedPoint| (p.speed_m_per_s * MILLIMETRES, p.frequency_hz);
     let bar = |p: &SpeedPoint| {
@@ -184,7 +185,8 @@ pub(super) fn speed_series(label: &str, colour: Colour, shape: MarkerShape, poin
     }
 }
 
-/// Clause on the number of segments in which a ridge is drawn, and on the segments in which it is left out.
+/// Clause on the number of segments in which a ridge is drawn, and on the number of segments whose ridge
+/// point is left out.
 pub(crate) fn describe_ridge_segments(
     drawn: &[Vec<RidgePoint>],
     ridge: &time_frequency::Ridge,
@@ -198,10 +200,10 @@ pub(crate) fn describe_ridge_segments(
     format!("in {drawn} of {} segments{without}", of.time_s.len())
 }
 
-// Spectrograms of the deflection after the release, for recording and model.
+// Data of a spectrogram and of its ridge.
 
-/// A plot with the times, frequencies and amplitudes of a spectrogram up to a number of bins, and with its
-/// ridge, part by part with gaps between.
+/// Completes a plot with the times, frequencies and amplitudes of a spectrogram, up to a number of frequency
+/// bins, and with the parts of its ridge, which gaps separate.
 pub(super) fn fill_map(
     plot: SpectrogramPlot,
     spectrogram: &time_frequency::Spectrogram,
@@ -227,15 +229,16 @@ pub(super) fn fill_map(
     }
 }
 
-// Target frequencies as lines over their windows, with two standard deviations either side.
+// Target frequencies as lines over their windows, with error bars of two standard deviations.
 
-/// Letters after which a name is cut in a map.
+/// Number of letters after which a name is cut in a map.
 const MAX_LABEL_LETTERS: usize = 14;
-/// Distance of a name from its line, and least distance of lines whose names stand on one side, fractions of
-/// the height.
+/// Distance of a name from its line, and smallest distance of two lines whose names are both above them;
+/// fractions of the height.
 const LABEL_OFFSET: f64 = 0.05;
 const CLOSE_TARGETS: f64 = 0.1;
-/// Range of the middle of a name, fractions of the width, so that the name stays inside the axes.
+/// Range within which the middle of a name lies, fractions of the width, so that the name stays inside the
+/// axes.
 const LABEL_LIMITS: (f64, f64) = (0.3, 0.7);
 
 /// Target lines over the ridges; met and missed targets have different styles.
@@ -265,7 +268,8 @@ fn target_lines(targets: &[TargetFrequency], label: &str, colour: Colour, mark: 
     }
 }
 
-/// Labels such as "high 908 Hz, met" above the lines; below a line where the next one is close.
+/// Labels such as "high 908 Hz, met" above the lines; a label is below its line if another line is close
+/// above it.
 pub(super) fn target_names(shown: &SpectrogramPlot) -> Vec<TextAnnotation> {
     let Some((bottom, top)) = shown.shown_hz.or_else(|| frequency_range(shown)) else { return Vec::new() };
     let Some((first, last)) = time_span(&shown.time_s) else { return Vec::new() };
@@ -346,7 +350,7 @@ mod tests {
                 .map(|l| l.matches('M').count())
                 .sum::<usize>()
         };
-        assert_eq!(lines(&drawn), 3); // two pieces and the sample in the legend
+        assert_eq!(lines(&drawn), 3); // two pieces, and the sample line in the legend
         assert_eq!(lines(&as_svg(&SpectrogramPlot { ridge: Vec::new(), ..example_spectrogram() })), 0);
     }
 

@@ -1,4 +1,4 @@
-//! Amplitude spectra, measured and of the model, with components, target frequencies and noise floor.
+//! Amplitude spectra of recording and model, with components, target frequencies and noise floor.
 
 pub mod caption;
 mod components;
@@ -31,17 +31,17 @@ pub struct SpectraPlot {
     pub note: String,
     /// Whether the measured motion is synthetic.
     pub synthetic: bool,
-    /// Measured spectrum; `None` where only published numbers are known.
+    /// Measured spectrum; `None` if only published numbers are known.
     pub measured: Option<SpectrumCurve>,
-    /// Spectrum of the model, of the same length, window and detrending.
+    /// Spectrum of the model, with the same length, window and detrending as the measured one.
     pub model: Option<SpectrumCurve>,
     /// Published or measured target frequencies.
     pub targets: Vec<Target>,
     /// Noise floor of the measured spectrum, m.
     pub noise_floor_m: Option<f64>,
-    /// Noise floor over frequency; drawn instead of the constant one.
+    /// Noise floor as a function of frequency; drawn instead of the constant one.
     pub noise_floor: Option<SpectrumLevel>,
-    /// 95 % interval of the measured spectrum from its noise.
+    /// 95 % interval of the measured spectrum, from its noise floor.
     pub interval_95: Option<AmplitudeInterval>,
     /// Leakage of the removed flip into the spectrum.
     pub leakage: Option<SpectrumLevel>,
@@ -99,8 +99,8 @@ pub(crate) fn strongest_claim(spectra: &SpectraPlot) -> String {
     }
 }
 
-/// Ends of the amplitude axis, m: from below the noise floor, or from 1e-4 of the highest peak without one,
-/// to above that peak.
+/// Ends of the amplitude axis, m. The lower end is below the noise floor or, without a noise floor, 1e-4 of
+/// the highest peak; the upper end is above that peak.
 fn amplitude_limits(spectra: &SpectraPlot) -> Option<(f64, f64)> {
     const UNDER_FLOOR: f64 = 0.1;
     const MODEL_RANGE: f64 = 1e-4;
@@ -130,7 +130,7 @@ fn spectrum_series(spectra: &SpectraPlot, highest: f64) -> Vec<Series> {
     drawn
 }
 
-/// Two standard deviations either side of a target.
+/// Shaded spans of two standard deviations on either side of each target.
 fn target_spans(targets: &[Target]) -> Vec<ShadedSpan> {
     let band = |t: &Target| {
         let sd_hz = t.frequency_sd_hz.filter(|sd| *sd > 0.0)?;
@@ -141,18 +141,18 @@ fn target_spans(targets: &[Target]) -> Vec<ShadedSpan> {
     targets.iter().filter_map(band).collect()
 }
 
-/// Most component names above a panel that also names targets.
+/// Maximum number of component names above a panel that also names targets.
 const MOST_NAMES: usize = 4;
 
-/// The components that are named: the measured ones, or the model's without a recording.
+/// The components that get names: the measured ones, or the model's if none were measured.
 fn labelled_components(spectra: &SpectraPlot) -> &[LabelledComponent] {
     if spectra.components.is_empty() { &spectra.model_components } else { &spectra.components }
 }
 
-/// Lines at the targets, and labels over the components.
+/// Lines at the targets, and labels above the components.
 fn target_lines(spectra: &SpectraPlot) -> Vec<VerticalLine> {
     let named = labelled_components(spectra);
-    // where components are named, the targets are named by top labels instead
+    // if components have names, the targets are named by top labels instead
     let label = |t: &Target| format!("{}: {} Hz", t.name, format_trimmed(t.frequency_hz, 4));
     let target = |t: &Target| {
         let label = if named.is_empty() { label(t) } else { String::new() };
@@ -162,18 +162,16 @@ fn target_lines(spectra: &SpectraPlot) -> Vec<VerticalLine> {
     spectra.targets.iter().map(target).chain(components::component_labels(named, most)).collect()
 }
 
-/// Names of the targets where components are named too.
+/// Names of the targets above the panel, if components have names too.
 fn target_labels(spectra: &SpectraPlot) -> Vec<TopLabel> {
     let caption = |t: &Target| TopLabel { label: t.name.clone(), at: t.frequency_hz };
     let named = !labelled_components(spectra).is_empty();
     spectra.targets.iter().filter(|_| named).map(caption).collect()
 }
 
-// Spectra of a condition: one per window that the fit reads, and the ring-down.
-
 // Noise floor, leakage and interval of a spectrum.
 
-/// A level, such as the noise floor, over frequency.
+/// A level, such as the noise floor, as a function of frequency.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SpectrumLevel {
     /// Frequencies, Hz.
@@ -182,7 +180,7 @@ pub struct SpectrumLevel {
     pub amplitude_m: Vec<f64>,
 }
 
-/// An interval of amplitudes over frequency.
+/// An interval of amplitudes as a function of frequency.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct AmplitudeInterval {
     /// Frequencies, Hz.
@@ -202,13 +200,13 @@ impl SpectrumLevel {
     }
 }
 
-/// Radius of the circle around a bin's complex amplitude that holds 95 % of the noise, in units of its root
-/// mean square: `sqrt(-ln 0.05)` (Rayleigh distribution of the magnitude).
+/// Radius of the circle around the complex amplitude of a bin that contains 95 % of the noise, in units of
+/// the root mean square of the noise: `sqrt(-ln 0.05)` (Rayleigh distribution of the magnitude).
 const CIRCLE_95: f64 = 1.730_818_382_602_285_7;
 
 impl AmplitudeInterval {
-    /// The 95 % interval of each amplitude for a noise floor. An interval that reaches zero means that the
-    /// bin may hold only noise.
+    /// The 95 % interval of each amplitude, for a given noise floor. If the interval reaches zero, the bin
+    /// may contain noise only.
     pub(crate) fn from_noise_floor(curve: &SpectrumCurve, floor: &SpectrumLevel) -> Self {
         let ends = |sign: f64| {
             let end = |(a, noise_m): (&f64, &f64)| (a + sign * CIRCLE_95 * noise_m).max(0.0);
@@ -224,12 +222,12 @@ impl AmplitudeInterval {
     }
 }
 
-/// Points in Hz and micrometres.
+/// Points with the frequency in Hz and the amplitude in micrometres.
 pub(super) fn axis_points(frequency_hz: &[f64], amplitude_m: &[f64]) -> Vec<Option<(f64, f64)>> {
     frequency_hz.iter().zip(amplitude_m).map(|(f, a)| Some((*f, a * MICROMETRES))).collect()
 }
 
-/// Noise floor and leakage, drawn below the spectra.
+/// Noise floor and leakage, drawn under the spectra.
 pub(super) fn level_series(spectra: &SpectraPlot, highest: f64) -> Vec<Series> {
     let constant =
         |floor_m: f64| [spectra.lowest_hz, highest].map(|f| Some((f, floor_m * MICROMETRES))).to_vec();

@@ -1,5 +1,5 @@
-//! Maps of a parameter study: a quantity over two parameters as colours, or over one as a curve. Points
-//! without a value are hatched.
+//! Maps of a parameter study: a quantity against two parameters as colours, or against one parameter as a
+//! curve. Points without a value are hatched.
 
 mod claim;
 
@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 const MAP_MM: f64 = 56.0;
 const CURVE_MM: f64 = 46.0;
 
-/// Draws map number `at`, counted from 0; without panels where there is no such map.
+/// Draws the map with index `at`; the figure has no panels if there is no such map.
 #[must_use]
 pub fn draw_figure(study: &Study, scene: &Scene, outcomes: &[PointOutcome], at: usize) -> Figure {
     let Some(map) = study.maps.get(at) else { return Figure::default() };
@@ -45,12 +45,12 @@ pub fn draw_figure(study: &Study, scene: &Scene, outcomes: &[PointOutcome], at: 
     }
 }
 
-/// Labels of the axes of a study.
+/// Labels of the axes of a study, as text.
 pub(super) fn describe_axes(study: &Study) -> String {
     study.axes.iter().map(axis_label).collect::<Vec<_>>().join(" and ")
 }
 
-/// Values of a map at all points of the grid, in the unit of the figure, and reasons for missing ones.
+/// Values of a map at all points of the grid, in the unit of the figure, and the reasons for missing values.
 pub(super) struct SweepMapValues<'a> {
     map: &'a SweepMap,
     pub values: Vec<Option<f64>>,
@@ -58,7 +58,7 @@ pub(super) struct SweepMapValues<'a> {
 }
 
 impl<'a> SweepMapValues<'a> {
-    /// Map number `at` of a study.
+    /// The values of the map with index `at`.
     pub(crate) fn new(study: &Study, map: &'a SweepMap, outcomes: &[PointOutcome], at: usize) -> Self {
         let reason = |outcome: &PointOutcome| outcome.values.get(at)?.err();
         let reasons = outcomes.iter().map(reason).collect();
@@ -128,7 +128,7 @@ impl<'a> SweepMapValues<'a> {
 /// Label of the scene from which the study starts.
 const SCENE_LABEL: &str = "the scene as written";
 
-/// An axis in the unit of figures.
+/// An axis of a study, in the unit of the figures.
 struct DisplayAxis<'a> {
     axis: &'a SweepAxis,
     middles: Vec<f64>,
@@ -143,14 +143,14 @@ impl<'a> DisplayAxis<'a> {
         Self { axis, middles, edges }
     }
 
-    /// The axis from the start of the first cell to the end of the last.
+    /// Axis of a chart, from the start of the first cell to the end of the last cell.
     fn chart_axis(&self) -> ChartAxis {
         let range = self.edges.first().copied().zip(self.edges.last().copied());
         let (label, scale) = (axis_label(self.axis), axis_scale(self.axis));
         ChartAxis { label, scale, range, ..ChartAxis::default() }
     }
 
-    /// Value of the scene itself; `None` outside the axis.
+    /// Value of the parameter in the scene itself; `None` if it lies outside the axis.
     fn scene_value(&self, scene: &Scene) -> Option<f64> {
         let value = scene.value(self.axis.parameter.name)? * display_unit(self.axis.parameter).1;
         let within = value >= *self.edges.first()? && value <= *self.edges.last()?;
@@ -160,7 +160,7 @@ impl<'a> DisplayAxis<'a> {
 
 // Hatch patterns for missing values.
 
-/// Replacement patterns, in order, for reasons whose own pattern is taken.
+/// Replacement patterns, in order, for reasons whose own pattern is already in use.
 const FALLBACK_PATTERNS: [HatchPattern; 9] = [
     HatchPattern::Dotted,
     HatchPattern::DashedUpright,
@@ -173,7 +173,7 @@ const FALLBACK_PATTERNS: [HatchPattern; 9] = [
     HatchPattern::Crossed,
 ];
 
-/// The pattern of each reason in a study; two reasons share one only when no pattern is left.
+/// The pattern of each reason in a study; reasons share a pattern only if none is left.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(in crate::figures) struct ReasonPatterns(BTreeMap<MissingReason, HatchPattern>);
 
@@ -205,7 +205,8 @@ impl ReasonPatterns {
         Self(given)
     }
 
-    /// One hatch per reason in a map, in the order of the table of reasons; `cell` gives the area of a point.
+    /// One hatch for each reason that occurs in a map, in the order of the table of reasons; `cell` gives the
+    /// area of a point.
     pub(crate) fn reason_hatches(
         &self,
         reasons: &[Option<MissingReason>],
@@ -221,8 +222,8 @@ impl ReasonPatterns {
     }
 }
 
-/// The pattern of a reason unless another reason of the study has it. None is plain grey, which would look
-/// like a value in print without colours.
+/// The pattern of a reason if no other reason of the study uses it. No pattern is plain grey, which would
+/// look like a value in a print without colours.
 fn default_pattern(reason: MissingReason) -> HatchPattern {
     match reason {
         MissingReason::ContactLost => HatchPattern::Rising,
@@ -250,7 +251,7 @@ pub(in crate::figures) fn axis_scale(axis: &SweepAxis) -> AxisScale {
     }
 }
 
-/// The range of colours or y axis that a study sets, in the display unit.
+/// The range that a study sets for the colours or the y axis, in the display unit.
 pub(in crate::figures) fn map_range(map: &SweepMap) -> Option<(f64, f64)> {
     let factor = map.reading.unit().factor;
     map.range.map(|(low, high)| (low * factor, high * factor))
@@ -262,7 +263,7 @@ pub(in crate::figures) fn map_label(map: &SweepMap) -> String {
     if shown.is_empty() { map.name.clone() } else { format!("{}, {shown}", map.name) }
 }
 
-/// Display unit of a parameter, and the factor from its SI value.
+/// Display unit of a parameter, and the factor from SI to that unit.
 pub(in crate::figures) fn display_unit(parameter: &ModelParameter) -> (&'static str, f64) {
     match parameter.unit {
         "m" => ("mm", 1e3),
@@ -272,18 +273,18 @@ pub(in crate::figures) fn display_unit(parameter: &ModelParameter) -> (&'static 
     }
 }
 
-/// The name of a parameter in words: `drive.amplitude_m` is the "drive amplitude".
+/// Name of a parameter in words: "drive amplitude" for `drive.amplitude_m`.
 pub(in crate::figures) fn parameter_words(axis: &SweepAxis) -> String {
     let ModelParameter { name, symbol, unit, .. } = axis.parameter;
     let (table, key) = name.split_once('.').unwrap_or(("", name));
     let suffix = format!("_{}", unit.to_lowercase().replace('/', " per ").replace(' ', "_"));
     let key = key.strip_suffix(&suffix).unwrap_or(key).replace('_', " ");
-    // a key that equals the symbol is written as the symbol
+    // a key that equals the symbol is written like the symbol
     let key = if key.eq_ignore_ascii_case(symbol) { (*symbol).to_owned() } else { key };
     if table == "blade" { key } else { format!("{table} {key}") }
 }
 
-/// Label of an axis: `drive.amplitude_m` is the "drive amplitude a, mm".
+/// Label of an axis: "drive amplitude a, mm" for `drive.amplitude_m`.
 pub(in crate::figures) fn axis_label(axis: &SweepAxis) -> String {
     let (words, symbol) = (parameter_words(axis), axis.parameter.symbol);
     let named = if words.ends_with(&format!(" {symbol}")) { words } else { format!("{words} {symbol}") };
@@ -295,16 +296,16 @@ pub(in crate::figures) fn axis_label(axis: &SweepAxis) -> String {
 
 // Colour limits of a map.
 
-/// Quantiles at the first and the last colour where values beyond them are outliers.
+/// Quantiles of the values at the first and the last colour, if values beyond them are outliers.
 const COLOUR_QUANTILES: [f64; 2] = [0.02, 0.98];
-/// Largest distance of an extreme value from its quantile, in units of the range between the quantiles,
-/// before it counts as an outlier.
+/// Distance of an extreme value from its quantile above which it counts as an outlier, as a multiple of the
+/// range between the quantiles.
 const OUTLIER_DISTANCE: f64 = 0.25;
-/// Fewest values for which outliers are sought.
+/// Minimum number of values for which outliers are sought.
 const MIN_OUTLIER_SAMPLES: usize = 8;
 
-/// Values of the first and the last colour. `None`, for the full range, where there are too few values or
-/// nearly all are equal.
+/// Values of the first and the last colour. `None` means the full range: there are too few values, or nearly
+/// all are equal.
 pub(super) fn colour_limits(values: &[Option<f64>]) -> Option<(f64, f64)> {
     let mut sorted: Vec<f64> = values.iter().flatten().copied().filter(|v| v.is_finite()).collect();
     if sorted.len() < MIN_OUTLIER_SAMPLES {
@@ -313,7 +314,7 @@ pub(super) fn colour_limits(values: &[Option<f64>]) -> Option<(f64, f64)> {
     sorted.sort_by(f64::total_cmp);
     let last = sorted.len() - 1;
     let [low, high] = COLOUR_QUANTILES.map(|share| share * last as f64);
-    // rounded inwards, so that the extreme of a few values can be an outlier too
+    // rounded inwards, so that even the extreme of a few values can be an outlier
     let (low, high) = (sorted[low.ceil() as usize], sorted[high.floor() as usize]);
     let between = high - low;
     let end = |share: f64, extreme: f64| {

@@ -1,5 +1,5 @@
-//! All maps of a parameter study on one sheet: small maps or curves over the same axes or, for many
-//! parameters, the rank correlations of maps and parameters.
+//! All maps of a parameter study on one sheet: small maps or curves with the same axes or, for a study with
+//! many parameters, the rank correlations between maps and parameters.
 
 use super::sweep_map::{MapClaim, ReasonPatterns, SweepMapValues, describe_axes};
 use super::sweep_map::{axis_label, parameter_words};
@@ -13,15 +13,15 @@ use plain_charts::{
 /// Heights of a panel and of a row of the table of correlations, mm.
 const PANEL_MM: f64 = 42.0;
 const ROW_MM: f64 = 7.0;
-/// Least height of the table of correlations, in rows: the label of the colour bar fits beside it.
+/// Smallest height of the table of correlations, in rows; the label of the colour bar needs this height.
 const FEWEST_ROWS: usize = 5;
-/// Letters that fit above a panel.
+/// Number of letters that fit above a panel.
 const CLAIM_LETTERS: usize = 34;
-/// Most panels; further maps are left out.
+/// Maximum number of panels; further maps are left out.
 const MOST: usize = 12;
 
-/// Draws the sheet of a study over a grid of one or two parameters. Maps without any value have no panel and
-/// are named under the heading; without any panel the figure is empty.
+/// Draws the sheet of a study with a grid of one or two parameters. Maps without any value have no panel;
+/// they are named under the heading. If there is no panel at all, the figure is empty.
 #[must_use]
 pub fn draw_figure(study: &Study, scene: &Scene, outcomes: &[PointOutcome]) -> Figure {
     let patterns = ReasonPatterns::from_outcomes(outcomes);
@@ -66,12 +66,12 @@ pub fn draw_figure(study: &Study, scene: &Scene, outcomes: &[PointOutcome]) -> F
     }
 }
 
-/// The sheet of a study without maps: rank correlations as numbers over colours.
+/// The sheet of a study without map figures: a table of rank correlations, as numbers on colours.
 pub(crate) fn draw_correlations(study: &Study, found: &RankCorrelations) -> Figure {
     let of = |at: usize| -> Vec<Option<f64>> {
         found.of_map(study, at).into_iter().rev().map(|one| one.rank_correlation).collect()
     };
-    // the first parameter on top
+    // the first parameter is at the top
     let axes: Vec<_> = study.axes.iter().rev().collect();
     let values: Vec<Vec<Option<f64>>> = (0..study.maps.len()).map(of).collect();
     let cells = || {

@@ -1,13 +1,14 @@
-//! A synthetic recording: the simulated motion, the frames with exposure and noise, and the lost frames.
+//! Figure of a synthetic recording: the simulated motion, the frames with exposure and noise, and the lost
+//! frames.
 
 use super::FigureText;
 use crate::recording::Recording;
 use crate::text::{format_length, format_milliseconds, format_percent, format_short};
 use plain_charts::{ChartAxis, Colour, ErrorBar, FULL_WIDTH_MM, Figure, Mark, Panel, Series, VerticalLine};
 
-/// Samples of the motion per frame.
+/// Number of samples of the motion per frame.
 pub(crate) const MOTION_SAMPLES: f64 = 8.0;
-/// Frames of an enlarged part, and frames of it before its instant.
+/// Number of frames in an enlarged part, and number of these before its central instant.
 const ENLARGED: f64 = 40.0;
 const BEFORE: f64 = 10.0;
 /// Fraction of the run after which a stick counts as late.
@@ -19,9 +20,9 @@ const PANEL_MM: f64 = 40.0;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TwinPlot<'a> {
     pub title: &'a str,
-    /// The motion without exposure and noise, about [`MOTION_SAMPLES`] times as many samples as frames.
+    /// The motion without exposure and noise, with about [`MOTION_SAMPLES`] samples per frame.
     pub motion: &'a Recording,
-    /// The motion as the camera sees it, without noise.
+    /// The motion averaged over the exposure of each frame, without noise.
     pub seen: &'a Recording,
     pub tracked: &'a Recording,
     /// Exposure of a frame, s.
@@ -32,8 +33,8 @@ pub(crate) struct TwinPlot<'a> {
     pub stick_s: &'a [[f64; 2]],
 }
 
-/// Draws the deflection over the whole run and around two releases (longest stick, late stick), and the
-/// errors of the camera.
+/// Draws the deflection, for the whole run and around two releases (of the longest stick and of a late
+/// stick), and the errors of the camera.
 pub(crate) fn draw_figure(twin: &TwinPlot) -> Figure {
     let words = figure_text(twin);
     let mut panels = vec![draw_run_panel(twin)];
@@ -50,7 +51,7 @@ pub(crate) fn draw_figure(twin: &TwinPlot) -> Figure {
     }
 }
 
-/// Caption with the main numbers, and description.
+/// Caption with the main numbers, and description of the figure.
 fn figure_text(twin: &TwinPlot) -> FigureText {
     let grid = twin.tracked.grid();
     let lost = lost_points(twin).len();
@@ -77,7 +78,7 @@ fn figure_text(twin: &TwinPlot) -> FigureText {
     }
 }
 
-/// Noise of the deflection, m: tip and head have independent noise.
+/// Noise of the deflection, m; the noise of the tip and that of the head are independent.
 fn deflection_noise_m(twin: &TwinPlot) -> f64 {
     std::f64::consts::SQRT_2 * twin.noise_m
 }
@@ -87,7 +88,7 @@ fn deflection_m(recording: &Recording, at: usize) -> Option<f64> {
     Some((*traces.tip_x_m.get(at)?)? - (*traces.head_x_m.get(at)?)?)
 }
 
-/// Times, s, and deflections, mm; `None` where head or tip is lost.
+/// Times, s, and deflections, mm; `None` if head or tip is lost.
 fn deflection_points(recording: &Recording) -> Vec<Option<(f64, f64)>> {
     let grid = recording.grid();
     (0..grid.frames).map(|at| Some((grid.time_s(at), 1e3 * deflection_m(recording, at)?))).collect()
@@ -100,7 +101,7 @@ fn lost_points(twin: &TwinPlot) -> Vec<Option<(f64, f64)>> {
     seen.filter(|(_, found)| found.is_none()).map(|(seen, _)| seen).collect()
 }
 
-/// Deflection in a recording minus that of the motion at the instant of the frame, m.
+/// Deflection in a recording minus that of the motion at the same instant, m.
 fn difference_points(twin: &TwinPlot, of: &Recording) -> Vec<Option<(f64, f64)>> {
     let (grid, traces) = (of.grid(), twin.motion.traces());
     let difference = |at: usize| {
@@ -122,7 +123,7 @@ fn draw_run_panel(twin: &TwinPlot) -> Panel {
     }
 }
 
-/// A part of the run, frame by frame.
+/// Panel of a part of the run, in which single frames are visible.
 fn draw_enlarged_panel(twin: &TwinPlot, name: &str, at_s: f64) -> Panel {
     let frame_s = 1.0 / twin.tracked.grid().frame_rate_hz;
     let (from, to) = (at_s - BEFORE * frame_s, at_s + (ENLARGED - BEFORE) * frame_s);
@@ -131,7 +132,7 @@ fn draw_enlarged_panel(twin: &TwinPlot, name: &str, at_s: f64) -> Panel {
     Panel { title: format!("{name}, {} frames", ENLARGED as usize), ..panel }
 }
 
-/// Motion, tracked frames and lost frames; error bars only in an enlarged part.
+/// Motion, tracked frames and lost frames; error bars are drawn only in an enlarged part.
 fn part_series(twin: &TwinPlot, part: Option<(f64, f64)>) -> Vec<Series> {
     let tracked = deflection_points(twin.tracked);
     let sd_mm = 1e3 * deflection_noise_m(twin);
@@ -154,7 +155,7 @@ fn part_series(twin: &TwinPlot, part: Option<(f64, f64)>) -> Vec<Series> {
     ]
 }
 
-/// Errors of the camera: blur alone, and blur with noise.
+/// Panel of the errors of the camera: due to exposure alone, and due to exposure and noise.
 fn draw_camera_panel(twin: &TwinPlot) -> Panel {
     let series = |label: &str, colour, mark, of: &Recording| {
         let points = difference_points(twin, of).into_iter();
@@ -169,7 +170,8 @@ fn draw_camera_panel(twin: &TwinPlot) -> Panel {
     Panel { title, ..Panel::new(ChartAxis::time(), y, 0.8 * PANEL_MM, series) }
 }
 
-/// Ends of the longest stick and of the last late stick that enough frames follow, s.
+/// Ends, s, of the longest stick and of the last late stick, of those sticks that an enlarged part fits
+/// around.
 fn release_instants(twin: &TwinPlot) -> Vec<(&'static str, f64)> {
     let grid = twin.tracked.grid();
     let (start_s, end_s) = (grid.start_s, grid.time_s(grid.frames.saturating_sub(1)));
@@ -223,7 +225,7 @@ mod tests {
         assert_eq!(release_instants(&twin), [("longest stick ends", 1.2), ("stick-slip", 1.45)]);
         let missing = deflection_points(&tracked).iter().filter(|point| point.is_none()).count();
         assert!(missing > 50 && lost_points(&twin).iter().flatten().count() == missing);
-        // nothing is blurred in this view, and what is left has the stated noise
+        // there is no blur in this view, and the difference has the stated noise
         assert!(difference_points(&twin, twin.seen).into_iter().flatten().all(|(_, m)| m.abs() < 2e-7));
         let noise: Vec<f64> =
             difference_points(&twin, &tracked).into_iter().flatten().map(|(_, m)| m).collect();

@@ -1,4 +1,4 @@
-//! The links of the fitted model over frames of the video, at instants through the reversal.
+//! The links of the fitted model drawn over frames of the video, at instants of the reversal.
 
 use super::FigureText;
 use super::poses::{joint_positions, reversal_poses};
@@ -9,19 +9,20 @@ use crate::text::{format_length, join_with_and};
 use plain_charts::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Raster, Series};
 use portable_math as math;
 
-/// The shown instants: name of the model's pose, and its name in the figure.
+/// The instants to show: name of the model's pose, and name of the instant in the figure.
 const SHOWN: [(&str, &str); 4] = [
     ("before", "before the reversal"),
     ("upright", "in the flip"),
     ("still stuck", "at the release"),
     ("after", "after the flip"),
 ];
-/// Most frames between an instant of the model and a frame that has head and tip.
+/// Maximum number of frames between an instant of the model and the nearest frame in which head and tip are
+/// tracked.
 const NEAR: usize = 5;
 /// Height of a panel, mm.
 const DRAWING_MM: f64 = 42.0;
-/// Pixels across a panel, and the shown part of the video frame in lengths of the blade: half width about the
-/// head, and heights above the glass. It is larger than any panel.
+/// Number of pixels across a panel; then the part of the video frame that is shown, in lengths of the blade:
+/// half width about the head, and heights above the glass. This part is larger than any panel.
 const FRAME_POINTS: usize = 256;
 const FRAME_HALF: f64 = 1.5;
 const FRAME_HEIGHTS: [f64; 2] = [-0.3, 1.3];
@@ -33,14 +34,14 @@ const ROOM: f64 = 0.12;
 pub enum Frame {
     /// The video has no picture of the instant.
     Missing,
-    /// The picture shows neither the tracked head nor the tip.
+    /// The picture contains neither the head nor the tip of the model.
     Elsewhere,
-    /// The picture around the links, in mm of the figure.
+    /// The part of the picture around the links, in mm of the figure.
     Shown(Raster),
 }
 
 impl Frame {
-    /// The picture; `None` where it does not show the links.
+    /// The picture; `None` if there is none or if it does not show the links.
     #[must_use]
     pub fn raster(&self) -> Option<&Raster> {
         match self {
@@ -50,8 +51,8 @@ impl Frame {
     }
 }
 
-/// A frame of the recording with the pose of the model. Positions are along the sweep from the model's head
-/// and above the glass, m.
+/// A frame of the recording with the pose of the model. Positions are along the sweep, relative to the
+/// model's head, and above the glass, m.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Instant {
     /// Name of the event, such as `upright`.
@@ -60,14 +61,14 @@ pub struct Instant {
     pub time_s: f64,
     /// Head, hinge and tip of the model.
     pub joints_m: [(f64, f64); 3],
-    /// The tracked head and tip; at the model's height where no height was tracked.
+    /// The tracked head and tip; at the height of the model's point if no height was tracked.
     pub tracked_m: [(f64, f64); 2],
     /// The frame of the video.
     pub frame: Frame,
 }
 
 impl Instant {
-    /// Distances of the tracked head and tip from the model's, m, with the name of the point.
+    /// Distances of the tracked head and tip from those of the model, m, each with the name of the point.
     fn distances_m(&self) -> [(&'static str, f64); 2] {
         let [head, _, tip] = self.joints_m;
         let apart = |(x, y): (f64, f64), (to_x, to_y): (f64, f64)| math::hypot(to_x - x, to_y - y);
@@ -85,7 +86,8 @@ pub struct VideoFrames {
 }
 
 impl VideoFrames {
-    /// The instants of a condition that its recording contains; `None` without an instant or a video.
+    /// The instants of a condition that its recording contains; `None` if there are none, without a video, or
+    /// if the heads of recording and model turn in opposite directions.
     #[must_use]
     pub fn of(case: &ConditionComparison) -> Option<Self> {
         let film = case.measured?.film.filter(|_| !case.alignment.opposite_turn)?;
@@ -99,8 +101,8 @@ impl VideoFrames {
     }
 }
 
-/// The tracked frame nearest to a time of the recording, s. `None` where no height was tracked, as the
-/// picture then has no known position.
+/// The tracked frame nearest to a time of the recording, s. `None` if no height was tracked, since the
+/// position of the picture is then unknown.
 fn instant(
     case: &ConditionComparison,
     film: &RecordingVideo<'_>,
@@ -118,7 +120,7 @@ fn instant(
     let at = frames.filter(|at| (0.0..grid.frames as f64).contains(at)).map(|at| at as usize).find(has)?;
     let time_s = grid.time_s(at);
     let model_s = time_s - case.alignment.shift_s;
-    // measured minus model at the instant, less an offset
+    // measured minus model at the instant, minus an offset
     let apart_m = |measured: &[Option<f64>], model: &[Option<f64>], added_m: f64| {
         Some((*measured.get(at)?)? - view.interpolate_column(model, model_s)? - added_m)
     };
@@ -136,7 +138,7 @@ fn instant(
         (head.0 + head_on_m, head.1 + head_up_m.unwrap_or_default()),
         (tip.0 + tip_on_m, tip.1 + tip_up_m.unwrap_or_default()),
     ];
-    // shift from the figure's coordinates to those of the recording
+    // shift from the coordinates of the figure to those of the recording
     let from = |column: &[Option<f64>], at_m: f64| Some((*column.get(at)?)? - at_m);
     let by_head = head_up_m.and_then(|_| from(&traces.head_y_m, tracked_m[0].1));
     let by_tip = tip_up_m.and_then(|_| from(&traces.tip_y_m, tracked_m[1].1));
@@ -145,7 +147,7 @@ fn instant(
     Some(Instant { name, time_s, joints_m, tracked_m, frame })
 }
 
-/// Frame `at` around the links, resampled to the axes of the figure.
+/// The part of frame `at` around the links, resampled to the axes of the figure.
 fn photograph(
     film: &RecordingVideo<'_>,
     at: usize,
@@ -171,20 +173,20 @@ fn photograph(
     Frame::Shown(Raster { png, x: [-1e3 * half_m, 1e3 * half_m], y })
 }
 
-/// The figure of a condition; `None` without a video, or where nothing was tracked at the instants.
+/// The figure of a condition; `None` without a video, or if nothing was tracked at the instants.
 pub(crate) fn block(case: &ConditionComparison) -> Option<FigureBlock> {
     let shown = VideoFrames::of(case)?;
     let words = FigureText { caption: caption(&shown), details: details(&shown) };
     Some(case.figure_block("video-frames", words, figure(&shown)))
 }
 
-/// The point that lies farthest from the model, with its distance, m.
+/// The tracked point that is farthest from the model: its instant, its name and its distance, m.
 fn farthest(shown: &VideoFrames) -> Option<(&Instant, &'static str, f64)> {
     let points = shown.instants.iter().flat_map(|i| i.distances_m().map(|(point, m)| (i, point, m)));
     points.max_by(|a, b| a.2.total_cmp(&b.2))
 }
 
-/// One sentence on the figure.
+/// Caption: one sentence on the figure.
 pub(crate) fn caption(shown: &VideoFrames) -> String {
     let Some((instant, point, distance_m)) = farthest(shown) else { return String::new() };
     format!(
@@ -242,7 +244,7 @@ pub fn figure(shown: &VideoFrames) -> Figure {
             format!("The model's links end within {} of the tracked points", format_length(distance_m))
         }),
         subtitle: shown.subtitle.clone(),
-        watermarked: false, // (the figure of a condition is marked by that)
+        watermarked: false, // (marked by the caller if the data are synthetic)
         description: caption(shown),
         width_mm: FULL_WIDTH_MM,
         columns: 2,
@@ -250,12 +252,12 @@ pub fn figure(shown: &VideoFrames) -> Figure {
     }
 }
 
-/// The two links with the tracked points, mm.
+/// The panel of an instant: the two links with the tracked points, mm.
 fn drawing(shown: &VideoFrames, instant: &Instant) -> Panel {
     let place = |(x, y): (f64, f64)| Some((1e3 * x, 1e3 * y));
     let [head, hinge, tip] = instant.joints_m;
     let [(_, head_m), (_, tip_m)] = instant.distances_m();
-    // one scale for all instants
+    // the same scale at all instants
     let all = || shown.instants.iter().flat_map(|i| i.joints_m);
     let size = all().map(|(_, y)| y).fold(0.0, f64::max);
     let half = all().map(|(x, _)| x.abs()).fold(0.0, f64::max) + ROOM * size;

@@ -30,7 +30,7 @@ pub struct WindowOverview {
     pub time_s: Vec<f64>,
     /// The quantity, m.
     pub channel_m: Vec<Option<f64>>,
-    /// Head along the sweep, m; empty for no panel of it.
+    /// Position of the head along the sweep, m; if empty, its panel is left out.
     pub head_x_m: Vec<Option<f64>>,
     /// The named windows.
     pub windows: Vec<WindowSpan>,
@@ -43,7 +43,7 @@ pub struct WindowOverview {
 /// Heights of the panels, mm.
 const HEIGHT_MM: f64 = 46.0;
 const HEAD_HEIGHT_MM: f64 = 26.0;
-/// Colours of the windows in their order.
+/// Colours of the windows, in the order of the windows.
 const COLOURS: [Colour; 6] =
     [Colour::SkyBlue, Colour::Orange, Colour::Vermilion, Colour::Green, Colour::Purple, Colour::Grey];
 
@@ -51,7 +51,7 @@ const COLOURS: [Colour; 6] =
 #[must_use]
 pub fn draw_figure(shown: &WindowOverview) -> Figure {
     let mut panels = vec![draw_panel(shown, &shown.quantity, &shown.channel_m, HEIGHT_MM)];
-    // only the topmost panel has names; the shades run through both
+    // only the topmost panel has names; the shaded spans cross both panels
     let label = |w: &WindowSpan| TopLabel { label: w.name.clone(), at: (w.from_s + w.to_s) / 2.0 };
     panels[0].top_labels = shown.windows.iter().map(label).collect();
     if !shown.head_x_m.is_empty() {
@@ -81,7 +81,7 @@ fn draw_panel(shown: &WindowOverview, name: &str, values_m: &[Option<f64>], heig
     }
 }
 
-/// The windows shaded, the analysed one framed.
+/// Shaded spans of the windows, with a frame around the analysed part.
 fn window_spans(shown: &WindowOverview) -> Vec<ShadedSpan> {
     let shaded =
         |(w, colour): (&WindowSpan, &Colour)| ShadedSpan::new(w.name.clone(), *colour, w.from_s, w.to_s);

@@ -1,16 +1,16 @@
-//! Work-precision diagram: error over wall time, one line per method. Runs with missed or invented
-//! transitions have their own panel.
+//! Work-precision diagram: error against wall time, with one line per method. Runs with missed or invented
+//! transitions are also shown in a panel of their own.
 
 use plain_charts::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, MarkerShape, Panel, Series};
 
 /// A run in the diagram.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WorkPrecisionRun {
-    /// Name of the method; its runs make one line, in their order.
+    /// Name of the method; the runs of a method form one line, in the order of the list.
     pub method: String,
     /// Wall time, s.
     pub wall_s: f64,
-    /// Error in the unit of the diagram; `None` where it is not defined.
+    /// Error in the unit of the diagram; `None` if it is undefined.
     pub error: Option<f64>,
     /// Number of missed or invented transitions.
     pub wrong_transitions: usize,
@@ -21,19 +21,19 @@ pub struct WorkPrecisionRun {
 pub struct WorkPrecision {
     /// Heading.
     pub title: String,
-    /// Line under it; empty for none.
+    /// Line under the heading; empty for none.
     pub subtitle: String,
     /// Quantity and unit of the error.
     pub error_label: String,
     /// The runs.
     pub points: Vec<WorkPrecisionRun>,
-    /// Accuracy of the reference; smaller errors are drawn at this value.
+    /// Accuracy of the reference; errors smaller than this are drawn at this value.
     pub floor: Option<f64>,
 }
 
-/// Heights of the panels of errors and of wrong transitions, mm.
+/// Total height of the diagram, and height of the panel of wrong transitions, mm.
 const HEIGHTS_MM: (f64, f64) = (88.0, 24.0);
-/// Looks of the methods, in order of appearance.
+/// Colours and symbols of the methods, in order of appearance.
 const LOOKS: [(Colour, MarkerShape); 7] = [
     (Colour::Vermilion, MarkerShape::Disc),
     (Colour::Blue, MarkerShape::Square),
@@ -60,7 +60,7 @@ pub fn draw_figure(shown: &WorkPrecision) -> Figure {
         let points = runs(*method).map(|p| Some((p.wall_s, at_least_floor(p.error?))));
         Series::new(*method, *colour, Mark::Joined(*shape), points)
     });
-    // runs with wrong transitions, over their number
+    // number of wrong transitions of the runs that have any
     let strays = looks().map(|(method, (colour, shape))| {
         let wrong = runs(*method).filter(|p| p.wrong_transitions > 0);
         let points = wrong.map(|p| (p.wall_s, p.wrong_transitions as f64));
@@ -72,7 +72,7 @@ pub fn draw_figure(shown: &WorkPrecision) -> Figure {
     let floor = shown.floor.map(|floor| {
         Series::new("limit of the reference", Colour::Grey, Mark::Dashed, [(low, floor), (high, floor)])
     });
-    // the axis reaches over all errors, however many decades these are
+    // the axis covers all errors, however many decades they span
     let errors = shown.points.iter().filter_map(|p| p.error).map(|e| e.max(shown.floor.unwrap_or(0.0)));
     let error_range = value_range(errors.chain(shown.floor)).unwrap_or((1e-12, 1.0));
     let y = ChartAxis::log(shown.error_label.clone()).with_ends(Some(error_range));
@@ -96,7 +96,7 @@ pub fn draw_figure(shown: &WorkPrecision) -> Figure {
     }
 }
 
-/// Room beyond the data on a logarithmic axis, as a factor.
+/// Factor by which a logarithmic axis extends beyond the data.
 const ROOM: f64 = 1.5;
 
 fn value_range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {

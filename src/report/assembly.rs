@@ -1,4 +1,4 @@
-//! A fit as a report: its recordings against the model at the estimates.
+//! Assembles the report of a fit: its recordings compared with the model at the estimates.
 
 mod tables;
 
@@ -22,8 +22,8 @@ use crate::fit::result::{FitResult, FitStatus};
 use rayon::prelude::*;
 
 impl Report {
-    /// The report of a fit that was made with the library: the same as the program's, without the
-    /// descriptions of the recordings and without provenance.
+    /// The report of a fit that was made through the library. It equals the report of the program, except
+    /// that it has no descriptions of the recordings and no provenance.
     ///
     /// # Errors
     /// [`RunFailure`] when the model at the estimates does not run.
@@ -66,7 +66,7 @@ pub fn build_report(
     Report { tables: comparison_tables(&cases), figures, ..report }
 }
 
-/// The same without its figures, which take most of the time.
+/// The report of a fit without its figures, which take most of the time.
 pub(crate) fn build_report_without_figures(
     job: &Job,
     measured: &[FittedRecording],
@@ -105,7 +105,7 @@ fn fill_report_sections(
     }
 }
 
-/// The condition whose friction figure stands for condition `of`, because both have the same run.
+/// The condition whose friction figure also represents the condition `of`, since both have the same run.
 fn shared_law_case<'a, 'b>(
     cases: &'b [ConditionComparison<'a>],
     of: usize,
@@ -114,8 +114,8 @@ fn shared_law_case<'a, 'b>(
     cases.iter().find(|case| case.same_run.as_ref().is_some_and(|same| shares(same, case)))
 }
 
-/// The figures that show whether the model explains a condition: recording and model on one axis, cycles over
-/// speed, friction, residuals.
+/// The figures that show whether the model explains a condition: recording and model on one axis, cycle
+/// against speed, friction, residuals.
 fn condition_figures(case: &ConditionComparison, law: Option<&ConditionComparison>) -> Vec<FigureBlock> {
     let parts = [
         evidence::figure_block(case),
@@ -126,8 +126,9 @@ fn condition_figures(case: &ConditionComparison, law: Option<&ConditionCompariso
     parts.into_iter().flatten().collect()
 }
 
-/// By condition: history, spectra, spectrograms and phase portraits; for all conditions but `telling` also
-/// the figures that the answer shows of that one.
+/// The figures of all conditions: histories, spectra, spectrograms and phase portraits. The answer at the top
+/// of the page shows further figures of the condition `telling`; for the other conditions these are included
+/// here.
 fn measured_figures(cases: &[ConditionComparison], telling: usize) -> Vec<FigureBlock> {
     let all = |(i, case): (usize, &ConditionComparison)| {
         let shown = shared_law_case(cases, telling).map(|law| law.condition);
@@ -144,7 +145,7 @@ fn measured_figures(cases: &[ConditionComparison], telling: usize) -> Vec<Figure
     make_file_names_unique(cases.par_iter().enumerate().flat_map_iter(all).collect())
 }
 
-/// Poses of the blade in every run, then over the frames of each video, then animations.
+/// Figures of the poses of the blade in every run, of its links over frames of each video, and animations.
 fn blade_figures(cases: &[ConditionComparison]) -> Vec<FigureBlock> {
     let runs = || cases.iter().filter(|case| case.same_run.is_some());
     let filmed = cases.iter().filter_map(video_frames::block);
@@ -152,7 +153,7 @@ fn blade_figures(cases: &[ConditionComparison]) -> Vec<FigureBlock> {
     runs().filter_map(poses::figure_block).chain(filmed).chain(moving).collect()
 }
 
-/// Correlations of the parameters, and the distance of every target from the model.
+/// Figures of the correlations of the parameters, and of the deviation of the model from every target.
 fn summary_figures(job: &Job, result: &FitResult, report: &Report) -> Vec<FigureBlock> {
     let features = [report.components.as_slice(), report.features.as_slice()];
     let blocks = [
@@ -193,12 +194,12 @@ fn probe_line(found: &crate::fit::identifiability::Probe) -> ProbeLine {
     }
 }
 
-/// Notes of the fit without those of the gate, which have a section of their own.
+/// Notes of the fit, without those of the gate, which have a section of their own.
 fn fit_notes(measured: &[FittedRecording], result: &FitResult) -> Vec<String> {
     let mut notes: Vec<String> =
         result.notes.iter().filter(|note| !result.gate.notes.contains(note)).cloned().collect();
     let freed = result.nuisances.iter().any(|nuisance| nuisance.recording.is_none());
-    // a fit to traces that frees none has such a note already
+    // a fit to traces without freed constants already has such a note
     let exact = match (freed, &result.misfit) {
         (true, _) => Some("every number of the scene that is not freed"),
         (false, None) => Some("every other number of the scene"),
@@ -240,7 +241,7 @@ mod tests {
         };
         let conditions: Vec<ModelCondition> = job.conditions.iter().map(|_| condition()).collect();
         let model = SceneModel::new(conditions, job.parameter_names(), PlausibilityLimits::default());
-        // everything in one thread, whose runs are counted
+        // everything in one thread, in which the runs are counted
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
         let (runs, figures) = pool.install(|| {
             let models = run_conditions(&job, &model, &result).unwrap();

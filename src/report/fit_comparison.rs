@@ -1,4 +1,4 @@
-//! Several fits side by side: which components each meets, and whether their parameters agree.
+//! Comparison of several fits: the components that each of them meets, and the agreement of their parameters.
 
 mod intervals;
 mod page;
@@ -84,15 +84,15 @@ pub(crate) fn comparison_json(several: &FitComparison) -> Result<String, serde_j
 /// A fit as input of a comparison.
 #[derive(Debug, Clone, Copy)]
 pub struct ComparisonInput<'a> {
-    /// Name of its folder.
+    /// Name of the folder of the fit.
     pub name: &'a str,
-    /// What its own report says.
+    /// The report of the fit.
     pub report: &'a Report,
-    /// Its job.
+    /// The job of the fit.
     pub job: &'a Job,
-    /// Its recordings: those of the first conditions.
+    /// The recordings of the fit, which belong to its first conditions.
     pub measured: &'a [FittedRecording<'a>],
-    /// Its best model, condition by condition.
+    /// The best model of the fit: its run in each condition.
     pub best: &'a [ModelRun],
 }
 
@@ -101,24 +101,24 @@ pub struct ComparisonInput<'a> {
 pub struct FitComparison {
     /// Heading.
     pub title: String,
-    /// The fits, without figures of their own.
+    /// The fits, without their figures.
     pub fits: Vec<ComparedFit>,
-    /// Every parameter of any of them.
+    /// Every parameter that is free in any of the fits.
     pub parameters: Vec<SharedParameter>,
     /// Figures in the order of the page.
     pub figures: Vec<FigureBlock>,
-    /// What the comparison says, in words.
+    /// Results of the comparison, in words.
     pub statements: Vec<Statement>,
 }
 
 /// A fit of a comparison.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ComparedFit {
-    /// Name of its folder.
+    /// Name of the folder of the fit.
     pub name: String,
-    /// What its own report says.
+    /// The report of the fit.
     pub report: Report,
-    /// The verdict on it.
+    /// The verdict on the fit.
     pub verdict: ReportVerdict,
 }
 
@@ -128,7 +128,7 @@ impl FitComparison {
         self.statements.iter().map(Statement::plain_text).collect()
     }
 
-    /// Whether every model explains its traces and meets every component.
+    /// Whether every model explains its traces and meets all of its components.
     pub(crate) fn passes(&self) -> bool {
         self.fits.iter().all(|fit| fit.verdict.passes())
     }
@@ -136,7 +136,7 @@ impl FitComparison {
 
 /// A name cut to the width of a panel title or legend.
 pub(super) fn shorten_name(name: &str) -> String {
-    /// Most letters in a legend of a figure as wide as a column.
+    /// Maximum number of letters in the legend of a figure that is one column wide.
     const MOST: usize = 24;
     text::truncate_text(name, MOST)
 }
@@ -150,18 +150,18 @@ pub struct SharedParameter {
     pub symbol: String,
     /// Unit; empty for a plain number.
     pub unit: String,
-    /// Estimates in the order of the fits; `None` if it is not free in a fit.
+    /// Estimates in the order of the fits; `None` if the parameter is not free in a fit.
     pub lines: Vec<Option<ParameterLine>>,
-    /// Pairs of fits in which it is free.
+    /// Pairs of fits in which the parameter is free.
     pub pairs: Vec<IntervalPair>,
 }
 
-/// Two fits and one parameter.
+/// The intervals of one parameter in two fits.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct IntervalPair {
     /// Names of the fits.
     pub fits: [String; 2],
-    /// How their 95 % intervals lie.
+    /// Relation of the 95 % intervals of the two fits.
     pub relation: IntervalRelation,
 }
 
@@ -169,11 +169,12 @@ pub struct IntervalPair {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum IntervalRelation {
-    /// They have no value in common.
+    /// The intervals have no value in common.
     Disjoint,
-    /// They have values in common, which does not show that the parameters are equal.
+    /// The intervals have values in common; this does not show that the parameters are equal.
     Overlap,
-    /// One parameter is not identified or at a bound, so that its interval does not reflect the data.
+    /// In one of the fits the parameter is not identified or at a bound, so that its interval does not
+    /// reflect the data.
     NotComparable,
 }
 
@@ -187,11 +188,11 @@ impl IntervalRelation {
     }
 }
 
-/// Verdicts whose interval reflects the data; an open end extends to infinity.
+/// Verdicts with which the interval reflects the data; an open end extends to infinity.
 const COMPARABLE_VERDICTS: [ParameterVerdict; 3] =
     [ParameterVerdict::Identified, ParameterVerdict::OpenBelow, ParameterVerdict::OpenAbove];
 
-/// How the intervals of two estimates lie.
+/// Relation of the intervals of two estimates.
 pub(super) fn interval_relation(a: &ParameterLine, b: &ParameterLine) -> IntervalRelation {
     let comparable = |p: &ParameterLine| COMPARABLE_VERDICTS.contains(&p.verdict);
     let below = |a: &ParameterLine, b: &ParameterLine| {
@@ -204,7 +205,7 @@ pub(super) fn interval_relation(a: &ParameterLine, b: &ParameterLine) -> Interva
     }
 }
 
-/// Every parameter of any fit, in the order in which they appear.
+/// Every parameter of any fit, in order of first appearance.
 pub(super) fn shared_parameters(entries: &[ComparedFit]) -> Vec<SharedParameter> {
     let mut named: Vec<&ParameterLine> = Vec::new();
     for line in entries.iter().flat_map(|entry| &entry.report.parameters) {

@@ -1,4 +1,4 @@
-//! Reports as JSON for scripts: `docs/reports.md` lists the keys.
+//! Reports as JSON for scripts; `docs/reports.md` lists the keys.
 
 use super::rich_text::Statement;
 use super::verdict::ReportVerdict;
@@ -6,10 +6,10 @@ use super::{FigureSubject, Report, ReportSummary};
 use crate::figures::FigureBlock;
 use serde::Serialize;
 
-/// Version of the keys.
+/// Version of the format.
 pub(super) const FORMAT: u32 = 1;
 
-/// A figure as it is listed.
+/// Entry of a figure in the list of figures.
 #[derive(Debug, Serialize)]
 pub(super) struct FigureEntry<'a> {
     pub file: &'a str,
@@ -25,7 +25,7 @@ impl<'a> FigureEntry<'a> {
     }
 }
 
-/// What the JSON says of one fit.
+/// Contents of the JSON document of a fit.
 #[derive(Debug, Serialize)]
 pub(super) struct ReportDocument<'a> {
     #[serde(flatten)]

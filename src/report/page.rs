@@ -1,5 +1,5 @@
-//! The page of a report: one HTML file with its style, figures and script, which loads nothing else and is
-//! complete without its script.
+//! The page of a report: one HTML file that contains its style, figures and script. It loads nothing else,
+//! and is complete even without its script.
 
 pub(super) mod agreement;
 pub(super) mod html;
@@ -23,17 +23,17 @@ impl Report {
     }
 }
 
-/// Most bytes of a page with extra figures for telephones.
+/// Largest size of a page with additional figures for telephones, bytes.
 const MOST_BYTES: usize = 1_000_000;
 
-/// The page; the same report always gives the same bytes. A page that would be too large has no extra figures
-/// for telephones, which then show the wide ones smaller.
+/// The page; the same report always gives the same bytes. If it would be too large, the additional figures
+/// for telephones are left out, and telephones show the wide figures at a smaller size.
 pub(crate) fn render_page(report: &Report) -> String {
     let whole = assemble_page(report, true);
     if whole.len() <= MOST_BYTES { whole } else { assemble_page(report, false) }
 }
 
-/// The page, with `narrow` also with figures for narrow screens.
+/// The page; if `narrow`, it also contains figures for narrow screens.
 fn assemble_page(report: &Report, narrow: bool) -> String {
     let verdict = ReportVerdict::from_report(report);
     let (first, evidence) = evidence_html(report, narrow);
@@ -49,7 +49,7 @@ fn assemble_page(report: &Report, narrow: bool) -> String {
     ]
     .concat();
     let measured = if report.recordings.is_empty() { "The model alone" } else { "Measured against model" };
-    // a gate looks at features, which a fit to traces does not rest on
+    // the gate examines features, on which a fit to traces does not depend
     let search = if report.misfit.is_some() { "Search" } else { "Search and gate" };
     let sections = [
         open("answer", "Answer", answer),
@@ -69,7 +69,7 @@ fn assemble_page(report: &Report, narrow: bool) -> String {
     render_document(&report.title, &data_banner(report), &sections)
 }
 
-/// Banner that says if the data are synthetic or published.
+/// Banner that states whether the data are synthetic or published.
 pub(super) fn data_banner(report: &Report) -> String {
     let named: Vec<_> =
         report.recordings.iter().filter(|r| r.synthetic).map(|r| isolate_name(&r.name)).collect();
@@ -87,14 +87,14 @@ pub(super) fn data_banner(report: &Report) -> String {
     }
 }
 
-/// Figures of a subject, and the number of figures before them on the page.
+/// Figures of a subject, and number of figures that precede them on the page.
 fn figures_of_subject(report: &Report, subject: FigureSubject) -> (Vec<&FigureBlock>, usize) {
     let groups = || report.figures.iter();
     let before = groups().take_while(|group| group.subject != subject).map(|group| group.figures.len()).sum();
     (groups().filter(|group| group.subject == subject).flat_map(|group| &group.figures).collect(), before)
 }
 
-/// The first figure of the evidence, which stands in the answer, and the others.
+/// HTML of the first figure of the evidence, which is part of the answer, and HTML of the other figures.
 fn evidence_html(report: &Report, narrow: bool) -> (String, String) {
     let (all, before) = figures_of_subject(report, FigureSubject::Evidence);
     let (first, rest) = all.split_at(all.len().min(1));
@@ -102,7 +102,7 @@ fn evidence_html(report: &Report, narrow: bool) -> (String, String) {
     (html(first, before), html(rest, before + first.len()))
 }
 
-/// The figures of a subject.
+/// HTML of the figures of a subject.
 fn subject_figures_html(report: &Report, subject: FigureSubject) -> String {
     let (all, before) = figures_of_subject(report, subject);
     figures_html(all, before, false)
@@ -193,7 +193,7 @@ fn commands_html(p: &Provenance) -> String {
     )
 }
 
-/// A row: its name, its value in a run, and whether any value but `none` is bad.
+/// A row of the table of events: its name, its value for a run, and whether any value but `none` is bad.
 type EventRow = (&'static str, fn(&RunSummary) -> String, bool);
 
 const EVENT_ROWS: [EventRow; 12] = [
@@ -228,7 +228,7 @@ const EVENT_ROWS: [EventRow; 12] = [
 ];
 
 const NO_EVENTS: &str = "none";
-/// Smaller forces are rounding errors of zero, N: the blade presses with some 0.1 N.
+/// Forces below this are rounding errors of zero, N; the preload of the blade is some 0.1 N.
 const ROUNDING_N: f64 = 1e-9;
 
 fn force_text(newtons: f64) -> String {
@@ -251,7 +251,7 @@ fn text_or_none(value: Option<f64>, text: impl Fn(f64) -> String) -> String {
     value.map_or_else(|| NO_EVENTS.to_owned(), text)
 }
 
-/// The table, with a column for each condition.
+/// The table of events, with a column for each condition.
 pub(super) fn events_table(runs: &[RunSummary]) -> String {
     let one = |(what, of, hard): &EventRow| -> Vec<HtmlCell> {
         let cell = |run| {

@@ -1,12 +1,12 @@
 //! Sentences in which names that users chose are kept apart from the program's own words.
 //!
-//! A name may be written from right to left, or hold characters that turn the direction of what follows. The
-//! page isolates each name; text without markup drops the characters that would turn it.
+//! A name may be written from right to left, or contain characters that change the direction of the text that
+//! follows. The page isolates each name; text without markup omits such characters.
 
 use crate::text::make_printable;
 use serde::{Serialize, Serializer};
 
-/// A sentence: own words and names in turn.
+/// A sentence: a sequence of the program's own words and of names.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Sentence(pub(crate) Vec<SentencePart>);
 
@@ -20,24 +20,24 @@ pub(crate) enum SentencePart {
 }
 
 impl Sentence {
-    /// A sentence of own words.
+    /// A sentence of the program's own words.
     pub(crate) fn new(words: impl Into<String>) -> Self {
         Self::default().with_words(words)
     }
 
-    /// The same, continued with own words.
+    /// Appends words of the program.
     pub(crate) fn with_words(mut self, words: impl Into<String>) -> Self {
         self.0.push(SentencePart::Words(words.into()));
         self
     }
 
-    /// The same, continued with a name.
+    /// Appends a name.
     pub(crate) fn with_name(mut self, name: &str) -> Self {
         self.0.push(SentencePart::Name(make_printable(name)));
         self
     }
 
-    /// The same, continued with names and commas between them.
+    /// Appends names, separated by commas.
     pub(crate) fn with_names<'a>(self, names: impl IntoIterator<Item = &'a str>) -> Self {
         let joined = |sentence: Self, (i, name): (usize, &str)| {
             if i == 0 { sentence.with_name(name) } else { sentence.with_words(", ").with_name(name) }
@@ -45,7 +45,7 @@ impl Sentence {
         names.into_iter().enumerate().fold(self, joined)
     }
 
-    /// As text without markup.
+    /// The sentence as text without markup.
     pub(crate) fn plain_text(&self) -> String {
         self.0
             .iter()
@@ -68,14 +68,14 @@ impl Serialize for Sentence {
     }
 }
 
-/// A statement with details that support it.
+/// A statement with supporting details.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
 pub struct Statement {
-    /// What is stated.
+    /// The statement itself.
     pub statement: Sentence,
-    /// Details, one a line.
+    /// Details, each on a line of its own.
     pub details: Vec<Sentence>,
-    /// Whether it is good; `None` if it is neither good nor bad.
+    /// Whether the statement is good news; `None` if it is neither good nor bad.
     pub good: Option<bool>,
 }
 
@@ -94,12 +94,12 @@ impl Statement {
         Self { statement: statement.into(), details, good }
     }
 
-    /// The same with a verdict.
+    /// Sets whether the statement is good.
     pub(crate) fn with_verdict(self, good: bool) -> Self {
         Self { good: Some(good), ..self }
     }
 
-    /// The whole as one line of text.
+    /// The statement and its details as one line of text.
     pub(crate) fn plain_text(&self) -> String {
         let details: Vec<String> = self.details.iter().map(Sentence::plain_text).collect();
         let statement = self.statement.plain_text();

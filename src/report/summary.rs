@@ -1,5 +1,5 @@
-//! The answer at the top of a report: whether the model explains the recording, the numbers of the blade, how
-//! certain they are, and what to do next.
+//! The answer at the top of a report: whether the model explains the recording, the numbers of the blade,
+//! their certainty, and what to do next.
 
 use super::Report;
 use super::rich_text::{Sentence, Statement};
@@ -15,41 +15,41 @@ use crate::text::{
 };
 use serde::Serialize;
 
-/// Ratio of residual to noise above which a run visibly deviates.
+/// Ratio of residual to noise above which a run visibly deviates from the recording.
 const SEEN: f64 = 3.0;
-/// Deviation of the model from a met target that is mentioned, in standard deviations.
+/// Deviation of the model from a met target above which it is mentioned, in standard deviations.
 const FAR_SD: f64 = 1.96;
 
 /// The answer of a report.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub(crate) struct ReportSummary {
-    /// Whether the model explains what was measured, with residual and noise.
+    /// Whether the model explains the measurements, with residual and noise.
     pub headline: Statement,
-    /// The numbers of the blade: friction at rest and at speed, then every other parameter.
+    /// The numbers of the blade: friction at rest and at speed, then all other parameters.
     pub quantities: Vec<SummaryQuantity>,
-    /// How certain they are.
+    /// Certainty of these numbers.
     pub certainty: Sentence,
-    /// What to do next.
+    /// Recommended next step.
     pub next: Sentence,
 }
 
 /// A number of the blade, in SI units.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub(crate) struct SummaryQuantity {
-    /// Its meaning.
+    /// Meaning of the number.
     pub name: String,
-    /// The keys of a scene that it comes from.
+    /// Keys of the scene on which the number depends.
     pub keys: Vec<&'static str>,
     /// Unit; empty for a plain number.
     pub unit: String,
     pub value: f64,
-    /// Lower end of the 95 % interval; `None` where it is open.
+    /// Lower end of the 95 % interval; `None` if it is open.
     pub lower_95: Option<f64>,
-    /// Upper end of the 95 % interval; `None` where it is open.
+    /// Upper end of the 95 % interval; `None` if it is open.
     pub upper_95: Option<f64>,
-    /// Whether the data determine it.
+    /// Whether the data determine the number.
     pub identified: bool,
-    /// Whether a parameter that it depends on was fitted.
+    /// Whether a parameter on which the number depends was fitted.
     pub fitted: bool,
 }
 
@@ -65,8 +65,8 @@ impl ReportSummary {
     }
 }
 
-/// Whether a parameter is a coefficient of the friction law. The summary has friction at rest and at speed
-/// instead.
+/// Whether a parameter is a coefficient of the friction law. Instead of these, the summary states the
+/// friction at rest and at speed.
 fn is_friction_coefficient(name: &str) -> bool {
     name.starts_with("friction.")
 }
@@ -143,7 +143,7 @@ fn trace_headline(report: &Report, misfit: &TraceMisfit) -> Statement {
     Statement::with_details(words, details, Some(misfit.explained))
 }
 
-/// Deviation of a single run from the start; traces are fitted in segments.
+/// Sentence on the deviation of a single run from its start; traces are fitted in shorter segments.
 fn single_run_sentence(report: &Report) -> Option<Sentence> {
     let (condition, r) = farthest_residual(report)?;
     let ratio = r.rms_over_noise.filter(|ratio| *ratio > NOTHING_LEFT)?;
@@ -160,7 +160,7 @@ fn single_run_sentence(report: &Report) -> Option<Sentence> {
     )))
 }
 
-/// A channel of a trace as a point of the blade.
+/// Name of the point of the blade to which a channel belongs.
 fn channel_point_name(channel: &str) -> &str {
     match channel {
         "tip-x" => "tip",
@@ -170,7 +170,7 @@ fn channel_point_name(channel: &str) -> &str {
     }
 }
 
-/// The condition whose single run has the largest ratio of residual to noise, with that residual.
+/// Index of the condition whose single run has the largest ratio of residual to noise, with that residual.
 pub(in crate::report) fn farthest_condition(
     conditions: &[ComparisonSummary],
 ) -> Option<(usize, &ResidualSummary)> {
@@ -180,18 +180,18 @@ pub(in crate::report) fn farthest_condition(
     left.max_by(|(i, a), (j, b)| ratio(a).total_cmp(&ratio(b)).then(j.cmp(i)))
 }
 
-/// The name of that condition, with the residual.
+/// Name of the condition of [`farthest_condition`], with its residual.
 fn farthest_residual(report: &Report) -> Option<(&str, &ResidualSummary)> {
     let (condition, line) = farthest_condition(&report.comparison)?;
     Some((report.comparison.get(condition)?.condition.as_str(), line))
 }
 
-/// Every target that was fitted.
+/// All targets that were fitted.
 fn fitted_targets(report: &Report) -> impl Iterator<Item = &TargetComparison> {
     report.components.iter().chain(&report.features)
 }
 
-/// "all 3 targets", "2 of 3 targets".
+/// Whether all targets are met, and their count in words: "all 3 targets", "2 of 3 targets".
 fn count_met_targets(report: &Report) -> (bool, String) {
     let (met, all) = (fitted_targets(report).filter(|c| c.pass).count(), fitted_targets(report).count());
     let count = match (met, all) {
@@ -202,7 +202,8 @@ fn count_met_targets(report: &Report) -> (bool, String) {
     (met == all, count)
 }
 
-/// The missed targets, then met ones that are more than [`FAR_SD`] standard deviations off.
+/// Sentences on the missed targets, then on met targets from which the model deviates by more than [`FAR_SD`]
+/// standard deviations.
 fn missed_target_sentences(report: &Report) -> Vec<Sentence> {
     let apart = |c: &TargetComparison| c.model.zip(c.target_sd).map(|(m, sd)| (m - c.target).abs() / sd);
     let far = |c: &&TargetComparison| c.pass && apart(c).is_some_and(|sds| sds > FAR_SD);
@@ -285,14 +286,14 @@ fn certainty_sentence(report: &Report) -> Sentence {
     Sentence::new(known_words + constants)
 }
 
-/// The reason why parameters are open, if all have the same.
+/// The reason why parameters are not identified, if it is the same for all.
 fn shared_reason<'a>(open: &[&'a ParameterLine]) -> Option<&'a str> {
     let (first, rest) = open.split_first()?;
     let why = first.why.as_deref()?;
     rest.iter().all(|p| p.why.as_deref() == Some(why)).then_some(why)
 }
 
-/// The most urgent thing to do, one sentence.
+/// Sentence on the most urgent next step.
 fn next_step_sentence(report: &Report) -> Sentence {
     let all_known = report.parameters.iter().all(ParameterLine::is_identified);
     if let Some(run) = report.runs.iter().find(|run| run.opposite_turn) {
@@ -338,10 +339,10 @@ fn next_step_sentence(report: &Report) -> Sentence {
     Sentence::new("Test the model on a recording that was not fitted, at another speed or preload.")
 }
 
-/// An estimate closer to a bound than this fraction of the range lies at it.
+/// An estimate lies at a bound if it is closer to it than this fraction of the range.
 const AT_BOUND: f64 = 1e-3;
 
-/// Whether a search ended at a bound: the best value may lie beyond.
+/// Whether a search ended at a bound; the best value may then lie beyond the bound.
 fn is_at_bound(p: &ParameterLine) -> bool {
     let [lower, upper] = p.bounds;
     let near = AT_BOUND * (upper - lower);

@@ -1,4 +1,4 @@
-//! The verdict on a fit, built once for the page, the JSON and the terminal.
+//! The verdict on a fit, built once and used for the page, the JSON and the terminal.
 
 use super::rich_text::{Sentence, Statement};
 use super::{Report, summary};
@@ -15,15 +15,16 @@ use serde::Serialize;
 
 /// The verdict on a fit.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
-#[allow(clippy::struct_excessive_bools)] // they are the answers that a script asks for
+#[allow(clippy::struct_excessive_bools)] // one for each question of a script
 pub struct ReportVerdict {
-    /// Whether the model explains the traces that were fitted; also without traces.
+    /// Whether the model explains the traces that were fitted. In a fit without traces: whether the estimated
+    /// errors of the cameras are compatible with their priors.
     pub model_explains_recording: bool,
-    /// Whether every component is within its tolerance; also without components.
+    /// Whether the frequency of every component is within its tolerance; true without components.
     pub all_components_met: bool,
-    /// Whether the model lies in the 95 % interval of every other feature's target.
+    /// Whether the model lies in the 95 % interval of the target of every other feature.
     pub all_features_met: bool,
-    /// Whether everything that was held out is predicted.
+    /// Whether the model predicts everything that was held out.
     pub all_held_out_met: bool,
     /// Whether the data determine every parameter.
     pub all_parameters_identified: bool,
@@ -41,7 +42,7 @@ pub struct ReportVerdict {
 }
 
 impl ReportVerdict {
-    /// The verdict on what a report holds.
+    /// The verdict on the contents of a report.
     pub(crate) fn from_report(report: &Report) -> Self {
         let met = |list: &[TargetComparison]| list.iter().all(|c| c.pass);
         Self {
@@ -61,7 +62,7 @@ impl ReportVerdict {
         }
     }
 
-    /// Whether the model does what was asked of it: explains the traces, and meets every component.
+    /// Whether the model explains the traces and meets every component.
     pub(crate) fn passes(&self) -> bool {
         self.model_explains_recording && self.all_components_met
     }
@@ -110,25 +111,25 @@ fn verdict_statements(report: &Report) -> Vec<Statement> {
         ));
     }
     found.extend(ending_statements(report));
-    // bad statements come first
+    // statements that are bad news come first
     found.sort_by_key(|statement| statement.good != Some(false));
     found
 }
 
-/// Statement if the features are met only with a camera far from its prior.
+/// Statement for features that are met only with a camera far from its prior.
 fn far_camera_statement(report: &Report) -> Option<Statement> {
     let reasons = far_from_priors(&report.nuisances);
     let is_far = report.misfit.is_none() && !reasons.is_empty();
     is_far.then(|| Statement::new(unexplained_headline(&reasons)).with_verdict(false))
 }
 
-/// Whether the model explains the traces, with the residuals of every channel.
+/// Statement on whether the model explains the traces, with the residuals of every channel.
 fn misfit_statement(misfit: &TraceMisfit) -> Statement {
     let details = misfit.channels.iter().map(residual_sentence).collect();
     Statement::with_details(misfit.headline(), details, Some(misfit.explained))
 }
 
-/// Residuals of a channel compared with its noise, and the segment that fits worst.
+/// Sentence on the residual of a channel compared with its noise, and on the segment with the worst fit.
 fn residual_sentence(c: &ChannelMisfit) -> Sentence {
     let worst = c.worst.first().map_or_else(String::new, |w| {
         let [from, to, chi2] = [w.start_s, w.end_s, w.chi2_per_dof].map(format_number);
@@ -140,11 +141,11 @@ fn residual_sentence(c: &ChannelMisfit) -> Sentence {
     Sentence::default().with_name(&c.recording).with_words(words)
 }
 
-/// Singular and plural of what is counted.
+/// Singular and plural of the counted nouns.
 const NOUNS: [[&str; 2]; 3] =
     [["value that was", "values that were"], ["component", "components"], ["feature", "features"]];
 
-/// "2 of 2 components are met", with details of those that are `listed`.
+/// Statement such as "2 of 2 components are met", with details on the `listed` ones.
 fn met_statement(
     noun: &str,
     how: &str,
@@ -160,7 +161,7 @@ fn met_statement(
     (total > 0).then(|| Statement::with_details(words, details, Some(count == total)))
 }
 
-/// Name, model, target with its deviation, error and tolerance.
+/// Sentence with name, model, target with its standard deviation, error and tolerance.
 pub(super) fn comparison_sentence(c: &TargetComparison) -> Sentence {
     let (unit, factor) = text::choose_prefix(&c.unit, [c.target]);
     let unit = if unit.is_empty() { unit } else { format!(" {unit}") };
@@ -201,7 +202,7 @@ fn parameter_sentence(p: &ParameterLine) -> Sentence {
     Sentence::default().with_name(&p.name).with_words(words)
 }
 
-/// Number of intervals that contain the true values of synthetic data.
+/// Statement on the number of intervals that contain the true values of synthetic data.
 fn truth_statement(parameters: &[ParameterLine]) -> Option<Statement> {
     let (known, open): (Vec<_>, Vec<_>) =
         parameters.iter().filter_map(|p| p.truth.map(|truth| (p, truth))).partition(|(p, _)| p.is_bounded());
@@ -228,7 +229,7 @@ fn truth_statement(parameters: &[ParameterLine]) -> Option<Statement> {
     Some(Statement::with_details(words, outside.map(detail).collect(), Some(inside == all)))
 }
 
-/// How search and best run ended.
+/// Statements on how the search and the best run ended.
 fn ending_statements(report: &Report) -> Vec<Statement> {
     let search = &report.search;
     let mut found = Vec::new();
@@ -265,7 +266,7 @@ fn ending_statements(report: &Report) -> Vec<Statement> {
     found
 }
 
-/// Contact losses and jams of a run that went on after them; `None` if there were none.
+/// Statement on losses of contact and jams after which a run went on; `None` if there were none.
 fn hard_event_statement(run: &RunSummary) -> Option<Statement> {
     let counts = [(run.contact_losses, "leaves the glass"), (run.jams, "jams")];
     let happened = counts.into_iter().filter(|(count, _)| *count > 0);
@@ -489,7 +490,7 @@ mod tests {
             ..SearchLine::default()
         };
         let verdict = ReportVerdict::from_report(&Report { search, ..Report::default() });
-        // (what is not as one would have it comes first)
+        // (bad news comes first)
         assert_eq!(
             verdict.summary()[0],
             "The search ended before it had converged (budget-exhausted), after 1 evaluation of the model, \

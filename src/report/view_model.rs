@@ -4,30 +4,30 @@ use crate::fit;
 use crate::recording::quality::{self, Grade, Quality, QualityFinding};
 use serde::Serialize;
 
-/// A recording and what it can show.
+/// A recording with its quality.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RecordingLine {
     pub name: String,
-    /// Whether no camera took it.
+    /// Whether the recording is synthetic.
     pub synthetic: bool,
-    /// The exports that it was imported from; none for one that never was.
+    /// Names of the exports from which the recording was imported; empty if it was not imported.
     pub exports: Vec<String>,
-    /// The gravest finding as a grade.
+    /// Grade according to the most severe finding.
     pub grade: Grade,
-    /// What was measured on its traces.
+    /// Measurements on the traces of the recording.
     pub measurements: Quality,
-    /// What was found on it, the gravest first.
+    /// Findings on the recording, the most severe first.
     pub findings: Vec<QualityFinding>,
-    /// The same as `wiperlab inspect` says it.
+    /// The findings, as `wiperlab inspect` prints them.
     pub verdict: Vec<String>,
 }
 
 impl RecordingLine {
-    /// The same with findings that only its folder could show.
+    /// Adds findings that only the folder of the recording could show.
     pub(crate) fn add_findings(&mut self, more: impl IntoIterator<Item = QualityFinding>) {
         let kept = std::mem::take(&mut self.findings);
         self.findings = more.into_iter().chain(kept).collect();
-        // stable: the order above within a severity
+        // stable, so that the order is kept within a severity
         self.findings.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
         self.grade = quality::grade_findings(&self.findings);
         self.verdict = quality::verdict_lines(&self.measurements, &self.findings);
@@ -37,39 +37,41 @@ impl RecordingLine {
 /// A product of powers of the parameters.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct CombinationLine {
-    /// Such as `friction.c friction.a^0.31`.
+    /// The product in words, such as `friction.c friction.a^0.31`.
     pub words: String,
-    /// Whether the features determine it.
+    /// Whether the features determine the product.
     pub determined: bool,
-    /// Standard deviation of its logarithm; for one that is left open, that of which the box allows.
+    /// Standard deviation of its logarithm; for an undetermined product, the largest one that the search box
+    /// allows.
     pub sd_relative: f64,
 }
 
-/// How the search ended.
+/// Outcome of the search.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct SearchLine {
-    /// How; `None` before a search.
+    /// Status at the end of the search; `None` before a search.
     pub status: Option<fit::result::FitStatus>,
-    /// Whether it had converged.
+    /// Whether the search had converged.
     pub converged: bool,
-    /// Evaluations of the model.
+    /// Number of evaluations of the model.
     pub evaluations: usize,
-    /// Those that failed, by reason.
+    /// Numbers of failed evaluations, by reason.
     pub failed: Vec<FailureCount>,
     pub local_searches: usize,
     /// Sum of squared residuals at the estimates.
     pub cost: f64,
-    /// Rise in cost that bounds a 95 % interval.
+    /// Rise of the cost at the ends of a 95 % interval.
     pub threshold: f64,
-    /// Twins of the best model that were fitted again.
+    /// Number of twins of the best model that were fitted.
     pub twins: usize,
     /// Number of combinations of the parameters that the features determine at the estimates.
     pub rank: usize,
-    /// Largest singular value of the sensitivities over the smallest; `None` where one is zero.
+    /// Ratio of the largest to the smallest singular value of the sensitivities; `None` if one of them is
+    /// zero.
     pub condition: Option<f64>,
 }
 
-/// Evaluations that failed for one reason.
+/// Number of evaluations that failed for one reason.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct FailureCount {
     /// The reason, such as `contact-lost`.
@@ -77,22 +79,22 @@ pub struct FailureCount {
     pub count: usize,
 }
 
-/// What the gate found at one place of the box.
+/// Result of a probe of the gate at one point of the search box.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct ProbeLine {
-    /// Features that the model showed there.
+    /// Number of features that the model showed at that point.
     pub features_seen: usize,
-    /// Number of combinations of the parameters that they determine there.
+    /// Number of combinations of the parameters that these features determine at that point.
     pub rank: usize,
-    /// Largest singular value over the smallest; `None` where one is zero.
+    /// Ratio of the largest to the smallest singular value; `None` if one of them is zero.
     pub condition: Option<f64>,
-    /// Parameters that they determine by themselves.
+    /// Parameters that these features determine individually.
     pub determines: Vec<String>,
-    /// Why the model failed there, if it did.
+    /// Reason why the model failed at that point, if it did.
     pub failure: Option<String>,
 }
 
-/// Files, version and commands behind the numbers.
+/// Files, version and commands from which the numbers were obtained.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Provenance {
     /// Version of the program.
@@ -103,17 +105,17 @@ pub struct Provenance {
     pub fingerprint: String,
     /// Files with their hashes.
     pub files: Vec<SourceFile>,
-    /// Commands that make this report again.
+    /// Commands that reproduce this report.
     pub commands: Vec<String>,
 }
 
-/// A file that went into a report.
+/// A file from which a report was made.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct SourceFile {
-    /// What it is, such as `job`, `result`, `scene`, `trace`, `description`, `export`.
+    /// Kind of the file, such as `job`, `result`, `scene`, `trace`, `description`, `export`.
     pub kind: String,
     pub name: String,
     pub sha256: String,
-    /// Whether it holds a motion that no camera took.
+    /// Whether the file contains a synthetic motion.
     pub synthetic: bool,
 }

@@ -4,16 +4,16 @@ use sha2::{Digest, Sha256};
 
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// SHA-256 of a text in pieces. A byte-order mark at its start is ignored and CRLF counts as LF, so a
-/// checkout that changes line endings does not change the hash. For a text with neither it is the plain
-/// SHA-256 of its bytes.
+/// SHA-256 of a text that arrives in pieces. A byte-order mark at its start is ignored, and CRLF counts as
+/// LF, so that a checkout that changes line endings does not change the hash. For a text with neither, it
+/// equals the SHA-256 of the bytes.
 #[derive(Debug, Clone, Default)]
 pub struct TextHash {
     digest: Sha256,
-    /// The first bytes, until they show whether they are a byte-order mark.
+    /// The first bytes, kept until they show whether they are a byte-order mark.
     start: Vec<u8>,
     started: bool,
-    /// The last byte was a CR whose successor is not known yet.
+    /// Whether the last byte was a CR whose successor is not yet known.
     ends_in_cr: bool,
 }
 
@@ -33,7 +33,7 @@ impl TextHash {
         self.hash_lines(bytes);
     }
 
-    /// The hash in 64 hexadecimal digits.
+    /// The hash as 64 hexadecimal digits.
     pub(crate) fn finish(mut self) -> String {
         if !self.started {
             self.check_byte_order_mark();
@@ -74,7 +74,7 @@ impl TextHash {
     }
 }
 
-/// SHA-256 of bytes in 64 hexadecimal digits.
+/// SHA-256 of bytes, as 64 hexadecimal digits.
 #[must_use]
 pub fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()

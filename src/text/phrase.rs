@@ -1,6 +1,6 @@
-//! Short phrases: lists, counts, intervals, names cut short.
+//! Short phrases: lists, counts, intervals, truncated names.
 
-/// "a, b and c".
+/// A list of words: "a, b and c".
 pub(crate) fn join_with_and(items: &[String]) -> String {
     match items {
         [] => String::new(),
@@ -14,7 +14,7 @@ pub(crate) fn pluralise(noun: &str, count: usize) -> String {
     if count == 1 { noun.to_owned() } else { format!("{noun}s") }
 }
 
-/// "once", "twice", "14 times".
+/// A number of times in words: "once", "twice", "14 times".
 pub(crate) fn format_times(count: usize) -> String {
     match count {
         1 => "once".to_owned(),
@@ -37,7 +37,7 @@ pub(crate) fn format_interval(
     }
 }
 
-/// A text cut to `most` characters, the last of which is then an ellipsis.
+/// A text truncated to `most` characters; if truncated, its last character is an ellipsis.
 pub(crate) fn truncate_text(text: &str, most: usize) -> String {
     if text.chars().count() <= most {
         return text.to_owned();
@@ -52,13 +52,13 @@ pub(crate) fn capitalise(text: &str) -> String {
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
-/// Message of a panic; `None` where the payload is no text.
+/// Message of a panic; `None` if its payload is not text.
 pub(crate) fn panic_message(payload: &(dyn std::any::Any + Send)) -> Option<String> {
     let text = payload.downcast_ref::<&str>().map(|text| (*text).to_owned());
     text.or_else(|| payload.downcast_ref::<String>().cloned())
 }
 
-/// Words broken into lines of at most `width` characters; a longer word has a line of its own.
+/// Breaks a text into lines of at most `width` characters; a longer word has a line of its own.
 pub(crate) fn wrap_words(words: &str, width: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in words.split_whitespace() {

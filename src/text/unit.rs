@@ -1,17 +1,17 @@
-//! Units with metric prefixes, and shares as percentages.
+//! Units with metric prefixes, and fractions as percentages.
 
 use plain_charts::number::{format_decimals, format_digits, format_short, format_with_sd, to_ascii, typeset};
 
-/// Prefixes with their factors, the smallest last.
+/// Prefixes with the factors to them, the smallest prefix last.
 const PREFIXES: [(&str, f64); 3] = [("", 1.0), ("m", 1e3), ("\u{b5}", 1e6)];
-/// Units without prefix or with another name here.
+/// Units that get no prefix or have another name in text: name in files, name in text, and factor.
 const UNPREFIXED_UNITS: [(&str, &str, f64); 5] =
     [("1", "", 1.0), ("", "", 1.0), ("kg", "g", 1e3), ("kg m2", "g mm\u{b2}", 1e9), ("s/m", "s/m", 1.0)];
-/// Least value, in the unit as shown, without a prefix: 0.2 N is as readable as 200 mN.
+/// Smallest value for which a larger prefix is kept: 0.2 N is as readable as 200 mN.
 const LEAST_UNPREFIXED: f64 = 0.1;
 
-/// A unit with the prefix that makes the largest of some values readable, and the factor to it; an empty unit
-/// for a plain number.
+/// A unit with the prefix that makes the largest of some values readable, and the factor to that unit; the
+/// unit is empty for a plain number.
 pub(crate) fn choose_prefix(unit: &str, values: impl IntoIterator<Item = f64>) -> (String, f64) {
     if let Some((_, shown, factor)) = UNPREFIXED_UNITS.iter().find(|(name, ..)| *name == unit) {
         return ((*shown).to_owned(), *factor);
@@ -22,12 +22,12 @@ pub(crate) fn choose_prefix(unit: &str, values: impl IntoIterator<Item = f64>) -
     (format!("{prefix}{unit}"), *factor)
 }
 
-/// A name with its unit, as on an axis.
+/// A name with its unit, as in the label of an axis.
 pub(crate) fn label_with_unit(name: &str, unit: &str) -> String {
     if unit.is_empty() { name.to_owned() } else { format!("{name}, {unit}") }
 }
 
-/// A length in metres: micrometres with two digits, or millimetres with three.
+/// A length, m, as micrometres with two digits or as millimetres with three.
 pub(crate) fn format_length(metres: f64) -> String {
     if metres.abs() < 1e-3 {
         format!("{} \u{b5}m", format_digits(metres * 1e6, 2))
@@ -36,12 +36,13 @@ pub(crate) fn format_length(metres: f64) -> String {
     }
 }
 
-/// A speed in m/s, as mm/s with three digits.
+/// A speed, m/s, as mm/s with three digits.
 pub(crate) fn format_speed(metres_per_s: f64) -> String {
     format!("{} mm/s", format_digits(metres_per_s * 1e3, 3))
 }
 
-/// A time in seconds, as ms to a tenth. A clock time, too long for a motion, stays in seconds.
+/// A time, s, as milliseconds with one decimal. A time of 10 s or more, such as that of a clock, stays in
+/// seconds.
 pub(crate) fn format_milliseconds(seconds: f64) -> String {
     const CLOCK_S: f64 = 10.0;
     if seconds.abs() >= CLOCK_S {
@@ -51,7 +52,7 @@ pub(crate) fn format_milliseconds(seconds: f64) -> String {
     }
 }
 
-/// A share as a percentage of three digits without zeros at the end: a tolerance of 0.02 is `2 %`.
+/// A fraction as a percentage with three digits, without trailing zeros: 0.02 becomes `2 %`.
 pub(crate) fn format_percent(share: f64) -> String {
     format!("{} %", format_short(100.0 * share))
 }
@@ -63,7 +64,8 @@ pub(crate) fn format_signed_percent(share: f64) -> String {
     format!("{} %", typeset(written))
 }
 
-/// Least standard deviation of an angle shown, degrees: 0.0001 degrees move a point 6 mm away by 0.01 um.
+/// Smallest standard deviation of an angle that is shown, degrees; 0.0001 degrees move a point at 6 mm by
+/// 0.01 um.
 const LEAST_SHOWN_DEGREES: f64 = 1e-4;
 
 /// An angle with its standard deviation, rad, as degrees in ASCII: `0.300(1) degrees`.

@@ -1,9 +1,9 @@
-//! Suggestions for common slips.
+//! Advice on common mistakes.
 
 use crate::text::round_to_digits;
 use toml::de::DeValue;
 
-/// Digits of a converted number: a product of decimal numbers may have too many.
+/// Number of digits of a converted number, since a product of decimal numbers may have too many.
 const DIGITS: usize = 6;
 
 /// Prefixes of units with their factors.
@@ -19,7 +19,7 @@ const PREFIXES: [(&str, f64); 9] = [
     ("n", 1e-9),
 ];
 
-/// Units, the endings of keys in that unit, and their size in the unit of the key.
+/// Units: name, ending of the keys that have this unit, and size of the unit in the unit of the key.
 const UNITS: [(&str, &str, f64); 15] = [
     ("Hz", "_hz", 1.0),
     ("hz", "_hz", 1.0),
@@ -59,7 +59,7 @@ pub(super) fn suggest_value(key: &str, value: &DeValue<'_>, kinds: &[&str]) -> O
     })
 }
 
-/// Advice on a number written as a text.
+/// Advice on a number in quotes.
 fn suggest_number(key: &str, text: &str) -> Option<String> {
     let text = text.trim();
     if text.parse::<f64>().is_ok() {
@@ -74,7 +74,7 @@ fn suggest_number(key: &str, text: &str) -> Option<String> {
 
 /// Advice on a number followed by a unit.
 fn suggest_without_unit(key: &str, text: &str) -> Option<String> {
-    // (the longest number at the start; `1e3Hz` has an exponent, `10e` has none)
+    // (the longest number at the start: in `1e3Hz` this includes the exponent, in `10e` there is none)
     let number = |text: &str| text.trim().replacen(',', ".", 1).parse::<f64>().ok();
     let (value, unit) =
         (1..=text.len()).rev().find_map(|end| Some((number(text.get(..end)?)?, &text[end..])))?;
@@ -82,7 +82,7 @@ fn suggest_without_unit(key: &str, text: &str) -> Option<String> {
     if unit.is_empty() {
         return None;
     }
-    // (`_n_per_m` ends in the unit of a quotient)
+    // (the key `_n_per_m` ends in the unit of a denominator)
     let mut prefixes = PREFIXES.iter().filter(|_| !key.contains("_per_"));
     let size = prefixes.find_map(|(prefix, factor)| {
         let rest = unit.strip_prefix(prefix)?;
@@ -96,7 +96,7 @@ fn suggest_without_unit(key: &str, text: &str) -> Option<String> {
     Some(size.map_or_else(alone, without_unit))
 }
 
-/// Problem of a key or table that occurred before.
+/// Description of a key or table that is defined twice.
 pub(super) fn describe_duplicate(line: &str) -> String {
     let line = line.split('#').next().unwrap_or_default().trim();
     if let Some(table) = line.strip_prefix('[') {
@@ -110,7 +110,7 @@ pub(super) fn describe_duplicate(line: &str) -> String {
     format!("key `{key}`: found a second time, expected it once; remove one of the two")
 }
 
-/// Problem of a line that is no TOML, for common slips.
+/// Description of a line that is not TOML, for common mistakes.
 pub(super) fn describe_bad_line(line: &str) -> Option<String> {
     let line = line.split('#').next().unwrap_or_default().trim();
     let Some((key, value)) = line.split_once('=') else {
@@ -163,7 +163,7 @@ mod tests {
                 "{text}"
             );
         }
-        // a quotient is not converted by its last unit, nor what is in no unit of the table
+        // no conversion for a key with a quotient, or for a unit that the table lacks
         for (key, text) in [("head_stiffness_n_per_m", "25 mm"), ("noise_px", "0.1 px"), ("stop_s", "1 min")]
         {
             assert!(suggest_without_unit(key, text).unwrap().starts_with("write the number alone"), "{text}");

@@ -1,4 +1,4 @@
-//! Every key of a kind of file, from its schema.
+//! List of all keys of a kind of file, from its schema.
 
 use super::schema_check::{self, resolve_reference};
 use serde_json::Value;
@@ -6,28 +6,28 @@ use serde_json::Value;
 /// The keys of a table of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct KeyTable {
-    /// Its name as written in a file, such as `[blade]` or `[[trace]]`; empty for the top level.
+    /// Name of the table as written in a file, such as `[blade]` or `[[trace]]`; empty for the top level.
     pub name: String,
     /// Description of the table.
     pub about: String,
-    /// Its keys, in the order of the schema.
+    /// Keys of the table, in the order of the schema.
     pub keys: Vec<KeyEntry>,
 }
 
 /// A key of a table.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct KeyEntry {
-    /// Its name.
+    /// Name of the key.
     pub name: String,
-    /// Accepted values, with range and default.
+    /// Accepted values of the key, with range and default.
     pub value: String,
-    /// Whether it is required.
+    /// Whether the key is required.
     pub required: bool,
-    /// Its meaning, with its unit.
+    /// Meaning of the key, with its unit.
     pub meaning: String,
 }
 
-/// The tables of a kind of file: the top level, then its tables, each followed by its own tables.
+/// The tables of a kind of file: first the top level, then its tables, each followed by its own subtables.
 #[must_use]
 pub fn list_key_tables(schema: &Value) -> Vec<KeyTable> {
     let mut all = Vec::new();
@@ -81,7 +81,7 @@ fn describe_takes(root: &Value, part: &Value) -> String {
     }
 }
 
-/// A schema without its reference; of several alternatives the one that is a table or a list.
+/// A schema with its reference resolved; among several alternatives, the one that is a table or a list.
 fn resolve_container<'a>(root: &'a Value, part: &'a Value) -> &'a Value {
     let part = resolve_reference(root, part);
     let ways = part.get("anyOf").and_then(Value::as_array).into_iter().flatten();

@@ -1,4 +1,4 @@
-//! All problems of a file: its tables and values against the schema of its format.
+//! Finds all problems of a file: checks its tables and values against the schema of its format.
 
 use super::hint::{describe_bad_line, describe_duplicate, suggest_value};
 use super::{TomlError, line_and_column, suggest_key};
@@ -7,7 +7,7 @@ use serde_json::Value as Schema;
 use std::ops::Range;
 use toml::de::{DeTable, DeValue};
 
-/// Most problems listed: a file with more is most likely of another kind.
+/// Maximum number of problems that are listed; a file with more is most likely of another kind.
 const MOST_PROBLEMS: usize = 20;
 
 /// The problems of a file, in the order of its lines; empty for a file that matches the schema.
@@ -36,7 +36,7 @@ struct SchemaCheck<'a> {
     file: &'a str,
     text: &'a str,
     root: &'a Schema,
-    /// Byte offset and problem.
+    /// Problems found so far, each with its byte offset.
     found: Vec<(usize, TomlError)>,
 }
 
@@ -141,7 +141,7 @@ impl<'a> SchemaCheck<'a> {
     }
 }
 
-/// A schema without its reference.
+/// A schema with its reference resolved.
 pub(super) fn resolve_reference<'a>(root: &'a Schema, schema: &'a Schema) -> &'a Schema {
     let pointer = schema["$ref"].as_str().and_then(|place| place.strip_prefix('#'));
     pointer.and_then(|pointer| root.pointer(pointer)).unwrap_or(schema)
@@ -156,12 +156,12 @@ fn list_alternatives<'a>(root: &'a Schema, schema: &'a Schema) -> Vec<&'a Schema
     }
 }
 
-/// Whether the advice on an unknown key suggests a known one.
+/// Whether the advice on an unknown key suggests the given known key.
 fn suggests_key(problem: &TomlError, known: &str) -> bool {
     matches!(problem, TomlError::UnknownKey { advice, .. } if advice.contains(&format!("`{known}`?")))
 }
 
-/// Key of a schema with a description of its values, where types alone say too little.
+/// Key in a schema for a description of the accepted values, used if the types alone say too little.
 const IN_WORDS: &str = "x-expected";
 
 /// Accepted values of a schema, in words.
@@ -184,7 +184,7 @@ pub(super) fn describe_expected(root: &Schema, schema: &Schema) -> String {
     }
 }
 
-/// Types of a schema without `null`, which TOML does not have.
+/// Types of a schema, without `null`, which TOML does not have.
 fn list_types(schema: &Schema) -> Vec<&str> {
     let all: Vec<&str> = match &schema["type"] {
         Schema::String(one) => vec![one.as_str()],
@@ -194,7 +194,7 @@ fn list_types(schema: &Schema) -> Vec<&str> {
     all.into_iter().filter(|kind| *kind != "null").collect()
 }
 
-/// The words that a schema accepts, if it accepts only some words.
+/// The words that a schema accepts, if it accepts only certain words.
 fn list_words(schema: &Schema) -> Option<Vec<&str>> {
     if let Some(one) = schema.get("const") {
         return one.as_str().map(|word| vec![word]);
@@ -202,7 +202,7 @@ fn list_words(schema: &Schema) -> Option<Vec<&str>> {
     Some(schema.get("enum")?.as_array()?.iter().filter_map(Schema::as_str).collect())
 }
 
-/// Whether a value has the type of a schema, or is one of its words.
+/// Whether a value has the type of a schema, or is one of the words that it accepts.
 fn matches_schema(schema: &Schema, value: &DeValue<'_>) -> bool {
     if let Some(words) = list_words(schema) {
         return matches!(value, DeValue::String(text) if words.contains(&text.as_ref()));
@@ -217,7 +217,7 @@ fn matches_schema(schema: &Schema, value: &DeValue<'_>) -> bool {
         | (DeValue::Boolean(_), "boolean")
         | (DeValue::Array(_), "array")
         | (DeValue::Table(_), "object") => true,
-        // a negative count is refused here, because its type cannot hold it
+        // a negative count is refused here, since its Rust type cannot represent it
         (DeValue::Integer(number), "integer") => {
             let least = schema.get("minimum").and_then(Schema::as_f64).unwrap_or(f64::NEG_INFINITY);
             number.as_str().parse::<f64>().map_or(true, |number| number >= least)

@@ -1,5 +1,5 @@
-//! What a command may overwrite: files that it provably made itself, others only with `--force`, a measured
-//! recording never.
+//! Rules for overwriting: a command may overwrite files that it provably made itself, other files only with
+//! `--force`, and a measured recording never.
 
 use super::marker::{FolderMarker, OutputCommand, WritePolicy, hash_file};
 use super::preserved_files::{FolderRecording, SIMULATION_SUMMARY, is_simulation_summary};
@@ -34,7 +34,7 @@ pub(crate) struct OutputGuard {
     folder: PathBuf,
     writer: WritePolicy,
     pub marker: FolderMarker,
-    /// Why the marker there cannot be read.
+    /// Reason why the marker of the folder cannot be read.
     unreadable: Option<String>,
 }
 
@@ -48,8 +48,9 @@ impl OutputGuard {
         Ok(guard)
     }
 
-    /// Refuses to overwrite a file that is not provably the command's own, and returns the hash of one that
-    /// is. `coming` is the hash of the new contents, if known: identical contents are always allowed.
+    /// Refuses to overwrite a file that was not provably made by the command. Returns the hash of a file that
+    /// may be overwritten because the command made it. `coming` is the hash of the new contents, if known:
+    /// identical contents are always allowed.
     pub(crate) fn check_overwrite(&self, name: &str, coming: Option<&str>) -> Outcome<Option<String>> {
         let path = self.folder.join(name);
         let Some(found) = hash_file(&path)? else { return Ok(None) };
@@ -79,8 +80,8 @@ impl OutputGuard {
         ))
     }
 
-    /// Files to remove after the command has written `names`: unchanged ones of its last run, and with
-    /// `--force` unchanged ones of another recording.
+    /// Files to remove after the command has written `names`: unchanged files of its last run and, with
+    /// `--force`, unchanged files of another recording.
     pub(crate) fn outdated_files(&self, names: &[&str]) -> Vec<String> {
         let maker = self.writer.maker;
         let of_last_run = |by: OutputCommand| by == maker && maker.replaces_last_run();
@@ -91,7 +92,7 @@ impl OutputGuard {
         listed.filter(|(name, _)| self.is_unchanged(name)).map(|(name, _)| name.clone()).collect()
     }
 
-    /// Whether a listed file is unchanged and lies in or below the folder, not behind a link.
+    /// Whether a file listed in the marker is unchanged and lies in or below the folder, not behind a link.
     fn is_unchanged(&self, name: &str) -> bool {
         let path = self.folder.join(name);
         let inside = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
@@ -101,7 +102,7 @@ impl OutputGuard {
         inside && !linked && is_file && hash_file(&path).is_ok_and(|found| found.is_some_and(is_own))
     }
 
-    /// Protects a measured recording from everything but a new import of the same exports, which loses
+    /// Protects a measured recording from everything except a new import of the same exports, which loses
     /// nothing.
     fn protect_recording(&self, names: &[&str]) -> Outcome<()> {
         let FolderRecording::Measured { why, exports, files } =
@@ -159,7 +160,7 @@ impl OutputGuard {
     }
 }
 
-/// Whether two imports read the same exports, in any order.
+/// Whether two imports have the same exports, in any order.
 fn have_same_exports(some: &[String], others: &[String]) -> bool {
     let sorted = |hashes: &[String]| {
         let mut hashes = hashes.to_vec();

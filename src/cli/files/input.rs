@@ -1,5 +1,5 @@
-//! Reading of regular files and, as `-`, of standard input, up to a size limit. The size is checked before
-//! and while reading, because a file may grow and standard input has no size.
+//! Reads regular files and, for the name `-`, standard input, up to a size limit. The size is checked before
+//! and during reading, since a file may grow and standard input has no size.
 
 use crate::cli::failure::{Failure, Outcome};
 use std::fmt;
@@ -9,17 +9,17 @@ use std::path::Path;
 use std::str::FromStr;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// The name of standard input on the command line.
+/// Name that stands for standard input on the command line.
 const STANDARD_INPUT: &str = "-";
-/// Largest TOML file. A job with a thousand components has a quarter of this size. Parsing takes up to a
-/// hundred times as much memory.
+/// Size limit of a TOML file. A job with a thousand components has a quarter of this size. Parsing needs up
+/// to a hundred times as much memory.
 const TOML_LIMIT: ReadLimit =
     ReadLimit { largest: FileSize(500_000), advice: "this is no file that people write; name another one" };
-/// Largest result of a fit: about a hundred times the results in this repository.
+/// Size limit of the result of a fit: about a hundred times the size of the results in this repository.
 const JSON_LIMIT: ReadLimit =
     ReadLimit { largest: FileSize(16_000_000), advice: "this program writes none so large; make it again" };
 
-/// Largest file with data, bytes: `--max-file-size`.
+/// Size limit of a data file, bytes: `--max-file-size`.
 static MAX_DATA_BYTES: AtomicU64 = AtomicU64::new(FileSize::DEFAULT.0);
 
 /// A number of bytes.
@@ -27,12 +27,12 @@ static MAX_DATA_BYTES: AtomicU64 = AtomicU64::new(FileSize::DEFAULT.0);
 pub(crate) struct FileSize(u64);
 
 impl FileSize {
-    /// About the size of the longest recording that is read, ten million frames.
+    /// About the size of the longest recording that can be read, with ten million frames.
     pub(crate) const DEFAULT: Self = Self(1_000_000_000);
     const UNITS: [(&str, u64); 5] =
         [("GB", 1_000_000_000), ("MB", 1_000_000), ("kB", 1_000), ("B", 1), ("", 1)];
 
-    /// Sets the size limit of all data files that are read afterwards.
+    /// Sets the size limit of all data files that are read from now on.
     pub(crate) fn set_read_limit(self) {
         MAX_DATA_BYTES.store(self.0, Ordering::Relaxed);
     }
@@ -60,7 +60,7 @@ impl FromStr for FileSize {
     }
 }
 
-/// The largest file of a kind, and what to do with a larger one.
+/// Size limit for one kind of file, with advice for a larger file.
 #[derive(Clone, Copy)]
 struct ReadLimit {
     largest: FileSize,
@@ -88,32 +88,32 @@ impl ReadLimit {
     }
 }
 
-/// Whether a path is the name of standard input.
+/// Whether a path stands for standard input.
 pub(crate) fn is_standard_input(path: &Path) -> bool {
     path.as_os_str() == STANDARD_INPUT
 }
 
-/// Bytes of a file with data.
+/// Bytes of a data file.
 pub(crate) fn read_data(path: &Path) -> Outcome<Vec<u8>> {
     read_limited(path, ReadLimit::for_data())
 }
 
-/// Refuses a file with data that is open, and larger than what is read into memory.
+/// Refuses an open data file that is larger than the limit for reading into memory.
 pub(crate) fn check_data_size(path: &Path, file: &File) -> Outcome<()> {
     ReadLimit::for_data().check_open_file(path, file)
 }
 
-/// Text of a UTF-8 file with data (a byte-order mark is dropped).
+/// Text of a data file in UTF-8 (a byte-order mark is removed).
 pub(crate) fn read_text(path: &Path) -> Outcome<String> {
     decode_utf8(path, read_data(path)?)
 }
 
-/// Text of a TOML file, which people write.
+/// Text of a TOML file. These are written by people.
 pub(crate) fn read_toml(path: &Path) -> Outcome<String> {
     decode_utf8(path, read_limited(path, TOML_LIMIT)?)
 }
 
-/// Text of a JSON file, which this program writes.
+/// Text of a JSON file that this program has written.
 pub(crate) fn read_json(path: &Path) -> Outcome<String> {
     decode_utf8(path, read_limited(path, JSON_LIMIT)?)
 }
@@ -135,7 +135,7 @@ fn read_limited(path: &Path, limit: ReadLimit) -> Outcome<Vec<u8>> {
     if is_standard_input(path) {
         return read_all(path, io::stdin().lock(), limit);
     }
-    // checked before opening, because opening a pipe waits for its writer
+    // checked before opening, since opening a pipe waits for its writer
     check_regular_file(path, &fs::metadata(path).map_err(|error| read_failure(path, &error))?)?;
     let file = File::open(path).map_err(|error| read_failure(path, &error))?;
     limit.check_open_file(path, &file)?;
@@ -154,7 +154,8 @@ fn read_at_most(from: impl Read, largest: FileSize) -> io::Result<Option<Vec<u8>
     Ok((bytes.len() as u64 <= largest.0).then_some(bytes))
 }
 
-/// Only a regular file has an end and can be read twice with the same result.
+/// Refuses anything but a regular file: only such a file has an end, and gives the same contents when read
+/// twice.
 fn check_regular_file(path: &Path, found: &Metadata) -> Outcome<()> {
     let problem = match found.file_type() {
         kind if kind.is_file() => return Ok(()),
@@ -197,7 +198,7 @@ mod tests {
         assert_eq!(FileSize::DEFAULT.to_string().parse(), Ok(FileSize::DEFAULT));
     }
 
-    /// What the metadata says is not what is read: the limit holds all the same.
+    /// The limit holds even if the contents are longer than the metadata says.
     #[test]
     fn no_more_is_taken_than_allowed() {
         assert_eq!(read_at_most(&b"1234"[..], FileSize(4)).unwrap(), Some(b"1234".to_vec()));

@@ -1,4 +1,4 @@
-//! The marker of an output folder: which command made which file, and the hash of its contents.
+//! The marker of an output folder: the command that made each file, and the hash of the file's contents.
 
 use crate::cli::failure::{Failure, Outcome};
 use crate::text::TextHash;
@@ -13,12 +13,13 @@ use std::path::Path;
 pub(crate) const MARKER_FILE: &str = ".wiperlab.json";
 const MARKER_FORMAT: u32 = 1;
 
-/// The files that commands made in a folder. It has no timestamps, so the same outputs have the same marker.
+/// The files that commands have made in a folder. There are no timestamps, so that the same outputs give the
+/// same marker.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct FolderMarker {
     format: u32,
-    /// By name from the folder, with `/`.
+    /// Files by their name relative to the folder, with `/` as separator.
     pub files: BTreeMap<String, MarkedFile>,
 }
 
@@ -30,8 +31,8 @@ pub(crate) struct MarkedFile {
     pub version: String,
     /// Hash of the contents as text, without line ends and byte-order mark.
     pub sha256: String,
-    /// Hash of the file that it replaces, if a command made that too. Until all files are renamed, or if the
-    /// program is killed meanwhile, either file may be on the disk.
+    /// Hash of the replaced file, if a command had made that file too. Until all files are renamed, or if the
+    /// program is killed before that, either file may be on the disk.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub replaces: Option<String>,
 }
@@ -49,8 +50,8 @@ impl Default for FolderMarker {
 }
 
 impl FolderMarker {
-    /// Reads the marker of a folder; an empty one if there is none or it cannot be read, then with the
-    /// reason.
+    /// Reads the marker of a folder. If there is none, or if it cannot be read, returns an empty marker; in
+    /// the latter case with the reason.
     pub(crate) fn load(folder: &Path) -> Outcome<(Self, Option<String>)> {
         let path = folder.join(MARKER_FILE);
         if !path.exists() {
@@ -75,7 +76,7 @@ impl FolderMarker {
     }
 }
 
-/// Largest marker, description or summary that is read, bytes; this program writes none that large.
+/// Size limit of a marker, description or summary, bytes; the files of this program are smaller.
 const MAX_MARKER_BYTES: u64 = 16_000_000;
 
 /// Reads a marker, description or summary, if it is a file of at most [`MAX_MARKER_BYTES`].
@@ -87,7 +88,7 @@ pub(crate) fn read_small_file(path: &Path) -> Result<Vec<u8>, String> {
     fs::read(path).map_err(|error| error.to_string())
 }
 
-/// Hash of a file as in markers; `None` if there is no file.
+/// Hash of a file, as in markers; `None` if the file does not exist.
 pub(crate) fn hash_file(path: &Path) -> Outcome<Option<String>> {
     let refused = |error: io::Error| Failure::at(path.display(), format!("cannot be read: {error}"));
     if !path.is_file() {
@@ -98,7 +99,7 @@ pub(crate) fn hash_file(path: &Path) -> Outcome<Option<String>> {
     Ok(Some(hashing.hash.finish()))
 }
 
-/// A reader that hashes what is read through it.
+/// A reader that computes the hash of everything that is read through it.
 pub(crate) struct HashingReader<R> {
     from: R,
     pub hash: TextHash,
@@ -118,7 +119,7 @@ impl<R: Read> Read for HashingReader<R> {
     }
 }
 
-/// A command that writes files into a folder, as the marker records it.
+/// A command that writes files into a folder, as recorded in the marker.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum OutputCommand {
@@ -139,23 +140,24 @@ pub(crate) enum OutputCommand {
 }
 
 impl OutputCommand {
-    /// Its name on the command line, the same as in the marker.
+    /// Name of the command on the command line; the marker has the same name.
     pub(crate) fn command_name(self) -> String {
         format!("{self:?}").to_lowercase()
     }
 
-    /// Whether it makes a recording; a folder holds one recording.
+    /// Whether the command makes a recording; a folder contains at most one.
     pub(crate) fn makes_recordings(self) -> bool {
         matches!(self, Self::Import | Self::Simulate | Self::Twin)
     }
 
-    /// Whether a run replaces the whole last one: files of the last run that are not written again are
-    /// removed. An import keeps exports; init, demo and figures write next to files of other commands.
+    /// Whether a run of the command replaces the whole previous run: files of that run that are not written
+    /// again are removed. An import keeps exports; init, demo and figures write next to files of other
+    /// commands.
     pub(crate) fn replaces_last_run(self) -> bool {
         !matches!(self, Self::Demo | Self::Figures | Self::Import | Self::Init)
     }
 
-    /// What to do instead of overwriting a file.
+    /// Advice for the case that the command would overwrite a file.
     pub(crate) fn overwrite_advice(self) -> &'static str {
         match self {
             Self::Fit => "move the file away",
@@ -165,16 +167,16 @@ impl OutputCommand {
     }
 }
 
-/// The option of every command that writes into a folder.
+/// The option `--force` of every command that writes into a folder.
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub(crate) struct Overwrite {
-    /// Overwrite also files that this command did not make, or that were changed since it made them; never a
+    /// Overwrite even files that this command did not make, or that were changed since it made them; never a
     /// measured recording
     #[arg(long)]
     pub force: bool,
 }
 
-/// Who writes, and what it may overwrite.
+/// The command that writes, and what it may overwrite.
 #[derive(Debug, Clone)]
 pub(crate) struct WritePolicy {
     pub maker: OutputCommand,
@@ -182,7 +184,7 @@ pub(crate) struct WritePolicy {
     /// SHA-256 of the exports that an import reads; an import of the same exports may replace a measured
     /// recording.
     pub exports: Vec<String>,
-    /// Dialect of its tables; a trace is always plain, because programs read it.
+    /// Dialect of the tables; a trace is always plain, since programs read it.
     pub csv: CsvDialect,
 }
 
@@ -192,23 +194,24 @@ impl WritePolicy {
     }
 }
 
-/// How tables are written for those who open them with a double click.
+/// Dialect of tables, for users who open them with a double click.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub(crate) enum CsvDialect {
-    /// Commas between cells, decimal points (RFC 4180 with line feeds): what every program reads
+    /// Commas between cells, decimal points (RFC 4180 with line feeds): readable by every program
     #[default]
     Plain,
-    /// Excel where a comma is decimal, as in Germany: semicolons between cells, decimal commas
+    /// Excel with a decimal comma, as in Germany: semicolons between cells, decimal commas
     ExcelDe,
-    /// Excel where a point is decimal, as in the US
+    /// Excel with a decimal point, as in the US
     ExcelUs,
 }
 
-/// Marks a file as UTF-8 for Excel.
+/// Byte-order mark, which tells Excel that a file is UTF-8.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 impl CsvDialect {
-    /// A table in this dialect. Cells that are numbers get its decimal mark, all others stay as they are.
+    /// Converts a table to this dialect. Numeric cells get its decimal mark; all other cells stay as they
+    /// are.
     pub(crate) fn convert_table(self, plain: impl Read, mut to: impl Write) -> io::Result<()> {
         to.write_all(BYTE_ORDER_MARK)?;
         let decimal_comma = self == Self::ExcelDe;

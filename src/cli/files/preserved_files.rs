@@ -1,23 +1,23 @@
-//! Which recording a folder holds, and which of its files no command overwrites.
+//! Determines which recording a folder contains, and which of its files no command may overwrite.
 
 use super::marker::{FolderMarker, OutputCommand, hash_file, read_small_file};
 use crate::cli::failure::Outcome;
 use crate::recording::files::{DESCRIPTION_FILE, RecordingFile, TRACE_FILE};
 use std::path::Path;
 
-/// Summary that `simulate` writes next to its trace, and no import does.
+/// Name of the summary that `simulate` writes next to its trace; no import writes one.
 pub(crate) const SIMULATION_SUMMARY: &str = "summary.json";
-/// Keys of the summary of a simulation that the summary of a study does not have.
+/// Keys that the summary of a simulation has and that of a study lacks.
 const KEYS_OF_A_SIMULATION: [&str; 2] = ["stopped_at_s", "rhs_evaluations"];
 
-/// Whether the file is the summary of a simulation.
+/// Whether a file is the summary of a simulation.
 pub(crate) fn is_simulation_summary(path: &Path) -> bool {
     let summary: Option<serde_json::Value> =
         path.is_file().then(|| serde_json::from_slice(&read_small_file(path).ok()?).ok()).flatten();
     summary.is_some_and(|summary| KEYS_OF_A_SIMULATION.iter().all(|key| summary.get(key).is_some()))
 }
 
-/// The recording that a folder holds.
+/// The recording in a folder.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum FolderRecording {
     Nothing,
@@ -25,11 +25,11 @@ pub(crate) enum FolderRecording {
     Synthetic,
     /// Taken by a camera, or not proven to be synthetic.
     Measured {
-        /// Why it counts as measured.
+        /// Reason why the recording counts as measured.
         why: String,
-        /// SHA-256 of its exports, as far as known.
+        /// SHA-256 of the exports of the recording, as far as known.
         exports: Vec<String>,
-        /// Names of its files.
+        /// Names of the files of the recording.
         files: Vec<String>,
     },
 }
@@ -70,7 +70,7 @@ impl FolderRecording {
     }
 }
 
-/// The recording of a folder with a description; `trace` is the hash of its trace.
+/// The recording in a folder with a description; `trace` is the hash of its trace.
 fn from_description(folder: &Path, marker: &FolderMarker, trace: Option<&str>) -> FolderRecording {
     let bytes = read_small_file(&folder.join(DESCRIPTION_FILE));
     let text = bytes.and_then(|bytes| String::from_utf8(bytes).map_err(|error| error.to_string()));

@@ -1,9 +1,10 @@
-//! Files that appear all together or not at all: they are written under temporary names, then renamed.
+//! Files that appear all together or not at all: they are written under temporary names and then renamed.
 //!
-//! What is on the disk when: every file is flushed before any gets its name; then the folder's marker says
-//! what comes and what it replaces, and is flushed too; then the files are renamed one by one and the names
-//! flushed; at last the marker says what is there. So a reader meets each file old or new and whole, also
-//! after a loss of power, and the next run of the command can prove what it finds.
+//! Order of the steps: all files are flushed to the disk before any of them gets its name. Then the folder's
+//! marker is written and flushed; it lists the new files and those that they replace. Then the files are
+//! renamed one by one, and their names are flushed. Finally the marker is written that lists the files that
+//! are there. Thus a reader finds each file complete, either old or new, even after a power failure, and the
+//! next run of the command can prove what it finds.
 
 use super::guard::{OutputGuard, refuse_measured};
 use super::marker::{CsvDialect, FolderMarker, HashingReader, MARKER_FILE, MarkedFile, WritePolicy};
@@ -20,11 +21,12 @@ use tempfile::NamedTempFile;
 
 /// Prefix and suffix of temporary names.
 const TEMPORARY_NAME: (&str, &str) = (".wiperlab-", ".tmp");
-/// A temporary file is locked microseconds after it is made, until the program ends. An older one without a
-/// lock belongs to a program that was killed.
+/// Age above which a temporary file without a lock was left by a program that was killed: a temporary file is
+/// locked within microseconds of its creation, until the program ends.
 const ABANDONED_AFTER: Duration = Duration::from_secs(60);
 
-/// Files of a command under temporary names. Dropped before [`OutputStaging::commit`] they are removed.
+/// Files of a command under temporary names. They are removed if this is dropped before
+/// [`OutputStaging::commit`].
 pub(crate) struct OutputStaging {
     folder: PathBuf,
     guard: Option<(OutputGuard, WritePolicy)>,
@@ -41,7 +43,7 @@ struct StagedFile {
 }
 
 impl OutputStaging {
-    /// Prepares the files `names`; refuses what [`OutputGuard`] refuses.
+    /// Prepares the files `names`; refuses whatever [`OutputGuard`] refuses.
     pub(crate) fn new(folder: &Path, writer: &WritePolicy, names: &[&str]) -> Outcome<Self> {
         let guard = OutputGuard::new(folder, writer, names)?;
         Ok(Self { guard: Some((guard, writer.clone())), ..Self::new_unguarded(folder, names)? })
@@ -81,7 +83,7 @@ impl OutputStaging {
 
     /// Renames all files, or none.
     pub(crate) fn commit(self) -> Outcome<()> {
-        let (made, files) = (self.made, self.files); // folders are dropped after their files
+        let (made, files) = (self.made, self.files); // folders must be dropped after the files in them
         let (folder, guard) = (self.folder, self.guard);
         flush_files(&files)?;
         let within: BTreeSet<PathBuf> =
@@ -112,11 +114,12 @@ fn rename_staged(files: Vec<StagedFile>) -> Outcome<()> {
     Ok(())
 }
 
-/// The marker of a folder while files are renamed, and afterwards.
+/// The markers of a folder: before, during and after the renaming of files.
 struct MarkerUpdate<'a> {
     folder: &'a Path,
     before: &'a FolderMarker,
-    /// Lists the new and the replaced hash of every file, so it holds before, during and after the renaming.
+    /// Lists the new and the replaced hash of every file, so that it is valid before, during and after the
+    /// renaming.
     pending: FolderMarker,
     after: FolderMarker,
     outdated: Vec<String>,
@@ -179,8 +182,8 @@ impl<'a> MarkerUpdate<'a> {
     }
 }
 
-/// Flushes folders, so that the names of new files survive a loss of power. File systems that cannot flush
-/// folders are skipped.
+/// Flushes folders to the disk, so that the names of new files survive a power failure. On file systems that
+/// cannot flush folders, this does nothing.
 fn sync_folders(folders: &BTreeSet<PathBuf>) -> Outcome<()> {
     #[cfg(unix)]
     for folder in folders {
@@ -195,12 +198,12 @@ fn sync_folders(folders: &BTreeSet<PathBuf>) -> Outcome<()> {
     Ok(())
 }
 
-/// Folders that were made for files. Those that stay empty are removed.
+/// Folders that were created for files. Those that remain empty are removed.
 #[derive(Default)]
 struct CreatedFolders(Vec<PathBuf>);
 
 impl CreatedFolders {
-    /// Makes a folder with its missing parents and records them, outermost first.
+    /// Creates a folder with its missing parents, and records them, the outermost first.
     fn create(&mut self, folder: &Path) -> Outcome<()> {
         let is_missing = |path: &&Path| !path.as_os_str().is_empty() && !path.exists();
         let mut missing: Vec<PathBuf> =
@@ -211,7 +214,7 @@ impl CreatedFolders {
             .map_err(|error| write_failure(folder, &error))
     }
 
-    /// Keeps the folders and flushes their names.
+    /// Keeps the folders, and flushes their names to the disk.
     fn keep(mut self) -> Outcome<()> {
         let parents = std::mem::take(&mut self.0);
         sync_folders(&parents.iter().filter_map(|made| made.parent()).map(Path::to_owned).collect())
@@ -221,14 +224,14 @@ impl CreatedFolders {
 impl Drop for CreatedFolders {
     fn drop(&mut self) {
         for folder in self.0.iter().rev() {
-            // only an empty folder is removed; the failure itself is reported elsewhere
+            // this removes only an empty folder; the failure that left it empty is reported elsewhere
             let _ = fs::remove_dir(folder);
         }
     }
 }
 
-/// Refuses a path that is taken by something else than a file, or that no file can have. All paths are
-/// checked before the first renaming, so that files appear together.
+/// Refuses a path that something other than a file occupies, or that no file can have. All paths are checked
+/// before the first file is renamed, so that the files appear together.
 pub(crate) fn check_path_free(path: &Path) -> Outcome<()> {
     let taken = |at: &Path, found: &str, expected: &str| {
         let at = at.display();
@@ -240,7 +243,7 @@ pub(crate) fn check_path_free(path: &Path) -> Outcome<()> {
     match path.parent() {
         _ if path.is_dir() => taken(path, "a folder", "a file"),
         Some(within) if within.exists() && !within.is_dir() => taken(within, "a file", "a folder"),
-        // a name that is too long, for instance
+        // for example a name that is too long
         _ => match found {
             Err(error) if error.kind() != ErrorKind::NotFound => Err(write_failure(path, &error)),
             _ => Ok(()),
@@ -248,7 +251,7 @@ pub(crate) fn check_path_free(path: &Path) -> Outcome<()> {
     }
 }
 
-/// Writes a file under a temporary name, locked if the file system can; returns it with its hash.
+/// Writes a file under a temporary name and locks it, if the file system can; returns the file with its hash.
 fn write_temporary(path: &Path, contents: impl Read) -> io::Result<(NamedTempFile, String)> {
     let within = path.parent().unwrap_or(Path::new(""));
     let mut builder = tempfile::Builder::new();
@@ -260,7 +263,7 @@ fn write_temporary(path: &Path, contents: impl Read) -> io::Result<(NamedTempFil
     Ok((file, contents.hash.finish()))
 }
 
-/// The same for a table in another dialect.
+/// Like [`write_temporary`], for a table in another dialect.
 fn write_temporary_table(
     path: &Path,
     plain: impl Read,
@@ -272,12 +275,12 @@ fn write_temporary_table(
     write_temporary(path, converted)
 }
 
-/// Removes temporary files of programs that were killed.
+/// Removes temporary files left by programs that were killed.
 fn remove_abandoned(folder: &Path) {
     let passing = |name: &str| name.starts_with(TEMPORARY_NAME.0) && name.ends_with(TEMPORARY_NAME.1);
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         if passing(&entry.file_name().to_string_lossy()) && is_abandoned(&entry.path()) {
-            let _ = fs::remove_file(entry.path()); // harmless; the next command tries again
+            let _ = fs::remove_file(entry.path()); // a failure is harmless; the next command tries again
         }
     }
 }
@@ -291,7 +294,7 @@ fn is_abandoned(path: &Path) -> bool {
         && File::open(path).is_ok_and(|file| file.try_lock().is_ok())
 }
 
-/// Flushes files in parallel: one commit of the file system then serves many of them.
+/// Flushes files in parallel, so that one commit of the file system serves many of them.
 fn flush_files(staged: &[StagedFile]) -> Outcome<()> {
     const AT_ONCE: usize = 64;
     let flushed = |staged: &StagedFile| {
@@ -306,7 +309,8 @@ fn flush_files(staged: &[StagedFile]) -> Outcome<()> {
     })
 }
 
-/// Permissions of an ordinary new file (the user's mask still applies); temporary files would be private.
+/// Permissions of an ordinary new file (the user's mask still applies); by default temporary files are
+/// private.
 #[cfg(unix)]
 fn readable_by_all() -> fs::Permissions {
     std::os::unix::fs::PermissionsExt::from_mode(0o666)

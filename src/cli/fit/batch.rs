@@ -1,4 +1,4 @@
-//! Several jobs one after the other, or a shard of them: whole fits, none of which is divided.
+//! Fits several jobs one after the other, or a shard of them; a single fit is never divided.
 
 use super::FitArgs;
 use crate::cli::checkpoint::CHECKPOINT_FILE;
@@ -8,12 +8,13 @@ use crate::cli::prelude::*;
 use crate::fit::result::{FitResult, FitStatus};
 use std::collections::BTreeMap;
 
-/// State of a job in a list.
+/// State of a job in a list of jobs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum BatchJobState {
-    /// It has a result of this job and version whose search had converged; with the outcome of that fit.
+    /// The job has a result of this version of the job and of the program, whose search had converged; with
+    /// the outcome of that fit.
     Done(CommandOutcome),
-    /// It has no such result.
+    /// The job has no such result.
     Due,
 }
 
@@ -66,8 +67,8 @@ pub(crate) fn check_distinct_folders(jobs: &[PathBuf]) -> Outcome<()> {
 }
 
 impl FitArgs {
-    /// Fits the jobs of the list that are in the shard and not done yet. A refused job does not stop the
-    /// others.
+    /// Fits the jobs of the list that belong to the shard and are not yet done. A job that is refused does
+    /// not stop the others.
     pub(crate) fn run_batch(&self, global: &GlobalArgs) -> Outcome {
         check_distinct_folders(&self.jobs)?;
         let (mut refused, mut early) = (None, Vec::new());

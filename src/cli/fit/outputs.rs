@@ -1,4 +1,4 @@
-//! Files that a fit writes next to its result: the parameters in a row, the recordings compared with the
+//! Files that a fit writes next to its result: the parameters as one row, the recordings compared with the
 //! model, and the scenes at the estimates.
 
 use crate::cli::job::LoadedJob;
@@ -8,11 +8,11 @@ use crate::draft::{FittedScene, write_fitted_scene};
 use crate::fit::job::HeadSource;
 use crate::fit::result::{FitResult, FitStatus};
 
-/// The parameters in a row.
+/// File with the parameters as one row.
 const PARAMETERS_FILE: &str = "parameters.csv";
 
 impl LoadedJob {
-    /// Refuses a folder that the files of this fit cannot be written to.
+    /// Refuses a folder into which the files of this fit cannot be written.
     pub(crate) fn check_outputs(&self, writer: &WritePolicy) -> Outcome<()> {
         let scenes = (0..self.job().conditions.len()).map(|at| self.scene_file_name(at));
         let names = [files::RESULT_FILE, PARAMETERS_FILE, COMPARISON_FILE].map(str::to_owned);
@@ -22,7 +22,7 @@ impl LoadedJob {
         (0..self.job().conditions.len()).try_for_each(|at| self.driver_path(at).map(|_| ()))
     }
 
-    /// Writes what was found into the folder of the job.
+    /// Writes the result and the other files into the folder of the job.
     pub(crate) fn write_outputs(&self, result: &FitResult, writer: &WritePolicy) -> Outcome<()> {
         let mut files = vec![(files::RESULT_FILE.to_owned(), result.to_json().into_bytes())];
         if result.status != FitStatus::Failed {
@@ -32,7 +32,7 @@ impl LoadedJob {
         files::write_outputs(&self.folder, writer, &files)
     }
 
-    /// Name of the scene of a condition, numbered if there are several.
+    /// File name of the scene of a condition, numbered if there are several conditions.
     fn scene_file_name(&self, condition: usize) -> String {
         match self.job().conditions.len() {
             1 => "fitted-scene.toml".to_owned(),
@@ -40,7 +40,7 @@ impl LoadedJob {
         }
     }
 
-    /// Every estimate with its interval in one row, so that the rows of many fits make a table.
+    /// All estimates with their intervals as one row, so that the rows of many fits form a table.
     fn parameters_csv(&self, result: &FitResult) -> Outcome<Vec<u8>> {
         let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:?}"));
         let synthetic = self.measured.iter().any(|loaded| loaded.recording.is_synthetic());
@@ -70,7 +70,7 @@ impl LoadedJob {
         table.into_inner().map_err(Failure::internal)
     }
 
-    /// The recordings compared with the model, and the scenes.
+    /// The files with the recordings compared with the model, and with the scenes at the estimates.
     fn comparison_files(&self, result: &FitResult) -> Outcome<Vec<(String, Vec<u8>)>> {
         let model = self.problem.fitted_model(result).map_err(Failure::input)?;
         let runs = match run_conditions(self.job(), &model, result) {
@@ -99,7 +99,7 @@ impl LoadedJob {
         Ok(files)
     }
 
-    /// The recording that drives the fitted scene of a condition, as that scene names it.
+    /// The recording that drives the fitted scene of a condition, as named in that scene.
     fn driver_path(&self, at: usize) -> Outcome<Option<String>> {
         let condition = &self.job().conditions[at];
         let trace = self.problem.traces().iter().find(|trace| trace.condition == at);

@@ -1,4 +1,4 @@
-//! The result of a fit on standard output: targets, parameters and notes.
+//! Prints the result of a fit to standard output: targets, parameters and notes.
 
 use super::CompletedFit;
 use crate::fit::linear_model::ParameterCombination;
@@ -6,7 +6,7 @@ use crate::fit::misfit::{ChannelMisfit, TraceMisfit, far_from_priors, unexplaine
 use crate::fit::result::{FitResult, NuisanceResult};
 use crate::text::{self, format_digits, to_ascii};
 
-/// Digits of a number that is shown.
+/// Number of significant digits of printed numbers.
 const DIGITS: usize = 5;
 
 /// Prints misfit, features, parameters and notes.
@@ -30,7 +30,7 @@ pub(crate) fn print_summary(solved: &CompletedFit) {
     print_notes(result);
 }
 
-/// Such as `1,234 evaluations of the model in 12.3 s (100/s)`.
+/// Sentence such as `1,234 evaluations of the model in 12.3 s (100/s)`.
 fn describe_evaluations(solved: &CompletedFit) -> String {
     let evaluations = &solved.result.evaluations;
     let what = match solved.result.misfit {
@@ -78,7 +78,7 @@ fn print_feature_row(
     print_line!("{name:<36} {target:>11} {model:>11} {unit:<4} {error:>8}  {met}");
 }
 
-/// Prints combinations of parameters that the features determine, and the notes.
+/// Prints the combinations of parameters that the features determine, and the notes.
 fn print_notes(result: &FitResult) {
     print_line!("");
     result.combinations.iter().for_each(|found| print_line!("{}", describe_combination(found)));
@@ -102,10 +102,11 @@ pub(super) fn format_value(value: f64) -> String {
     to_ascii(&format_digits(value, DIGITS))
 }
 
-/// Most segments of a channel that are listed.
+/// Maximum number of segments of a channel that are listed.
 const MOST_SEGMENTS: usize = 3;
 
-/// The first sentence, residuals against noise, and the misfit over the length of the segments.
+/// Prints the headline, the residuals compared with the noise, and the misfit for each length of the
+/// segments.
 pub(crate) fn print_misfit(misfit: &TraceMisfit) {
     print_line!("{}", text::to_ascii(&misfit.headline()));
     print_line!("recording                channel     residual, um  noise, um  chi2/dof   neighbours");
@@ -139,7 +140,7 @@ fn print_worst_segments(c: &ChannelMisfit) {
     }
 }
 
-/// Prints what was estimated in addition to the parameters.
+/// Prints the quantities that were estimated in addition to the parameters.
 pub(crate) fn print_nuisances(list: &[NuisanceResult]) {
     if list.is_empty() {
         return;

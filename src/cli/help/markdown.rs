@@ -1,8 +1,9 @@
-//! Pages of the documentation for a terminal: the part of Markdown that the pages use.
+//! Renders pages of the documentation for a terminal; supports the part of Markdown that these pages use.
 
 use crate::text::wrap_words;
 
-/// The section of a heading, with its subsections; with an empty heading the text before the first section.
+/// The section with the given heading and its subsections; for an empty heading, the text before the first
+/// section.
 pub(crate) fn find_section<'a>(page: &'a str, heading: &str) -> &'a str {
     let level = |line: &str| line.bytes().take_while(|byte| *byte == b'#').count();
     let mut places = page.split_inclusive('\n').scan(0, |at, line| {
@@ -18,8 +19,8 @@ pub(crate) fn find_section<'a>(page: &'a str, heading: &str) -> &'a str {
     &page[start..end.map_or(page.len(), |(end, _)| end)]
 }
 
-/// A page with lines of at most `width` characters: links as their words, each row of a table as a list, code
-/// unchanged.
+/// A page with lines of at most `width` characters. Links are replaced by their text, each row of a table
+/// becomes a list, and code is unchanged.
 pub(crate) fn render_for_terminal(page: &str, width: usize) -> String {
     let mut out = String::new();
     let mut paragraph = String::new();
@@ -65,7 +66,7 @@ fn starts_item(line: &str) -> bool {
     line.starts_with("- ") || line.split_once(". ").is_some_and(|(number, _)| number.parse::<u8>().is_ok())
 }
 
-/// Prints a paragraph or an item with its indentation.
+/// Appends a paragraph or a list item with its indentation.
 fn flush_paragraph(out: &mut String, paragraph: &mut String, width: usize) {
     let indent = paragraph.len() - paragraph.trim_start_matches(' ').len();
     let hanging = if starts_item(paragraph) { indent + 2 } else { indent };
@@ -76,7 +77,8 @@ fn flush_paragraph(out: &mut String, paragraph: &mut String, width: usize) {
     paragraph.clear();
 }
 
-/// Prints a row of a table as a list: its first cell, then each other cell with the name of its column.
+/// Appends a row of a table as a list: first its first cell, then each further cell with the name of its
+/// column.
 fn push_table_row(out: &mut String, line: &str, columns: &mut Option<Vec<String>>, width: usize) {
     let cells = line.replace("\\|", "\u{1}");
     let cells: Vec<String> =
@@ -96,7 +98,7 @@ fn push_table_row(out: &mut String, line: &str, columns: &mut Option<Vec<String>
     }
 }
 
-/// Text without links and emphasis.
+/// The text without links and emphasis.
 fn strip_markup(words: &str) -> String {
     let mut plain = String::new();
     let mut rest = words;

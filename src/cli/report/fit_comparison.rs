@@ -1,4 +1,4 @@
-//! Several fits side by side.
+//! Comparison of several fits.
 
 use super::{ReportFiles, ReportedFit, default_reports_folder};
 use crate::cli::prelude::*;
@@ -6,10 +6,11 @@ use crate::cli::report;
 use crate::report::assembly;
 use crate::report::fit_comparison::{ComparisonInput, compare_fits, comparison_json, render_page};
 
-/// Longest name of a folder that is made from names of fits; file systems allow more.
+/// Maximum length of a folder name that is made from the names of fits; file systems allow longer names.
 const LONGEST_NAME: usize = 100;
 
-/// Writes the comparison of fits. True if one of them does not explain its recording or misses a component.
+/// Writes the comparison of fits. Returns true if one of them does not explain its recording or misses a
+/// component.
 pub(crate) fn write_comparison(
     jobs: &[PathBuf],
     out: Option<&Path>,
@@ -51,7 +52,7 @@ pub(crate) fn write_comparison(
     Ok(!several.passes())
 }
 
-/// Refuses a fit that is given twice, and two fits with the same name.
+/// Refuses a fit that is given twice, and different fits with the same name.
 fn check_distinct_fits(fits: &[&Path]) -> Outcome<()> {
     let place = |fit: &Path| fit.canonicalize().unwrap_or_else(|_| fit.to_owned());
     for (i, fit) in fits.iter().enumerate() {
@@ -75,7 +76,7 @@ fn check_distinct_fits(fits: &[&Path]) -> Outcome<()> {
     Ok(())
 }
 
-/// `reports/A-and-B` next to the first fit's folder `fits`.
+/// The folder `reports/A-and-B` next to the folder `fits` of the first fit.
 fn default_comparison_folder(fits: &[&Path]) -> Outcome<PathBuf> {
     let name = fits.iter().map(|fit| files::display_name(fit)).collect::<Vec<_>>().join("-and-");
     if name.len() > LONGEST_NAME {

@@ -42,7 +42,7 @@ fn hash_source_file(kind: &str, name: String, path: &Path, synthetic: bool) -> O
     Ok(SourceFile { kind: kind.to_owned(), name, sha256: sha256(&files::read_data(path)?), synthetic })
 }
 
-/// A scene, and the recording that drives it where one does.
+/// A scene and, if a recording drives it, the files of that recording.
 fn scene_files(name: String, path: &Path) -> Outcome<Vec<SourceFile>> {
     let text = files::read_toml(path)?;
     let mut found = vec![hash_source_file("scene", name.clone(), path, false)?];
@@ -55,7 +55,7 @@ fn scene_files(name: String, path: &Path) -> Outcome<Vec<SourceFile>> {
     Ok(found)
 }
 
-/// Trace, description and exports of a recording; the hashes of exports are those of its import.
+/// Trace, description and exports of a recording; the hashes of the exports are those from the import.
 fn recording_files(
     role: &str,
     name: &str,
@@ -92,8 +92,8 @@ fn parent_folder(name: &str) -> String {
     name.rsplit_once('/').map_or_else(String::new, |(folder, _)| folder.to_owned())
 }
 
-/// A path in the folder `within`, without `.` and `..`. An absolute path, or one that leaves the project,
-/// stays as written.
+/// A path in the folder `within`, without `.` and `..`. An absolute path, or a path that leaves the project,
+/// is returned as written.
 fn normalise_path(within: &str, path: &str) -> String {
     let whole = Path::new(within).join(path);
     let mut parts: Vec<String> = Vec::new();

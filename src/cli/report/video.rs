@@ -1,4 +1,4 @@
-//! Pictures of a recording's frames, from the folder that its `[video]` names.
+//! Pictures of the frames of a recording, from the folder named under `[video]` in its description.
 
 use crate::cli::load::{LoadedRecording, description_path};
 use crate::cli::prelude::*;
@@ -12,12 +12,12 @@ pub(crate) struct FramePictures {
     place: PixelMapping,
     first_frame: usize,
     files: Vec<PathBuf>,
-    /// The first picture that could not be read, and why.
+    /// The failure of the first picture that could not be read.
     failed: Mutex<Option<Failure>>,
 }
 
 impl FramePictures {
-    /// The pictures of the recording at `path`, where its description names some.
+    /// The pictures of the recording at `path`; `None` if its description names none.
     pub(crate) fn load(path: &Path, loaded: &LoadedRecording) -> Outcome<Option<Self>> {
         let Some((file, video)) = loaded.file.as_ref().and_then(|file| Some((file, file.video.as_ref()?)))
         else {
@@ -54,7 +54,7 @@ impl FramePictures {
         RecordingVideo { mapping: self.place, pictures: self }
     }
 
-    /// Refuses if a picture could not be read.
+    /// Fails if a picture could not be read.
     pub(crate) fn check_pictures(&self) -> Outcome<()> {
         self.failed.lock().unwrap_or_else(PoisonError::into_inner).take().map_or(Ok(()), Err)
     }
@@ -72,8 +72,8 @@ impl PictureSource for FramePictures {
     }
 }
 
-/// Sort key that puts frame9 before frame10: numbers are compared by their number of digits, then as text;
-/// equal keys by the whole name.
+/// Sort key that puts frame9 before frame10: numbers are compared by their number of digits, then as text.
+/// Equal keys are ordered by the whole name.
 fn natural_sort_key(name: &str) -> (Vec<(usize, String)>, String) {
     let mut parts: Vec<(bool, String)> = Vec::new();
     for letter in name.chars() {

@@ -11,10 +11,10 @@ use short_spectra::time_frequency::FrequencyRange;
 use short_spectra::{Component, ComponentVerdict, SpectralAnalysis};
 use std::fmt::Write;
 
-/// Rows of a block of text; the blocks of a long record are made in parallel.
+/// Number of rows in a block of text; the blocks of a long record are made in parallel.
 const BLOCK_ROWS: usize = 4096;
 
-/// `components.json`; the start of a component is a time of the recording.
+/// Contents of `components.json`; the start of a component is given on the clock of the recording.
 pub(crate) fn components_json(studied: &StudiedWindow) -> Outcome<Vec<u8>> {
     let from_s = studied.recording.grid().time_s(studied.frames.start);
     let timed = |c: &Component| Component { begins_s: c.begins_s.map(|s| from_s + s), ..c.clone() };
@@ -27,7 +27,7 @@ fn to_json(value: &impl Serialize) -> Outcome<Vec<u8>> {
     Ok(bytes)
 }
 
-/// `spectrum.json`: what was analysed, and how.
+/// Contents of `spectrum.json`: the analysed data, and the settings of the analysis.
 #[derive(Serialize)]
 struct SpectrumDescription<'a> {
     recording: &'a str,
@@ -46,7 +46,7 @@ struct SpectrumDescription<'a> {
     noise_floor_m: f64,
     fastest_hz: f64,
     windows: Vec<NamedWindowSpan>,
-    /// Range of the ridge, whether or not it is a component that drifts.
+    /// Frequency range of the ridge, whether or not the ridge is listed as a drifting component.
     ridge_hz: Option<FrequencyRange>,
     note: &'a str,
     hint: Option<&'a str>,
@@ -89,7 +89,8 @@ pub(crate) fn description_json(request: &SpectrumRequest, studied: &StudiedWindo
     })
 }
 
-/// `spectrum.csv`, a row for each bin; cells that a long or gappy record lacks are empty.
+/// Contents of `spectrum.csv`, with one row per bin; cells are empty if a long record, or one with gaps, has
+/// no such value.
 pub(crate) fn spectrum_csv(analysis: &SpectralAnalysis) -> Vec<u8> {
     let spectrum = &analysis.spectrum;
     let cell = |text: &mut String, value: Option<f64>| match value {
@@ -123,7 +124,7 @@ pub(crate) fn spectrum_csv(analysis: &SpectralAnalysis) -> Vec<u8> {
     std::iter::once(header.to_owned()).chain(blocks).collect::<String>().into_bytes()
 }
 
-/// `ridge.csv`: the course of the strongest component above the slow ones.
+/// Contents of `ridge.csv`: the strongest component above the slow ones, as a function of time.
 pub(crate) fn ridge_csv(course: &[CoursePoint]) -> Vec<u8> {
     let speed = |speed: Option<f64>| speed.map_or_else(String::new, |speed| format!("{speed:e}"));
     let row = |p: &CoursePoint| {
@@ -135,7 +136,7 @@ pub(crate) fn ridge_csv(course: &[CoursePoint]) -> Vec<u8> {
     std::iter::once(header.to_owned()).chain(course.iter().map(row)).collect::<String>().into_bytes()
 }
 
-/// The components on standard output.
+/// Prints the components to standard output.
 pub(crate) fn print_summary(channel: Channel, studied: &StudiedWindow) {
     let (recording, spectrum) = (&studied.recording, &studied.analysis.spectrum);
     let synthetic = if recording.is_synthetic() { " (synthetic: no camera took it)" } else { "" };

@@ -1,4 +1,4 @@
-//! Tasks as processes on this machine, several at once; then the shards are put together.
+//! Runs the tasks as processes on this machine, several at once, and then puts the shards together.
 
 use super::plan::SubmissionPlan;
 use crate::cli::failure::{BAD_INPUT, STOPPED_EARLY};
@@ -9,7 +9,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
-/// Interval at which the processes are checked.
+/// Interval between checks of the processes.
 const PAUSE: Duration = Duration::from_millis(20);
 
 /// The command of a task, as words.
@@ -23,7 +23,7 @@ fn shard_command(plan: &SubmissionPlan, task: usize) -> Vec<String> {
     words
 }
 
-/// All commands on standard output.
+/// Prints all commands to standard output.
 pub(crate) fn print_commands(plan: &SubmissionPlan) {
     let commands = plan.tasks.iter().map(|task| shard_command(plan, task));
     for words in commands.chain([plan.collect_command()]) {
@@ -45,7 +45,7 @@ pub(crate) fn run_tasks(plan: &SubmissionPlan, global: &GlobalArgs) -> Outcome {
     let (mut running, mut ended): (Vec<LocalTask>, Vec<FinishedTask>) = (Vec::new(), Vec::new());
     loop {
         if interrupt::control_flow().is_break() {
-            drop(running); // dropping them kills them
+            drop(running); // dropping the tasks kills them
             bar.finish_and_clear();
             stops.announce_stop(&kept);
             return Ok(CommandOutcome::StoppedEarly);
@@ -83,7 +83,7 @@ pub(crate) fn run_tasks(plan: &SubmissionPlan, global: &GlobalArgs) -> Outcome {
     run_collect(plan, global)
 }
 
-/// Runs the job at the end, which prints what is missing.
+/// Runs the final job, which prints what is missing.
 fn run_collect(plan: &SubmissionPlan, global: &GlobalArgs) -> Outcome {
     let mut command = Command::new(&plan.program);
     command.args(plan.collect_command()).args(global.quiet.then_some("--quiet"));
@@ -103,7 +103,7 @@ fn start_failure(plan: &SubmissionPlan, error: &std::io::Error) -> Failure {
     Failure::Internal(format!("{}: cannot be started: {error}", plan.program))
 }
 
-/// A running task. When dropped it is killed and loses the points in progress.
+/// A running task. If dropped, it is killed, and the points in progress are lost.
 struct LocalTask {
     number: usize,
     child: Child,
@@ -122,7 +122,7 @@ impl LocalTask {
         Ok(Self { number, child, log })
     }
 
-    /// How it has ended, or the task where it still runs.
+    /// The finished task, or the task itself if it is still running.
     fn try_finish(mut self) -> Outcome<Result<FinishedTask, Self>> {
         let status = self.child.try_wait().map_err(Failure::internal)?;
         Ok(match status {
@@ -134,7 +134,7 @@ impl LocalTask {
 
 impl Drop for LocalTask {
     fn drop(&mut self) {
-        let _ = self.child.kill(); // (it may have ended)
+        let _ = self.child.kill(); // (it may already have ended)
         let _ = self.child.wait();
     }
 }
@@ -151,12 +151,12 @@ impl FinishedTask {
         self.status.code() == Some(i32::from(BAD_INPUT))
     }
 
-    /// Whether it neither succeeded nor stopped at its time limit.
+    /// Whether the task neither succeeded nor stopped at its time limit.
     fn has_failed(&self) -> bool {
         !self.status.success() && self.status.code() != Some(i32::from(STOPPED_EARLY))
     }
 
-    /// Its last line of output, or its exit status if there is none.
+    /// The last line of the task's output, or its exit status if there is no output.
     fn message(&self, plan: &SubmissionPlan) -> String {
         let text = fs::read(&self.log).unwrap_or_default();
         let text = String::from_utf8_lossy(&text);

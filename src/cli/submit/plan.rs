@@ -1,4 +1,4 @@
-//! What is submitted, checked.
+//! The checked plan of a submission.
 
 use super::tasks::TaskList;
 use crate::cli::args::TimeLimit;
@@ -9,29 +9,29 @@ use crate::cli::{fit, sweep};
 use std::fs;
 use std::time::Duration;
 
-/// Shortest walltime, s, because Slurm counts in minutes.
+/// Shortest walltime, s; Slurm counts in minutes.
 const SHORTEST_S: u64 = 60;
 
-/// Fraction of the walltime by which a task ends earlier, for points in progress and a late start.
+/// Fraction of the walltime by which a task ends early, to allow for points in progress and for a late start.
 const MARGIN: f64 = 0.05;
-/// Smallest and largest of these margins, s.
+/// Smallest and largest value of this margin, s.
 const MARGINS_S: (u64, u64) = (30, 300);
 
-/// An array of tasks and the job after them.
+/// An array of tasks, and the final job that runs after them.
 #[derive(Debug)]
 pub(crate) struct SubmissionPlan {
-    /// This program, for other machines.
+    /// Path of this program, for use on other machines.
     pub program: String,
     /// Working folder of the tasks.
     pub folder: String,
     pub work: SubmittedWork,
     pub shards: usize,
     pub tasks: TaskList,
-    /// Cores of a task.
+    /// Number of cores of a task.
     pub threads: usize,
     pub walltime: Option<Duration>,
     pub directives: Vec<String>,
-    /// Options of every command that the files need.
+    /// Options that every command needs to read the files.
     pub options: Vec<String>,
 }
 
@@ -41,12 +41,12 @@ impl SubmissionPlan {
         [self.work.task_command(), self.options.clone()].concat()
     }
 
-    /// Command of the job at the end.
+    /// Command of the final job.
     pub(crate) fn collect_command(&self) -> Vec<String> {
         [self.work.collect_command(self.shards), self.options.clone()].concat()
     }
 
-    /// Time limit of a task.
+    /// Time after which a task ends itself.
     pub(crate) fn time_limit(&self) -> Option<Duration> {
         self.walltime.map(|walltime| walltime.saturating_sub(time_margin(walltime)))
     }
@@ -56,7 +56,7 @@ impl SubmissionPlan {
         self.work.folder().join("submit")
     }
 
-    /// Folder of what the tasks print.
+    /// Folder for the output of the tasks.
     pub(crate) fn logs_folder(&self) -> PathBuf {
         self.work.folder().join("logs")
     }
@@ -67,7 +67,7 @@ impl SubmissionPlan {
             .map_err(|error| Failure::Internal(format!("{}: cannot be made: {error}", logs.display())))
     }
 
-    /// `1 core`, `4 cores`.
+    /// Number of cores in words, such as `1 core` or `4 cores`.
     pub(crate) fn describe_cores(&self) -> String {
         format!("{} core{}", self.threads, if self.threads == 1 { "" } else { "s" })
     }
@@ -78,7 +78,7 @@ fn time_margin(walltime: Duration) -> Duration {
     Duration::from_secs(margin_s.clamp(MARGINS_S.0, MARGINS_S.1))
 }
 
-/// Time that Slurm gives a task, for [`clap`].
+/// Parses the walltime that Slurm grants a task, for [`clap`].
 pub(crate) fn parse_walltime(text: &str) -> Result<TimeLimit, String> {
     let limit: TimeLimit = text.parse()?;
     if limit.0.as_secs() < SHORTEST_S {
@@ -87,17 +87,18 @@ pub(crate) fn parse_walltime(text: &str) -> Result<TimeLimit, String> {
     Ok(limit)
 }
 
-/// The work that is divided among tasks, with absolute paths.
+/// The work that is divided among the tasks, with absolute paths.
 #[derive(Debug, Clone)]
 pub(crate) enum SubmittedWork {
-    /// A parameter study, whose shards and results lie in a folder.
+    /// A parameter study, and the folder of its shards and results.
     Study { study: String, out: String },
-    /// Jobs of fits, each of which is done whole, next to its file; and a folder for scripts and logs.
+    /// Jobs of fits, each of which is fitted as a whole and writes its result next to its job file; and a
+    /// folder for scripts and logs.
     Jobs { jobs: Vec<String>, out: String },
 }
 
 impl SubmittedWork {
-    /// Reads and checks a study or jobs as `wiperlab sweep` and `wiperlab fit` do.
+    /// Reads and checks a study or jobs, as `wiperlab sweep` and `wiperlab fit` do.
     pub(crate) fn load(files: &[PathBuf], out: Option<&Path>, overwrite: Overwrite) -> Outcome<Self> {
         if let Some(name) = files.iter().find(|file| files::is_standard_input(file)) {
             return Err(Failure::at(
@@ -153,7 +154,7 @@ impl SubmittedWork {
         }
     }
 
-    /// Command of the job at the end.
+    /// Command of the final job.
     pub(crate) fn collect_command(&self, shards: usize) -> Vec<String> {
         let shards = shards.to_string();
         match self {
@@ -164,13 +165,13 @@ impl SubmittedWork {
         }
     }
 
-    /// Folder in which scripts and logs have theirs.
+    /// Folder that contains the folders of scripts and of logs.
     pub(crate) fn folder(&self) -> PathBuf {
         let (Self::Study { out, .. } | Self::Jobs { out, .. }) = self;
         Path::new(out).join(crate::cli::shards::SHARDS_FOLDER)
     }
 
-    /// Name of the tasks for the scheduler and prefix of their logs: at most 15 letters, digits and hyphens.
+    /// Name of the tasks in the scheduler, and prefix of their logs: at most 15 letters, digits and hyphens.
     pub(crate) fn job_name(&self) -> String {
         const LONGEST: usize = 15;
         let stem = match self {
@@ -182,7 +183,7 @@ impl SubmittedWork {
     }
 }
 
-/// The folder in which all files lie, absolute.
+/// The innermost folder that contains all files, as an absolute path.
 fn common_folder(files: &[String]) -> String {
     let mut folders = files.iter().filter_map(|file| Path::new(file).parent());
     let first = folders.next().unwrap_or(Path::new("/"));

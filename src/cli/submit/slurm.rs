@@ -1,17 +1,17 @@
-//! Slurm: `sbatch` (<https://slurm.schedmd.com/sbatch.html>) takes a script of a task and one of the job that
-//! puts the shards together; a third script submits both.
+//! Slurm: `sbatch` (<https://slurm.schedmd.com/sbatch.html>) accepts a script for the tasks and a script for
+//! the job that puts the shards together; a third script submits both.
 //!
 //! No directive contains a path, which would need quoting: jobs are submitted from the folder of their logs.
 //! `--signal=B:` signals the process of the script itself, which is the program; without `B:` only steps of
-//! `srun` get the signal. After the loss of a node a task is queued again and goes on.
+//! `srun` receive the signal. After the failure of a node, a task is queued again and continues.
 
 use super::plan::SubmissionPlan;
 use crate::cli::submit;
 use std::time::Duration;
 
-/// The program that submits.
+/// The program that submits scripts.
 pub(crate) const SBATCH: &str = "sbatch";
-/// Submits the other scripts.
+/// Name of the script that submits the other scripts.
 pub(crate) const SUBMIT_SH: &str = "submit.sh";
 
 const SUBMIT_COMMANDS: &str = r#"array=$(sbatch --parsable ../submit/array.sh)
@@ -21,12 +21,12 @@ collect=$(sbatch --parsable --dependency="afterany:$array" ../submit/collect.sh)
 echo "collect: ${collect%%;*}"
 "#;
 
-/// All scripts by name.
+/// All scripts, each with its name.
 pub(crate) fn slurm_scripts(plan: &SubmissionPlan) -> [(&'static str, String); 3] {
     [("array.sh", array_script(plan)), ("collect.sh", collect_script(plan)), (SUBMIT_SH, submit_script(plan))]
 }
 
-/// Script of a task. The program replaces the shell (`exec`), so that it receives signals itself.
+/// Script of a task. The program replaces the shell (`exec`), so that it receives signals directly.
 fn array_script(plan: &SubmissionPlan) -> String {
     let own = [format!("--job-name={}", plan.work.job_name()), format!("--array={}", plan.tasks)];
     let limit =
@@ -52,7 +52,7 @@ fn collect_script(plan: &SubmissionPlan) -> String {
     )
 }
 
-/// Script that submits the others from the folder of the logs.
+/// Script that submits the other scripts from the folder of the logs.
 fn submit_script(plan: &SubmissionPlan) -> String {
     let logs = submit::quote_word(&plan.logs_folder().to_string_lossy());
     format!(
@@ -76,7 +76,7 @@ fn directive_lines(plan: &SubmissionPlan, own: &[String], cores: usize, log: &st
     lines.iter().chain(&plan.directives).map(|line| format!("#SBATCH {line}\n")).collect()
 }
 
-/// `HH:MM:SS`, hours without a limit.
+/// A time as `HH:MM:SS`; the number of hours is not limited.
 fn format_clock(time: Duration) -> String {
     let s = time.as_secs();
     format!("{:02}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60)

@@ -1,13 +1,13 @@
-//! Which tasks of an array run.
+//! Selection of the tasks of an array that run.
 
 use std::collections::BTreeSet;
 use std::fmt;
 use std::str::FromStr;
 
-/// Most tasks of an array: the default limit of Slurm (MaxArraySize 1001).
+/// Maximum number of tasks of an array: the default limit of Slurm (MaxArraySize 1001).
 pub(crate) const MAX_TASKS: usize = 1000;
 
-/// Numbers of tasks, rising.
+/// Numbers of tasks, in ascending order.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct TaskList(Vec<usize>);
 
@@ -29,14 +29,14 @@ impl TaskList {
     }
 }
 
-/// From numbers in any order.
+/// Makes a list from numbers in any order.
 impl FromIterator<usize> for TaskList {
     fn from_iter<I: IntoIterator<Item = usize>>(numbers: I) -> Self {
         Self(numbers.into_iter().collect::<BTreeSet<usize>>().into_iter().collect())
     }
 }
 
-/// As an array list: `0,3-5`.
+/// Formats the numbers as an array list, such as `0,3-5`.
 impl fmt::Display for TaskList {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (place, run) in self.0.chunk_by(|a, b| a + 1 == *b).enumerate() {
@@ -74,7 +74,7 @@ fn parse_task(text: &str) -> Option<usize> {
     digits.then(|| text.parse().ok())?.filter(|task| *task < MAX_TASKS)
 }
 
-/// Number of shards, for [`clap`].
+/// Parses the number of shards, for [`clap`].
 pub(crate) fn parse_shard_count(text: &str) -> Result<usize, String> {
     crate::cli::args::parse_count(text).ok().filter(|shards| *shards <= MAX_TASKS).ok_or_else(|| {
         format!(

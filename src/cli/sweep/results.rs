@@ -1,4 +1,4 @@
-//! The files of a study, from its points.
+//! Writes the files of a study from its points.
 
 use super::{LoadedStudy, collection_failure};
 use crate::cli::prelude::*;
@@ -15,7 +15,7 @@ const TABLE: &str = "sweep.csv";
 const SUMMARY: &str = "summary.json";
 
 impl LoadedStudy {
-    /// Checks that a study can write its files into a folder.
+    /// Checks that the study can write its files into a folder.
     pub(crate) fn check_outputs(&self, out: &Path, writer: &WritePolicy) -> Outcome<OutputFolder> {
         let sheet = self.study.has_sheet().then_some(SHEET_NAME);
         let mapped = self.study.maps.iter().filter(|_| self.study.is_mapped());
@@ -24,7 +24,7 @@ impl LoadedStudy {
         OutputFolder::check(out, writer, &names.iter().map(String::as_str).collect::<Vec<_>>())
     }
 
-    /// Writes table, summary and figures of a study of which every point is known.
+    /// Writes table, summary and figures of a study for which every point is known.
     pub(crate) fn write_outputs(
         &self,
         points: &mut PointCollection<File>,
@@ -69,7 +69,7 @@ impl LoadedStudy {
         Ok(CommandOutcome::done_if(summary.has_values()))
     }
 
-    /// Every map in one figure.
+    /// The sheet of a study: all its maps, or its rank correlations.
     fn sheet_figure(&self, mapped: &[Point], correlations: &RankCorrelations) -> Figure {
         match self.study.is_mapped() {
             true => sweep_sheet::draw_figure(&self.study, &self.scene, mapped),
@@ -78,7 +78,8 @@ impl LoadedStudy {
     }
 }
 
-/// A panic is a fault of the program, not of the study, and must not pass for one.
+/// Warns of a point that ended with a panic. This is a defect of the program, not a property of the study,
+/// and must not be mistaken for one.
 fn warn_of_panic(index: usize, point: &Point) {
     if let Some(ended) = point.ended.as_ref().filter(|ended| ended.reason == MissingReason::Panicked) {
         let (number, why) = (index + 1, &ended.why);

@@ -1,4 +1,4 @@
-//! A shard of a study, and the note that names the study of the shards in a folder.
+//! Runs a shard of a study, and writes the note that names the study to which the shards in a folder belong.
 
 use super::LoadedStudy;
 use super::solve::StudyPart;
@@ -9,18 +9,18 @@ use crate::sweep::journal::SweepPoint;
 use serde::{Deserialize, Serialize};
 use std::fs;
 
-/// File that names the study of the shards.
+/// Name of the note.
 const NOTE: &str = "study.json";
 
 /// Contents of the note.
 #[derive(Serialize, Deserialize)]
 struct StudyNote {
-    /// Path of the study from the folder of the note.
+    /// Path of the study, relative to the folder of the note.
     study: String,
 }
 
 impl LoadedStudy {
-    /// Runs the points of a shard that no shard in the folder holds.
+    /// Runs those points of a shard that no shard in the folder contains yet.
     pub(crate) fn solve_shard(&self, study: &Path, out: &Path, shard: Shard, global: &GlobalArgs) -> Outcome {
         let journal = shard_checkpoint(out, shard);
         files::check_path_free(&journal)?;
@@ -45,7 +45,7 @@ impl LoadedStudy {
         Ok(CommandOutcome::Done)
     }
 
-    /// Points that other shards hold. They are not computed again when a study is divided anew.
+    /// Points that other shards contain. These are not computed again when a study is divided anew.
     fn points_in_other_shards(&self, out: &Path, own: Shard) -> Outcome<Vec<bool>> {
         let header = self.header();
         let mut held = vec![false; self.study.point_count()];
@@ -60,12 +60,12 @@ impl LoadedStudy {
     }
 }
 
-/// Writes the note that names the study of the shards.
+/// Writes the note that names the study to which the shards belong.
 fn write_study_note(study: &Path, out: &Path) -> Outcome<()> {
     let folder = out.join(SHARDS_FOLDER);
     let made = |error| Failure::Internal(format!("{}: cannot be made: {error}", folder.display()));
     fs::create_dir_all(&folder).map_err(made)?;
-    // relative, because a shared folder may have another path on each machine
+    // relative, since a shared folder may have a different path on each machine
     let study = files::relative_path(&folder, study)?;
     let note = serde_json::to_string(&StudyNote { study }).map_err(Failure::internal)? + "\n";
     if fs::read_to_string(folder.join(NOTE)).is_ok_and(|found| found == note) {
@@ -74,7 +74,7 @@ fn write_study_note(study: &Path, out: &Path) -> Outcome<()> {
     files::write_unmarked(&folder, &[(NOTE, note.into_bytes())])
 }
 
-/// The study whose shards are in a folder.
+/// The study to which the shards in a folder belong.
 pub(crate) fn find_study(out: &Path) -> Outcome<PathBuf> {
     let path = out.join(SHARDS_FOLDER).join(NOTE);
     let refused = |found: String| {

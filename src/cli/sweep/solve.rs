@@ -1,4 +1,4 @@
-//! Runs the points of a study, or of a part of it, into a journal.
+//! Runs the points of a study, or of a part of it, and writes them to a journal.
 
 use super::LoadedStudy;
 use crate::checkpoint::{CheckpointSink, Shard, StoredRecord, format_header_line};
@@ -9,22 +9,22 @@ use crate::sweep::{self, PointRecheck, SweepError};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// A part of a study and its journal.
+/// A part of a study, with its journal.
 pub(crate) struct StudyPart<'a> {
     pub shard: Shard,
     pub journal: &'a Path,
     /// Whether the journal is continued; otherwise a new one is begun.
     pub resume: bool,
-    /// Points that other journals hold.
+    /// For each point, whether another journal contains it.
     pub elsewhere: Vec<bool>,
-    /// How to go on after an early stop.
+    /// Advice on how to continue after an early stop.
     pub advice: &'static str,
-    /// Whether progress is printed without a terminal.
+    /// Whether progress is printed even if there is no terminal.
     pub reports: bool,
 }
 
 impl LoadedStudy {
-    /// Runs the points that the journal of the whole study does not hold; `false` if interrupted.
+    /// Runs the points that the journal of the whole study does not contain; returns `false` if interrupted.
     pub(crate) fn solve(&self, journal: &Path, resume: bool, global: &GlobalArgs) -> Outcome<bool> {
         let (elsewhere, advice) = (Vec::new(), "go on with --resume");
         self.solve_part(
@@ -33,8 +33,8 @@ impl LoadedStudy {
         )
     }
 
-    /// Runs the points of a part that no journal holds, and appends them to its journal; `false` if
-    /// interrupted.
+    /// Runs those points of a part that no journal contains, and appends them to its journal; returns `false`
+    /// if interrupted.
     pub(crate) fn solve_part(&self, part: &StudyPart, global: &GlobalArgs) -> Outcome<bool> {
         let (header, name) = (self.header(), part.journal.display().to_string());
         let points = self.study.point_count();

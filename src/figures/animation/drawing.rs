@@ -1,4 +1,4 @@
-//! The linkage to scale: its joints and the panels in which it moves. Lengths in mm, heights above the glass.
+//! The linkage to scale: its joints and the panels in which it moves. Lengths in mm; heights above the glass.
 
 use super::Animation;
 use crate::figures::poses::joint_positions;
@@ -7,23 +7,23 @@ use crate::simulate::ModelSample;
 use plain_charts::{ChartAxis, Colour, Mark, Panel, Series, TextAnnotation, value_span};
 
 const MM: f64 = 1e3;
-/// Estimated width of the axes in half a page, mm; it sets the scale of the drawing.
+/// Estimated width of the axes in half a page, mm; determines the scale of the drawing.
 const AXES_MM: f64 = 70.0;
-/// Least and greatest height of the drawing, mm.
+/// Smallest and largest height of the drawing, mm.
 const HEIGHT_MM: (f64, f64) = (50.0, 80.0);
-/// Margins above the blade (head and labels) and below the glass, in lengths of the blade.
+/// Margins above the blade (for head and labels) and below the glass, in lengths of the blade.
 const ABOVE: f64 = 0.42;
 const BELOW: f64 = 0.13;
-/// Least distance of two pose names in a row, and distance of rows, mm.
+/// Smallest distance between two pose names in a row, and distance between rows, mm.
 const LABEL_MM: f64 = 10.0;
 const ROW_MM: f64 = 3.2;
-/// Distance of the middle of a text from the end of the drawing, mm.
+/// Distance between the middle of a text and the end of the drawing, mm.
 const MARGIN_MM: f64 = 5.0;
-/// Half width and height of the drawn head, in lengths of the blade; not the size of a real head.
+/// Half width and height of the drawn head, in lengths of the blade; not to scale.
 pub(super) const HEAD_HALF_WIDTH: f64 = 0.22;
 pub(super) const HEAD_HEIGHT: f64 = 0.14;
 
-/// A pose with its name, as [`linkage_points_mm`].
+/// Name and joints of a pose; the joints are those of [`linkage_points_mm`].
 type LabelledPose = (&'static str, [(f64, f64); 3]);
 
 /// Upper hinge of the neck, hinge between neck and lip, and lip tip, mm.
@@ -36,7 +36,7 @@ pub(super) fn blade_length_mm(linkage: &Linkage) -> f64 {
     MM * (linkage.l1_m + linkage.l2_m)
 }
 
-/// The panel with glass, scale bar, and the poses at the ends of the hold and halfway through the flip.
+/// The panel with the glass, a scale bar and the poses of [`key_poses`].
 pub(super) fn draw_linkage_panel(animation: &Animation) -> Panel {
     let length = blade_length_mm(&animation.linkage);
     let (low, high) = (-BELOW * length, (1.0 + ABOVE) * length);
@@ -77,9 +77,9 @@ fn text_at(text: &str, at: (f64, f64)) -> TextAnnotation {
     TextAnnotation::new(text, Colour::Black, at)
 }
 
-/// The tip enlarged over the last shown part, where it slips.
+/// The enlarged tip in the last shown part, in which it slips.
 pub(super) fn draw_tip_panel(animation: &Animation, height_mm: f64) -> Panel {
-    /// Margins beside the path of the tip and below the glass, in lengths of that path.
+    /// Margins beside the path of the tip and below the glass, in units of the length of that path.
     const ROOM: f64 = 0.12;
     const UNDER: f64 = 0.3;
     let [from_s, to_s] = animation.pace.last_part_s();
@@ -95,7 +95,7 @@ pub(super) fn draw_tip_panel(animation: &Animation, height_mm: f64) -> Panel {
     Panel { title, equal_aspect: true, ..Panel::new(x, y, height_mm, [glass_line(left, right)]) }
 }
 
-/// The pose names above the heads, each in the lowest row in which it overlaps no earlier name.
+/// The pose names above the heads, each in the lowest row in which it does not overlap an earlier name.
 fn pose_labels(poses: &[LabelledPose], height: f64, row: f64, apart: f64) -> Vec<TextAnnotation> {
     let mut labels: Vec<TextAnnotation> = Vec::new();
     for (name, [(x, _), ..]) in poses {
@@ -108,7 +108,8 @@ fn pose_labels(poses: &[LabelledPose], height: f64, row: f64, apart: f64) -> Vec
     labels
 }
 
-/// The drawn poses: both ends of the hold and, where the tip passes the head, the middle of the flip.
+/// The drawn poses: at both ends of the hold and, if the tip passes the head during the hold, at that
+/// instant.
 fn key_poses(animation: &Animation) -> Vec<LabelledPose> {
     let [from_s, to_s] = animation.hold_s;
     let at = |time_s: f64| animation.samples.iter().find(|s| s.time_s >= time_s);
@@ -152,7 +153,7 @@ mod tests {
                     && (length(hinge, tip) - 1e3 * motion.linkage.l2_m).abs() < 1e-9
             );
         }
-        // a head that is drawn up lifts the tip by as much
+        // raising the head raises the tip by the same amount
         let lifted = ModelSample { head_drop_m: motion.samples[0].head_drop_m - 1e-4, ..motion.samples[0] };
         assert!((linkage_points_mm(&motion.linkage, &lifted)[2].1 - 0.1).abs() < 1e-9);
     }

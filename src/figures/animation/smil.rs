@@ -1,4 +1,4 @@
-//! The moving elements over the still figure: one SVG element per part, with its key frames inside.
+//! The moving elements over the still figure: one SVG element per part, which contains its key frames.
 
 use super::drawing::{HEAD_HALF_WIDTH, HEAD_HEIGHT};
 use super::{Animation, PlaybackPace, PlaybackPart, drawing};
@@ -10,23 +10,23 @@ use std::fmt::Write;
 
 /// Largest position error of a drawn point, canvas units: a fiftieth of a millimetre, less than a line width.
 const TOLERANCE: f64 = 0.3;
-/// Half width of the tip's symbol, and of the cross of a measured point, canvas units.
+/// Half widths of the tip's symbol and of the cross at a measured point, canvas units.
 const TIP_HALF_WIDTH: f64 = 20.0;
 const CROSS_HALF_WIDTH: f64 = 15.0;
-/// Distance of the symbol below the tip, canvas units.
+/// Distance of the mode symbol below the tip, canvas units.
 const SYMBOL_OFFSET: f64 = 40.0;
-/// Distance of the name of a link from its middle, canvas units.
+/// Distance of a link's name from the middle of the link, canvas units.
 const NAME_OFFSET: f64 = 52.0;
 /// Background colour of the figure.
 const BACKGROUND: &str = "#FFFFFF";
 /// Font size, canvas units.
 const TEXT_SIZE: f64 = 44.0;
-/// Shortest time for which a measured point is shown, as a fraction of the playback time: screens show no
-/// shorter one.
+/// Shortest time for which a measured point is shown, as a fraction of the playback time; a screen cannot
+/// show anything shorter.
 const MIN_CROSS_FRACTION: f64 = 1.0 / 2000.0;
 
-/// A contact mode, its name, and the colour and outline of the tip's symbol; the outline is in units of the
-/// half width.
+/// A contact mode, its name, and the colour and outline of its symbol; the outline is in units of the half
+/// width.
 type ContactModeSymbol = (TipMode, &'static str, Colour, &'static str);
 
 const CONTACT_MODE_SYMBOLS: [ContactModeSymbol; 4] = [
@@ -36,7 +36,7 @@ const CONTACT_MODE_SYMBOLS: [ContactModeSymbol; 4] = [
     (TipMode::Flight, "flight", Colour::Purple, "M0 -1.3L1.3 0L0 1.3L-1.3 0Z"),
 ];
 
-/// The moving elements; empty without the two drawings.
+/// The moving elements; empty if the two drawings are missing.
 pub(super) fn moving_elements(animation: &Animation, plots: &[PanelPlacement]) -> String {
     let [plot, close, strips @ ..] = plots else { return String::new() };
     [
@@ -50,7 +50,7 @@ pub(super) fn moving_elements(animation: &Animation, plots: &[PanelPlacement]) -
     .concat()
 }
 
-/// Key frames with the canvas points of head, hinge and tip as x, y, x, y, x, y.
+/// Key frames of the pose: canvas coordinates of head, hinge and tip, as x, y, x, y, x, y.
 fn pose_key_frames(animation: &Animation, plot: &PanelPlacement) -> KeyFrames<6> {
     let point = |sample: &ModelSample| {
         let points = drawing::linkage_points_mm(&animation.linkage, sample);
@@ -61,7 +61,7 @@ fn pose_key_frames(animation: &Animation, plot: &PanelPlacement) -> KeyFrames<6>
     animation.samples.iter().filter_map(point).collect()
 }
 
-/// Simplified key frames of `N` of the numbers from index `from` on.
+/// Simplified key frames of `N` numbers of each pose, from index `from` on.
 fn select_numbers<const N: usize>(poses: &KeyFrames<6>, from: usize) -> KeyFrames<N> {
     let some: KeyFrames<N> =
         poses.iter().map(|(share, all)| (*share, std::array::from_fn(|k| all[from + k]))).collect();
@@ -81,7 +81,7 @@ fn line_path(values: &[f64; 4]) -> String {
     format!("M{x1} {y1}L{x2} {y2}")
 }
 
-/// A moving group; without SMIL it stays at its first place.
+/// A group that moves; without SMIL it stays at its first position.
 fn moving_group(
     animation: &Animation,
     changed: AnimatedAttribute,
@@ -93,7 +93,7 @@ fn moving_group(
     format!("<g transform=\"translate({})\">{motion}{contents}</g>\n", format_translation(first))
 }
 
-/// A link from the point at index `from` to the next.
+/// A link from the joint whose coordinates begin at index `from` to the next joint.
 fn moving_link(animation: &Animation, poses: &KeyFrames<6>, from: usize, width: u32) -> String {
     let keys: KeyFrames<4> = select_numbers(poses, from);
     let Some((_, first)) = keys.first() else { return String::new() };
@@ -141,7 +141,7 @@ fn link_name(animation: &Animation, poses: &KeyFrames<6>, from: usize, word: &st
     )
 }
 
-/// The lip near its tip, clipped to its panel.
+/// The lip near its tip, clipped to the panel.
 fn enlarged_tip(animation: &Animation, plot: &PanelPlacement) -> String {
     let [(left, top), (right, bottom)] = plot.corners();
     let [x, y, width, height] = format_numbers(&[left, top, right - left, bottom - top]);
@@ -151,7 +151,7 @@ fn enlarged_tip(animation: &Animation, plot: &PanelPlacement) -> String {
         measured_crosses(animation, plot),
     ]
     .concat();
-    // the id follows from the place: animations of one page with the same id have the same frame
+    // the id is made from the position: animations of a page that share an id have the same clipping frame
     let name = format!("frame-{x}-{y}-{width}-{height}").replace('.', "_");
     let frame = format!(
         "<clipPath id=\"{name}\"><rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"/></clipPath>"
@@ -175,7 +175,8 @@ fn moving_head(animation: &Animation, plot: &PanelPlacement) -> String {
     )
 }
 
-/// When the tip enters and leaves a mode, as fractions of the playback time.
+/// Changes of visibility of a contact mode, as fractions of the playback time: whether the tip is in that
+/// mode from then on.
 fn mode_intervals(animation: &Animation, mode: TipMode) -> Vec<(f64, bool)> {
     let mut spells: Vec<(f64, bool)> = animation
         .modes
@@ -186,7 +187,7 @@ fn mode_intervals(animation: &Animation, mode: TipMode) -> Vec<(f64, bool)> {
     spells
 }
 
-/// A group with switched visibility.
+/// A group that appears and disappears at given times.
 fn visible_at_times(animation: &Animation, spells: &[(f64, bool)], contents: &str) -> String {
     let opacity = |on: &bool| u8::from(*on).to_string();
     let Some((_, first)) = spells.first() else { return String::new() };
@@ -194,7 +195,7 @@ fn visible_at_times(animation: &Animation, spells: &[(f64, bool)], contents: &st
     format!("<g opacity=\"{}\">{change}{contents}</g>\n", opacity(first))
 }
 
-/// A group that is visible in one contact mode; empty where the mode never occurs.
+/// A group that is visible in one contact mode; empty if that mode never occurs.
 fn visible_in_mode(animation: &Animation, mode: TipMode, contents: &str) -> String {
     let spells = mode_intervals(animation, mode);
     if spells.iter().any(|(_, on)| *on) {
@@ -234,7 +235,7 @@ fn text_element(x: f64, y: f64, anchor: &str, words: &str) -> String {
     )
 }
 
-/// Name of the contact mode at the upper corner of the drawing, and pace above the enlarged tip.
+/// Name of the contact mode in the upper corner of the drawing, and pace above the enlarged tip.
 fn mode_and_pace_text(animation: &Animation, plot: &PanelPlacement, close: &PanelPlacement) -> String {
     let [[(left, top), _], [(_, frame), (right, _)]] = [plot.corners(), close.corners()];
     let y = top + TEXT_SIZE / 2.0;
@@ -254,7 +255,7 @@ fn mode_and_pace_text(animation: &Animation, plot: &PanelPlacement, close: &Pane
     modes.chain(paces).collect()
 }
 
-/// When a part is shown; the last stays visible to the end.
+/// Changes of visibility of a part of the motion; the last part stays visible to the end.
 fn part_visibility(animation: &Animation, part: &PlaybackPart) -> Vec<(f64, bool)> {
     let [from_s, to_s] = animation.pace.span_s();
     let mut spells = vec![(0.0, part.from_s <= from_s)];
@@ -267,8 +268,8 @@ fn part_visibility(animation: &Animation, part: &PlaybackPart) -> Vec<(f64, bool
     spells
 }
 
-/// The measured tip on the glass and the measured head at its drop, at the nearest frame; hidden where not
-/// tracked.
+/// Crosses at the measured tip (drawn on the glass) and at the measured head, from the nearest frame; hidden
+/// while not tracked.
 fn measured_crosses(animation: &Animation, plot: &PanelPlacement) -> String {
     let Some(measured) = &animation.measured else { return String::new() };
     let length = drawing::blade_length_mm(&animation.linkage);
@@ -319,7 +320,8 @@ fn jumping_cross(animation: &Animation, time_s: &[f64], frames: &[Option<(f64, f
     )
 }
 
-/// The time cursor of each strip; it waits at the ends of a strip that covers only a part.
+/// The time cursors of the strips; a cursor waits at either end of a strip that covers only a part of the
+/// motion.
 fn time_cursors(animation: &Animation, strips: &[PanelPlacement]) -> String {
     let turns: Vec<f64> = animation.pace.parts.iter().flat_map(|p| [p.from_s, p.to_s]).collect();
     let cursor = |(plot, [from_s, to_s]): (&PanelPlacement, [f64; 2])| {
@@ -337,11 +339,11 @@ fn time_cursors(animation: &Animation, strips: &[PanelPlacement]) -> String {
 
 // Key frames and SMIL elements.
 
-/// Pairs of a fraction of the playback time and values.
+/// Key frames: a fraction of the playback time with the values at that time.
 pub(super) type KeyFrames<const N: usize> = Vec<(f64, [f64; N])>;
 
-/// The key frames between which linear interpolation stays within `tolerance` (Douglas and Peucker, over
-/// time).
+/// The key frames that suffice for linear interpolation to stay within `tolerance` (Douglas and Peucker, with
+/// time as the abscissa).
 pub(super) fn simplify_key_frames<const N: usize>(
     values: &[(f64, [f64; N])],
     tolerance: f64,
@@ -362,7 +364,7 @@ pub(super) fn simplify_key_frames<const N: usize>(
     values.iter().zip(kept).filter(|(_, kept)| *kept).map(|(value, _)| *value).collect()
 }
 
-/// Largest distance of a key frame from linear interpolation between two others.
+/// Largest deviation of the values of a key frame from linear interpolation between two other key frames.
 fn deviation_from_line<const N: usize>(
     from: &(f64, [f64; N]),
     to: &(f64, [f64; N]),
@@ -372,16 +374,16 @@ fn deviation_from_line<const N: usize>(
     (0..N).map(|k| (from.1[k] + share * (to.1[k] - from.1[k]) - value.1[k]).abs()).fold(0.0, f64::max)
 }
 
-/// What of an element is animated.
+/// The attribute of an element that is animated.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum AnimatedAttribute {
     /// The path of a line.
     Path,
-    /// The place of a group.
+    /// The position of a group.
     Place,
-    /// The place of a group, in jumps.
+    /// The position of a group, which jumps from value to value.
     Jumping,
-    /// Whether it is visible.
+    /// The visibility of a group.
     Visible,
 }
 
@@ -400,7 +402,7 @@ impl AnimatedAttribute {
 }
 
 /// The SMIL element that animates an attribute; empty for fewer than two key frames. The first value holds
-/// from the start, as SMIL requires, and the last one to the end.
+/// from the start, as SMIL requires, and the last value holds to the end.
 pub(super) fn animate_element<T>(
     changed: AnimatedAttribute,
     pace: &PlaybackPace,
@@ -414,7 +416,7 @@ pub(super) fn animate_element<T>(
         push_item(&mut values, &written(value));
     }
     if matches!(changed, AnimatedAttribute::Path | AnimatedAttribute::Place) {
-        push_item(&mut times, "1"); // straight lines need an end
+        push_item(&mut times, "1"); // interpolation needs a value at the end
         push_item(&mut values, &written(last));
     }
     let (name, attributes) = changed.animating_element();

@@ -15,15 +15,16 @@ use crate::text::{
     format_times, join_with_and,
 };
 
-/// The enlarged part starts and ends this long before and after the release, s: a few cycles of the high
+/// Times by which the enlarged part begins before and ends after the release, s: a few cycles of the high
 /// component.
 const ZOOM_S: (f64, f64) = (0.005, 0.03);
-/// Most reversals whose instants are marked; of more only the first, as labels need room.
+/// Maximum number of reversals whose instants are all marked; of more reversals only the first is marked,
+/// since labels need room.
 const MOST_TURNS: usize = 4;
-/// Most windows that are drawn.
+/// Maximum number of windows drawn.
 const MOST_WINDOWS: usize = 10;
 
-/// The figures of a condition: whole motion and, where there is one, the release.
+/// The figures of a condition: the whole motion and, if there is a release, the enlarged part around it.
 pub(crate) fn figure_blocks(case: &ConditionComparison) -> Vec<FigureBlock> {
     let history = build_history(case);
     let whole = case.figure_block("history", whole_text(case, &history), draw_figure(&history));
@@ -38,7 +39,7 @@ fn build_history(case: &ConditionComparison) -> TimeHistory {
     let whole_s = (grid.start_s, grid.time_s(grid.frames.saturating_sub(1)));
     let zoom_s = release_s(&shown);
     let light = |traces: MotionTraces| thin_frames(traces, whole_s, zoom_s);
-    // one after the other, so that only one full motion is in memory
+    // thinned one after the other, so that only one full motion is in memory
     let measured = case.recording().map(MotionTraces::from_recording).map(light);
     let model = light(MotionTraces::from_model(&case.model.view.recording, &case.alignment));
     let windows = fit_window_spans(case).into_iter().enumerate();
@@ -57,14 +58,14 @@ fn build_history(case: &ConditionComparison) -> TimeHistory {
     }
 }
 
-/// The span around the release of the tip, limited to the recording, s.
+/// Time interval around the release of the tip, limited to the recording, s.
 fn release_s(shown: &TimedRecording) -> Option<(f64, f64)> {
     let (grid, release_s) = (shown.recording.grid(), shown.instant_s(InstantKind::Release)?);
     let last_s = grid.time_s(grid.frames.saturating_sub(1));
     Some(((release_s - ZOOM_S.0).max(grid.start_s), (release_s + ZOOM_S.1).min(last_s)))
 }
 
-/// Named instants of the reversals; of the first alone where there are more than [`MOST_TURNS`].
+/// Named instants of the reversals; only those of the first reversal if there are more than [`MOST_TURNS`].
 fn turn_instants(shown: &TimedRecording) -> Vec<(String, f64)> {
     let turns = shown.instants.reversals.len();
     let marked = if turns > MOST_TURNS { 1 } else { turns };
@@ -78,7 +79,7 @@ fn turn_instants(shown: &TimedRecording) -> Vec<(String, f64)> {
     all.filter_map(named).collect()
 }
 
-/// The windows of the fit that the recording contains, in order of time: features, start and end, s.
+/// The windows of the fit that the recording contains, in order of time: features, start, s, and end, s.
 fn fit_window_spans(case: &ConditionComparison) -> Vec<(String, f64, f64)> {
     let (shown, grid) = (case.measured_or_model(), case.measured_or_model().recording.grid());
     let place = |l: &FitWindow| {
@@ -138,7 +139,7 @@ fn enlarged_text(case: &ConditionComparison, history: &TimeHistory) -> FigureTex
     FigureText { caption, details: details.join(" ") }
 }
 
-/// Sources of the drawn motions.
+/// Clause on the sources of the drawn motions.
 fn whose_motion(case: &ConditionComparison) -> String {
     match case.recording() {
         Some(_) => format!("{} over the fitted model", case.source_kind()),
@@ -146,7 +147,7 @@ fn whose_motion(case: &ConditionComparison) -> String {
     }
 }
 
-/// The compared channel, the root mean square of its residual, m, and the same in units of the noise.
+/// The compared channel, the root mean square of its residual, m, and the ratio of that to the noise.
 fn rms_difference(
     case: &ConditionComparison,
     within_s: Option<(f64, f64)>,
@@ -157,7 +158,7 @@ fn rms_difference(
     Some((of, rms_m, case.noise_m(of).map(|noise_m| rms_m / noise_m)))
 }
 
-/// "the model misses the deflection by 7.4 um, 2.6 times the noise"
+/// Clause on the misfit: "the model misses the deflection by 7.4 um, 2.6 times the noise".
 fn describe_miss((of, rms_m, over_noise): (Channel, f64, Option<f64>)) -> String {
     let noise =
         over_noise.map_or_else(String::new, |ratio| format!(", {} times the noise", format_digits(ratio, 2)));
@@ -226,7 +227,7 @@ fn describe_overlay(case: &ConditionComparison) -> String {
     )
 }
 
-/// Clause on the uncertainty of the clock; empty where it is below half a frame.
+/// Clause on the uncertainty of the clock; empty if this is below half a frame.
 fn describe_clock_uncertainty(case: &ConditionComparison, shift_sd_s: f64) -> String {
     let frame_s = 1.0 / case.measured_or_model().recording.grid().frame_rate_hz;
     match shift_sd_s {
@@ -239,7 +240,7 @@ fn describe_clock_uncertainty(case: &ConditionComparison, shift_sd_s: f64) -> St
     }
 }
 
-/// Sentence on the number and the duration of the sticks that are shown.
+/// Sentence on the number and duration of the sticks that are shown.
 fn describe_sticks(history: &TimeHistory) -> String {
     let shown = history.measured.as_ref().or(history.model.as_ref());
     let shown = shown.and_then(|m| Some((*m.time_s.first()?, *m.time_s.last()?)));
@@ -275,8 +276,8 @@ fn describe_early_end(case: &ConditionComparison) -> Option<String> {
         .then(|| format!("The model's run ended early, at {at} s: {}.", run.status.meaning()))
 }
 
-/// Sentence on the release. It uses the values of the fit, so that all pages agree; without such a feature it
-/// reads the recording or the model.
+/// Sentence on the release. It uses the values of the fit, so that all pages agree; if the fit has no such
+/// feature, the release is measured from the recording or the model.
 fn describe_release(case: &ConditionComparison) -> Option<String> {
     const RELEASE: Reading =
         Reading::Interval { interval: ReversalInterval::ReleaseAfterReversal, reversal: 1 };
@@ -299,7 +300,7 @@ fn describe_release(case: &ConditionComparison) -> Option<String> {
     ))
 }
 
-/// "4.2 ms after" or "4.2 ms before" the turn of the head.
+/// Time from the turn of the head in words: "4.2 ms after" or "4.2 ms before".
 fn format_turn_offset(after_s: f64) -> String {
     format!("{} {}", format_milliseconds(after_s.abs()), if after_s < 0.0 { "before" } else { "after" })
 }

@@ -1,4 +1,4 @@
-//! The ring-down of a condition of a fit: its data and its caption.
+//! The ring-down figure of a condition of a fit: its data and its caption.
 
 use crate::compare::ConditionComparison;
 use crate::compare::condition::{FitWindow, compare_frequency};
@@ -9,8 +9,8 @@ use crate::figures::{FigureBlock, FigureText, subtitle};
 use crate::text::{format_digits, format_length, format_with_sd};
 use short_spectra::{Component, LONGEST_DECOMPOSED, SpectralAnalysis};
 
-/// Index of the window with the lowest sought frequency, and that frequency, Hz; `None` where the job seeks
-/// none.
+/// Index of the window with the lowest target frequency, and that frequency, Hz; `None` if the job has no
+/// target frequency.
 pub(crate) fn lowest_window(case: &ConditionComparison, all: &[FitWindow]) -> Option<(usize, f64)> {
     let frequency = |l: &FitWindow| {
         let aims = l.targets.iter();
@@ -23,11 +23,11 @@ pub(crate) fn lowest_window(case: &ConditionComparison, all: &[FitWindow]) -> Op
     lowest.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Least amplitude of the component nearest to the target, standard deviations of the noise.
+/// Smallest amplitude of the component nearest to the target, standard deviations of the noise.
 const LEAST_OVER_NOISE: f64 = 2.0;
 
-/// The figure of the window's analysis. `None` for a record too long to be decomposed, or where the component
-/// nearest to the target is below twice the noise.
+/// The figure of the window's analysis; `None` if the record is too long to be decomposed, or if the
+/// component nearest to the target has an amplitude below twice the noise.
 pub(crate) fn figure_block(
     case: &ConditionComparison,
     window: &FitWindow,
@@ -99,7 +99,7 @@ fn nearest_component(analysis: &SpectralAnalysis, target_hz: f64) -> Option<&Com
     analysis.spectrum.components.iter().min_by(|a, b| off(a).total_cmp(&off(b)))
 }
 
-/// Sentence on frequency, damping and doubts.
+/// Sentence on frequency, damping and doubts about a component.
 fn describe_component(component: &Component) -> String {
     let frequency = format_with_sd(component.frequency_hz, component.frequency_sd_hz);
     const KNOWN: f64 = 2.0;

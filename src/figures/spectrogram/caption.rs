@@ -9,13 +9,13 @@ use crate::recording::channel::{Channel, InstantKind};
 use crate::text::{format_digits, format_milliseconds};
 use std::ops::Range;
 
-/// Highest shown frequency over the highest of the ridges.
+/// Ratio of the highest frequency shown to the highest frequency of the ridges.
 const RIDGE_MARGIN: f64 = 1.6;
 
-/// A side with its ridge and the shift of its clock, s.
+/// Recording or model, with its ridge and the shift of its clock, s.
 type ShiftedRidge<'a> = (SpectrogramSide, &'a TrackedRidge, f64);
 
-/// The figure of a condition; empty where no side is long enough for a segment.
+/// The figure of a condition; empty if neither recording nor model is long enough for a segment.
 pub(crate) fn figure_blocks(case: &ConditionComparison) -> Vec<FigureBlock> {
     let (measured, model) = (case.ridges.measured.as_ref(), case.ridges.model.as_ref());
     let of =
@@ -44,7 +44,7 @@ pub(crate) fn figure_blocks(case: &ConditionComparison) -> Vec<FigureBlock> {
                     targets: target_frequencies(case, side),
                     ..SpectrogramPlot::default()
                 };
-                // with a fast camera most bins lie above the shown frequencies
+                // with a fast camera, most frequency bins lie above the shown frequencies
                 let bins = followed.spectrogram.frequency_hz.partition_point(|f| *f <= shown_hz.1);
                 let start_s = followed.start_s + shift_s;
                 (of, fill_map(plot, &followed.spectrogram, &followed.courses, start_s, bins))
@@ -54,7 +54,7 @@ pub(crate) fn figure_blocks(case: &ConditionComparison) -> Vec<FigureBlock> {
     vec![case.figure_block("spectrogram", figure_text(case, &sides), figure)]
 }
 
-/// The target frequencies of the deflection with their windows on one side.
+/// The target frequencies of the deflection, with their windows in the recording or in the model.
 fn target_frequencies(case: &ConditionComparison, (of, _, shift_s): &ShiftedRidge) -> Vec<TargetFrequency> {
     let side = match of {
         SpectrogramSide::Measured => case.measured_side(),
@@ -137,7 +137,7 @@ fn figure_title(sides: &[ShiftedRidge]) -> String {
     }
 }
 
-/// Caption with the frequency ranges of the ridges.
+/// Caption, with the frequency ranges of the ridges.
 fn claim_sentence(case: &ConditionComparison, sides: &[ShiftedRidge]) -> String {
     let name = |of: &SpectrogramSide| {
         if *of == SpectrogramSide::Measured { case.source_kind() } else { "the fitted model" }

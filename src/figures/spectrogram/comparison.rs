@@ -1,4 +1,5 @@
-//! Spectrograms of recording and model on one colour scale, with both ridges over time and over tip speed.
+//! Spectrograms of recording and model on one colour scale, with both ridges against time and against tip
+//! speed.
 
 use super::{
     Figure, SpectrogramPlot, colour_range_db, decibel_map, draw_map, full_figure, ridge_points, time_span,
@@ -6,7 +7,7 @@ use super::{
 use crate::figures::spectrogram;
 use plain_charts::{ChartAxis, Colour, HeatMap, Mark, MarkerShape, Panel, Series};
 
-/// Source of a spectrogram.
+/// The source of a spectrogram.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SpectrogramSide {
     /// The recording.
@@ -20,18 +21,19 @@ pub enum SpectrogramSide {
 pub struct SpectrogramComparison {
     /// Heading.
     pub title: String,
-    /// How they were made; empty for none.
+    /// How the spectrograms were made; empty for none.
     pub note: String,
     /// Whether the measured motion is synthetic.
     pub synthetic: bool,
-    /// One or both sides over the same frequencies; the first sets the colour scale.
+    /// Recording, model or both, with the same frequencies; the first one sets the colour scale.
     pub sides: Vec<(SpectrogramSide, SpectrogramPlot)>,
 }
 
-/// Heights of the maps and of the ridges under them, mm.
+/// Heights of the maps and of the panels of ridges below them, mm.
 const HEIGHT_MM: f64 = 56.0;
 const RIDGE_HEIGHT_MM: f64 = 40.0;
-/// Most columns and rows of a map, for small files; a cell stays narrower than a millimetre.
+/// Maximum number of columns and of rows of a map, so that files stay small; a cell is still narrower than a
+/// millimetre.
 const MOST_COLUMNS: usize = 64;
 const MOST_ROWS: usize = 48;
 
@@ -84,7 +86,7 @@ pub fn draw_comparison(shown: &SpectrogramComparison) -> Figure {
     }
 }
 
-/// Merges neighbouring columns and rows by their largest amplitude, which keeps thin lines, and drops
+/// Merges neighbouring columns and rows into their largest amplitude, which preserves thin lines, and drops
 /// frequencies that are not shown.
 fn coarsen_spectrogram(shown: &SpectrogramPlot) -> SpectrogramPlot {
     let (low, high) = shown.shown_hz.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
@@ -92,7 +94,7 @@ fn coarsen_spectrogram(shown: &SpectrogramPlot) -> SpectrogramPlot {
     let to = shown.frequency_hz.partition_point(|f| *f <= high).max(from);
     let (columns, rows) =
         (shown.time_s.len().div_ceil(MOST_COLUMNS).max(1), (to - from).div_ceil(MOST_ROWS).max(1));
-    // every so many points of the ridge, and all its gaps
+    // every n-th point of the ridge, and all its gaps
     let every = shown.ridge.len().div_ceil(MOST_COLUMNS).max(1);
     let ridge = shown.ridge.iter().enumerate().filter(|(i, p)| p.frequency_hz.is_none() || i % every == 0);
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
@@ -114,13 +116,13 @@ fn coarsen_spectrogram(shown: &SpectrogramPlot) -> SpectrogramPlot {
     }
 }
 
-/// Both ridges over time.
+/// Both ridges against time.
 fn draw_ridges_over_time(sides: &[(SpectrogramSide, SpectrogramPlot)], time: ChartAxis) -> Option<Panel> {
     let line = |(of, shown): &(SpectrogramSide, SpectrogramPlot)| {
         let (name, colour, _, mark) = of.look();
         Series::new(format!("ridge, {name}"), colour, mark, ridge_points(&shown.ridge))
     };
-    // the model lies under the recording
+    // the model is drawn below the recording
     let ridges: Vec<Series> =
         sides.iter().rev().map(line).filter(|s| s.points.iter().any(Option::is_some)).collect();
     let targets = sides.first().map_or(&[][..], |(_, first)| &first.targets);
@@ -131,7 +133,7 @@ fn draw_ridges_over_time(sides: &[(SpectrogramSide, SpectrogramPlot)], time: Cha
     })
 }
 
-/// Both ridges over the speed of the tip.
+/// Both ridges against the speed of the tip.
 fn draw_ridges_over_speed(sides: &[(SpectrogramSide, SpectrogramPlot)]) -> Option<Panel> {
     let symbols = |(of, shown): &(SpectrogramSide, SpectrogramPlot)| {
         let (name, colour, shape, _) = of.look();

@@ -13,14 +13,14 @@ use crate::text::{
 };
 use short_spectra::{SampledRecord, SpectralAnalysis, SpectrumSettings};
 
-/// Highest shown frequency: this many times the upper end of the fit's band, and at least this, Hz. Above it
-/// a fast camera records only noise.
+/// Highest frequency shown: this multiple of the upper end of the fit's band, and at least `MIN_TOP_HZ`.
+/// Above that, a fast camera records only noise.
 const BAND_MARGIN: f64 = 10.0;
 
 const MIN_TOP_HZ: f64 = 5e3;
 
-/// The spectra in the order of the job, then the ring-down. Long windows take much memory, so each is
-/// analysed once, one after the other.
+/// The spectra in the order of the job, then the ring-down. Long windows need much memory, so they are
+/// analysed one after the other, each only once.
 pub(crate) fn figure_blocks(case: &ConditionComparison) -> Vec<FigureBlock> {
     let all = group_fit_windows(case.job, case.condition);
     let lowest = ring_down::caption::lowest_window(case, &all);
@@ -62,7 +62,7 @@ fn window_block(
     Some(case.figure_block(&file, words, draw_figure(&spectra)))
 }
 
-/// Cuts the spectra at the highest shown frequency.
+/// Cuts the spectra at the highest frequency shown.
 fn limit_frequencies(mut spectra: SpectraPlot, band: &FeatureBand) -> SpectraPlot {
     let components = spectra.components.iter().chain(&spectra.model_components).map(|c| c.frequency_hz);
     let top_hz = components.fold(MIN_TOP_HZ, f64::max).max(BAND_MARGIN * band.band_hz.1);
@@ -76,7 +76,7 @@ fn limit_frequencies(mut spectra: SpectraPlot, band: &FeatureBand) -> SpectraPlo
     spectra
 }
 
-/// The spectral analysis of a window on one side.
+/// The spectral analysis of a window in the recording or in the model.
 fn analyse_window(
     case: &ConditionComparison,
     side: &TimedRecording,
@@ -144,7 +144,7 @@ fn figure_title(spectra: &SpectraPlot, met: &[FrequencyComparison]) -> String {
     }
 }
 
-/// Clause on the number of target frequencies that the model meets, and on the largest error.
+/// Clause on the number of target frequencies that the model meets, and on its largest error.
 fn claim_sentence(met: &[FrequencyComparison]) -> String {
     let error = |met: &FrequencyComparison| met.model_hz.map(|hz| (hz / met.target.frequency_hz - 1.0).abs());
     let errors: Vec<f64> = met.iter().filter_map(error).collect();

@@ -4,15 +4,15 @@ use super::MICROMETRES;
 use crate::text::{format_trimmed, format_with_sd};
 use plain_charts::{Colour, ErrorBar, Mark, MarkerShape, Series, VerticalLine};
 
-/// A component for display: frequency and amplitude with two standard deviations, or the range of a drifting
-/// frequency.
+/// A component as it is drawn: frequency and amplitude with their standard deviations, or the range of a
+/// drifting frequency.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct LabelledComponent {
     /// Frequency, Hz.
     pub frequency_hz: f64,
     /// Standard deviation of the frequency, Hz.
     pub frequency_sd_hz: f64,
-    /// Least and greatest frequency of a drifting component, Hz.
+    /// Lowest and highest frequency of a drifting component, Hz.
     pub range_hz: Option<(f64, f64)>,
     /// Amplitude, m.
     pub amplitude_m: f64,
@@ -23,7 +23,8 @@ pub struct LabelledComponent {
 }
 
 impl LabelledComponent {
-    /// Label: the frequency with its standard deviation in units of the last digit, and the remark.
+    /// Label: the frequency with its standard deviation in units of its last digit, or the range of a
+    /// drifting frequency; then the remark.
     pub(crate) fn label_text(&self) -> String {
         let frequency = match self.range_hz {
             Some((low, high)) => format!("{} to {} Hz", format_trimmed(low, 4), format_trimmed(high, 4)),
@@ -36,7 +37,7 @@ impl LabelledComponent {
         self.remark.is_empty()
     }
 
-    /// Frequency, Hz, and amplitude, micrometres.
+    /// Frequency, Hz, and amplitude, micrometres, as drawn.
     fn axis_point(&self) -> (f64, f64) {
         (self.frequency_hz, self.amplitude_m * MICROMETRES)
     }
@@ -55,14 +56,14 @@ impl LabelledComponent {
     }
 }
 
-/// Look of the components of one source: entry in the legend, colour, shape.
+/// Appearance of the components of one source: legend entry, colour, symbol.
 type ComponentLook = (&'static str, Colour, MarkerShape);
-/// Looks without and with a remark, for a single source.
+/// Appearances of components without and with a remark, if there is only one source.
 const ALONE: [ComponentLook; 2] = [
     ("component \u{b1} 2 sd", Colour::Blue, MarkerShape::Disc),
     ("component that is not clear", Colour::Vermilion, MarkerShape::Diamond),
 ];
-/// Looks for recording and model in one panel; the model's line is vermilion.
+/// Appearances if recording and model share a panel; the model's curve is vermilion.
 const MEASURED: [ComponentLook; 2] = [
     ("measured \u{b1} 2 sd", Colour::Black, MarkerShape::Disc),
     ("measured, not clear", Colour::Black, MarkerShape::Diamond),
@@ -92,13 +93,14 @@ fn source_series(
     [(clear, true), (not_clear, false)].map(of).into_iter().filter(|s| !s.points.is_empty())
 }
 
-/// Labels above the panel with lines from their symbols; at most `most`, clear components first.
+/// Labels above the panel, with lines to their symbols; at most `most` labels, those of clear components
+/// first.
 pub(super) fn component_labels(
     components: &[LabelledComponent],
     most: usize,
 ) -> impl Iterator<Item = VerticalLine> {
     let mut order: Vec<&LabelledComponent> = components.iter().collect();
-    order.sort_by_key(|c| !c.is_clear()); // (stable: the order of the list otherwise)
+    order.sort_by_key(|c| !c.is_clear()); // (stable, so that components otherwise keep the order of the list)
     order.into_iter().take(most).map(|c| VerticalLine {
         above: Some(c.axis_point().1),
         ..VerticalLine::new(c.label_text(), Colour::Grey, Mark::Dotted, c.frequency_hz)

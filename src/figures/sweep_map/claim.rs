@@ -7,13 +7,13 @@ use crate::sweep::{PointOutcome, Study, SweepAxis, SweepMap};
 use crate::text::{capitalise, format_decimals, format_trimmed};
 use portable_math as math;
 
-/// Least absolute rank correlation of a trend.
+/// Smallest absolute rank correlation of a clear trend.
 const CLEAR: f64 = 0.5;
-/// Least fraction of points with a value for a statement on trends.
+/// Smallest fraction of points with a value for which trends are stated.
 const MOSTLY_KNOWN: f64 = 0.5;
-/// Significant digits of the larger end.
+/// Significant digits of the end that is larger in size.
 const DIGITS: i32 = 3;
-/// Powers of ten of the larger end for which both ends have the same number of decimals.
+/// Powers of ten of that end for which both ends have the same number of decimals.
 const PLAIN: std::ops::RangeInclusive<i32> = -3..=4;
 
 /// Range and trends of a map.
@@ -21,12 +21,13 @@ const PLAIN: std::ops::RangeInclusive<i32> = -3..=4;
 pub(in crate::figures) struct MapClaim {
     /// The quantity, such as "High component".
     pub name: String,
-    /// Its least and greatest value, such as "222 to 637 Hz".
+    /// Its range, such as "222 to 637 Hz".
     range: String,
-    /// "falls with preload force", and the same with symbols; empty where there is no clear trend.
+    /// All clear trends, such as "falls with preload force", in words and by symbols; empty if no trend is
+    /// clear.
     trend: String,
     short_trend: String,
-    /// The strongest trend alone, with its symbol.
+    /// The strongest trend only, by its symbol.
     strongest: String,
 }
 
@@ -54,7 +55,8 @@ impl MapClaim {
         format!("{}: {}", self.name, join_trend(&self.range, &self.trend))
     }
 
-    /// Range and trend within a number of letters: trends in words, by symbols, or only the strongest.
+    /// Range and trends in at most `letters` letters: all trends in words, all trends by symbols, only the
+    /// strongest trend, or no trend.
     pub(crate) fn fit_in_letters(&self, letters: usize) -> String {
         let ways =
             [&self.trend, &self.short_trend, &self.strongest].map(|trend| join_trend(&self.range, trend));
@@ -67,7 +69,8 @@ fn join_trend(range: &str, trend: &str) -> String {
     if trend.is_empty() { range.to_owned() } else { format!("{range}, {trend}") }
 }
 
-/// Values of map number `at` at every point, in the unit of the figure; `None` where there is none.
+/// Values at every point of the map with index `at`, in the unit of the figure; `None` at a point without a
+/// value.
 pub(in crate::figures) fn map_values(
     study: &Study,
     outcomes: &[PointOutcome],
@@ -97,7 +100,7 @@ fn value_range(map: &SweepMap, values: &[Option<f64>]) -> String {
     if low == high { format!("{low}{unit}") } else { format!("{low} to {high}{unit}") }
 }
 
-/// The clear trends, strongest first.
+/// The clear trends, the strongest first.
 fn clear_trends<'a>(study: &'a Study, values: &[Option<f64>]) -> Vec<(f64, &'a SweepAxis)> {
     let known: Vec<(usize, f64)> =
         values.iter().enumerate().filter_map(|(index, value)| Some((index, (*value)?))).collect();

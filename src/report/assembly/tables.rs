@@ -1,4 +1,4 @@
-//! Rows of the tables of a report, from a job, its recordings and its result.
+//! Rows of the tables of a report, made from a job, its recordings and its result.
 
 use crate::compare::{FittedRecording, NextPeak, ParameterLine, TargetComparison, TrueValue};
 use crate::fit::job::{FreeParameter, Job, TargetSource};
@@ -31,7 +31,7 @@ pub(super) fn recording_line(measured: &FittedRecording) -> RecordingLine {
     }
 }
 
-/// A row with what the job says of a target: its source, condition and tolerance.
+/// A row with the job's settings for a target: its source, condition and tolerance.
 fn comparison_line(job: &Job, measured: &[FittedRecording], name: &str) -> TargetComparison {
     let Some(target) = job.targets.iter().find(|target| target.feature.name == name) else {
         return TargetComparison { name: name.to_owned(), ..TargetComparison::default() };
@@ -93,7 +93,7 @@ pub(super) fn feature_lines(
     found.iter().map(feature).collect()
 }
 
-/// The parameters in job order, with the truth where one twin alone was fitted.
+/// The parameters in the order of the job, with their true values if the only recording is a twin.
 pub(super) fn parameter_lines(
     job: &Job,
     measured: &[FittedRecording],
@@ -139,7 +139,7 @@ fn parameter_line(
     line
 }
 
-/// Why a parameter is not identified.
+/// Reason why a parameter is not identified.
 fn unidentified_reason(
     free: &FreeParameter,
     verdict: ParameterVerdict,

@@ -1,5 +1,5 @@
-//! Estimates with their 95 % intervals: a panel for each parameter that at least two fits have, a row for
-//! each fit.
+//! Estimates with their 95 % intervals: one panel for each parameter that at least two fits share, with one
+//! row for each fit.
 
 use super::{ComparedFit, IntervalRelation, SharedParameter, shorten_name};
 use crate::compare::ParameterLine;
@@ -13,20 +13,21 @@ use portable_math as math;
 
 const ROW_MM: f64 = 5.5;
 const LEAST_HEIGHT_MM: f64 = 16.0;
-/// Margin of the axis beyond the farthest finite end, as a fraction of the span of the ends.
+/// Margin of the axis beyond the outermost finite ends, as a fraction of the span of the ends.
 const ROOM: f64 = 0.12;
-/// The same as a fraction of the value, if there is only one end.
+/// Margin of the axis if there is only one end, as a fraction of its value.
 const ALONE: f64 = 0.1;
-/// The axis is logarithmic above this ratio of the largest to the smallest end.
+/// Ratio of the largest to the smallest end above which the axis is logarithmic.
 const WIDE: f64 = 30.0;
 
-/// The figures, none if no parameter is shared. There are as few as fit into a column of a journal.
+/// The figures; none if no parameter is shared. The parameters are divided among as few figures as fit into a
+/// journal column.
 pub(super) fn interval_figures(entries: &[ComparedFit], parameters: &[SharedParameter]) -> Vec<FigureBlock> {
     let shared: Vec<&SharedParameter> = parameters.iter().filter(|p| !p.pairs.is_empty()).collect();
     let fits = |figures: &[Figure]| figures.iter().all(|f| f.height_mm(Medium::Column) <= MAX_HEIGHT_MM);
     let parted = |parts: usize| shared.chunks(shared.len().div_ceil(parts));
     let drawn = |parts: usize| parted(parts).map(|part| draw_figure(entries, part)).collect::<Vec<Figure>>();
-    // a single parameter may make a figure too high
+    // even a single parameter may make a figure too high
     let Some(parts) = (1..=shared.len()).find(|parts| fits(&drawn(*parts)) || *parts == shared.len()) else {
         return Vec::new();
     };
@@ -54,7 +55,7 @@ fn draw_figure(entries: &[ComparedFit], parameters: &[&SharedParameter]) -> Figu
     }
 }
 
-/// Fits to something else than a film, for the subtitle.
+/// Clause on the fits whose data are not from a film, for the subtitle.
 fn describe_sources(entries: &[ComparedFit]) -> String {
     let names = |is: fn(&&ComparedFit) -> bool| {
         entries.iter().filter(is).map(|e| shorten_name(&e.name)).collect::<Vec<_>>().join(", ")
@@ -67,14 +68,14 @@ fn describe_sources(entries: &[ComparedFit]) -> String {
     kinds.into_iter().filter_map(named).collect::<Vec<_>>().join("; ")
 }
 
-/// How many pairs of intervals can be compared, and how many of them do not overlap.
+/// Number of pairs of intervals that can be compared, and number of those that do not overlap.
 fn count_pairs(parameters: &[&SharedParameter]) -> (usize, usize) {
     let pairs = || parameters.iter().flat_map(|p| p.pairs.iter().map(|pair| pair.relation));
     let comparable = pairs().filter(|r| *r != IntervalRelation::NotComparable).count();
     (comparable, pairs().filter(|r| *r == IntervalRelation::Disjoint).count())
 }
 
-/// The claim with its number.
+/// The main result with its number.
 fn claim_sentence(parameters: &[&SharedParameter]) -> String {
     match count_pairs(parameters) {
         (0, _) => "No two of the 95 % intervals can be compared".to_owned(),
@@ -103,14 +104,14 @@ fn figure_details(parameters: &[&SharedParameter]) -> String {
     )
 }
 
-/// Style of an estimate: label, colour, mark, and whether the parameter is identified.
+/// Styles of estimates: label, colour, mark, and whether the parameter is identified.
 const LOOKS: [(&str, Colour, Mark, bool); 2] = [
     ("identified", Colour::Blue, Mark::Joined(MarkerShape::Disc), true),
     ("not identified, or a limit", Colour::Vermilion, Mark::Hollow(MarkerShape::Diamond), false),
 ];
 
 fn draw_panel(entries: &[ComparedFit], parameter: &SharedParameter) -> Panel {
-    // the first fit stands at the top, and an axis counts from the bottom
+    // the first fit is at the top, and an axis counts from the bottom
     let lines = entries.iter().zip(&parameter.lines).rev();
     let having: Vec<(&ComparedFit, &ParameterLine)> =
         lines.filter_map(|(entry, line)| Some((entry, line.as_ref()?))).collect();
@@ -121,7 +122,7 @@ fn draw_panel(entries: &[ComparedFit], parameter: &SharedParameter) -> Panel {
     let x = if log { ChartAxis::log(label) } else { ChartAxis::linear(label) };
     let series = |(label, colour, mark, identified): &(&str, Colour, Mark, bool)| -> Vec<Series> {
         let of = having.iter().enumerate().filter(|(_, (_, line))| line.is_identified() == *identified);
-        // one series for each row, because the symbols of a series are joined
+        // one series per row, since the symbols of a series are joined
         of.map(|(row, (_, line))| Series {
             label: (*label).to_owned(),
             colour: *colour,
@@ -149,13 +150,15 @@ fn draw_panel(entries: &[ComparedFit], parameter: &SharedParameter) -> Panel {
     }
 }
 
-/// The 95 % interval. An open end lies beyond the frame, which clips it without a cap.
+/// The 95 % interval as an error bar. An open end lies outside the frame, which clips it, so that it has no
+/// cap.
 fn interval_bar(line: &ParameterLine, y: f64, (log, low, high): (bool, f64, f64)) -> ErrorBar {
     let beyond = if log { (low / 10.0, high * 10.0) } else { (2.0 * low - high, 2.0 * high - low) };
     ErrorBar::Horizontal { y, from: line.lower_95.unwrap_or(beyond.0), to: line.upper_95.unwrap_or(beyond.1) }
 }
 
-/// Whether the axis is logarithmic, and its ends: a little beyond every finite end, estimate and truth.
+/// Whether the axis is logarithmic, and its ends, which lie slightly beyond every finite end, estimate and
+/// true value.
 fn axis_range(having: &[(&ComparedFit, &ParameterLine)]) -> (bool, f64, f64) {
     let ends =
         having.iter().flat_map(|(_, p)| [Some(p.estimate), p.lower_95, p.upper_95, p.truth.map(|t| t.value)]);
@@ -173,7 +176,7 @@ fn axis_range(having: &[(&ComparedFit, &ParameterLine)]) -> (bool, f64, f64) {
     (false, low - room, high + room)
 }
 
-/// An estimate with its unit and interval, for the tables next to the figure.
+/// An estimate and its interval as text, for the tables next to the figure.
 pub(super) fn estimate_text(line: &ParameterLine) -> [String; 2] {
     [format_number(line.estimate), format_interval(line.lower_95, line.upper_95, format_number)]
 }

@@ -33,13 +33,13 @@ pub(crate) fn render_page(several: &FitComparison) -> String {
     render_document(&several.title, &several.fits.iter().map(data_lead).collect::<String>(), &sections)
 }
 
-/// The banner on the data of a fit, with the name of the fit.
+/// The banner on the data of a fit, beginning with the name of the fit.
 fn data_lead(entry: &ComparedFit) -> String {
     let named = format!("role=\"note\">{}: ", isolate_name(&entry.name));
     data_banner(&entry.report).replacen("role=\"note\">", &named, 1)
 }
 
-/// The fits in a table.
+/// Table of the fits.
 fn fits_table(entries: &[ComparedFit]) -> String {
     let row = |e: &ComparedFit| -> Vec<HtmlCell> {
         let share = |met: usize, of: usize| (format!("{met} of {of}"), if met == of { Good } else { Bad });
@@ -68,7 +68,7 @@ fn fits_table(entries: &[ComparedFit]) -> String {
     render_table("The fits", column_heads(&head), entries.iter().map(row).collect())
 }
 
-/// Estimates side by side.
+/// Table of the parameters, with one column for each fit.
 fn parameters_table(several: &FitComparison) -> String {
     let cell = |line: &Option<ParameterLine>| -> HtmlCell {
         let Some(line) = line else { return ("not free".to_owned(), Words) };
@@ -109,7 +109,7 @@ fn parameters_table(several: &FitComparison) -> String {
         + &render_table("Parameters, by fit", head, several.parameters.iter().map(row).collect())
 }
 
-/// Rows of all fits, sorted by name, each with the name of its fit as condition.
+/// Rows of all fits, grouped by target; the condition of a row begins with the name of its fit.
 fn merge_comparisons(
     several: &FitComparison,
     of: impl Fn(&ComparedFit) -> &Vec<TargetComparison>,
@@ -127,7 +127,7 @@ fn merge_comparisons(
     lines
 }
 
-/// The section of every fit under its name.
+/// The section of each fit, under its name.
 fn section_per_fit(several: &FitComparison, of: impl Fn(&ComparedFit) -> String) -> String {
     let section = |entry: &ComparedFit| format!("<h3>{}</h3>\n{}", isolate_name(&entry.name), of(entry));
     several.fits.iter().map(section).collect()

@@ -1,5 +1,5 @@
-//! Spectra of several fits: those of one channel in windows with the same instants, in one panel or in one
-//! for each fit.
+//! Spectra of several fits, grouped by channel and by the instants of their windows; the spectra of a group
+//! share a panel or have a panel for each fit.
 
 use super::{ComparisonInput, shorten_name};
 use crate::compare::TargetComparison;
@@ -14,10 +14,10 @@ use short_spectra::{self as spectrum, SpectrumSettings};
 
 const MICROMETRES: f64 = 1e6;
 
-/// Subtitle if recordings of both kinds are drawn.
+/// Note in the subtitle if both synthetic and other recordings are drawn.
 const MIXED: &str = "some recordings are synthetic: no camera took those marked so";
 
-/// What the windows of a group have in common: the channel, the instants at which they begin and end, and
+/// Common properties of the windows of a group: the channel, the instants at which they begin and end, and
 /// their number within their fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct WindowKind {
@@ -26,7 +26,7 @@ struct WindowKind {
     number: usize,
 }
 
-/// The component of a fit in a group.
+/// A component of a fit, as a member of a group.
 struct SpectrumGroupMember<'a> {
     fitted: &'a ComparisonInput<'a>,
     aim: &'a FitTarget,
@@ -55,7 +55,7 @@ pub(super) fn spectra_figures(fits: &[ComparisonInput]) -> Vec<FigureBlock> {
     (1..).zip(drawn).map(block).collect()
 }
 
-/// The components of a fit; windows of the same kind are numbered.
+/// The components of a fit; those with windows of the same kind are numbered.
 fn group_members<'a>(fitted: &'a ComparisonInput<'a>) -> Vec<SpectrumGroupMember<'a>> {
     let anchor = |end: WindowEnd| if let WindowEnd::Found { anchor, .. } = end { Some(anchor) } else { None };
     let mut found: Vec<SpectrumGroupMember> = Vec::new();
@@ -82,7 +82,7 @@ fn window_spectrum(band: &FeatureBand, recording: &Recording) -> Option<Spectrum
     Some(bins.map(|(f, a)| Some((*f, a * MICROMETRES))).collect())
 }
 
-/// Amplitude, um, over frequency, Hz.
+/// Frequency, Hz, and amplitude, um.
 type SpectrumPoints = Vec<Option<(f64, f64)>>;
 
 impl<'a> SpectrumGroupMember<'a> {
@@ -98,7 +98,7 @@ impl<'a> SpectrumGroupMember<'a> {
         window_spectrum(self.band, &self.fitted.best.get(self.aim.feature.condition)?.view.recording)
     }
 
-    /// The lines of the report about the component.
+    /// Rows of the report on the component.
     fn comparisons(&self) -> impl Iterator<Item = &'a TargetComparison> {
         let (report, name) = (self.fitted.report, &self.aim.feature.name);
         report.components.iter().chain(&report.held_out).filter(move |c| c.name == *name)
@@ -121,7 +121,7 @@ impl<'a> SpectrumGroupMember<'a> {
     }
 }
 
-/// The claim with its numbers: the frequencies of the models.
+/// The main result with its numbers: the frequencies of the models.
 fn claim_sentence(group: &[&SpectrumGroupMember], channel: &str) -> String {
     let found: Vec<String> = group.iter().filter_map(|m| Some(format_digits(m.model_hz()?, 3))).collect();
     if found.is_empty() {
@@ -165,15 +165,15 @@ fn draw_figure(group: &[&SpectrumGroupMember]) -> Option<(Figure, String, String
     Some((figure, caption, details))
 }
 
-// Panels
+// Panels.
 
-/// Most fits whose spectra share a panel: with their recordings they make six lines, and more would hide each
-/// other.
+/// Maximum number of fits whose spectra share a panel: with their recordings these are six curves, and more
+/// would hide each other.
 const MOST_OVER_EACH_OTHER: usize = 3;
-/// Heights, mm: of all spectra in one panel, and of those of one fit.
+/// Heights of a panel with all spectra and of a panel with those of one fit, mm.
 const HEIGHT_MM: f64 = 70.0;
 const EACH_HEIGHT_MM: f64 = 36.0;
-/// Factors by which the axes extend beyond the bands of the components, above the highest peak and below it.
+/// Factors by which the axes extend beyond the bands of the components, above the highest peak, and below it.
 const BAND_MARGIN: f64 = 2.0;
 const OVER_PEAK: f64 = 2.0;
 const UNDER_PEAK: f64 = 2e-4;
@@ -193,7 +193,7 @@ fn draw_panels(group: &[&SpectrumGroupMember]) -> Option<Vec<Panel>> {
     Some(panels.into_iter().map(|panel| Panel { x: x.clone(), y: y.clone(), ..panel }).collect())
 }
 
-/// The common axes of all panels.
+/// The axes that all panels share.
 fn common_axes(group: &[&SpectrumGroupMember], panels: &[Panel]) -> Option<(ChartAxis, ChartAxis)> {
     let bands = || group.iter().map(|m| m.band.band_hz);
     let low = bands().fold(f64::INFINITY, |l, b| l.min(b.0)) / BAND_MARGIN;
@@ -222,7 +222,7 @@ fn target_line(member: &SpectrumGroupMember, colour: Colour) -> Option<VerticalL
     })
 }
 
-/// One fit: its model under its recording.
+/// The panel of one fit, with the curve of the model drawn under that of the recording.
 fn draw_fit_panel(member: &SpectrumGroupMember) -> Panel {
     let synthetic = member.measured_recording().is_some_and(Recording::is_synthetic);
     let what = if synthetic { "synthetic recording" } else { "recording" };
@@ -245,7 +245,7 @@ fn draw_overlay_panel(group: &[&SpectrumGroupMember]) -> Panel {
     });
     let mut rules: Vec<VerticalLine> = Vec::new();
     for rule in looking().filter_map(|(m, (colour, _))| target_line(m, colour)) {
-        // equal labels share one line
+        // targets with equal labels share one line
         if rules.iter().all(|known| known.label != rule.label) {
             rules.push(rule);
         }
@@ -258,7 +258,7 @@ fn draw_overlay_panel(group: &[&SpectrumGroupMember]) -> Panel {
     }
 }
 
-/// The measured spectra; fits with the same recording and window share one.
+/// The measured spectra; fits with the same recording and window share one curve.
 fn measured_series(group: &[&SpectrumGroupMember]) -> Vec<Series> {
     let mut drawn: Vec<(&Recording, &SpectrumGroupMember)> = Vec::new();
     for (recording, member) in group.iter().filter_map(|m| Some((m.measured_recording()?, *m))) {

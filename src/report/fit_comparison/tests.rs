@@ -34,7 +34,7 @@ fn intervals_are_apart_only_where_both_ends_are_known() {
     assert_eq!(interval_relation(&known(0.1, 0.2), &known(0.3, 0.4)), IntervalRelation::Disjoint);
     assert_eq!(interval_relation(&known(0.3, 0.4), &known(0.1, 0.2)), IntervalRelation::Disjoint);
     assert_eq!(interval_relation(&known(0.1, 0.3), &known(0.3, 0.4)), IntervalRelation::Overlap);
-    // an open end reaches beyond everything, a closed one does not
+    // an open end extends to infinity, a closed one does not
     assert_eq!(
         interval_relation(&line(Knowledge::OpenAbove, Some(0.1), None), &known(0.3, 0.4)),
         IntervalRelation::Overlap
@@ -156,7 +156,7 @@ fn parameters_of_eight_fits_are_parted_into_figures_that_fit_a_column() {
         blocks.iter().map(|block| block.file.as_str()).collect::<Vec<_>>(),
         ["parameters-1.svg", "parameters-2.svg"]
     );
-    // 28 pairs of eight fits a parameter
+    // 28 pairs of eight fits for each parameter
     let pairs: Vec<usize> = charts.iter().map(|figure| 28 * figure.panels.len()).collect();
     assert!(
         blocks.iter().zip(pairs).all(|(block, pairs)| block.caption.contains(&format!("0 of {pairs} pairs"))),

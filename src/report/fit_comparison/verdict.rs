@@ -1,4 +1,4 @@
-//! Statements of a comparison.
+//! Statements of a comparison of fits.
 
 use super::{ComparedFit, IntervalPair, IntervalRelation, SharedParameter};
 use crate::report::rich_text::{Sentence, Statement};
@@ -18,7 +18,7 @@ pub(super) fn comparison_statements(
     found
 }
 
-/// A fit in a line.
+/// Summary of a fit in one sentence.
 fn fit_sentence(entry: &ComparedFit) -> Sentence {
     let (components, parameters) = (&entry.report.components, &entry.report.parameters);
     let met = components.iter().filter(|c| c.pass).count();
@@ -34,12 +34,13 @@ fn fit_sentence(entry: &ComparedFit) -> Sentence {
     if met == components.len() { line } else { line.with_words("; missed: ").with_names(missed) }
 }
 
-/// Longest list of pairs; of more only the counts by parameter are given, as the table has them all.
+/// Maximum number of pairs that are listed; for more pairs only the counts by parameter are stated, since the
+/// table lists all pairs.
 const MOST_PAIRS: usize = 12;
 
 type SharedPair<'a> = (&'a SharedParameter, &'a IntervalPair);
 
-/// Which intervals of shared parameters overlap, and which do not.
+/// Statements on the intervals of shared parameters that overlap and those that do not.
 fn overlap_statements(parameters: &[SharedParameter]) -> Vec<Statement> {
     let pairs = || parameters.iter().flat_map(|p| p.pairs.iter().map(move |pair| (p, pair)));
     let of = |relation: IntervalRelation| {
@@ -93,7 +94,7 @@ fn overlap_statements(parameters: &[SharedParameter]) -> Vec<Statement> {
     found
 }
 
-/// Names the fits to synthetic or published data.
+/// Statements that name the fits to synthetic and to published data.
 fn source_statements(entries: &[ComparedFit]) -> Vec<Statement> {
     let of = |words: &str, is: fn(&ComparedFit) -> bool| {
         let names: Vec<&str> = entries.iter().filter(|e| is(e)).map(|e| e.name.as_str()).collect();

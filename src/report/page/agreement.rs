@@ -1,4 +1,4 @@
-//! Tables that compare targets and model.
+//! Tables that compare targets with the model.
 
 use super::html::CellStyle::{Name, Number, Prose, Words};
 use super::html::*;
@@ -29,7 +29,7 @@ pub(super) fn held_out_table(list: &[TargetComparison]) -> String {
     comparison_table("Held-out values: target against prediction", words, ["value", "condition"], list)
 }
 
-/// Values of several fits, with the name of the fit as condition.
+/// Table of the values of several fits; the condition of a row begins with the name of its fit.
 pub(in crate::report) fn fits_table(caption: &str, list: &[TargetComparison]) -> String {
     let words =
         "Relative error is model / target \u{2212} 1; what counts as met is as on the page of each fit.";
@@ -86,10 +86,10 @@ fn comparison_row(c: &TargetComparison, several: bool) -> Vec<HtmlCell> {
     cells
 }
 
-/// Remarks on a value.
+/// Remarks on the value of the model.
 fn value_remarks(c: &TargetComparison) -> String {
     let size = |value: f64| {
-        // no prefixes for Hz
+        // Hz gets no prefixes
         let (unit, factor) =
             if c.unit == "Hz" { (c.unit.clone(), 1.0) } else { text::choose_prefix(&c.unit, [value]) };
         format!("{} {unit}", format_digits(value * factor, 2)).trim_end().to_owned()
@@ -115,7 +115,7 @@ fn value_remarks(c: &TargetComparison) -> String {
     parts.into_iter().flatten().collect::<Vec<_>>().join("; ")
 }
 
-/// Decimals of a correlation.
+/// Number of decimals of a correlation.
 const DECIMALS: usize = 2;
 
 pub(super) fn misfit_html(misfit: Option<&TraceMisfit>) -> String {

@@ -7,7 +7,7 @@ use crate::text::{capitalise, make_printable};
 use html_escape::encode_safe;
 use plain_charts::Medium;
 
-/// Any text escaped for HTML.
+/// A text, escaped for HTML.
 pub(in crate::report) fn escape_text(raw: &str) -> String {
     encode_safe(&make_printable(raw)).into_owned()
 }
@@ -17,17 +17,17 @@ pub(in crate::report) fn isolate_name(raw: &str) -> String {
     format!("<bdi>{}</bdi>", escape_text(raw))
 }
 
-/// A key such as `friction.b_s_per_m`, which may break at its dots and underscores.
+/// A key such as `friction.b_s_per_m`, in which lines may break at dots and underscores.
 pub(in crate::report) fn breakable_key(raw: &str) -> String {
     format!("<code>{}</code>", escape_text(raw).replace('_', "_<wbr>").replace('.', ".<wbr>"))
 }
 
-/// Keys with commas between them.
+/// Keys, separated by commas.
 pub(in crate::report) fn keys_html(keys: &[impl AsRef<str>]) -> String {
     keys.iter().map(|key| breakable_key(key.as_ref())).collect::<Vec<_>>().join(", ")
 }
 
-/// The meaning of a number, with the keys of the scene that it comes from in small print.
+/// The meaning of a number, with the related keys of the scene in small print.
 pub(in crate::report) fn words_with_keys(words: &str, keys: &[&str]) -> String {
     let words = escape_text(&capitalise(words));
     if keys.is_empty() {
@@ -36,17 +36,17 @@ pub(in crate::report) fn words_with_keys(words: &str, keys: &[&str]) -> String {
     format!("{words}<small class=\"key\">{}</small>", keys_html(keys))
 }
 
-/// The meaning and key of a parameter; the key alone if no scene has it.
+/// The meaning and key of a parameter; the key alone if no scene has this parameter.
 pub(in crate::report) fn parameter_html(name: &str) -> String {
     parameters::find_parameter(name)
         .map_or_else(|| breakable_key(name), |row| words_with_keys(row.meaning, &[row.name]))
 }
 
-/// Prose whose names between backticks are isolated.
+/// Prose in which the names between backticks are isolated.
 pub(in crate::report) fn prose_html(raw: &str) -> String {
     let parts: Vec<&str> = raw.split('`').collect();
     if parts.len().is_multiple_of(2) {
-        // unpaired backticks mark no names
+        // unpaired backticks do not mark names
         return format!("<span dir=\"auto\">{}</span>", escape_text(raw));
     }
     let html = |(i, part): (usize, &&str)| match i % 2 {
@@ -56,7 +56,7 @@ pub(in crate::report) fn prose_html(raw: &str) -> String {
     parts.iter().enumerate().map(html).collect()
 }
 
-/// A sentence with its names isolated.
+/// A sentence in which the names are isolated.
 pub(in crate::report) fn sentence_html(sentence: &Sentence) -> String {
     let piece = |piece: &SentencePart| match piece {
         SentencePart::Words(words) => prose_html(words),
@@ -86,9 +86,10 @@ pub(in crate::report) type HtmlCell = (String, CellStyle);
 pub(in crate::report) enum CellStyle {
     /// Text, aligned at its start.
     Words,
-    /// Longer text, which may fill a wide column.
+    /// Longer text, which may occupy a wide column.
     Prose,
-    /// A name of any length that a user chose; it is broken rather than push the numbers off the page.
+    /// A name of any length, chosen by the user; it is broken so that it does not push the numbers off the
+    /// page.
     Name,
     /// A number, aligned at the right.
     Number,
@@ -109,12 +110,12 @@ impl CellStyle {
     }
 }
 
-/// A cell with the word for good or bad in its colour.
+/// A cell with the word for good or for bad, in the respective colour.
 pub(in crate::report) fn verdict_cell(good: bool, words: [&str; 2]) -> HtmlCell {
     if good { (escape_text(words[0]), CellStyle::Good) } else { (escape_text(words[1]), CellStyle::Bad) }
 }
 
-/// Heads of columns in the program's own words: columns of one style in a group, with `|` between them.
+/// Heads of columns, in the program's own words: the heads of each style, separated by `|`.
 pub(in crate::report) fn column_heads(groups: &[(CellStyle, &str)]) -> Vec<HtmlCell> {
     groups
         .iter()
@@ -122,8 +123,8 @@ pub(in crate::report) fn column_heads(groups: &[(CellStyle, &str)]) -> Vec<HtmlC
         .collect()
 }
 
-/// A table in a box that scrolls by itself where it is wider than the page; nothing when it has no rows. The
-/// first cell of a row is its head.
+/// A table in a box that scrolls if the table is wider than the page; empty if it has no rows. The first cell
+/// of a row is the head of the row.
 pub(in crate::report) fn render_table(
     caption: &str,
     head: Vec<HtmlCell>,
@@ -132,7 +133,7 @@ pub(in crate::report) fn render_table(
     if rows.is_empty() {
         return String::new();
     }
-    // on a narrow screen every row is a list, in which each cell names its column
+    // on a narrow screen each row becomes a list in which each cell shows the name of its column
     let cell = |(i, ((html, style), (of, _))): (usize, (&HtmlCell, &HtmlCell))| match i {
         0 => format!("<th role=\"rowheader\" scope=\"row\" class=\"{}\">{html}</th>", style.css_class()),
         _ if html.is_empty() => "<td role=\"cell\" class=\"none\"></td>".to_owned(),
@@ -155,29 +156,30 @@ pub(in crate::report) fn render_table(
     )
 }
 
-/// Named values as a list; nothing for none.
+/// Named values as a list; empty if there are none.
 pub(in crate::report) fn facts_list(list: &[(String, String)]) -> String {
     let items: String = list.iter().map(|(name, html)| format!("<dt>{name}</dt><dd>{html}</dd>\n")).collect();
     if list.is_empty() { items } else { format!("<dl>\n{items}</dl>\n") }
 }
 
-/// Sentences as a list; nothing for none.
+/// Sentences as a list; empty if there are none.
 pub(in crate::report) fn sentence_list(sentences: &[String]) -> String {
     items_html(sentences.iter().map(|sentence| prose_html(sentence)))
 }
 
-/// A list; nothing for none.
+/// A list of items; empty if there are none.
 pub(in crate::report) fn items_html(items: impl Iterator<Item = String>) -> String {
     let items: String = items.map(|html| format!("<li>{html}</li>\n")).collect();
     if items.is_empty() { items } else { format!("<ul>\n{items}</ul>\n") }
 }
 
-/// A paragraph that says how to read what follows.
+/// A paragraph on how to read the part that follows.
 pub(in crate::report) fn reading_hint(words: &str) -> String {
     format!("<p class=\"about\">{}</p>\n", escape_text(words))
 }
 
-/// Figures with their captions, numbered from `before` + 1; with `narrow` also in a version for telephones.
+/// Figures with their captions, numbered from `before` + 1; if `narrow`, each also in a version for
+/// telephones.
 pub(in crate::report) fn figures_html<'a>(
     blocks: impl IntoIterator<Item = &'a FigureBlock>,
     before: usize,
@@ -197,7 +199,7 @@ pub(in crate::report) fn figures_html<'a>(
     blocks.into_iter().enumerate().map(one).collect()
 }
 
-/// A figure for wide screens, and with `narrow` also for narrow ones, unless it is animated.
+/// A figure for wide screens and, if `narrow`, also for narrow ones, unless the figure is animated.
 fn responsive_figure(block: &FigureBlock, narrow: bool) -> String {
     let wide = block.drawing.on_screen();
     match &block.drawing {
@@ -209,7 +211,7 @@ fn responsive_figure(block: &FigureBlock, narrow: bool) -> String {
     }
 }
 
-/// The details of a figure, folded, a paragraph for each line; nothing if there are none.
+/// The details of a figure, folded, with one paragraph per line; empty if there are none.
 fn details_html(text: &str) -> String {
     let paragraph = |words: &str| format!("<p>{}</p>\n", prose_html(words));
     let told: String = text.lines().filter(|line| !line.is_empty()).map(paragraph).collect();
@@ -224,7 +226,7 @@ pub(in crate::report) struct PageSection {
     pub id: &'static str,
     pub heading: &'static str,
     pub html: String,
-    /// Whether its contents are folded at first.
+    /// Whether the contents of the section are folded at first.
     pub folded: bool,
 }
 
@@ -236,7 +238,7 @@ impl PageSection {
             format!("<section id=\"{id}\" aria-labelledby=\"{id}-heading\">\n{inside}</section>")
         };
         if *folded {
-            // (a link to what is folded unfolds it)
+            // (a link to folded contents unfolds them)
             return format!("<details><summary>{heading}</summary>\n{}</details>\n", section(html));
         }
         section(&format!("{heading}\n{html}")) + "\n"

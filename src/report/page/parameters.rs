@@ -89,7 +89,7 @@ fn intervals_table(list: &[ParameterLine], twins: usize) -> String {
         + &reading_hint(words)
 }
 
-/// `friction.c friction.a^0.31` with its exponents raised.
+/// A product such as `friction.c friction.a^0.31`, with its exponents as superscripts.
 fn product_html(words: &str) -> String {
     let factor = |factor: &str| match factor.split_once('^') {
         Some((of, exponent)) => {
@@ -122,7 +122,7 @@ pub(super) fn search_html(report: &Report) -> String {
     let s = &report.search;
     let Some(status) = s.status else { return String::new() };
     let determined = format!("{} of {}", s.rank, report.parameters.len());
-    // a fit to traces has iterates and starts in place of evaluations and a gate
+    // a fit to traces has iterates and starts instead of evaluations and a gate
     if report.misfit.is_some() {
         return search_facts(&[
             ("status", status.name().to_owned()),

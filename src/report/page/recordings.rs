@@ -1,4 +1,4 @@
-//! Quality of each recording, with the findings of `wiperlab inspect`.
+//! Section on the quality of each recording, with the findings of `wiperlab inspect`.
 
 use super::html::CellStyle::{Bad, Number, Prose, Words};
 use super::html::*;
@@ -10,12 +10,12 @@ pub(super) fn recordings_html(list: &[RecordingLine]) -> String {
     list.iter().map(recording_html).collect()
 }
 
-/// "1 frame", "22 frames".
+/// A count with its noun: "1 frame", "22 frames".
 fn count_noun(count: usize, noun: &str) -> String {
     format!("{count} {}", pluralise(noun, count))
 }
 
-/// Replaces the ASCII `um` of terminal text by micrometres.
+/// Replaces the ASCII `um` of terminal text with the symbol for micrometres.
 fn typeset_text(said: &str) -> String {
     said.replace(" um", " \u{b5}m")
 }
@@ -61,7 +61,7 @@ fn recording_html(r: &RecordingLine) -> String {
     )
 }
 
-/// A count without decimals, any other number with four digits.
+/// A count without decimals; any other number with four digits.
 fn format_count_or_number(value: f64) -> String {
     const MOST: f64 = 1e6;
     if value.fract() == 0.0 && value.abs() < MOST { format!("{value:.0}") } else { format_number(value) }

@@ -39,7 +39,7 @@ pub(in crate::report) fn recording(name: &str, synthetic: bool) -> RecordingLine
     }
 }
 
-/// A page without its own script, which is the last thing in it.
+/// A page without its script, which is its last element.
 fn without_script(html: &str) -> &str {
     let (before, script) = html.rsplit_once("<script>").unwrap();
     for foreign in
@@ -50,7 +50,7 @@ fn without_script(html: &str) -> &str {
     before
 }
 
-/// A report in which every text is this one.
+/// A report in which every text is `t`.
 fn everywhere(t: &str) -> Report {
     let own = || t.to_owned();
     let comparison = || TargetComparison {
@@ -240,7 +240,7 @@ fn hard_events_that_did_not_happen_are_said_to_be_none() {
     }
 }
 
-/// Opening tags of headings in order, as their level.
+/// Levels of the headings, in order.
 fn headings(html: &str) -> Vec<u8> {
     html.match_indices("<h")
         .filter_map(|(at, _)| html.as_bytes().get(at + 2).filter(|b| b.is_ascii_digit()).map(|b| b - b'0'))

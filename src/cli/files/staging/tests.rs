@@ -4,7 +4,7 @@ use crate::cli::files::marker::{OutputCommand, Overwrite};
 use std::time::SystemTime;
 use tempfile::TempDir;
 
-/// Files with their names as contents, unless another text is given.
+/// Writes files whose contents are their names.
 fn placed(folder: &Path, names: &[&str]) -> Outcome<()> {
     let files: Vec<(&str, &str)> = names.iter().map(|name| (*name, *name)).collect();
     staged(folder, OutputCommand::Spectrum, &files)?.commit()
@@ -32,7 +32,7 @@ fn text(folder: &Path, name: &str) -> String {
     fs::read_to_string(folder.join(name)).unwrap()
 }
 
-/// As a program that is killed after it renamed `renamed` of its files leaves the folder.
+/// Leaves the folder as a program does that is killed after it has renamed `renamed` of its files.
 fn killed(staging: OutputStaging, renamed: usize) {
     let (guard, writer) = staging.guard.as_ref().unwrap();
     MarkerUpdate::new(&staging.folder, guard, writer, &staging.files).unwrap().write_pending().unwrap();
@@ -81,7 +81,7 @@ fn a_loss_of_power_leaves_every_file_old_or_new_and_a_torn_marker_proves_nothing
     let folder = TempDir::new().unwrap();
     let at = folder.path();
     staged(at, OutputCommand::Sweep, &OLD).unwrap().commit().unwrap();
-    // before any name was given: whatever became of the temporary files, none of them is an output
+    // before any renaming: whatever became of the temporary files, none of them is an output
     let staging = staged(at, OutputCommand::Sweep, &NEW).unwrap();
     for (i, staged) in staging.files.iter().enumerate() {
         let file = File::options().write(true).open(staged.file.path()).unwrap();
@@ -93,7 +93,8 @@ fn a_loss_of_power_leaves_every_file_old_or_new_and_a_torn_marker_proves_nothing
     );
     drop(staging);
     assert_eq!(names(at), [MARKER_FILE, "a", "b", "gone"]);
-    // the marker itself is replaced whole, but even torn or zeroed it only makes the program ask
+    // the marker itself is replaced as a whole; but even if it is torn or zeroed, the program only asks for
+    // `--force`
     let whole = fs::read(at.join(MARKER_FILE)).unwrap();
     for torn in [&whole[..whole.len() / 2], &vec![0; whole.len()], b""] {
         fs::write(at.join(MARKER_FILE), torn).unwrap();
@@ -105,7 +106,7 @@ fn a_loss_of_power_leaves_every_file_old_or_new_and_a_torn_marker_proves_nothing
         );
     }
     fs::write(at.join(MARKER_FILE), &whole).unwrap();
-    // an output that lost its last block after it had got its name is found out
+    // an output whose last block was lost after the renaming is detected
     fs::write(at.join("a"), "old").unwrap();
     assert!(staged(at, OutputCommand::Sweep, &NEW).unwrap().commit().is_err());
 }
