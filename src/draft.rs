@@ -1,9 +1,9 @@
-//! Writes a first scene and a first job for a recording. Comments in the files give the findings in the
-//! recording, the reason of each number, and the numbers that only the user knows.
+//! Writes a first scene and a first job for a recording. Comments in these files list the findings in the
+//! recording, the reason for each number, and the numbers that only the user knows.
 //!
-//! The blade is that of the bundled example. Parameters that a fit can find in any recording (friction,
-//! stiffness, damping) are free within wide bounds; those that have to be measured on the blade (lengths,
-//! masses, preload) are marked.
+//! The blade is that of the bundled example. Parameters that a fit can determine from any recording
+//! (friction, stiffness, damping) are free within wide bounds; those that must be measured on the blade
+//! (lengths, masses, preload) are marked.
 
 mod findings;
 mod job;
@@ -17,7 +17,7 @@ pub(crate) use scene::{FittedScene, YOURS_MARK, write_fitted_scene, write_scene,
 use serde::Serialize;
 pub(crate) use stroke::KnownStroke;
 
-/// Widest line of a comment, characters.
+/// Maximum width of a comment line, characters.
 const WIDTH: usize = 100;
 
 /// Builder of a TOML file with comments.
@@ -36,7 +36,7 @@ impl CommentedToml {
         all.into_iter().fold(self, |text, words| text.add_comment(words.as_ref()))
     }
 
-    /// Adds a line as it is.
+    /// Adds a line without its trailing blanks.
     pub(super) fn add_line(mut self, line: &str) -> Self {
         self.0.push_str(line.trim_end());
         self.0.push('\n');
@@ -47,30 +47,30 @@ impl CommentedToml {
         self.add_line("")
     }
 
-    /// Adds an empty line and the head of a table.
+    /// Adds an empty line and the header of a table.
     pub(super) fn add_table(self, name: &str) -> Self {
         self.add_empty_line().add_line(&format!("[{name}]"))
     }
 
-    /// Adds a key with a text.
+    /// Adds a key with a string.
     pub(super) fn add_text(self, key: &str, value: &str) -> Self {
         let value = toml::Value::String(value.to_owned());
         self.add_line(&format!("{key} = {value}"))
     }
 
-    /// Adds a key with the shortest decimal number that reads back as the same.
+    /// Adds a key with a number, written as the shortest decimal that is read back unchanged.
     pub(super) fn add_number(self, key: &str, value: f64) -> Self {
         self.add_line(&format!("{key} = {value:?}"))
     }
 
-    /// Adds a line per key and number.
+    /// Adds one line for each key with its number.
     pub(super) fn add_numbers(self, rows: &[(&str, f64)]) -> Self {
         rows.iter().fold(self, |text, (key, value)| text.add_number(key, *value))
     }
 
     /// Adds a key with a word or a list of words.
     pub(super) fn add_word(self, key: &str, value: impl Serialize) -> Self {
-        // words and lists of them cannot fail
+        // converting words and lists of words cannot fail
         let value = toml::Value::try_from(value).unwrap_or_else(|_| toml::Value::Array(Vec::new()));
         self.add_line(&format!("{key} = {value}"))
     }
@@ -80,45 +80,46 @@ impl CommentedToml {
     }
 }
 
-/// How a first job treats a number of the blade.
+/// Role of a parameter of the blade in a first job.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum ParameterRole {
-    /// Measured on the blade by the user: freed with this relative standard deviation, or held where there is
-    /// none.
+    /// Measured on the blade by the user: free with this relative standard deviation, held constant without
+    /// one.
     Yours(Option<f64>),
-    /// Poorly known before a fit: freed with this relative standard deviation around the example's value.
+    /// Poorly known before a fit: free with this relative standard deviation around the value of the example.
     Guessed(f64),
     /// Fitted between two bounds.
     Fitted([f64; 2]),
-    /// Fitted between two bounds in units of the inverse of the greatest head speed.
+    /// Fitted between two bounds in units of the reciprocal of the maximum head speed.
     FittedOverSpeed([f64; 2]),
 }
 
 // Bounds are about a decade wide. With wider ones, searches that start far from the middle fail.
 
-/// Bounds of the decaying part of the friction coefficient: rubber on wet glass at rest.
+/// Bounds of the part of the friction coefficient that decays with speed, for rubber on wet glass.
 const FALLING: [f64; 2] = [0.03, 0.6];
 /// Bounds of the friction coefficient at high speed.
 const STAYING: [f64; 2] = [0.1, 0.8];
-/// Bounds of the decay rate of the friction: over an eighth of the greatest speed to five times that speed.
-/// Outside of them the friction looks constant.
+/// Bounds of the decay rate of the friction, in units of the reciprocal of the maximum head speed. Between
+/// them, the friction decays over an eighth of that speed to five times that speed; outside them it looks
+/// constant.
 const DECAY: [f64; 2] = [0.2, 8.0];
-/// Bounds around the 195 Hz of the paper's blade.
+/// Bounds of the natural frequency of the neck, Hz, around the 195 Hz of the blade in the paper.
 const NECK_HZ: [f64; 2] = [60.0, 600.0];
 /// Bounds of the stiffness ratio: from a negligible shoulder to a nearly rigid one.
 const SHOULDER: [f64; 2] = [4.0, 60.0];
-/// A part that was weighed or computed from its cross section.
+/// Mass or inertia of a part, weighed or computed from its cross section.
 const WEIGHED: ParameterRole = ParameterRole::Yours(Some(0.05));
-/// Read from a scale below the blade.
+/// Preload, read from a scale below the blade.
 const PRELOAD: ParameterRole = ParameterRole::Yours(Some(0.05));
-/// Measured on a picture of the cross section; a fit holds lengths.
+/// Length, measured on a picture of the cross section; a fit holds it constant.
 const MEASURED: ParameterRole = ParameterRole::Yours(None);
-/// A natural frequency or an angle of a blade of the same kind.
+/// Natural frequency or angle, known from a blade of the same kind.
 const SIMILAR: ParameterRole = ParameterRole::Guessed(0.2);
-/// The largest deviation of a freed constant: damping ratios of rubbers differ by factors.
+/// Damping ratio, with the largest standard deviation that a job allows: those of rubbers differ by factors.
 const UNKNOWN: ParameterRole = ParameterRole::Guessed(0.5);
 
-/// The parameters of the example's blade, shoulder and friction in the form of a draft.
+/// Parameters of the blade, the shoulder and the friction in the order of a draft, with their roles.
 pub(crate) const PARAMETER_PLAN: [(&str, ParameterRole); 21] = [
     ("blade.head_mass_kg", WEIGHED),
     ("blade.neck_mass_kg", WEIGHED),
@@ -143,7 +144,7 @@ pub(crate) const PARAMETER_PLAN: [(&str, ParameterRole); 21] = [
     ("friction.c", ParameterRole::Fitted(STAYING)),
 ];
 
-/// The parameters of a blade with or without a shoulder.
+/// Parameters of a blade with or without a shoulder, with their roles.
 pub(super) fn plan_parameters(shoulder: bool) -> impl Iterator<Item = (&'static str, ParameterRole)> {
     PARAMETER_PLAN.into_iter().filter(move |(name, _)| shoulder || !name.starts_with("shoulder."))
 }

@@ -1,8 +1,9 @@
 //! Reads the exports of tracking programs into a [`Recording`](crate::recording::Recording) with a report.
-//! Rate, scale and direction of y have no defaults: what the file does not say the user has to.
+//! Frame rate, scale and direction of y have no defaults: the user must give those that the file does not
+//! contain.
 //!
-//! Coordinates keep the file's origin. They are only scaled and, where y points down, mirrored (`y` becomes
-//! `-y`). A new format is one file with one `FileFormat` and one row in `FORMATS`.
+//! Coordinates keep the origin of the file. They are only scaled and, if y points down, mirrored (`y` becomes
+//! `-y`). A new format needs one file with one `FileFormat`, and one row in `FORMATS`.
 
 mod assemble;
 mod error;
@@ -23,14 +24,14 @@ pub(crate) use reader::companion::companion_names;
 use reader::encoding::DecodedText;
 use reader::{Document, encoding};
 
-/// Imports one recording from one or more files that share its frame grid.
+/// Imports one recording from one or more files with the same frame grid.
 ///
 /// # Errors
 /// [`ImportError`] with the place, what was found, what was expected and what to do.
 pub fn import(sources: &[ImportSource], options: &ImportOptions) -> Result<Import, ImportError> {
     options::check_options(options)?;
     check_file_names(sources)?;
-    // (in parallel, because hashing takes a third of the time of reading)
+    // (in parallel, because hashing takes a third as long as reading)
     let (hashes, imported) = rayon::join(|| hash_sources(sources), || read_exports(sources, options));
     let mut imported = imported?;
     imported.file.source =

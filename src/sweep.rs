@@ -1,9 +1,9 @@
-//! A parameter study: a scene is run at every point of a grid or a sample, and readings are taken of each
-//! run.
+//! A parameter study: a scene is simulated at every point of a grid or a sample, and readings are taken from
+//! each run.
 //!
 //! A point whose run ends early or lacks a reading has a reason instead of a value ([`MissingReason`]);
-//! nothing is filled in. Points are independent of each other, so the numbers do not depend on the number
-//! of threads, and a study resumes from a [`journal`] of finished points.
+//! missing values are not filled in. Points are independent of each other, so the numbers do not depend on
+//! the number of threads, and a study resumes from a [`journal`] of finished points.
 
 pub mod collect;
 pub mod grid;
@@ -28,30 +28,31 @@ use rayon::prelude::*;
 use std::ops::ControlFlow;
 use std::sync::mpsc::{Receiver, sync_channel};
 
-/// Most points that wait for the disk, so that a slow disk does not fill the memory.
+/// Maximum number of points that wait for the disk, so that a slow disk does not fill the memory.
 const WAITING: usize = 4096;
 
-/// Why a study stopped.
+/// Reason why a study stopped.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SweepError {
     /// The journal cannot be written.
     #[error("the journal cannot be written: {problem}")]
     JournalWrite {
-        /// Why.
+        /// Reason why it cannot be written.
         problem: String,
     },
-    /// The caller asked for the end; the journal holds the finished points.
+    /// The caller asked the study to stop; the journal contains the finished points.
     #[error("the study was asked to stop")]
     Interrupted,
 }
 
-/// Runs the points of a shard for which `due` holds, in parallel.
+/// Runs the points of a shard for which `due` returns true, in parallel.
 ///
-/// `flow` is asked before each point. Finished points go to `sink` in any order; `done` is called after each
-/// write. No outcome stays in memory: a [`PointCollection`] reads them from the [`journal`].
+/// `flow` is called before each point and may stop the study. Finished points go to `sink` in any order; once
+/// they are written, `done` is called for each of them. No outcome stays in memory: a [`PointCollection`]
+/// reads the outcomes from the [`journal`].
 ///
 /// # Errors
-/// [`SweepError`] when the journal cannot be written, or when `flow` breaks before the last point.
+/// [`SweepError`] if the journal cannot be written, or if `flow` breaks before the last point.
 pub fn run_sweep(
     study: &Study,
     scene: &Scene,
@@ -92,7 +93,7 @@ pub fn run_all_points(study: &Study, scene: &Scene) -> Vec<PointOutcome> {
         .collect()
 }
 
-/// Writes lines as they arrive; lines that arrived during a write share the next one.
+/// Writes lines as they arrive; lines that arrive during a write are written together in the next one.
 fn write_lines(
     lines: &Receiver<String>,
     sink: &mut dyn CheckpointSink,

@@ -1,7 +1,7 @@
 //! The checksum at the end of a line, and the fingerprint of a problem.
 //!
-//! A line is a JSON object with the last key `sha256`: the first digits of the SHA-256 of the bytes before
-//! the comma of that key. `sha256sum` verifies it.
+//! A line is a JSON object whose last key is `sha256`. Its value is the first digits of the SHA-256 of all
+//! bytes before the comma that precedes this key, so that `sha256sum` can verify a line.
 
 use serde::Serialize;
 use serde_json::Value;
@@ -9,10 +9,11 @@ use sha2::{Digest, Sha256};
 
 const CHECKSUM_KEY: &str = ",\"sha256\":\"";
 const LINE_END: &str = "\"}";
-/// Hexadecimal digits of the checksum: 64 bits miss one accidental change in 2e19.
+/// Number of hexadecimal digits of the checksum. With these 64 bits, one accidental change in 2e19 goes
+/// unnoticed.
 const CHECKSUM_DIGITS: usize = 16;
 
-/// Appends the checksum to a JSON object, which then is a line of a journal.
+/// Appends the checksum to a JSON object, which makes it a line of a journal.
 #[must_use]
 pub fn append_checksum(object: &str) -> String {
     let content = object.strip_suffix('}').unwrap_or(object);
@@ -22,7 +23,7 @@ pub fn append_checksum(object: &str) -> String {
 /// Result of the check of a line.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum LineChecksum {
-    /// The checksum is right; the object without it.
+    /// The checksum is right; the value is the object without it.
     Valid(Vec<u8>),
     /// The checksum in the line differs from the computed one.
     Broken { found: String, computed: String },
@@ -52,11 +53,11 @@ fn hex_checksum(content: &[u8]) -> String {
     Sha256::digest(content).iter().take(CHECKSUM_DIGITS / 2).map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// SHA-256 of the canonical JSON of a problem, in hexadecimal: sorted keys, numbers as the shortest
-/// decimals that keep every bit. Equal values have equal fingerprints, independent of the layout of their
-/// files.
+/// SHA-256, in hexadecimal, of the canonical JSON of a problem, which has sorted keys and writes each number
+/// as the shortest decimal that keeps every bit. Equal values have equal fingerprints, whatever the layout of
+/// their files.
 pub(crate) fn fingerprint(problem: &impl Serialize) -> String {
-    // finite numbers and string keys cannot fail to serialize
+    // serializing finite numbers and string keys cannot fail
     let value = serde_json::to_value(problem).unwrap_or_default();
     let mut text = String::new();
     write_canonical(&value, &mut text);
@@ -96,7 +97,7 @@ mod tests {
     #[test]
     fn every_changed_byte_of_a_line_is_found() {
         let line = append_checksum("{\"index\":3,\"values\":[\"0.25\"]}");
-        // printf '%s' '{"index":3,"values":["0.25"]' | sha256sum
+        // checksum from `printf '%s' '{"index":3,"values":["0.25"]' | sha256sum`
         assert_eq!(line, "{\"index\":3,\"values\":[\"0.25\"],\"sha256\":\"3e7e4b4d0d5fce91\"}");
         assert_eq!(
             LineChecksum::check(line.as_bytes()),

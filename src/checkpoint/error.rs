@@ -1,32 +1,32 @@
-//! Why a journal is refused.
+//! Errors in journals.
 
 use super::header::{CheckpointKind, LAYOUT};
 
-/// Why a journal was refused.
+/// Reason for refusing a journal.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CheckpointError {
-    /// The file has another layout.
+    /// The journal has another version of the layout.
     #[error(
         "{file}: a journal of layout {found}, expected layout {LAYOUT}; move it away and run the {kind} again"
     )]
     Layout {
         /// File as named by the user.
         file: String,
-        /// Kind of its computation.
+        /// Kind of computation that the journal records.
         kind: CheckpointKind,
-        /// Layout of the file.
+        /// Version of the layout in the file.
         found: u32,
     },
-    /// The journal is of another kind of computation.
+    /// The journal records another kind of computation.
     #[error(
         "{file}: the journal of a {found}, expected that of a {expected}; choose the right file or folder"
     )]
     OtherKind {
         /// File as named by the user.
         file: String,
-        /// Kind of its computation.
+        /// Kind of computation that the journal records.
         found: CheckpointKind,
-        /// Expected kind.
+        /// Expected kind of computation.
         expected: CheckpointKind,
     },
     /// Another version of the program wrote the journal.
@@ -36,7 +36,7 @@ pub enum CheckpointError {
     OtherVersion {
         /// File as named by the user.
         file: String,
-        /// Version in its header.
+        /// Program version in the header of the journal.
         found: String,
         /// Version of this program.
         expected: String,
@@ -49,9 +49,9 @@ pub enum CheckpointError {
     OtherProblem {
         /// File as named by the user.
         file: String,
-        /// Kind of its computation.
+        /// Kind of computation that the journal records.
         kind: CheckpointKind,
-        /// Fingerprint in its header.
+        /// Fingerprint in the header of the journal.
         found: String,
         /// Fingerprint of this problem.
         expected: String,
@@ -61,7 +61,7 @@ pub enum CheckpointError {
     Unreadable {
         /// File as named by the user.
         file: String,
-        /// Reason.
+        /// Reason why it cannot be read.
         problem: String,
     },
     /// The first line is not a valid header.
@@ -82,9 +82,9 @@ pub enum CheckpointError {
     Line {
         /// File as named by the user.
         file: String,
-        /// 1-based line.
+        /// Line number, counted from 1.
         line: usize,
-        /// Kind of its computation.
+        /// Kind of computation that the journal records.
         kind: CheckpointKind,
         /// What was found and what was expected.
         problem: String,
@@ -97,31 +97,31 @@ pub enum CheckpointError {
     Recomputed {
         /// File as named by the user.
         file: String,
-        /// 1-based line.
+        /// Line number, counted from 1.
         line: usize,
-        /// Kind of its computation.
+        /// Kind of computation that the journal records.
         kind: CheckpointKind,
-        /// Value in the line.
+        /// Outcome in the line.
         found: String,
-        /// Recomputed value.
+        /// Recomputed outcome.
         computed: String,
     },
-    /// Two journals disagree about one record.
+    /// Two journals contain different outcomes of the same point.
     #[error(
         "{file}:{line}: {found}, but {other_file}:{other_line} has {expected} at the same point; either was edited, or the machines that wrote them do not calculate alike to the last digit (another processor, system or build): move one of them away"
     )]
     Conflict {
         /// File as named by the user.
         file: String,
-        /// 1-based line in that file.
+        /// Line number in that file, counted from 1.
         line: usize,
-        /// Its value there.
+        /// Outcome in that line.
         found: String,
-        /// The file that was read before.
+        /// Journal that was read earlier, as named by the user.
         other_file: String,
-        /// 1-based line in that file.
+        /// Line number in that file, counted from 1.
         other_line: usize,
-        /// Its value there.
+        /// Outcome in that line.
         expected: String,
     },
 }

@@ -9,7 +9,7 @@ use std::fmt;
 /// Version of the layout of journals.
 pub(super) const LAYOUT: u32 = 3;
 
-/// Kind of the computation of a journal.
+/// Kind of computation that a journal records.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CheckpointKind {
@@ -22,7 +22,7 @@ pub enum CheckpointKind {
 }
 
 impl CheckpointKind {
-    /// Words of messages: the computation, a record, and the input file.
+    /// Words for messages: the computation, one of its records, and its input file.
     fn words(self) -> [&'static str; 3] {
         match self {
             Self::Fit => ["fit", "evaluation", "job"],
@@ -48,7 +48,7 @@ impl fmt::Display for CheckpointKind {
     }
 }
 
-/// First line of a journal; `B` is the part that depends on its kind.
+/// First line of a journal; `B` is the part that differs between the kinds of journals.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CheckpointHeader<B> {
@@ -56,21 +56,20 @@ pub struct CheckpointHeader<B> {
     pub journal: CheckpointKind,
     /// Version of the journal's layout.
     pub layout: u32,
-    /// Fingerprint of problem, data and program, from `checksum`.
+    /// Fingerprint of the problem, its data and the program, from `checksum`.
     pub fingerprint: String,
     /// Version of the program.
     pub version: String,
-    /// What a reader needs to interpret the records.
+    /// Data that a reader needs to interpret the records.
     pub body: B,
 }
 
 impl<B> CheckpointHeader<B> {
-    /// Checks that the header has the problem, data and program of `expected`.
+    /// Checks that the header belongs to the same problem, data and program as `expected`.
     ///
     /// # Errors
     /// [`CheckpointError::OtherVersion`], [`CheckpointError::OtherProblem`], or [`CheckpointError::Header`]
-    /// for an
-    /// edited header.
+    /// for a header that was edited.
     pub(crate) fn check_matches<R: CheckpointRecord<Body = B>>(
         &self,
         file: &str,
@@ -90,14 +89,14 @@ impl<B> CheckpointHeader<B> {
     }
 }
 
-/// Fields of a header in every layout.
+/// Fields that a header has in every version of the layout.
 #[derive(Debug, Deserialize)]
 pub(super) struct HeaderPrefix {
     pub journal: CheckpointKind,
     pub layout: u32,
 }
 
-/// Kind of a journal by its first line; `None` for a file that has no whole line or is no journal.
+/// Kind of a journal, from its first line; `None` if the file has no complete line or is not a journal.
 #[must_use]
 pub fn detect_kind(bytes: &[u8]) -> Option<CheckpointKind> {
     let first = split_lines(bytes).next().filter(|line| line.ended)?;
@@ -105,7 +104,7 @@ pub fn detect_kind(bytes: &[u8]) -> Option<CheckpointKind> {
     Some(start.journal)
 }
 
-/// Whether a file holds a whole line.
+/// Whether a file contains a complete line.
 #[must_use]
 pub fn has_whole_line(bytes: &[u8]) -> bool {
     split_lines(bytes).next().is_some_and(|line| line.ended)

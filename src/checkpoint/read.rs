@@ -10,24 +10,24 @@ use serde::de::DeserializeOwned;
 use std::collections::HashMap;
 use std::io::{BufRead, Read};
 
-/// Line of the first record, counted from 1.
+/// Line number of the first record, counted from 1.
 const FIRST_LINE: usize = 2;
 
 /// A journal in memory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CheckpointFile<R: CheckpointRecord> {
-    /// Its header.
+    /// Header of the journal.
     pub header: CheckpointHeader<R::Body>,
-    /// Its records, in file order, from line 2.
+    /// Records in file order, from line 2 on.
     pub records: Vec<R>,
-    /// Its last lines.
+    /// End of the journal.
     pub end: CheckpointEnd,
 }
 
 /// Reads a journal; `file` is its name in messages. A file without a complete header gives `None`.
 ///
-/// Everything after the last complete line is dropped: part of a line that was being written when the program
-/// was killed, and zero bytes that a file system may leave after a power failure.
+/// Everything after the last complete line is dropped: a part of a line that was being written when the
+/// program was killed, and zero bytes that a file system may leave after a power failure.
 ///
 /// # Errors
 /// [`CheckpointError`] at the first complete line that is not valid.
@@ -66,16 +66,16 @@ pub fn duplicate_record_error<R: CheckpointRecord>(
     line_error::<R>(file, found.line, format!("the {} {before}a second time", R::KIND.record()))
 }
 
-/// Whether a line is complete: it has its end, or a checksum, which is written last.
+/// Whether a line is complete: it has a line end, or a checksum, which is written last.
 fn is_complete(line: &RawLine) -> bool {
     line.ended || LineChecksum::check(strip_byte_order_mark(line.bytes)) != LineChecksum::Absent
 }
 
 impl<R: CheckpointRecord> CheckpointFile<R> {
-    /// Compares the record at `place` with its recomputation.
+    /// Compares the record at index `place` with its recomputation.
     ///
     /// # Errors
-    /// [`CheckpointError::Recomputed`] where they differ.
+    /// [`CheckpointError::Recomputed`] if they differ.
     pub(crate) fn check_recomputed(
         &self,
         file: &str,
@@ -90,7 +90,7 @@ impl<R: CheckpointRecord> CheckpointFile<R> {
 /// Compares a record with its recomputation.
 ///
 /// # Errors
-/// [`CheckpointError::Recomputed`] where they differ.
+/// [`CheckpointError::Recomputed`] if they differ.
 pub fn check_recomputed<R: CheckpointRecord>(
     file: &str,
     stored: &StoredRecord<R>,
@@ -109,7 +109,7 @@ fn parse_header<R: CheckpointRecord>(
     let at_header = |problem| CheckpointError::Header { file: file.clone(), problem };
     let line = strip_byte_order_mark(line);
     let object = check_line(line);
-    // a header without a checksum may be of an older layout, which has its own message
+    // a header without a checksum may be of an older layout, which gets an error message of its own
     let json = match &object {
         Ok(object) => object.as_slice(),
         Err(problem) if problem == MISSING_CHECKSUM => line,
@@ -127,7 +127,7 @@ fn parse_header<R: CheckpointRecord>(
 
 const MISSING_CHECKSUM: &str = "found no checksum at the end of the line, expected `\"sha256\":\"...\"}`";
 
-/// The object of a line without its checksum, or what is wrong with the checksum.
+/// The object in a line, without its checksum, or the problem with the checksum.
 fn check_line(line: &[u8]) -> Result<Vec<u8>, String> {
     match LineChecksum::check(line) {
         LineChecksum::Valid(object) => Ok(object),
@@ -146,19 +146,18 @@ fn line_error<R: CheckpointRecord>(file: &str, line: usize, problem: String) -> 
     CheckpointError::Line { file: file.to_owned(), line, problem, kind: R::KIND }
 }
 
-// Lines of a file, with any of the ends LF, CR LF or CR.
+// Lines of a file, which may end in LF, CR LF or CR.
 
-/// A line without its end.
+/// A line without its line end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct RawLine<'a> {
     pub bytes: &'a [u8],
-    /// Whether it has an end; the last line may lack it.
+    /// Whether the line has a line end; the last line of a file may lack it.
     pub ended: bool,
     /// Offset of the next line in the file, bytes.
     pub end_offset: usize,
 }
 
-/// The lines of a file, in order.
 pub(super) fn split_lines(bytes: &[u8]) -> impl Iterator<Item = RawLine<'_>> {
     let mut from = 0;
     std::iter::from_fn(move || {
@@ -179,8 +178,8 @@ pub(super) fn strip_byte_order_mark(line: &[u8]) -> &[u8] {
 /// with different arithmetic differs in nearly every record.
 pub const RECHECKED_RECORDS: usize = 8;
 
-/// Indices of at most [`RECHECKED_RECORDS`] records: one from each of as many equal parts of the journal,
-/// drawn with the seed.
+/// Indices of at most [`RECHECKED_RECORDS`] records. The journal is divided into that many equal parts, and
+/// the seed draws one record from each.
 #[must_use]
 pub fn sample_records(records: usize, seed: u64) -> Vec<usize> {
     let parts = RECHECKED_RECORDS.min(records);
@@ -189,10 +188,11 @@ pub fn sample_records(records: usize, seed: u64) -> Vec<usize> {
     (0..parts).map(draw).collect()
 }
 
-/// Longest line that is read, bytes: many times what the program writes, but a limit for other files.
+/// Upper limit of the length of a line, bytes: far above any line that the program writes, so that a file of
+/// another kind does not fill the memory.
 const LONGEST_LINE: u64 = 1 << 28;
 
-/// Reads a journal line by line, so that it may be larger than memory.
+/// Reads a journal line by line, so that it may be larger than the memory.
 ///
 /// Everything after the last complete line is dropped, as by [`read_checkpoint`].
 #[derive(Debug)]
@@ -207,20 +207,21 @@ pub struct CheckpointReader<R: CheckpointRecord, S> {
 /// The end of a journal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CheckpointEnd {
-    /// Bytes up to the end of the last complete line. The file is truncated to them before it is extended.
+    /// Number of bytes up to the end of the last complete line. The file is truncated to this length before
+    /// lines are appended.
     pub intact_bytes: usize,
-    /// Whether an incomplete line follows, which is dropped.
+    /// Whether an incomplete line follows; it is dropped.
     pub torn: bool,
-    /// Whether the last complete line lacks its end, which is added before the file is extended.
+    /// Whether the last complete line lacks its line end, which is added before lines are appended.
     pub unended: bool,
 }
 
-/// A record with its line in a journal.
+/// A record and its line number in the journal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StoredRecord<R> {
     /// The record.
     pub record: R,
-    /// Its line, counted from 1.
+    /// Line number, counted from 1.
     pub line: usize,
 }
 
@@ -228,7 +229,7 @@ impl<R: CheckpointRecord, S: BufRead> CheckpointReader<R, S> {
     /// Reads the header; `file` is the name in messages. A file without a complete header gives `None`.
     ///
     /// # Errors
-    /// [`CheckpointError`] where the file cannot be read or its first line is not valid.
+    /// [`CheckpointError`] if the file cannot be read or its first line is not valid.
     pub(crate) fn open(file: &str, from: S) -> Result<Option<Self>, CheckpointError> {
         let mut text = LineReader { from, chunk: Vec::new(), start: 0, used: 0 };
         let unreadable = |problem| CheckpointError::Unreadable { file: file.to_owned(), problem };
@@ -245,7 +246,7 @@ impl<R: CheckpointRecord, S: BufRead> CheckpointReader<R, S> {
     /// The next record; `None` after the last complete line.
     ///
     /// # Errors
-    /// [`CheckpointError`] where the file cannot be read or a complete line is not valid.
+    /// [`CheckpointError`] if the file cannot be read or a complete line is not valid.
     pub(crate) fn next_record(&mut self) -> Result<Option<StoredRecord<R>>, CheckpointError> {
         let Self { file, header, line_reader: text, line, end } = self;
         let unreadable = |problem| CheckpointError::Unreadable { file: file.clone(), problem };
@@ -268,7 +269,7 @@ impl<R: CheckpointRecord, S: BufRead> CheckpointReader<R, S> {
         Ok(Some(StoredRecord { record, line: *line - 1 }))
     }
 
-    /// The end of the journal, once all records are read.
+    /// End of the journal; it is valid once all records have been read.
     pub(crate) fn end(&self) -> CheckpointEnd {
         self.end
     }
@@ -278,11 +279,11 @@ impl<R: CheckpointRecord, S: BufRead> CheckpointReader<R, S> {
 #[derive(Debug)]
 struct LineReader<S> {
     from: S,
-    /// The last bytes read, up to a line feed. They are several lines where lines end with CR alone.
+    /// The bytes that were read last, up to a line feed: several lines if lines end in CR alone.
     chunk: Vec<u8>,
     /// Offset of the chunk in the file.
     start: usize,
-    /// Number of its bytes that were returned.
+    /// Number of bytes of the chunk that have been returned.
     used: usize,
 }
 

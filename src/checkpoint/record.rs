@@ -1,4 +1,4 @@
-//! Records of a journal, their lines and numbers, and the sink of the lines.
+//! Records of a journal, the form of their lines and numbers, and the sink for the lines.
 
 use super::checksum::append_checksum;
 use super::header::{CheckpointHeader, CheckpointKind, LAYOUT};
@@ -7,11 +7,11 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt::Debug;
 use std::hash::Hash;
 
-/// A computation with its outcome: one line of a journal.
+/// A computation and its outcome: one line of a journal.
 pub trait CheckpointRecord: Clone + Debug + PartialEq {
-    /// Kind of its journals.
+    /// Kind of the journals that contain such records.
     const KIND: CheckpointKind;
-    /// Part of the header that is specific to the kind.
+    /// Part of the header that only journals of this kind have.
     type Body: Serialize + DeserializeOwned + Clone + Debug + PartialEq;
     /// Serialized form of the record.
     type Row: Serialize + DeserializeOwned;
@@ -21,47 +21,48 @@ pub trait CheckpointRecord: Clone + Debug + PartialEq {
     /// Identity of the computation.
     fn identity(&self) -> Self::Identity;
 
-    /// The serialized form in line `at`, counted from 0 after the header.
+    /// Serialized form of the record in line `at`; the first line after the header is line 0.
     fn to_row(&self, at: usize) -> Self::Row;
 
-    /// The line number that a row contains, if any, counted from 0 after the header.
+    /// Line number that a row contains, if any; the first line after the header is line 0.
     fn line_index(row: &Self::Row) -> Option<usize>;
 
-    /// The record of a row.
+    /// Makes a record from a row.
     ///
     /// # Errors
     /// What was found and what was expected.
     fn from_row(row: Self::Row, body: &Self::Body) -> Result<Self, String>;
 
-    /// The first difference between two outcomes of one computation, as words for each; `None` if equal.
+    /// First difference between two outcomes of the same computation, as a text for each outcome; `None` if
+    /// they are equal.
     fn difference(&self, other: &Self) -> Option<[String; 2]>;
 
-    /// A sentence on the difference between two headers with equal fingerprints; `None` if equal.
+    /// Sentence on the difference between two headers with equal fingerprints; `None` if they are equal.
     fn problem_difference(found: &Self::Body, expected: &Self::Body) -> Option<String>;
 }
 
 impl<B: Serialize> CheckpointHeader<B> {
-    /// The header of a journal of such records.
+    /// Header of a journal with records of type `R`.
     pub(crate) fn new<R: CheckpointRecord<Body = B>>(fingerprint: &str, version: &str, body: B) -> Self {
         let (fingerprint, version) = (fingerprint.to_owned(), version.to_owned());
         Self { journal: R::KIND, layout: LAYOUT, fingerprint, version, body }
     }
 }
 
-/// Formats a header as a line.
+/// Formats a header as a line of a journal.
 #[must_use]
 pub fn format_header_line<B: Serialize>(header: &CheckpointHeader<B>) -> String {
     format_json_line(header)
 }
 
-/// Formats a record as line `at`, counted from 0 after the header.
+/// Formats a record as line `at` of a journal; the first line after the header is line 0.
 #[must_use]
 pub fn format_record_line<R: CheckpointRecord>(record: &R, at: usize) -> String {
     format_json_line(&record.to_row(at))
 }
 
 fn format_json_line<T: Serialize>(value: &T) -> String {
-    // string keys and finite numbers cannot fail; an empty line would be refused on reading
+    // serializing string keys and finite numbers cannot fail; an empty line would be refused when it is read
     append_checksum(&serde_json::to_string(value).unwrap_or_default()) + "\n"
 }
 
@@ -85,7 +86,7 @@ impl<'de> Deserialize<'de> for ExactNumber {
     }
 }
 
-/// A number as [`ExactNumber`], for `#[serde(with)]`.
+/// Serializes a number as an [`ExactNumber`], for `#[serde(with)]`.
 pub(crate) mod exact {
     use super::ExactNumber;
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -101,10 +102,10 @@ pub(crate) mod exact {
 
 /// Stores lines durably: when `append` returns, they are on disk. Only then is a record counted or reported.
 pub trait CheckpointSink: Send {
-    /// Appends one line or several, each with its newline.
+    /// Appends one or more lines, each with its newline.
     ///
     /// # Errors
-    /// The reason; the computation stops.
+    /// Reason why the lines cannot be stored; the computation then stops.
     fn append(&mut self, lines: &str) -> Result<(), String>;
 }
 

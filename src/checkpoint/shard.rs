@@ -3,10 +3,10 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// Most shards: more than a cluster has cores.
+/// Maximum number of shards, more than any cluster has cores.
 const MAX_SHARDS: usize = 1_000_000;
 
-/// The points of a study, or jobs of a list, whose index is `number` modulo `total`. This spreads slow
+/// The points of a study, or the jobs of a list, whose index modulo `total` is `number`. This spreads slow
 /// regions over all shards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
@@ -15,15 +15,15 @@ pub struct Shard {
 }
 
 impl Shard {
-    /// All points.
+    /// The single shard that contains all points.
     pub const WHOLE: Self = Self { number: 0, total: 1 };
 
-    /// Shard `at` (counted from 0) of `of`; `None` where `at` or `of` is too large.
+    /// Shard number `at`, counted from 0, of `of` shards; `None` if `at` or `of` is too large.
     pub(crate) fn new(at: usize, of: usize) -> Option<Self> {
         (at < of && of <= MAX_SHARDS).then_some(Self { number: at, total: of })
     }
 
-    /// Number of the shard, from 0.
+    /// Number of the shard, counted from 0.
     pub(crate) fn number(self) -> usize {
         self.number
     }
@@ -32,17 +32,17 @@ impl Shard {
         self.total
     }
 
-    /// Number of points in the shard, of `points` in total.
+    /// Number of points in the shard if the study has `points` points.
     pub(crate) fn count_points(self, points: usize) -> usize {
         points.saturating_sub(self.number).div_ceil(self.total)
     }
 
-    /// Whether it holds point `index`.
+    /// Whether the shard contains point `index`.
     pub(crate) fn contains(self, index: usize) -> bool {
         index % self.total == self.number
     }
 
-    /// Whether two shards may share a point: their numbers agree modulo the greatest common divisor of the
+    /// Whether two shards may share a point: their numbers agree modulo the greatest common divisor of their
     /// totals.
     pub(crate) fn overlaps(self, other: Self) -> bool {
         let (mut common, mut rest) = (self.total, other.total);
@@ -52,17 +52,17 @@ impl Shard {
         self.number % common == other.number % common
     }
 
-    /// Index of its point number `place`, both counted from 0.
+    /// Index in the study of point number `place` of the shard; both are counted from 0.
     pub(crate) fn point_index(self, place: usize) -> usize {
         self.number + place * self.total
     }
 
-    /// Name of its journal without extension, such as `3-of-64`.
+    /// Name of the journal of the shard, without extension, such as `3-of-64`.
     pub(crate) fn file_stem(self) -> String {
         format!("{}-of-{}", self.number, self.total)
     }
 
-    /// The shard of a journal with this name.
+    /// The shard whose journal has this name; `None` for any other name.
     pub(crate) fn from_file_stem(name: &str) -> Option<Self> {
         let (at, of) = name.split_once("-of-")?;
         Self::new(at.parse().ok()?, of.parse().ok()?).filter(|shard| shard.file_stem() == name)

@@ -9,33 +9,34 @@ use crate::text::{
 };
 use short_spectra::{Component, ComponentVerdict, SampledRecord, SpectralAnalysis, SpectrumSettings};
 
-/// What moves the head of the scene.
+/// Motion of the head in the scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum DraftHead {
-    /// The head of the recording.
+    /// The motion of the head in the recording.
     Recorded,
-    /// A cosine in the recording's clock; `origin_m` is the position of the recording's origin on the stroke.
+    /// A cosine in the clock of the recording; `origin_m` is the position in the recording at which the
+    /// stroke starts.
     Cosine { stroke: Stroke, origin_m: f64 },
 }
 
-/// A component that a job can ask for.
+/// A spectral component that a job can compare.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct DraftComponent {
     /// Name in the job.
     pub name: &'static str,
     /// Channel in which it was found.
     pub channel: Channel,
-    /// Window in the words of a job.
+    /// Window in the notation of a job, such as `release+0.01..release+0.1`.
     pub window: String,
     pub frequency_hz: f64,
-    /// Its standard deviation, Hz.
+    /// Standard deviation of the frequency, Hz.
     pub sd_hz: f64,
     pub amplitude_m: f64,
     /// Band of the component in the job, Hz.
     pub band_hz: [f64; 2],
 }
 
-/// Why nothing can be drafted for a recording.
+/// Reason why nothing can be drafted for a recording.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{0}")]
 pub(crate) struct DraftError(String);
@@ -45,55 +46,54 @@ pub(crate) struct DraftError(String);
 pub(crate) struct DraftFindings {
     /// Name of the recording.
     pub name: String,
-    /// Whether the recording is synthetic.
     pub synthetic: bool,
     pub frames: usize,
-    /// Frames a second, 1/s.
     pub frame_rate_hz: f64,
-    /// Whether the head's drop was tracked.
+    /// Whether the vertical motion of the head was tracked.
     pub drop: bool,
     /// Reversals of the head.
     pub reversals: Vec<Reversal>,
-    /// Greatest speed of the head, m/s.
+    /// Maximum speed of the head, m/s; that of the tip if the head was not tracked.
     pub greatest_speed_m_per_s: f64,
-    /// Start and end of a run, s.
+    /// Start and end of the simulated run, s.
     pub run_s: [f64; 2],
-    /// Fitted part of the recording, s; `None` for all of it.
+    /// Start and end of the fitted part of the recording, s; `None` for the whole recording.
     pub fitted_s: Option<[f64; 2]>,
-    /// Number of the first reversal, counted from 1, after which the tip sticks and slips again.
+    /// Number, counted from 1, of the first reversal after which the tip sticks and slips again; if there is
+    /// none, of the first reversal after which it slips.
     pub shown: Option<usize>,
-    /// Components after that reversal.
+    /// Components after reversal `shown`.
     pub components: Vec<DraftComponent>,
     pub(super) head: DraftHead,
 }
 
-/// Least fraction of frames in which a usable point is tracked.
+/// Smallest fraction of the frames in which a point must be tracked to be used.
 const LEAST_TRACKED_SHARE: f64 = 0.5;
-/// Least travel of the head, m: two pixels of the usual 20 um.
+/// Smallest travel of the head, m: a few pixels of the usual 20 um.
 const LEAST_TRAVEL_M: f64 = 5e-5;
-/// Averaging time of a speed, s: a few cycles of chatter.
+/// Interval between the sampled speeds, s. Each is averaged over twice this time, a few cycles of chatter.
 const SPEED_S: f64 = 5e-3;
-/// Most frames of a first fit, so that it ends within minutes.
+/// Maximum number of frames of a first fit, so that it ends within minutes.
 const MOST_FITTED: usize = 12_000;
-/// Fraction of these frames before the first reversal.
+/// Fraction of the fitted frames that precede the first reversal.
 const SHARE_BEFORE_REVERSAL: f64 = 0.3;
-/// Band of a component in units of its frequency.
+/// Lower and upper limit of the band of a component in a job, in units of its frequency.
 const BAND_FACTORS: [f64; 2] = [0.6, 1.5];
-/// Fraction of the Nyquist frequency above which exposure and tracker attenuate too much.
+/// Fraction of the Nyquist frequency above which the exposure and the tracker attenuate too much.
 const HIGHEST_SHARE: f64 = 0.8;
-/// Frequency between the ring-down of the head (78 Hz in the paper) and the stick-slip cycle (about 900 Hz),
-/// Hz.
+/// Frequency that separates the ring-down of the head (78 Hz in the paper) from the stick-slip cycle (about
+/// 900 Hz), Hz.
 const BETWEEN_HZ: f64 = 250.0;
-/// Largest relative standard deviation of a frequency that a job asks for.
+/// Largest relative standard deviation of the frequency of a component in a job.
 const MOST_RELATIVE_SD: f64 = 0.05;
-/// Lowest frequency of a component, Hz: the stroke is slower.
+/// Lowest frequency of a component, Hz; the frequency of the stroke is lower.
 const LOWEST_HZ: f64 = 10.0;
 
-/// Most reversals in a list.
+/// Maximum number of reversals in a list.
 const MOST_TURNS: usize = 6;
 
-/// Components to look for after a reversal: name, channel, ends of the window after the release, s, and
-/// whether the frequency is below [`BETWEEN_HZ`].
+/// Components that are sought after a reversal: name, channel, start and end of the window relative to the
+/// release, s, and whether the frequency is below [`BETWEEN_HZ`].
 const WANTED_COMPONENTS: [(&str, Channel, [&str; 2], bool); 3] = [
     ("low", Channel::HeadDrop, ["+0.01", "+0.2"], true),
     ("high", Channel::Deflection, ["+0.01", "+0.1"], false),
@@ -152,8 +152,8 @@ impl DraftFindings {
         })
     }
 
-    /// Findings for a model that is driven between two times, s; `moving` is the head, or the tip that
-    /// follows it.
+    /// Findings for a model that is driven between two times, s; `moving` is the position of the head, or of
+    /// the tip that follows it.
     fn from_driving_trace(
         recording: &Recording,
         exposure_s: Option<f64>,
@@ -195,7 +195,7 @@ impl DraftFindings {
         }
     }
 
-    /// The remark on a synthetic recording.
+    /// Remark that a recording is synthetic.
     pub(super) fn synthetic_note(&self) -> Option<&'static str> {
         self.synthetic.then_some("The recording is synthetic: no camera took it.")
     }
@@ -258,7 +258,7 @@ fn round_time_s(time_s: f64) -> f64 {
     (1e4 * time_s).round() / 1e4
 }
 
-/// Times, s, and speeds of a point, m/s, along the recording.
+/// Times, s, and mean speeds of a point, m/s, every [`SPEED_S`] along the recording.
 fn sample_speeds(grid: FrameGrid, moving: &[Option<f64>]) -> Vec<(f64, f64)> {
     let step = ((SPEED_S * grid.frame_rate_hz) as usize).max(2);
     let at = |first: usize| {
@@ -269,7 +269,7 @@ fn sample_speeds(grid: FrameGrid, moving: &[Option<f64>]) -> Vec<(f64, f64)> {
     (0..grid.frames).step_by(step).filter_map(at).collect()
 }
 
-/// Part of a long recording for a first fit, s.
+/// Part of a long recording that a first fit uses, s; `None` for a short recording.
 fn choose_fit_window(frames: usize, [start_s, end_s]: [f64; 2], reversals: &[Reversal]) -> Option<[f64; 2]> {
     if frames <= MOST_FITTED {
         return None;

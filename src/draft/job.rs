@@ -1,4 +1,4 @@
-//! job.toml of a draft.
+//! Writes the `job.toml` of a draft.
 
 use super::CommentedToml;
 use super::findings::{DraftComponent, DraftFindings, DraftHead};
@@ -8,18 +8,19 @@ use crate::fit::measure_targets;
 use crate::recording::Recording;
 use crate::text::{format_digits, format_percent, format_speed, join_with_and, round_to_digits};
 
-/// Standard deviation of the camera's tilt in a first fit, degrees: too small to be seen.
+/// Standard deviation of the camera's tilt in a first fit, degrees; so small a tilt goes unnoticed.
 const TILT_SD_DEG: f64 = 0.3;
-/// Relative standard deviation of the scale: a ruler in the picture.
+/// Relative standard deviation of the scale, taken from a ruler in the picture.
 const SCALE_SD: f64 = 0.005;
-/// Standard deviation of the position of a marker, m.
+/// Standard deviation of the distance of a marker from the point that it stands for, m.
 const OFFSET_SD_M: f64 = 0.002;
-/// Standard deviation of a clock that the reversal of the tip defines, s.
+/// Standard deviation of the camera's clock against that of the stroke, s, if the motion of the tip defines
+/// it.
 const CLOCK_SD_S: f64 = 0.005;
-/// Standard deviation of an arbitrary origin in the picture, m.
+/// Standard deviation of the offset, m, if the origin of the picture is arbitrary.
 const ORIGIN_SD_M: f64 = 0.1;
 
-/// Writes a job for a recording; `paths` are those of recording and scene, relative to the job. The job
+/// Writes a job for a recording; `paths` are the paths of recording and scene, relative to the job. The job
 /// contains only components that can be measured on the recording.
 pub(crate) fn write_job(
     found: &DraftFindings,
@@ -137,7 +138,7 @@ fn add_traces(text: CommentedToml, found: &DraftFindings) -> CommentedToml {
         DraftHead::Recorded => {
             text.add_numbers(&[("tilt_sd_deg", TILT_SD_DEG), ("offset_sd_m", OFFSET_SD_M)])
         }
-        // the camera has a clock and an origin of its own
+        // the clock and the origin of the camera are not those of the stroke
         DraftHead::Cosine { origin_m, .. } => {
             let is_near = origin_m.abs() < OFFSET_SD_M;
             let why = (!is_near).then_some("The origin of the picture is not where the stroke starts.");

@@ -1,4 +1,4 @@
-//! scene.toml of a draft.
+//! Writes the `scene.toml` of a draft.
 
 use super::findings::{DraftFindings, DraftHead};
 use super::stroke::Stroke;
@@ -13,15 +13,16 @@ use crate::text::{capitalise, format_digits, format_interval, format_percent, ma
 
 /// The blade of every draft.
 const EXAMPLE_SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
-/// Mark of a number that only the user knows.
+/// Marks a number that only the user knows.
 pub(crate) const YOURS_MARK: &str = "YOURS";
 /// Output rate of a run without a camera, 1/s.
 const SAMPLE_RATE_HZ: f64 = 10_000.0;
-/// Stroke of a scene without a recording: a head speed of up to 0.5 m/s, and its first reversal.
+/// Stroke of a scene without a recording: the head moves at up to 0.5 m/s, and reverses once within
+/// `DEFAULT_RUN_S`.
 const DEFAULT_STROKE: Stroke = Stroke { amplitude_m: 0.1, frequency_hz: 0.8, delay_s: 0.0 };
 const DEFAULT_RUN_S: [f64; 2] = [0.4, 1.0];
 
-/// A scene for a recording; `recording` is its path as seen from the scene.
+/// Writes a scene for a recording; `recording` is its path relative to the scene.
 ///
 /// # Errors
 /// [`SceneError`] if the bundled example cannot be read.
@@ -45,7 +46,7 @@ pub(crate) fn write_scene(
     Ok(add_run(drive, found.run_s, rate_hz).into_text())
 }
 
-/// A scene without any recording.
+/// Writes a scene without a recording.
 ///
 /// # Errors
 /// [`SceneError`] if the bundled example cannot be read.
@@ -56,7 +57,7 @@ pub(crate) fn write_scene_alone(shoulder: bool) -> Result<String, SceneError> {
     Ok(add_run(drive, DEFAULT_RUN_S, SAMPLE_RATE_HZ).into_text())
 }
 
-/// Title, blade, shoulder and friction.
+/// Adds the title, the blade, the shoulder and the friction.
 fn write_blade(head: CommentedToml, shoulder: bool) -> Result<CommentedToml, SceneError> {
     let example = Scene::parse("the bundled example", EXAMPLE_SCENE)?;
     let mut text = head
@@ -129,30 +130,31 @@ fn add_run(text: CommentedToml, [start_s, stop_s]: [f64; 2], rate_hz: f64) -> Co
         .add_line("outputs = [\"trace\", \"events\"]")
 }
 
-// The scene of a fit at its estimates.
+// The scene of a fit, with the estimates of its parameters.
 
-/// Tables of numbers in the order of a scene.
+/// Names of the tables of numbers, in the order of a scene.
 const TABLES: [&str; 3] = ["blade", "shoulder", "friction"];
-/// Digits of the ends of an interval.
+/// Number of significant digits of a prior and of the ends of an interval.
 const DIGITS: usize = 4;
 
-/// A scene with the estimates of a fit, and its origin.
+/// A scene with the estimates of a fit, and its provenance.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FittedScene<'a> {
-    /// The scene that the fit ran.
+    /// The scene that the fit simulated.
     pub scene: &'a Scene,
-    /// Name of its condition.
+    /// Name of the operating condition of the scene.
     pub condition: &'a str,
-    /// Whether its recording is synthetic; `None` where only numbers are published.
+    /// Whether the recording of the condition is synthetic; `None` if there are only published numbers.
     pub synthetic: Option<bool>,
-    /// Path of the recording that drives it, relative to the scene's file; `None` without one.
+    /// Path of the recording that drives the scene, relative to the file of the scene; `None` if none drives
+    /// it.
     pub recording: Option<&'a str>,
     /// The result with the estimates.
     pub result: &'a FitResult,
 }
 
-/// The scene of a fit at its estimates, with their intervals as comments; `None` for a start in the air,
-/// which a scene file cannot express.
+/// Writes the scene of a fit at its estimates, with their intervals as comments; `None` if a scene file
+/// cannot express it, for example a start in the air.
 pub(crate) fn write_fitted_scene(fitted: &FittedScene<'_>) -> Option<String> {
     let FittedScene { scene, condition, synthetic, recording, result } = *fitted;
     let of = match synthetic {
@@ -189,7 +191,8 @@ fn describe_estimate(result: &FitResult, name: &str) -> Option<String> {
     ))
 }
 
-/// Writes a scene as a file that reads back as the same; `None` for a start in the air.
+/// Writes a scene as a file that is read back unchanged; `None` if a file cannot express its drive or its
+/// start.
 fn write_scene_toml(
     head: CommentedToml,
     title: &str,
@@ -283,7 +286,7 @@ mod tests {
         for text in SCENES {
             let scene = Scene::parse("scene", text).unwrap();
             reads_back(&scene);
-            // numbers with all their digits, and a quantity that is written another way
+            // a number that needs all its digits, and a parameter that the scene writes as another quantity
             let moved = scene.with_parameter("friction.a", 0.1 + 0.2).unwrap();
             reads_back(&moved.with_parameter("blade.neck_natural_frequency_hz", 1000.0 / 3.0).unwrap());
         }

@@ -1,7 +1,8 @@
 //! Estimates the stroke of a head that was not tracked from the motion of the tip.
 //!
-//! A sliding tip trails the head by a nearly constant length `d`, so that `x = c + d s + P cos(w t) + Q
-//! sin(w t)` with the sign `s` of its speed. The model is linear in all parameters except the frequency.
+//! A sliding tip trails the head by a nearly constant length `d`, so that its position is `x = c + d s + P
+//! cos(w t) + Q sin(w t)`, where `s` is the sign of its speed. The model is linear in all parameters except
+//! the frequency.
 
 use crate::recording::Recording;
 use crate::recording::channel::mean_speed_m_per_s;
@@ -9,7 +10,7 @@ use nalgebra::{DMatrix, DVector};
 use portable_math as math;
 use std::f64::consts::TAU;
 
-/// A head on a cosine, `a (1 - cos(2 pi f (t - t0)))`.
+/// Motion of the head, `a (1 - cos(2 pi f (t - t0)))`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Stroke {
     pub amplitude_m: f64,
@@ -20,30 +21,29 @@ pub(crate) struct Stroke {
 /// The part of the stroke that the user knows.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct KnownStroke {
-    /// Amplitude of the head, m.
     pub amplitude_m: Option<f64>,
     pub frequency_hz: Option<f64>,
 }
 
-/// A stroke, and the position of the recording's origin on it, m.
+/// A stroke, and the position in the recording at which it starts, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct EstimatedStroke {
     pub stroke: Stroke,
     pub origin_m: f64,
 }
 
-/// Strokes of wipers and rigs, Hz.
+/// Range of stroke frequencies of wipers and rigs, Hz.
 const FREQUENCIES_HZ: [f64; 2] = [0.05, 5.0];
-/// Intervals of the coarse frequency grid.
+/// Number of intervals of the coarse grid of frequencies.
 const COARSE: usize = 200;
-/// Steps of the ternary search around its best point.
+/// Number of steps of the ternary search around the best frequency of the coarse grid.
 const REFINED: usize = 60;
 /// Averaging time of the speed of the tip, s.
 const SPEED_S: f64 = 0.01;
-/// Fraction of the greatest speed above which the tip slides.
+/// Fraction of the maximum speed of the tip above which it counts as sliding.
 const SLIDING: f64 = 0.3;
 
-/// The stroke that the tip follows; `None` if it does not slide enough.
+/// Estimates the stroke that the tip follows; `None` if the tip does not slide enough.
 pub(super) fn estimate_stroke(recording: &Recording, known: KnownStroke) -> Option<EstimatedStroke> {
     let sliding = select_sliding(recording);
     let fit =
@@ -68,7 +68,7 @@ pub(super) fn estimate_stroke(recording: &Recording, known: KnownStroke) -> Opti
     Some(EstimatedStroke { stroke, origin_m: middle_m - amplitude_m })
 }
 
-/// Time, s, position, m, and sign of the speed of the sliding tip, every [`SPEED_S`].
+/// Mean time, s, mean position, m, and sign of the speed of the sliding tip, once per [`SPEED_S`].
 fn select_sliding(recording: &Recording) -> Vec<[f64; 3]> {
     let (grid, tip) = (recording.grid(), &recording.traces().tip_x_m);
     let step = ((SPEED_S * grid.frame_rate_hz) as usize).max(2);
@@ -86,10 +86,10 @@ fn select_sliding(recording: &Recording) -> Vec<[f64; 3]> {
     slides.map(|[t, x, speed]| [t, x, speed.signum()]).collect()
 }
 
-/// Mean squared residual, m2, and `c`, `d`, `P`, `Q`, m, at a frequency. The tip does not trail while the
-/// blade flips: points far from a first solution are left out of the second one.
+/// Mean squared residual, m2, and the terms `c`, `d`, `P` and `Q`, m, for a frequency. While the blade flips,
+/// the tip does not trail the head: points far from a first solution are left out of the second one.
 fn fit_terms(sliding: &[[f64; 3]], frequency_hz: f64) -> Option<(f64, [f64; 4])> {
-    /// Residuals beyond this many times their median are left out.
+    /// Residuals above this multiple of their median are left out.
     const FAR: f64 = 4.0;
     let all: Vec<usize> = (0..sliding.len()).collect();
     let (left, _) = solve_terms(sliding, &all, frequency_hz)?;
@@ -101,9 +101,9 @@ fn fit_terms(sliding: &[[f64; 3]], frequency_hz: f64) -> Option<(f64, [f64; 4])>
     Some((left.iter().map(|r| r * r).sum::<f64>() / left.len() as f64, found))
 }
 
-/// Absolute residuals, m, and the least-squares solution for the points `used`.
+/// Absolute residuals, m, and the least-squares solution, for the points `used`.
 fn solve_terms(sliding: &[[f64; 3]], used: &[usize], frequency_hz: f64) -> Option<(Vec<f64>, [f64; 4])> {
-    /// Twice the number of terms.
+    /// Minimum number of points: twice the number of terms.
     const FEWEST: usize = 8;
     let both_sides = [1.0, -1.0].iter().all(|side| used.iter().any(|i| sliding[*i][2] == *side));
     if !both_sides || used.len() < FEWEST {
@@ -125,7 +125,7 @@ mod tests {
     use super::*;
     use crate::recording::{FrameGrid, Traces};
 
-    /// A tip that trails a head by 1.2 mm, in a picture whose origin lies 30 mm beside the head's end.
+    /// A tip that trails a head by 1.2 mm, in a picture where the stroke starts 30 mm from the origin.
     fn recording(stroke: Stroke, start_s: f64, length_s: f64) -> Recording {
         let grid = FrameGrid { start_s, frame_rate_hz: 2000.0, frames: (length_s * 2000.0) as usize };
         let tip = |i: usize| {

@@ -1,4 +1,4 @@
-//! Makes a recording of the tracks: calibration, choice of points, frame grid, findings and description.
+//! Makes a recording from the tracks: calibration, choice of points, frame grid, findings and description.
 
 use super::error::{ImportError, ImportResult};
 use super::options::ImportOptions;
@@ -52,7 +52,7 @@ pub(crate) fn assemble_recording(
     }
     drop(exports);
     for source in sources {
-        // (what is stored must not depend on the folder of the files)
+        // (the stored findings must not depend on the folder of the files)
         let name = base_name(&source.name);
         report
             .findings
@@ -86,7 +86,7 @@ pub(crate) fn assemble_recording(
     Ok(Import { recording, file, report })
 }
 
-/// Refuses tracks without a single position.
+/// Refuses an import in which no chosen track has any position.
 fn refuse_no_position(
     exports: &[TrackFile],
     chosen: &[Option<TrackIndex>; 2],
@@ -179,11 +179,11 @@ fn describe_recording(
     Ok(file)
 }
 
-/// Turns the recording as a level camera would have seen it, and gives what was done. An unclear tilt is left
-/// as it is. Refusals name `file`.
+/// Rotates the recording into the view of a level camera, and describes the rotation. A recording whose tilt
+/// is not clear is left unchanged. Errors name `file`.
 ///
 /// # Errors
-/// [`ImportError::Unusable`] where the path shows no tilt, or a point has only one coordinate.
+/// [`ImportError::Unusable`] if the path does not show the tilt, or if a point has only one coordinate.
 fn level_recording(
     recording: Recording,
     file: &str,
@@ -214,7 +214,7 @@ fn level_recording(
         return Ok((recording, Some(entry)));
     }
     let traces = rotate_traces(recording.traces(), tilt.angle_rad, tilt.centre_m).map_err(|e| refuse(&e))?;
-    // (the turned coordinates no longer show the step of the export)
+    // (the rotated coordinates no longer show the quantisation step of the export)
     report.findings.extend(check_position_steps(&measured, optics));
     let (name, grid) = (recording.name().to_owned(), recording.grid());
     let level = Recording::new(name, grid, traces, recording.is_synthetic())

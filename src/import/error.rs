@@ -1,4 +1,4 @@
-//! Why an export was refused: the place, what was found, what was expected, what to do.
+//! Errors of an import: the place, what was found, what was expected, and what to do.
 
 use crate::recording::files::FilesError;
 use crate::toml_file::TomlError;
@@ -9,9 +9,9 @@ use std::fmt::{self, Display};
 pub struct TextLocation {
     /// File as named by the user.
     pub file: String,
-    /// 1-based line.
+    /// Line number, counted from 1.
     pub line: usize,
-    /// 1-based column, in characters.
+    /// Column number, counted from 1 in characters.
     pub column: usize,
 }
 
@@ -21,18 +21,18 @@ impl Display for TextLocation {
     }
 }
 
-/// What is wrong with a cell.
+/// Problem with a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CellProblem {
     /// Text where a number belongs.
     NotANumber,
-    /// A row without its time or frame number.
+    /// A row without a time or frame number.
     NoTime,
-    /// A frame number with a fraction, or larger than any recording has.
+    /// A frame number with a fraction, or larger than that of any recording.
     NotAFrame,
-    /// The time of the row above, repeated.
+    /// The same time as in the row above.
     Duplicate,
-    /// A time before that of the row above.
+    /// A time earlier than that of the row above.
     Backwards,
     /// A time between two frames.
     OffGrid,
@@ -40,13 +40,13 @@ pub enum CellProblem {
     FarAway,
 }
 
-/// Why an import was refused.
+/// Reason for refusing an import.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ImportError {
     /// No file was given.
     #[error("no file to import: name the exported table")]
     NoSource,
-    /// A file name that occurs twice or that the recording itself needs.
+    /// A file name that occurs twice, or that is the name of a file of the recording itself.
     #[error(
         "{file}: found the file name `{name}`, expected one that no other file of the recording has; rename \
          the export"
@@ -54,37 +54,37 @@ pub enum ImportError {
     Name {
         /// File as named by the user.
         file: String,
-        /// Its name without folders.
+        /// File name without its folders.
         name: String,
     },
-    /// Two rows of one track in one frame.
+    /// Two rows of one track in the same frame.
     #[error(
         "{place}: found {what} {found} of track `{track}` a second time (first in line {first}), expected \
          every {what} once in a track; see in the tracking program which of the two is right and export again, or split the track where it merges with \
          another"
     )]
     DuplicateRow {
-        /// The second row.
+        /// Place of the second row.
         place: TextLocation,
         /// `frame` or `time`.
         what: &'static str,
-        /// Its value.
+        /// The frame number or the time.
         found: f64,
         /// Name of the track.
         track: String,
-        /// Line of the first row.
+        /// Line number of the first row.
         first: usize,
     },
     /// A table or a file without positions over time, such as another table of the same program.
     #[error("{place}: found {found}, expected {expected}; {advice}")]
     WrongTable {
-        /// The file, or the place that shows it.
+        /// The file, or the place in the file that shows the problem.
         place: String,
-        /// What the file holds.
+        /// Contents of the file.
         found: String,
-        /// What is expected instead.
+        /// Contents that are expected instead.
         expected: String,
-        /// Which menu of the program writes that.
+        /// How to export the expected table from the program.
         advice: String,
     },
     /// A row with more or fewer cells than the others.
@@ -93,25 +93,25 @@ pub enum ImportError {
          the row from what the tracking program shows (a missing value is an empty cell), or export again"
     )]
     Ragged {
-        /// The row.
+        /// Place of the row.
         place: TextLocation,
-        /// Its cells.
+        /// Number of cells in the row.
         found: usize,
-        /// Cells of the table.
+        /// Number of cells in the other rows.
         expected: usize,
     },
     /// A cell that cannot be used.
     #[error("{place}: column {name}: found `{found}`, expected {expected}; {advice}")]
     Cell {
-        /// The cell.
+        /// Place of the cell.
         place: TextLocation,
-        /// What is wrong with it.
+        /// Problem with the cell.
         problem: CellProblem,
         /// Name of the column.
         name: String,
         /// Text of the cell.
         found: Box<str>,
-        /// What belongs there.
+        /// What the cell should contain.
         expected: &'static str,
         /// What to do.
         advice: &'static str,
@@ -119,7 +119,7 @@ pub enum ImportError {
     /// A file or a value that cannot be used.
     #[error("{place}: found {found}, expected {expected}; {advice}")]
     Format {
-        /// The file with line and column where one shows it, or the option.
+        /// The file, with line and column if they are known, or the option.
         place: String,
         /// What was found.
         found: String,
@@ -131,7 +131,7 @@ pub enum ImportError {
     /// A file that cannot be used, with the reason as one sentence.
     #[error("{place}: {problem}")]
     Unusable {
-        /// The file, with line and column where one shows it.
+        /// The file, with line and column if they are known.
         place: String,
         /// What was found and expected, and what to do.
         problem: String,
@@ -145,18 +145,18 @@ pub enum ImportError {
         found: String,
         /// What was expected.
         expected: String,
-        /// The tracks there are, and the nearest.
+        /// The tracks that were found, and the one with the most similar name.
         advice: String,
     },
-    /// Missing options for facts that the file does not have, such as the frame rate.
+    /// Options that are missing for facts that the file does not contain, such as the frame rate.
     #[error("{files}: read as {format}, which does not say all of how it was recorded, and no default is \
         safe; give\n  {}", .missing.join("\n  "))]
     MissingOptions {
         /// Files as named by the user.
         files: String,
-        /// Format that they are in.
+        /// Format of the files.
         format: String,
-        /// Each option with its reason and what the file suggests.
+        /// Each missing option, with its reason and the value that the file suggests.
         missing: Vec<String>,
     },
     /// An option with an unusable value.
@@ -164,9 +164,9 @@ pub enum ImportError {
     Option {
         /// Name of the option.
         option: &'static str,
-        /// Its value.
+        /// Value of the option.
         found: String,
-        /// What is allowed.
+        /// Values that are allowed.
         expected: String,
     },
     /// The file's times contradict the declared rate.
@@ -184,11 +184,11 @@ pub enum ImportError {
     RateMismatch {
         /// File as named by the user.
         file: String,
-        /// Rate of its times, 1/s.
+        /// Frame rate that the times imply, 1/s.
         implied_hz: f64,
-        /// Rate as declared, 1/s.
+        /// Declared frame rate, 1/s.
         declared_hz: f64,
-        /// Frames from row to row if the declared rate is right and the times are real.
+        /// Number of frames from row to row, if the declared rate is right and the times are real.
         step: Option<usize>,
     },
     /// The camera's own record contradicts the declared rate.
@@ -198,17 +198,17 @@ pub enum ImportError {
          one"
     )]
     RecordedRateMismatch {
-        /// Rate as declared, 1/s.
+        /// Declared frame rate, 1/s.
         declared_hz: f64,
-        /// The camera's record that says otherwise.
+        /// The camera's record with another rate.
         record: String,
-        /// Its rate, 1/s.
+        /// Frame rate in the record, 1/s.
         recorded_hz: f64,
     },
-    /// The specification of the twin is not TOML.
+    /// The specification of the twin is not valid TOML.
     #[error(transparent)]
     Twin(#[from] TomlError),
-    /// The description cannot be written.
+    /// The description of the recording cannot be written.
     #[error(transparent)]
     Files(#[from] FilesError),
 }
@@ -216,7 +216,7 @@ pub enum ImportError {
 /// Result of a step of an import.
 pub(crate) type ImportResult<T> = Result<T, ImportError>;
 
-/// Most characters of a cell that a refusal shows.
+/// Maximum number of characters of a cell in an error message.
 const LONGEST_CELL: usize = 60;
 
 impl ImportError {
@@ -244,30 +244,30 @@ impl ImportError {
         Self::Unusable { place: place.to_string(), problem: problem.to_string() }
     }
 
-    /// Something wrong with the columns, shown by a line of the table.
+    /// Error in the columns of a table, with a line that shows it.
     pub(crate) fn columns(file: &str, line: usize, problem: impl Display, advice: impl Display) -> Self {
         Self::unusable(format!("{file}:{line}:1"), format!("{problem}; {advice}"))
     }
 
-    /// A file that holds nothing.
+    /// Error for an empty file.
     pub(crate) fn empty(file: &str) -> Self {
         let problem = "the file is empty, expected a table; export the track data again";
         Self::unusable(format!("{file}:1:1"), problem)
     }
 
-    /// Names, but no numbers; `line` is the last one with anything in it.
+    /// Error for a table with column names but no numbers; `line` is the last line that is not empty.
     pub(crate) fn header_only(file: &str, line: usize) -> Self {
         let (found, expected) = ("no rows of numbers after the header", "one a frame");
         Self::format(format!("{file}:{line}:1"), found, expected, "export again with the data rows selected")
     }
 
-    /// Files or tracks that do not share a frame grid.
+    /// Error for files or tracks that do not share a frame grid.
     pub(crate) fn grid_mismatch(file: &str, found: &str, expected: &str, other: &str) -> Self {
         let advice = "export both tracks from one clip with the same time settings";
         Self::format(file, found, format!("{expected} as in {other}"), advice)
     }
 
-    /// A cell that cannot be used, with what belongs there and what to do.
+    /// Error for a cell that cannot be used, with what it should contain and what to do.
     pub(crate) fn cell(
         place: TextLocation,
         problem: CellProblem,

@@ -1,17 +1,17 @@
-//! What a format of a tracking program must be able to do.
+//! Interface of the file formats of tracking programs.
 
 use crate::import::error::ImportResult;
 use crate::import::options::ImportOptions;
 use crate::import::reader::Document;
 use crate::import::reader::track_file::TrackFile;
 
-/// A file format; every file in `formats/` has one.
+/// A file format; each format in `formats` implements it.
 pub(crate) trait FileFormat: Sync {
-    /// Name on the command line.
+    /// Name of the format on the command line.
     fn name(&self) -> &'static str;
-    /// What in the content shows the format, if anything does. Tables of the same program without positions
-    /// are recognised too, and refused by [`FileFormat::read`].
+    /// Feature of the contents that identifies the format; `None` if the format is not recognised. Tables of
+    /// the same program without positions are also recognised, so that [`FileFormat::read`] can refuse them.
     fn recognises(&self, document: &Document) -> Option<String>;
-    /// Reads the clocks and tracks, in the file's own units.
+    /// Reads the clocks and tracks, in the units of the file.
     fn read<'a>(&self, document: &'a Document<'a>, options: &ImportOptions) -> ImportResult<TrackFile<'a>>;
 }

@@ -1,5 +1,5 @@
-//! The supported formats, and the choice among them. A new format is one file in this folder and its line in
-//! [`FORMATS`].
+//! The supported formats, and the choice of the format of a file. A new format needs one file in this folder
+//! and one line in [`FORMATS`].
 
 mod deeplabcut;
 mod dice;
@@ -48,7 +48,7 @@ static FORMATS: &[&dyn FileFormat] = &[
 /// Programs whose layout is not published; their tables need `--columns`.
 const UNDOCUMENTED: [&str; 5] = ["movias", "movias-neo", "tema", "proanalyst", "xcitex"];
 
-/// A format, and what in the content shows it.
+/// A format, and the feature of the contents that identifies it.
 type RecognisedFormat = (&'static dyn FileFormat, String);
 
 pub(crate) fn choose_format(
@@ -60,8 +60,8 @@ pub(crate) fn choose_format(
     };
     let format = FORMATS.iter().copied().find(|format| format.name() == name);
     let format = format.ok_or_else(|| unknown_format_error(name))?;
-    // (--format does not override a program's refusal of its own table; --columns does, because the user then
-    // says which columns are positions)
+    // (a table that its own program's format refuses is refused with --format too, but not with --columns,
+    // because the user then says which columns are positions)
     let mut checked = documents.iter().filter(|_| options.columns.is_none());
     match checked.find_map(|document| refusal_by_others(format, document, options)) {
         Some(refusal) => Err(refusal),
@@ -74,7 +74,7 @@ fn detect_format(
     options: &ImportOptions,
 ) -> ImportResult<(&'static dyn FileFormat, String)> {
     if options.columns.is_some() {
-        // (Kinovea's windows are filtered and lose samples even where their columns are named)
+        // (tables of Kinovea's windows are filtered and lack samples, even if their columns are named)
         let windows = documents.iter().all(kinovea::is_window);
         let format: &dyn FileFormat = if windows { &kinovea::Kinovea } else { &generic::GenericFormat };
         return Ok((format, "--columns names the columns".to_owned()));
@@ -93,31 +93,31 @@ fn detect_format(
     found.ok_or(ImportError::NoSource)
 }
 
-/// The first format that recognises a document. If another one does too and says that its program wrote no
-/// positions here, the document is refused.
+/// The first format that recognises a document. If another format recognises it as a table of its program
+/// without positions, the document is refused.
 fn recognise_document(document: &Document, options: &ImportOptions) -> ImportResult<RecognisedFormat> {
     let mut found = recognising_formats(document);
     let Some(first) = found.next() else {
         let plain: &dyn FileFormat = &plain::PlainFormat;
-        // (the refusal is the table's own problem, or asks for the names of its columns)
+        // (the error is that of reading the table, or asks for the names of its columns)
         let refusal = || document.table().map_or_else(|error| error, generic::unnamed_columns_error);
         return plain.recognises(document).map(|reason| (plain, reason)).ok_or_else(refusal);
     };
     found.find_map(|(other, _)| refusal_by(other, document, options)).map_or(Ok(first), Err)
 }
 
-/// The formats of programs that recognise a document. A plain table belongs to no program.
+/// The formats that recognise a document, except the plain table, which belongs to no program.
 fn recognising_formats<'d>(document: &'d Document) -> impl Iterator<Item = RecognisedFormat> + 'd {
     let of_programs = FORMATS.iter().copied().filter(|format| format.name() != plain::PLAIN_NAME);
     of_programs.filter_map(|format| format.recognises(document).map(|reason| (format, reason)))
 }
 
-/// The refusal of `format`, which recognises a document, if the document holds no positions over time.
+/// Error of `format`, which recognises the document, if the document contains no positions over time.
 fn refusal_by(format: &dyn FileFormat, document: &Document, options: &ImportOptions) -> Option<ImportError> {
     format.read(document, options).err().filter(|error| matches!(error, ImportError::WrongTable { .. }))
 }
 
-/// The refusal of a format other than `chosen` that recognises the document.
+/// Error of a format other than `chosen` that recognises the document but finds no positions in it.
 fn refusal_by_others(
     chosen: &dyn FileFormat,
     document: &Document,
@@ -127,7 +127,7 @@ fn refusal_by_others(
     others.into_iter().find_map(|(format, _)| refusal_by(format, document, options))
 }
 
-/// Findings on named columns of tables that would be refused without `--columns`.
+/// Findings about tables that would be refused if `--columns` did not name their columns.
 pub(crate) fn find_doubtful_columns(
     chosen: &dyn FileFormat,
     documents: &[Document],

@@ -1,18 +1,18 @@
-//! Options of an import: facts that the export itself does not have.
+//! Options of an import: facts that the export itself does not contain.
 
 use crate::import::error::ImportError;
 use crate::recording::files::YAxis;
 use toml::Value;
 
-/// Options of an import. Where neither an option nor the file has a fact and no default is safe, the import
+/// Options of an import. If neither an option nor the file gives a fact that has no safe default, the import
 /// is refused.
 #[derive(Debug, Clone, Default)]
 pub struct ImportOptions {
     /// Name of the recording, for messages and figures.
     pub name: String,
-    /// Name of the format; `None` or `auto` finds it from the content.
+    /// Name of the format; `None` or `auto` detects it from the contents.
     pub format: Option<String>,
-    /// Text encoding; `None` finds it from the content.
+    /// Text encoding; `None` detects it from the contents.
     pub encoding: Option<String>,
     /// Rate at which the camera recorded, 1/s.
     pub frame_rate_hz: Option<f64>,
@@ -20,11 +20,12 @@ pub struct ImportOptions {
     pub scale: Option<CoordinateScale>,
     /// Direction of y in the file.
     pub y_axis: Option<YAxis>,
-    /// Exposure of a frame, s.
+    /// Exposure time of a frame, s.
     pub exposure_s: Option<f64>,
-    /// Meaning of the time column; `None` takes that of the format, which is mostly seconds of the recording.
+    /// Meaning of the time column; `None` stands for the default of the format, usually seconds of the
+    /// recording.
     pub time: Option<TimeColumn>,
-    /// Frames from one row to the next where only every n-th frame was tracked; `None` is 1.
+    /// Number of frames from one row to the next, if only every n-th frame was tracked; `None` means 1.
     pub frame_step: Option<usize>,
     /// Name of the track of the lip tip.
     pub tip: Option<String>,
@@ -34,45 +35,45 @@ pub struct ImportOptions {
     pub columns: Option<ColumnMap>,
     /// Confidence below which a position counts as missing.
     pub min_likelihood: Option<f64>,
-    /// Whether the tilt of the camera is taken out of both tracks.
+    /// Whether the tilt of the camera is corrected in both tracks.
     pub level: bool,
-    /// `[conditions]` of the recording.
+    /// Table `[conditions]` of the recording.
     pub conditions: toml::Table,
-    /// Name and text of the specification of a twin, where the export is synthetic.
+    /// Name and text of the specification of a twin, if the export is synthetic.
     pub twin: Option<(String, String)>,
 }
 
-/// Largest frame step: at larger ones no vibration is seen.
+/// Largest frame step; with a larger one, no vibration could be seen.
 const LARGEST_STEP: usize = 1000;
 
 /// Meaning of a time column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TimeColumn {
-    /// Seconds of the recording itself: the rate may be taken from them.
+    /// Seconds of the recording itself, from which the frame rate may be determined.
     Real,
     /// Milliseconds of the recording itself.
     Milliseconds,
     /// Frame numbers.
     Frames,
-    /// Times of playback: they only count frames.
+    /// Times of playback, which only count frames.
     Playback,
 }
 
 /// Length of one unit of the file's coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum CoordinateScale {
-    /// Coordinates are pixels; the length that a pixel shows, m.
+    /// Coordinates are pixels; the value is the length that a pixel shows, m.
     MetresPerPixel(f64),
-    /// Coordinates are lengths; their unit, m.
+    /// Coordinates are lengths; the value is their unit, m.
     Unit(f64),
 }
 
-/// Length units by their symbol, m; `u`, the micro sign and the Greek mu all mean micro.
+/// Units of length by their symbol, m; `u`, the micro sign and the Greek mu all mean micro.
 const LENGTH_UNITS: [(&str, f64); 6] =
     [("m", 1.0), ("cm", 1e-2), ("mm", 1e-3), ("um", 1e-6), ("\u{b5}m", 1e-6), ("\u{3bc}m", 1e-6)];
 
 impl CoordinateScale {
-    /// Reads `21.5um/px` or a length unit such as `mm`.
+    /// Reads `21.5um/px`, or a unit of length such as `mm`.
     ///
     /// # Errors
     /// [`ImportError::Option`] for anything else.
@@ -88,11 +89,11 @@ impl CoordinateScale {
         let (number, name) = length.split_at(length.find(|c| !is_digit(c)).ok_or_else(refuse)?);
         let number = number.parse::<f64>().ok().filter(|n| n.is_finite() && *n > 0.0).ok_or_else(refuse)?;
         let unit = unit(name.trim()).ok_or_else(refuse)?;
-        // 1e-6 is no double: a product with it rounds twice, a quotient by 1e6 once
+        // a double cannot hold 1e-6 exactly: multiplying by it rounds twice, dividing by 1e6 rounds once
         Ok(Self::MetresPerPixel(number / (1.0 / unit).round()))
     }
 
-    /// Metres of one unit of the file.
+    /// Length of one unit of the coordinates in the file, m.
     pub(crate) fn metres(self) -> f64 {
         match self {
             Self::MetresPerPixel(metres) | Self::Unit(metres) => metres,
@@ -100,10 +101,10 @@ impl CoordinateScale {
     }
 }
 
-/// A column by its 1-based number or the name in the header.
+/// A column, by its number or by its name in the header.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ColumnName {
-    /// 1-based number.
+    /// Number of the column, counted from 1.
     Number(usize),
     /// Name in the header row.
     Name(String),
@@ -118,7 +119,7 @@ impl std::fmt::Display for ColumnName {
     }
 }
 
-/// Columns of a plain table: key and column, in the order given.
+/// Columns of a plain table: pairs of key and column, in the order given.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ColumnMap(pub Vec<(&'static str, ColumnName)>);
 
@@ -137,12 +138,12 @@ pub(crate) const COLUMN_KEYS: [&str; 13] = [
     "y",
     "confidence",
 ];
-/// Value of `frame=row`: the table has neither frames nor times, and every row is a frame.
+/// Value of `frame=row`: the table has neither frame numbers nor times, and every row is a frame.
 pub(crate) const ROW_COLUMN: &str = "row";
 
 impl ColumnMap {
-    /// Reads `time=1,tip-x=2,tip-y=3,head-x=4,head-y=5`; a column is a 1-based number or a name of the
-    /// header.
+    /// Reads `time=1,tip-x=2,tip-y=3,head-x=4,head-y=5`; a column is given by its number, counted from 1, or
+    /// by its name in the header.
     ///
     /// # Errors
     /// [`ImportError::Option`] naming the part at fault.
@@ -201,7 +202,7 @@ impl ImportOptions {
     /// Reads `KEY=VALUE` into `[conditions]`; numbers and true/false keep their type.
     ///
     /// # Errors
-    /// [`ImportError::Option`] where the key is missing or was given before.
+    /// [`ImportError::Option`] if the key is missing or was given before.
     pub fn add_condition(&mut self, text: &str) -> Result<(), ImportError> {
         let refuse = |expected: &str| ImportError::option("--condition", text, expected);
         let pair = text.split_once('=').filter(|pair| !pair.0.trim().is_empty());
@@ -220,7 +221,7 @@ impl ImportOptions {
     /// Reads `tip=NAME` or `head=NAME`.
     ///
     /// # Errors
-    /// [`ImportError::Option`] for another point or one that was given before.
+    /// [`ImportError::Option`] for any other text, and for a point that was given before.
     pub(crate) fn add_point(&mut self, text: &str) -> Result<(), ImportError> {
         let refuse = |expected: &str| ImportError::option("--point", text, expected);
         let pair = text.split_once('=').filter(|pair| !pair.1.trim().is_empty());
@@ -241,10 +242,10 @@ impl ImportOptions {
     }
 }
 
-/// Range of frame rates, frames/s: from time lapse to well beyond the fastest camera.
+/// Range of accepted frame rates, 1/s: from time lapse to well above the fastest camera.
 const RATES_HZ: std::ops::RangeInclusive<f64> = 1e-3..=1e9;
 
-/// Refuses numbers outside their range.
+/// Refuses options with numbers outside their range.
 ///
 /// # Errors
 /// [`ImportError::Option`] naming the option.

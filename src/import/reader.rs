@@ -1,4 +1,4 @@
-//! The steps from bytes to tracks on a frame grid that all formats share: encoding, dialect, table, layout,
+//! The steps from bytes to tracks on a frame grid, which all formats share: encoding, dialect, table, layout,
 //! timing.
 
 pub(crate) mod calibration;
@@ -36,11 +36,11 @@ pub(crate) use track_file::{
 pub(crate) struct Document<'a> {
     /// File as named by the user.
     pub file: &'a str,
-    /// Its name without folders and extension.
+    /// File name without folders and extension.
     pub stem: &'a str,
-    /// Its text, without a byte-order mark.
+    /// Text of the file, without a byte-order mark.
     pub text: &'a str,
-    /// The text as a table, or the refusal if it is not one.
+    /// The text as a table, or the error if it is not one.
     pub table: ImportResult<DelimitedTable<'a>>,
     /// The texts of the companions, with their names.
     pub companions: Vec<(&'a str, String)>,

@@ -1,4 +1,4 @@
-//! The files that go into an import and what comes out of it.
+//! The files that are imported, and the result of an import.
 
 use crate::import::error::ImportError;
 use crate::recording::Recording;
@@ -11,9 +11,9 @@ use crate::text::sha256;
 pub struct Import {
     /// The recording.
     pub recording: Recording,
-    /// The content of its `recording.toml`.
+    /// Contents of its `recording.toml`.
     pub file: RecordingFile,
-    /// What was found and decided.
+    /// Report on what was found and decided.
     pub report: ImportReport,
 }
 
@@ -22,7 +22,7 @@ pub struct Import {
 pub struct ImportReport {
     /// Name of the format that was used.
     pub format: String,
-    /// Reason for that format.
+    /// Reason for choosing this format.
     pub reason: String,
     /// Notes on what was read and assumed.
     pub notes: Vec<String>,
@@ -39,7 +39,7 @@ impl ImportReport {
         std::iter::once(first).chain(notes).chain(self.findings.iter().map(QualityFinding::to_line)).collect()
     }
 
-    /// Findings graver than a note, with their advice.
+    /// Findings more severe than a note, with their advice.
     pub fn warnings(&self) -> impl Iterator<Item = String> {
         let graver = self.findings.iter().filter(|finding| finding.severity > Severity::Note);
         graver.map(|finding| {
@@ -55,32 +55,32 @@ impl ImportReport {
 /// A file to import.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ImportSource {
-    /// Path or name as given by the user; the copy in the recording has its last part as name.
+    /// Path or name as given by the user; its last part is the name of the copy in the recording's folder.
     pub name: String,
-    /// Its bytes.
+    /// Contents of the file.
     pub bytes: Vec<u8>,
-    /// Its companion files, such as a camera's record.
+    /// Companion files, such as the record of a camera.
     pub companions: Vec<CompanionFile>,
 }
 
-/// A file that belongs to an export and is in its folder.
+/// A file in the folder of an export that belongs to the export.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CompanionFile {
     /// Path or name as given by the user.
     pub name: String,
-    /// Its bytes.
+    /// Contents of the file.
     pub bytes: Vec<u8>,
 }
 
 impl ImportSource {
-    /// A file without companions.
+    /// A source without companions.
     #[must_use]
     pub fn without_companions(name: impl Into<String>, bytes: Vec<u8>) -> Self {
         Self { name: name.into(), bytes, companions: vec![] }
     }
 }
 
-/// Refuses file names that occur twice: every copy in the recording's folder needs its own.
+/// Refuses file names that occur twice, because every copy in the recording's folder needs its own name.
 pub(crate) fn check_file_names(sources: &[ImportSource]) -> Result<(), ImportError> {
     if sources.is_empty() {
         return Err(ImportError::NoSource);

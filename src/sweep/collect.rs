@@ -1,13 +1,13 @@
 //! Points of a study, collected from any number of journals without repetition.
 //!
-//! The points lie in a temporary file; memory holds eight bytes per point.
+//! The points are stored in a temporary file; memory holds eight bytes per point.
 
 use super::journal::{SweepHeader, SweepPoint};
 use super::point::PointOutcome;
 use crate::checkpoint::{CheckpointEnd, CheckpointError, CheckpointReader, CheckpointRecord, StoredRecord};
 use std::io::{self, BufRead, BufWriter, Read, Seek, SeekFrom, Write};
 
-/// Why points cannot be collected.
+/// Reason why points cannot be collected.
 #[derive(Debug, thiserror::Error)]
 pub enum CollectError {
     /// A journal is refused, or two disagree.
@@ -18,14 +18,14 @@ pub enum CollectError {
     Spool(#[from] io::Error),
 }
 
-/// Points that a journal added.
+/// Result of adding a journal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct AddedPoints {
     /// Number of points in the journal.
     pub points: usize,
-    /// Number of points that no earlier journal had.
+    /// Number of points that no earlier journal contained.
     pub new: usize,
-    /// Whether the journal ends in a torn line.
+    /// The end of the journal, which may be a torn line.
     pub end: CheckpointEnd,
 }
 
@@ -33,7 +33,7 @@ pub struct AddedPoints {
 #[derive(Debug)]
 pub struct PointCollection<F: Write> {
     header: SweepHeader,
-    /// Offset of each point in the temporary file plus one; 0 for a missing point.
+    /// Offset of each point in the temporary file, plus one; 0 for a missing point.
     places: Vec<u64>,
     files: Vec<String>,
     spool: BufWriter<F>,
@@ -41,20 +41,23 @@ pub struct PointCollection<F: Write> {
     known: usize,
 }
 
-/// Bytes before the text of a point: number of its journal (4), its line (8), length of the text (4).
+/// Number of bytes before the text of a point: number of its journal (4), its line (8), length of the text
+/// (4).
 const HEAD_BYTES: usize = 16;
 
 impl<F: Read + Write + Seek> PointCollection<F> {
-    /// An empty collection; every journal has this `header`, and `spool` is an empty file.
+    /// An empty collection; every journal must have this `header`, and `spool` is an empty file.
     pub fn new(header: SweepHeader, spool: F) -> Self {
         let places = vec![0; header.body.points];
         Self { header, places, files: Vec::new(), spool: BufWriter::new(spool), end: 0, known: 0 }
     }
 
-    /// Adds the points of a journal; `None` without a complete header. Error texts call the journal `file`.
+    /// Adds the points of a journal; returns `None` if it has no complete header. Errors call the journal
+    /// `file`.
     ///
     /// # Errors
-    /// [`CollectError`] for another study or version, for damage, or when two journals disagree on a point.
+    /// [`CollectError`] if the journal is of another study or version, is damaged, or disagrees with an
+    /// earlier journal on a point.
     pub fn add_journal(
         &mut self,
         file: &str,
@@ -87,7 +90,7 @@ impl<F: Read + Write + Seek> PointCollection<F> {
     /// Calls `each` with every point in order.
     ///
     /// # Errors
-    /// [`CollectError::Spool`], also for a missing point.
+    /// [`CollectError::Spool`], also if a point is missing.
     pub fn for_each_point(&mut self, mut each: impl FnMut(usize, PointOutcome)) -> Result<(), CollectError> {
         for index in 0..self.places.len() {
             let missing = || io::Error::other(format!("point {index} is missing"));
@@ -143,7 +146,7 @@ impl<F: Read + Write + Seek> PointCollection<F> {
     }
 }
 
-/// A point and its line in a journal.
+/// A point, the index of its journal, and its line number there.
 struct SpooledPoint {
     point: SweepPoint,
     file: usize,

@@ -1,4 +1,5 @@
-//! Points of a study: a grid of all combinations of the axes' values, or a sample of their box.
+//! Points of a study: a grid of all combinations of the values of the axes, or a sample of the box that they
+//! span.
 
 use crate::model::parameters::ModelParameter;
 use portable_math as math;
@@ -10,33 +11,34 @@ use sobol::Sobol;
 use sobol::params::JoeKuoD6;
 use std::sync::OnceLock;
 
-/// Significant digits of a value between two ends: it is then the same on every machine, and short.
+/// Number of significant digits of a value between the two ends of an axis: it is then short, and the same on
+/// every machine.
 const DIGITS: usize = 12;
 
-/// How values lie along an axis.
+/// Spacing of the values of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum AxisSpacing {
-    /// By differences.
+    /// Equal differences between successive values.
     #[default]
     Linear,
-    /// By factors.
+    /// Equal ratios of successive values.
     Log,
 }
 
-/// A parameter and its rising values in SI.
+/// A parameter and its rising values, in SI units.
 #[derive(Debug, Clone)]
 pub struct SweepAxis {
-    /// Row in the table of parameters.
+    /// Row of the parameter in the table of parameters.
     pub parameter: &'static ModelParameter,
-    /// At least two rising values; for a sample, the ends of the range.
+    /// At least two rising values; for a sample, the two ends of the range.
     pub values: Vec<f64>,
     /// Spacing of the values, also on the axis of a figure.
     pub spacing: AxisSpacing,
 }
 
 impl AxisSpacing {
-    /// The value at a fraction of the range.
+    /// Value at the fraction `share` of the range.
     pub(crate) fn interpolate_value(self, from: f64, to: f64, share: f64) -> f64 {
         let value = match self {
             Self::Linear => from + share * (to - from),
@@ -45,7 +47,7 @@ impl AxisSpacing {
         format!("{value:.*e}", DIGITS - 1).parse().unwrap_or(value)
     }
 
-    /// `points` values (two or more) over the range; both ends are exact.
+    /// `points` values (at least two) spread over the range; both ends are exact.
     pub(crate) fn spread_values(self, from: f64, to: f64, points: usize) -> Vec<f64> {
         let last = points.saturating_sub(1);
         let value = |i: usize| match i {
@@ -64,7 +66,7 @@ pub(crate) struct AxisValues<'a> {
     pub spacing: AxisSpacing,
 }
 
-/// Value of every axis at point `index`; the first axis of a grid is the slowest.
+/// Value of every axis at point `index`; the first axis of a grid changes slowest.
 pub(crate) fn point_values(axes: &[AxisValues], sample: Option<&SamplePlan>, index: usize) -> Vec<f64> {
     match sample {
         Some(sample) => {
@@ -81,7 +83,7 @@ pub(crate) fn point_values(axes: &[AxisValues], sample: Option<&SamplePlan>, ind
     }
 }
 
-/// Indices of point `index` along axes of these lengths; the first axis is the slowest.
+/// Indices of point `index` along axes with these lengths; the first axis changes slowest.
 pub(crate) fn grid_indices(lengths: &[usize], index: usize) -> Vec<usize> {
     let mut rest = index;
     let mut places = vec![0; lengths.len()];
@@ -93,26 +95,26 @@ pub(crate) fn grid_indices(lengths: &[usize], index: usize) -> Vec<usize> {
 
 // Sampled points.
 
-/// Most dimensions of a sample: more than a scene has parameters.
+/// Maximum number of dimensions of a sample, more than a scene has parameters.
 const MOST_DIMENSIONS: usize = 64;
-/// Bits of a coordinate and of a point's index.
+/// Number of bits of a coordinate and of the index of a point.
 const BITS: usize = 32;
 
-/// How the points of a sampled study are chosen.
+/// Choice of the points of a sampled study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SamplePlan {
-    /// Sequence that fills the box.
+    /// Sequence of points that fills the box.
     #[serde(default)]
     pub method: SampleSequence,
     /// Number of points; a power of two fills the box most evenly.
     pub points: usize,
-    /// Another seed gives another sample of the same quality.
+    /// Seed of the sample; another seed gives another sample of the same quality.
     #[serde(default)]
     pub seed: u64,
 }
 
-/// A sequence that fills a box.
+/// A sequence of points that fills a box.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SampleSequence {
@@ -124,7 +126,7 @@ pub enum SampleSequence {
 
 impl SamplePlan {
     /// Coordinates of point `index` in the unit box, each above 0 and below 1. The Gray code of the index
-    /// gives a point without its predecessors.
+    /// gives a point directly, without those before it.
     pub(crate) fn unit_coordinates(&self, index: usize) -> impl Iterator<Item = f64> {
         let SampleSequence::Sobol = self.method;
         let mut shifts = Xoshiro256PlusPlus::seed_from_u64(self.seed);
@@ -137,7 +139,7 @@ impl SamplePlan {
     }
 }
 
-/// Direction numbers: a row per dimension, the first number for the lowest bit of an index.
+/// Direction numbers: one row per dimension, whose first number belongs to the lowest bit of an index.
 fn direction_numbers() -> &'static [Vec<u32>] {
     static DIRECTIONS: OnceLock<Vec<Vec<u32>>> = OnceLock::new();
     DIRECTIONS.get_or_init(|| Sobol::<u32>::init_direction_vals(MOST_DIMENSIONS, BITS, &JoeKuoD6::minimal()))
@@ -170,7 +172,7 @@ mod tests {
         sample(index).zip(sample(0)).take(dimensions).map(|(a, b)| digits(a) ^ digits(b)).collect()
     }
 
-    /// The crate computes each point from its predecessor.
+    /// The crate computes each point from the previous one.
     #[test]
     fn a_point_by_itself_is_that_of_the_sequence() {
         let sequence = Sobol::<u32>::new(12, &JoeKuoD6::minimal());
@@ -179,7 +181,7 @@ mod tests {
         }
     }
 
-    /// 2^k points have one coordinate in each of 2^k equal parts, whatever the seed and the dimension.
+    /// In every dimension and with every seed, 2^k points have one coordinate in each of 2^k equal parts.
     #[test]
     fn every_coordinate_is_stratified() {
         for seed in [0, 1, 99] {
@@ -194,7 +196,7 @@ mod tests {
         }
     }
 
-    /// The integral of a product of known value by 4,096 points in six dimensions; a random sample errs by
+    /// Integrates a product of known integral with 4,096 points in six dimensions; a random sample errs by
     /// 0.01.
     #[test]
     fn a_sample_integrates_better_than_random_numbers() {

@@ -21,7 +21,7 @@ pub(crate) type SweepHeader = checkpoint::CheckpointHeader<SweepHeaderBody>;
 pub struct SweepHeaderBody {
     /// Number of points.
     pub points: usize,
-    /// Axes, the slowest first.
+    /// Axes; the first one changes slowest.
     pub axes: Vec<AxisRecord>,
     /// Plan of a sampled study; `None` for a grid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -52,13 +52,13 @@ fn is_linear(spacing: &AxisSpacing) -> bool {
 /// One point in a journal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SweepPoint {
-    /// Index in the study, from 0.
+    /// Index in the study, counted from 0.
     pub index: usize,
-    /// Readings, or why the run ended early.
+    /// Readings, or the reason why the run ended early.
     pub outcome: PointOutcome,
 }
 
-/// The header of a study with this fingerprint.
+/// Header of the journal of a study with this fingerprint.
 #[must_use]
 pub fn study_header(study: &Study, fingerprint: &str) -> SweepHeader {
     let axis = |axis: &SweepAxis| AxisRecord {
@@ -100,7 +100,7 @@ impl CheckpointRecord for SweepPoint {
         }
     }
 
-    /// Points are not ordered by index.
+    /// Returns `None`, because the points are not ordered by index.
     fn line_index(_: &PointRow) -> Option<usize> {
         None
     }
@@ -146,7 +146,7 @@ impl CheckpointRecord for SweepPoint {
     }
 }
 
-/// A point as written in a line.
+/// A point as written in a line of the journal.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PointRow {
@@ -167,7 +167,8 @@ enum ValueCell {
 
 // Check of a resumed study: some points of its journal are computed again.
 
-/// A random selection of a journal's points (reservoir sampling); all points are equally likely.
+/// A random selection of points of a journal (reservoir sampling); all points are equally likely to be
+/// selected.
 #[derive(Debug)]
 pub(crate) struct PointRecheck {
     drawn: Vec<StoredRecord<SweepPoint>>,
@@ -181,7 +182,7 @@ impl PointRecheck {
         Self { drawn: Vec::new(), offered: 0, generator: Xoshiro256PlusPlus::seed_from_u64(seed) }
     }
 
-    /// Takes the next point of the journal into the selection, or leaves it out.
+    /// Adds the next point of the journal to the selection, or leaves it out.
     pub(crate) fn offer_point(&mut self, found: StoredRecord<SweepPoint>) {
         self.offered += 1;
         if self.drawn.len() < checkpoint::RECHECKED_RECORDS {
@@ -191,7 +192,7 @@ impl PointRecheck {
         }
     }
 
-    /// Computes the selected points again and compares every bit. Error texts call the journal `file`.
+    /// Computes the selected points again and compares every bit. Errors call the journal `file`.
     ///
     /// # Errors
     /// [`CheckpointError::Recomputed`] at the first difference.

@@ -9,7 +9,7 @@ use crate::simulate::twin::Camera;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Source of the numbers, in every row of the table and in the summary.
+/// Source of the numbers, which is stated in every row of the table and in the summary.
 const SOURCE: &str = "simulation";
 
 /// Header of `sweep.csv`.
@@ -21,8 +21,8 @@ pub(crate) fn csv_header(study: &Study) -> String {
     cells.join(",") + "\n"
 }
 
-/// Row of a point in `sweep.csv`. A missing value is an empty cell; the columns `status` and `missing` say
-/// why.
+/// Row of a point in `sweep.csv`. A missing value is an empty cell; the columns `status` and `missing` give
+/// the reason.
 pub(crate) fn csv_row(study: &Study, index: usize, outcome: &PointOutcome) -> String {
     let number = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
     let mut cells: Vec<String> = study.point_values(index).iter().map(|value| value.to_string()).collect();
@@ -32,7 +32,7 @@ pub(crate) fn csv_row(study: &Study, index: usize, outcome: &PointOutcome) -> St
     cells.join(",") + "\n"
 }
 
-/// Maps that lack a value for another reason than the end of the run: `column: reason; column: reason`.
+/// Maps that lack a value for a reason other than the early end of the run: `column: reason; column: reason`.
 fn describe_missing(study: &Study, outcome: &PointOutcome) -> String {
     let ended = outcome.ended.as_ref().map(|ended| ended.reason);
     let of = |(map, value): (&SweepMap, &Result<f64, MissingReason>)| {
@@ -43,7 +43,7 @@ fn describe_missing(study: &Study, outcome: &PointOutcome) -> String {
 }
 
 #[derive(Debug, Clone, Serialize)]
-#[allow(missing_docs)] // the fields are those of the file, named with their units
+#[allow(missing_docs)] // the fields have the names of the keys in the file, which include their units
 pub(crate) struct SweepSummary {
     pub title: String,
     pub scene: String,
@@ -59,7 +59,7 @@ pub(crate) struct SweepSummary {
     pub sample: Option<SamplePlan>,
     pub status: BTreeMap<&'static str, usize>,
     pub axes: Vec<AxisSummary>,
-    /// Figure with all maps, or with the rank correlations.
+    /// Name of the figure with all maps, or with the rank correlations.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sheet: Option<String>,
     pub maps: Vec<MapSummary>,
@@ -85,7 +85,7 @@ pub(crate) struct MapSummary {
     pub kind: &'static str,
     pub unit: &'static str,
     pub column: String,
-    /// Figure of the map, if the study is drawn as maps.
+    /// Name of the figure of the map, if the study is drawn as maps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub figure: Option<String>,
     pub values: usize,
@@ -160,7 +160,7 @@ impl SweepSummary {
         }
     }
 
-    /// Whether any map has a value anywhere.
+    /// Whether any map has a value at any point.
     pub(crate) fn has_values(&self) -> bool {
         self.maps.iter().any(|map| map.values > 0)
     }

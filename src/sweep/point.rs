@@ -1,4 +1,4 @@
-//! One point of a study: its run and the readings for every map.
+//! One point of a study: its run, and the readings for every map.
 
 use super::study::{Study, SweepMap};
 use crate::feature::{FeatureReader, MissingReason, RunRecord};
@@ -14,27 +14,28 @@ use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Right-hand sides after which a run ends: some hundred times those of a reversal, a few seconds.
+/// Number of evaluations of the right-hand side after which a run is ended: some hundred times that of a
+/// reversal, a few seconds of computing.
 const MOST_EVALUATIONS: u64 = 20_000_000;
 
 /// Outcome of a point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PointOutcome {
-    /// Why the run ended before its stop time, if it did.
+    /// Reason why the run ended before its stop time, if it did.
     pub ended: Option<EarlyEnd>,
-    /// Time of the end, s; `None` for a run that never started.
+    /// Time at which the run ended, s; `None` if the run did not start or its end is unknown.
     pub stopped_at_s: Option<f64>,
     /// One value per map, in the unit of the reading, or the reason why it is missing.
     pub values: Vec<Result<f64, MissingReason>>,
 }
 
-/// Why a run ended before its stop time.
+/// Reason why a run ended before its stop time.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EarlyEnd {
     /// The reason in one word.
     pub reason: MissingReason,
-    /// Details that the reason does not give; often empty.
+    /// Details that add to the reason; often empty.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub why: String,
 }
@@ -46,12 +47,12 @@ impl EarlyEnd {
 }
 
 impl PointOutcome {
-    /// Runs point `index` of a checked study; a panic becomes a reason.
+    /// Runs point `index` of a checked study; a panic is recorded as the reason of an early end.
     pub(crate) fn run_point(study: &Study, scene: &Scene, index: usize) -> Self {
         Self::run_point_scene(study, || study.scene_of_point(scene, index), || ControlFlow::Continue(()))
     }
 
-    /// Runs any scene as a point; `flow` is asked during the run and may end it.
+    /// Runs any scene as a point; `flow` is called during the run and may end it.
     #[must_use]
     pub fn run_point_scene(
         study: &Study,
@@ -69,20 +70,20 @@ impl PointOutcome {
         })
     }
 
-    /// Name of the end in files: `completed`, or the reason of an early end.
+    /// How the run ended, as written in files: `completed`, or the reason of an early end.
     #[must_use]
     pub fn status(&self) -> &'static str {
         self.ended.as_ref().map_or("completed", |ended| ended.reason.name())
     }
 
-    /// The outcome, or why nothing can be read and when the run ended, s.
+    /// The outcome; if nothing can be read, the reason and the time at which the run ended, s.
     fn try_run(
         study: &Study,
         scene: impl FnOnce() -> Result<Scene, SceneError>,
         flow: impl Fn() -> ControlFlow<()>,
     ) -> Result<Self, (EarlyEnd, Option<f64>)> {
         let scene = scene().map_err(|error| (EarlyEnd::new(MissingReason::NoStart, error), None))?;
-        // a study may set a preload or friction without a steady equilibrium to start in
+        // a study may set a preload or a friction for which the scene has no steady equilibrium to start in
         let speed = scene.drive.motion_at(scene.start_s).velocity_m_per_s;
         if scene.start == StartKind::SteadySlide && steady_slip_pose(&scene.linkage, speed).is_none() {
             return Err((EarlyEnd::new(MissingReason::NoStart, ""), None));
@@ -117,7 +118,7 @@ impl PointOutcome {
     }
 }
 
-/// Notes the transitions of a run, and its extremes if a map reads them.
+/// Records the transitions of a run, and its extremes if a map reads them.
 struct PointObserver<F> {
     transitions: Transitions,
     audit: Option<EnergyAudit>,

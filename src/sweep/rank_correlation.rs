@@ -8,30 +8,30 @@ use super::point::PointOutcome;
 use super::study::Study;
 use serde::Serialize;
 
-/// Most numbers in memory, values and coordinates together.
+/// Maximum count of numbers in memory, values and coordinates together.
 const MOST_NUMBERS: usize = 2_000_000;
-/// Most points: they give a correlation to better than 0.01.
+/// Maximum number of points; so many give a correlation to better than 0.01.
 const MOST_POINTS: usize = 200_000;
-/// Fewest pairs of a correlation.
+/// Minimum number of pairs for a correlation.
 const FEWEST_PAIRS: usize = 20;
 
 /// Values of every map at a selection of the points.
 #[derive(Debug, Clone)]
 pub struct RankCorrelations {
-    /// Fraction of the points that is selected.
+    /// Fraction of the points that are selected.
     share: f64,
-    /// Coordinates of the points, a list per axis.
+    /// Coordinates of the selected points, one list per axis.
     places: Vec<Vec<f64>>,
-    /// Values at the points, a list per map.
+    /// Values at the selected points, one list per map.
     values: Vec<Vec<Option<f64>>>,
 }
 
-/// Rank correlation (Spearman's) of a map with a parameter.
+/// Spearman's rank correlation of a map with a parameter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct RankCorrelation {
     /// Name of the parameter.
     pub parameter: &'static str,
-    /// From -1 to 1; `None` for too few values or a constant.
+    /// Value from -1 to 1; `None` if there are too few values or if all are equal.
     pub rank_correlation: Option<f64>,
 }
 
@@ -43,9 +43,9 @@ impl RankCorrelations {
         Self { share, places: vec![Vec::new(); axes], values: vec![Vec::new(); maps] }
     }
 
-    /// Takes a point into the selection, or leaves it out.
+    /// Adds a point to the selection, or leaves it out.
     pub(crate) fn look(&mut self, study: &Study, index: usize, outcome: &PointOutcome) {
-        // multiples of the golden ratio cover every regular part of a grid evenly
+        // the fractional parts of multiples of the golden ratio sample every regular part of a grid evenly
         if (index as f64 * 0.618_033_988_749_894_9).fract() >= self.share {
             return;
         }
@@ -54,7 +54,7 @@ impl RankCorrelations {
         self.values.iter_mut().zip(values).for_each(|(values, value)| values.push(value));
     }
 
-    /// Rank correlation of map `map` with every parameter.
+    /// Rank correlations of map number `map` with every parameter.
     pub(crate) fn of_map(&self, study: &Study, map: usize) -> Vec<RankCorrelation> {
         let of = |(at, axis): (usize, &SweepAxis)| {
             let pairs = self.places[at].iter().zip(&self.values[map]);
@@ -77,7 +77,7 @@ pub(crate) fn spearman_correlation(x: &[f64], y: &[f64]) -> Option<f64> {
     (scale > 0.0).then(|| product(&x, &y) / scale)
 }
 
-/// Ranks from 0; equal values share their mean rank.
+/// Ranks, counted from 0; equal values share their mean rank.
 fn rank_values(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
@@ -109,7 +109,7 @@ mod tests {
         assert!(of(|x| (x - 49.5).abs()).unwrap().abs() < 1e-12);
         assert_eq!(of(|_| 1.0), None);
         assert_eq!(spearman_correlation(&x[..5], &x[..5]), None);
-        // ranks 0..4 against 1, 0, 2, 4, 3, five times each: 1 - 6 * 4 / (5 * 24)
+        // each rank five times; Spearman's formula for the ranks 1 to 5: 1 - 6 * 4 / (5 * 24)
         let five = |of: [f64; 5]| of.repeat(5);
         let found =
             spearman_correlation(&five([1.0, 2.0, 3.0, 4.0, 5.0]), &five([2.0, 1.0, 3.0, 5.0, 4.0])).unwrap();

@@ -1,4 +1,4 @@
-//! A study file, checked completely before any run: axes, camera and maps.
+//! A study file, which is checked completely before any run: axes, camera and maps.
 
 mod as_written;
 
@@ -14,10 +14,10 @@ use crate::toml_file::{self, KeyRefusal, NumberPair, TomlError, refuse_key, sugg
 use as_written::{Map, StudyAxisFile, StudyFile};
 use serde::Serialize;
 
-/// Most frames of a run: a mistyped rate is refused before it fills the memory of every thread.
+/// Maximum number of frames of a run: a mistyped rate is refused before it fills the memory of every thread.
 pub(crate) const MOST_FRAMES: f64 = 1e6;
 
-/// Most points of a map: a figure one column wide shows 200 by 200 cells.
+/// Maximum number of points of a map: a figure one column wide shows 200 by 200 cells.
 const MOST_MAPPED: usize = 40_000;
 
 /// A checked study.
@@ -31,16 +31,16 @@ pub struct Study {
     pub camera: Camera,
     /// Parameters that vary; the first axis of a grid changes slowest.
     pub axes: Vec<SweepAxis>,
-    /// How points are sampled; `None` for a grid.
+    /// Plan of the sample; `None` for a grid.
     pub sample: Option<SamplePlan>,
-    /// Readings that are mapped over the axes.
+    /// Readings that are drawn as maps over the axes.
     pub maps: Vec<SweepMap>,
 }
 
-/// Why a study was refused.
+/// Reason for refusing a study.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum StudyError {
-    /// It is not TOML of the right shape.
+    /// The file is not TOML with the keys of a study.
     #[error(transparent)]
     Toml(#[from] TomlError),
     /// A value that cannot be used.
@@ -48,25 +48,25 @@ pub enum StudyError {
     Value {
         /// File as named by the user.
         file: String,
-        /// Key, with the entry that holds it.
+        /// Key, with the entry that contains it.
         key: String,
         /// What was found, what was expected, and what to do.
         problem: String,
     },
-    /// The scene refuses a point of the grid.
+    /// The scene refuses a point of the study.
     #[error("{file}: the point with {point}: {problem}")]
     Point {
         /// File as named by the user.
         file: String,
-        /// Names and values.
+        /// Names and values of the parameters at the point.
         point: String,
-        /// The scene's refusal.
+        /// Error of the scene.
         problem: Box<SceneError>,
     },
 }
 
 impl Study {
-    /// Reads and checks a study; `file` is its name in refusals.
+    /// Reads and checks a study; `file` is its name in errors.
     ///
     /// # Errors
     /// [`StudyError`] at the first problem.
@@ -81,7 +81,7 @@ impl Study {
         check().map_err(value_error(file))
     }
 
-    /// Reads a study without its axes: its only point is the scene itself.
+    /// Reads a study without its axes, so that its only point is the scene itself.
     ///
     /// # Errors
     /// [`StudyError`] at the first problem.
@@ -101,12 +101,12 @@ impl Study {
         self.sample.is_none() && self.axes.len() <= 2 && self.point_count() <= MOST_MAPPED
     }
 
-    /// Whether a sheet shows all maps; a single map that is drawn needs none.
+    /// Whether a sheet with all maps is drawn; a single map that is drawn itself needs no sheet.
     pub(crate) fn has_sheet(&self) -> bool {
         self.maps.len() > 1 || !self.is_mapped()
     }
 
-    /// Value of every axis at point `index`, SI.
+    /// Value of every axis at point `index`, in SI units.
     #[must_use]
     pub fn point_values(&self, index: usize) -> Vec<f64> {
         let axes = self.axes.iter().map(|axis| AxisValues { of: &axis.values, spacing: axis.spacing });
@@ -116,14 +116,15 @@ impl Study {
     /// The scene of point `index`.
     ///
     /// # Errors
-    /// The scene's refusal of a value.
+    /// [`SceneError`] if the scene refuses a value.
     pub fn scene_of_point(&self, scene: &Scene, index: usize) -> Result<Scene, SceneError> {
         let mut axes = self.axes.iter().zip(self.point_values(index));
         axes.try_fold(scene.clone(), |scene, (axis, value)| scene.with_parameter(axis.parameter.name, value))
     }
 
-    /// Checks a study against its scene: the scene admits the points (all of a small study, an even selection
-    /// of a large one), windows in seconds lie in the run, and the run has enough frames.
+    /// Checks a study against its scene: the scene must accept the points (all points of a small study, an
+    /// even selection of those of a large one), windows in seconds must lie within the run, and the run must
+    /// have a permitted number of frames.
     ///
     /// # Errors
     /// [`StudyError`] at the first problem.
@@ -146,7 +147,8 @@ impl Study {
         })
     }
 
-    /// SHA-256 over all that decides the outcome: study, scene and version of the program ([`fingerprint`]).
+    /// SHA-256 of everything that determines the outcome: study, scene and version of the program
+    /// ([`fingerprint`]).
     pub(crate) fn fingerprint(&self, scene: &Scene) -> String {
         fingerprint(&StudyFingerprint {
             version: env!("CARGO_PKG_VERSION"),
@@ -202,12 +204,12 @@ fn value_error(file: &str) -> impl Fn(KeyRefusal) -> StudyError {
     move |(key, problem)| StudyError::Value { file: file.to_owned(), key, problem }
 }
 
-/// Refuses a key whose rule does not hold.
+/// Refuses `key` if `holds` is false.
 fn require(holds: bool, key: &str, problem: impl FnOnce() -> String) -> Result<(), KeyRefusal> {
     if holds { Ok(()) } else { refuse_key(key, problem()) }
 }
 
-/// What decides the outcome of a study.
+/// Everything that determines the outcome of a study.
 #[derive(Serialize)]
 struct StudyFingerprint<'a> {
     version: &'static str,
@@ -221,9 +223,9 @@ struct StudyFingerprint<'a> {
 
 // Axes: each is a parameter of the scene with rising values.
 
-/// Most points of a study: a cluster computes them in a day. A mistyped number is refused.
+/// Maximum number of points of a study: a cluster computes them in a day, and a mistyped number is refused.
 const MOST_POINTS: usize = 100_000_000;
-/// Most values of an axis.
+/// Maximum number of values of an axis.
 const MOST_VALUES: usize = 100_000;
 
 fn check_axes(written: &[StudyAxisFile], sample: Option<&SamplePlan>) -> Result<Vec<SweepAxis>, KeyRefusal> {
@@ -293,7 +295,7 @@ fn check_axis(written: &StudyAxisFile, sampled: bool) -> Result<SweepAxis, KeyRe
     }
 }
 
-/// Number of points at the ends of a sampled axis: it keeps no more of its range.
+/// Number of values of a sampled axis: two, the ends of its range. Refuses `values` and `points`.
 fn check_sampled_ends(
     key: &impl Fn(&str) -> String,
     written: &StudyAxisFile,
@@ -352,28 +354,29 @@ fn check_log_values(key: &str, spacing: AxisSpacing, values: &[f64]) -> Result<(
 
 // Maps: their names and readings.
 
-/// Most maps: each becomes a figure in three sizes.
+/// Maximum number of maps; each becomes a figure in three sizes.
 const MOST_MAPS: usize = 100;
 /// File name, without suffix, of the figure with all maps.
 pub const SHEET_NAME: &str = "all-maps";
-/// Columns of every `sweep.csv`.
+/// Columns of every `sweep.csv`, whose names no map may have.
 const RESERVED_COLUMNS: [&str; 4] = ["status", "stopped_at_s", "missing", "source"];
 
-/// A reading over the grid.
+/// A reading over the points of a study.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SweepMap {
-    /// Name as written.
+    /// Name as written in the study file.
     pub name: String,
     /// Name in letters and digits, with `-` between words; the figure is `SLUG.svg`.
     pub slug: String,
     /// Quantity that is read from each run.
     pub reading: Reading,
-    /// Values of the first and the last colour, in the unit of the reading; `None` takes the extremes.
+    /// Values at the two ends of the colour scale, in the unit of the reading; `None` uses the smallest and
+    /// largest value.
     pub range: Option<(f64, f64)>,
 }
 
 impl SweepMap {
-    /// Column in `sweep.csv`: name and unit.
+    /// Name of the column in `sweep.csv`: name and unit of the map.
     #[must_use]
     pub fn column(&self) -> String {
         self.slug.replace('-', "_") + self.reading.unit().suffix
@@ -417,7 +420,7 @@ fn check_maps(written: &[Map], nyquist_hz: f64) -> Result<Vec<SweepMap>, KeyRefu
     Ok(maps)
 }
 
-/// A map must not share its column or its file with another.
+/// Refuses a map that shares its column or its file with another map.
 fn check_names(map: &SweepMap, earlier: &[SweepMap]) -> Result<(), KeyRefusal> {
     let problem = if RESERVED_COLUMNS.contains(&map.column().as_str()) {
         format!("`{}` is a column of every table; give the map another name", map.column())
@@ -431,7 +434,7 @@ fn check_names(map: &SweepMap, earlier: &[SweepMap]) -> Result<(), KeyRefusal> {
     refuse_key(map_key(&map.name, "name"), problem)
 }
 
-/// The maps of an entry; some kinds give several readings.
+/// The maps of an entry; some kinds of reading give several maps.
 fn maps_of_entry(written: &Map, nyquist_hz: f64) -> Result<Vec<SweepMap>, KeyRefusal> {
     let name = &written.name;
     require(!slugify(name).is_empty(), &map_key(name, "name"), || {

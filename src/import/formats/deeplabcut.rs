@@ -1,5 +1,5 @@
-//! DeepLabCut and Lightning Pose: tables under three header rows (four with individuals), and tables of
-//! labels set by hand.
+//! DeepLabCut and Lightning Pose: tables below three header rows (four with individuals), and tables of
+//! labels that were set by hand.
 
 use crate::import::error::{CellProblem, ImportError, ImportResult};
 use crate::import::format::FileFormat;
@@ -11,10 +11,10 @@ use crate::import::reader::{
 };
 use crate::recording::quality::{Check, QualityFinding, Severity};
 
-/// Parts of the names of files or scorers of smoothed positions: DeepLabCut's filtered predictions and the
-/// ensemble Kalman smoother of Lightning Pose.
+/// Words in the names of files or scorers that mark smoothed positions: those of DeepLabCut's filtered
+/// predictions and of the ensemble Kalman smoother of Lightning Pose.
 const SMOOTHED: [&str; 3] = ["filtered", "smoother", "smoothed"];
-/// Columns of the table of lengths and angles between body parts.
+/// Columns of the skeleton table, which contains lengths and angles between body parts.
 const SKELETON: [&str; 3] = ["length", "orientation", "likelihood"];
 
 pub(crate) struct DeepLabCut;
@@ -51,7 +51,7 @@ impl FileFormat for DeepLabCut {
             let layout = TableLayout { frame: Some(0), ..layout };
             let mut export = layout.read_tracks(document, table, facts())?;
             if header.points.iter().all(|point| point.confidence.is_none()) {
-                // (predictions have a likelihood; positions without one may be labels)
+                // (predictions have a likelihood; positions without one may be labels set by hand)
                 let picked =
                     export.clocks.iter().filter_map(|clock| picked_frames_finding(document.file, clock));
                 export.findings.extend(picked);
@@ -68,7 +68,7 @@ fn facts() -> Facts {
     Facts::pixels_down("DeepLabCut writes image pixels, y downwards")
 }
 
-/// Whether the rows are named by pictures instead of being numbered.
+/// Whether the rows are identified by names of pictures instead of frame numbers.
 fn names_images(table: &DelimitedTable, header: &DeepLabCutHeader) -> bool {
     table.head.get(header.start).is_some_and(|row| {
         table.parse_cell(row.first_cell()) == CellNumber::Text && row.first_cell().contains('.')
@@ -88,7 +88,7 @@ fn skeleton_table_error(table: &DelimitedTable, row: &TextRow) -> ImportError {
     )
 }
 
-/// The finding on positions that went through a low-pass filter, which weakens the high frequencies.
+/// Finding about positions that went through a low-pass filter, which weakens the high frequencies.
 fn filtering_finding(document: &Document, header: &DeepLabCutHeader) -> Option<QualityFinding> {
     let tells = |name: &str| SMOOTHED.iter().any(|word| name.to_lowercase().contains(word));
     let who = if tells(document.stem) {
@@ -109,10 +109,10 @@ fn filtering_finding(document: &Document, header: &DeepLabCutHeader) -> Option<Q
 
 /// First cells of the header rows; a table of one animal has no row `individuals`.
 const ROW_NAMES: [&str; 4] = ["scorer", "individuals", "bodyparts", "coords"];
-/// Individual to which body parts belong that occur once in a picture.
+/// Name of the individual that has the body parts that occur only once in a picture.
 const UNIQUE_INDIVIDUAL: &str = "single";
-/// Number of cells in front of the coordinates: a frame number or the path of a picture is one, a path in
-/// parts is three.
+/// Possible numbers of cells before the coordinates: one for a frame number or the path of a picture, three
+/// for a path that is split into parts.
 const INDEX_CELLS: [usize; 2] = [1, 3];
 const HEADER_ADVICE: &str = "the rows above the numbers are scorer, bodyparts, coords, with individuals in \
     second place if there are several; restore them as DeepLabCut wrote them, or have it write the table \
@@ -120,17 +120,17 @@ const HEADER_ADVICE: &str = "the rows above the numbers are scorer, bodyparts, c
 
 const PART_EXPECTED: &str = "x and y of every body part";
 
-/// Content of the header rows.
+/// Contents of the header rows.
 pub(crate) struct DeepLabCutHeader {
-    /// Row of the head with the first numbers.
+    /// Index of the first row of numbers in the head of the table.
     pub start: usize,
-    /// Cells in front of the coordinates.
+    /// Number of cells before the coordinates.
     pub index_cells: usize,
-    /// Cells of a row.
+    /// Number of cells in a row.
     pub cells: usize,
     pub points: Vec<PointCells>,
     pub scorers: Vec<String>,
-    /// Coordinates that are not read.
+    /// Names of the coordinates that are not read.
     ignored: Vec<String>,
 }
 
@@ -142,7 +142,7 @@ struct BodyPart<'t> {
     name: &'t str,
 }
 
-/// Columns of a part: x, y, likelihood.
+/// Columns of the x, y and likelihood of a body part.
 #[derive(Default)]
 struct BodyPartCells([Option<usize>; 3]);
 
@@ -276,16 +276,16 @@ fn header_error(table: &DelimitedTable, row: &TextRow, found: &str, expected: &s
     ImportError::columns(table.file, row.line, format!("found {found}, expected {expected}"), HEADER_ADVICE)
 }
 
-// Labels set by hand: a row names a picture of a video, and the picture's name ends in the frame number.
+// Labels set by hand: each row names a picture of a video, and the picture's name ends in the frame number.
 
-/// What belongs in the cell of a picture, and what to do about another one.
+/// What the cell of a picture should contain, and what to do if it does not.
 const PICTURE_REMEDY: (&str, &str) = (
     "a picture whose name ends in its frame number, such as img0042.png",
     "rename the pictures by their frames in the table, or import the table of analyze_videos, which numbers the \
      frames",
 );
 
-/// Reads the row of every picture. The rows may be in any order, and most frames have none.
+/// Reads one row for each labelled picture. The rows may be in any order, and most frames have no row.
 pub(crate) fn read_labels<'a>(
     document: &'a Document,
     table: &'a DelimitedTable,
@@ -331,7 +331,7 @@ pub(crate) fn read_labels<'a>(
         count += 1;
     }
     let video = video.unwrap_or_default();
-    // (the collected instance has no name: a refusal names the video)
+    // (the collected track has no name, so the error names the video)
     let name_video = |error| match error {
         ImportError::DuplicateRow { place, what, found, first, .. } => {
             ImportError::DuplicateRow { place, what, found, first, track: video.clone() }
@@ -366,7 +366,7 @@ fn read_label(table: &DelimitedTable, record: &RowView, cells: &PointCells) -> I
     })
 }
 
-/// The folder of a row's picture, which has the name of the video, and the name of the picture.
+/// Folder of the picture in a row, which is named after the video, and name of the picture.
 fn split_picture_path<'r>(record: &RowView<'r>, index_cells: usize) -> (String, &'r str) {
     if index_cells > 1 {
         return (record.cell(index_cells - 2).to_owned(), record.cell(index_cells - 1));
@@ -376,7 +376,7 @@ fn split_picture_path<'r>(record: &RowView<'r>, index_cells: usize) -> (String, 
     (folder.rsplit(['/', '\\']).next().unwrap_or("").to_owned(), image)
 }
 
-/// The number in which a picture's name ends, without its extension.
+/// The number at the end of a picture's name, before the extension.
 fn frame_number(image: &str) -> Option<f64> {
     let stem = image.rsplit_once('.').map_or(image, |(stem, _)| stem);
     let digits = stem.trim_end_matches(|c: char| c.is_ascii_digit()).len();

@@ -1,4 +1,4 @@
-//! DICe (Digital Image Correlation Engine) in tracking mode: a file a subset, a row a frame.
+//! DICe (Digital Image Correlation Engine) in tracking mode: one file per subset, one row per frame.
 
 use crate::import::error::{ImportError, ImportResult, TextLocation};
 use crate::import::format::FileFormat;
@@ -9,17 +9,18 @@ use crate::import::reader::{
 use crate::recording::files::YAxis;
 
 const FRAME: &str = "FRAME";
-/// Centre of the subset in the reference picture, and its displacement since.
+/// Columns with the centre of the subset in the reference picture; those in `DISPLACEMENT` give its
+/// displacement since then.
 const REFERENCE: [&str; 2] = ["COORDINATE_X", "COORDINATE_Y"];
 const DISPLACEMENT: [&str; 2] = ["DISPLACEMENT_X", "DISPLACEMENT_Y"];
 const SIGMA: &str = "SIGMA";
 const STATUS: &str = "STATUS_FLAG";
 /// Values of [`STATUS`] for a correlated frame: `CORRELATION_SUCCESSFUL`, `INITIALIZE_..._SUCCESSFUL` and
-/// `SEARCH_..._SUCCESSFUL` of DICe's `Status_Flag`. The others are failures or averages of other subsets.
+/// `SEARCH_..._SUCCESSFUL` of DICe's `Status_Flag`. Other values mark failures or averages of other subsets.
 const SUCCESSFUL: [f64; 7] = [0.0, 1.0, 2.0, 3.0, 4.0, 6.0, 18.0];
-/// Start of the comment that says whether displacements are from frame to frame.
+/// Text in the comments before the statement whether displacements are from frame to frame.
 const INCREMENTAL: &str = "Incremental correlation:";
-/// Most lines of the comment block.
+/// Maximum number of lines in the comment block.
 const PREAMBLE_LINES: usize = 64;
 
 pub(crate) struct Dice;
@@ -76,7 +77,7 @@ fn facts() -> Facts {
     Facts { y_axis: Some((YAxis::Down, why)), unit: Some((CoordinateUnit::Pixel, unit)), ..Facts::default() }
 }
 
-/// Index of the row of column names, and the row.
+/// Index of the row of column names, and the row itself.
 fn find_header<'t>(table: &'t DelimitedTable) -> Option<(usize, &'t TextRow)> {
     table.find_row(usize::MAX, |row| REFERENCE.iter().all(|name| row.has(name)))
 }
@@ -90,8 +91,8 @@ fn no_header_error(table: &DelimitedTable) -> ImportError {
     ImportError::columns(table.file, table.first_line(), problem, advice)
 }
 
-/// Refuses a field of points: there a frame has many references. In tracking mode the frames count up and the
-/// reference is constant.
+/// Refuses a field of points, in which one frame has many reference positions. In tracking mode the frame
+/// number increases and the reference position is constant.
 fn refuse_full_field(
     table: &DelimitedTable,
     start: usize,

@@ -1,4 +1,4 @@
-//! DIPP-MOTION (DITECT): the table behind an X-Y graph, in CP932, under a header of varying length.
+//! DIPP-MOTION (DITECT): the data of an X-Y graph as a table in CP932, below a header of varying length.
 
 use crate::import::error::{ImportError, ImportResult, TextLocation};
 use crate::import::format::FileFormat;
@@ -9,21 +9,22 @@ use crate::import::reader::{
 };
 use crate::recording::quality::{Check, QualityFinding, Severity};
 
-/// Start of the first line.
+/// Beginning of the first line.
 const MARK: &str = "DIPP-MOTION";
-/// "Time": the first column.
+/// "Time" in Japanese: beginning of the name of the first column.
 const TIME: &str = "\u{6642}\u{9593}";
-/// "Unit of the horizontal axis" and "unit of the vertical axis": x and y of the graph.
+/// "Unit of the horizontal axis" and "unit of the vertical axis" in Japanese; the axes are x and y.
 const UNITS: [&str; 2] = ["\u{6a2a}\u{8ef8}\u{5358}\u{4f4d}", "\u{7e26}\u{8ef8}\u{5358}\u{4f4d}"];
-/// "Coordinate": part of the name of a graph of positions.
+/// "Coordinate value" in Japanese: part of the name of a graph of positions.
 const COORDINATE: &str = "\u{5ea7}\u{6a19}\u{5024}";
-/// Ends of the column names of a point.
+/// Endings of the names of the two columns of a point.
 const AXES: [&str; 2] = ["(X)", "(Y)"];
-/// Units of time by their sign in a column's name.
+/// Units of time by their symbol in the name of a column, in seconds.
 const TIME_UNITS: [(&str, f64); 4] = [("s", 1.0), ("sec", 1.0), ("ms", 1e-3), ("\u{79d2}", 1.0)];
-/// Largest rounding error of a point at a local origin, in units of the file; values of 1e-11 occur.
+/// Largest coordinate of a point that counts as the local origin, in units of the file; rounding errors of
+/// 1e-11 occur.
 const AT_ORIGIN: f64 = 1e-6;
-/// The table that has the positions.
+/// Advice on saving the table that contains the positions.
 const MENU: &str = "save the data of the graph of X coordinate against Y coordinate of the points as CSV";
 
 pub(crate) struct DippMotion;
@@ -54,7 +55,8 @@ impl FileFormat for DippMotion {
     }
 }
 
-/// Refuses other graphs than of X against Y, such as of speeds. A line in brackets names the graph.
+/// Refuses every graph except that of X against Y, for example a graph of speeds. A line in brackets names
+/// the graph.
 fn refuse_other_graph(table: &DelimitedTable) -> ImportResult<()> {
     let mut rows = table.head.iter().map(|row| (row.line, row.first_cell()));
     match rows.find(|(_, cell)| cell.starts_with('[') && cell.contains("] - [")) {
@@ -90,7 +92,7 @@ fn point_columns(table: &DelimitedTable, row: &TextRow) -> ImportResult<Vec<Poin
     })
 }
 
-/// The unit of both axes, if the header has it.
+/// The unit of both axes, if the header contains it.
 fn coordinate_unit(table: &DelimitedTable) -> ImportResult<Fact<CoordinateUnit>> {
     let named = |name: &str| table.head.iter().find(|row| row.first_cell() == name);
     let [Some(x), Some(y)] = UNITS.map(named) else { return Ok(None) };
@@ -108,7 +110,7 @@ fn coordinate_unit(table: &DelimitedTable) -> ImportResult<Fact<CoordinateUnit>>
     }
 }
 
-/// The unit in the name of the time column; seconds without one.
+/// The unit in the name of the time column; if it has none, seconds are assumed.
 fn time_unit(table: &DelimitedTable, row: &TextRow) -> ImportResult<TimeUnit> {
     let name = row.first_cell().trim_start_matches(TIME);
     let sign = name.trim_matches(|c: char| {
@@ -126,7 +128,7 @@ fn time_unit(table: &DelimitedTable, row: &TextRow) -> ImportResult<TimeUnit> {
     }
 }
 
-/// The finding on a point that is always at (0, 0): it is the origin of a local system of coordinates.
+/// Finding about a point that is always at (0, 0), because it is the origin of a local coordinate system.
 fn local_origin_finding(export: &TrackFile) -> Option<QualityFinding> {
     let near = |column: &Column| {
         column.has_values() && column.iter().flatten().all(|value| value.abs() <= AT_ORIGIN)

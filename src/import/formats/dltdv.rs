@@ -1,5 +1,5 @@
-//! DLTdv (versions 5 to 8) and Argus: positions in pixels, in two columns for each point and camera, or as
-//! triplets.
+//! DLTdv (versions 5 to 8) and Argus: positions in pixels, as two columns for each point and camera, or as
+//! triplets of row, column and value.
 
 mod flat;
 mod sparse;
@@ -39,7 +39,7 @@ impl FileFormat for Dltdv {
     }
 }
 
-/// What the direction of y depends on, where the table does not show it.
+/// Explains what the direction of y depends on, if the table does not show it.
 pub(crate) const Y_AXIS_QUESTION: &str = "DLTdv 8 counts pixels from the top of the picture (down), DLTdv 5 to 7 and \
     Argus from its bottom (up), and this table does not tell which of them wrote it";
 pub(crate) const FIRST_PIXEL: &str =
@@ -47,7 +47,7 @@ pub(crate) const FIRST_PIXEL: &str =
 pub(crate) const SEVERAL_CAMERAS: &str = "several cameras: tip and head have to come from one of them; rows \
     are frames of the first camera, from which the others may be offset";
 
-/// Facts of pixels; without a direction of y the user is asked for it.
+/// Facts about coordinates in pixels; if the direction of y is unknown, the user is asked for it.
 pub(crate) fn pixel_facts(y_axis: Fact<YAxis>) -> Facts {
     let y_axis_open = y_axis.is_none().then_some(Y_AXIS_QUESTION);
     Facts {
@@ -58,14 +58,14 @@ pub(crate) fn pixel_facts(y_axis: Fact<YAxis>) -> Facts {
     }
 }
 
-/// Name of a point's track, with its camera where there are several.
+/// Name of the track of a point, with the camera if there are several.
 pub(crate) fn camera_track_name(point: &str, camera: &str, several: bool) -> String {
     if several { format!("{point}_cam{camera}") } else { point.to_owned() }
 }
 
 // Files of DLTdv without positions. Each is refused with advice on the file to import.
 
-/// End of a file's name, and its content.
+/// Ending of a file's name, and contents of the file.
 const SIBLING_KINDS: [(&str, &str); 5] = [
     ("xyzpts", "positions in space, reconstructed from several cameras"),
     ("xyzres", "residuals of a reconstruction"),
@@ -73,12 +73,12 @@ const SIBLING_KINDS: [(&str, &str); 5] = [
     ("dltCoefs", "coefficients of a calibration"),
     ("pointNames", "names of points"),
 ];
-/// Index of the calibration among them; it is recognised by its name, because it has no header.
+/// Index of the calibration in `SIBLING_KINDS`; it is recognised by its file name, because it has no header.
 const COEFFICIENTS_KIND: usize = 3;
-/// Rows of a file of calibration coefficients.
+/// Number of rows in a file of calibration coefficients.
 const COEFFICIENTS: usize = 11;
 
-/// The refusal of such a file, and what shows it.
+/// Error for a file of DLTdv without positions, and the feature that identifies the file.
 fn recognise_sibling(document: &Document) -> Option<(ImportError, String)> {
     if document.text.starts_with("PointNames_to_go_with") {
         let reason = "line 1 says that it is a list of DLTdv's point names".to_owned();
@@ -105,7 +105,7 @@ fn recognise_sibling(document: &Document) -> Option<(ImportError, String)> {
     Some((sibling_error(document, line, kind), reason))
 }
 
-/// Whether the columns come in threes that end in `_X`, `_Y`, `_Z`.
+/// Whether the columns come in groups of three whose names end in `_X`, `_Y` and `_Z`.
 fn has_space_columns(row: &TextRow) -> bool {
     let of_point = |cells: &[String]| {
         let [x, y, z] = cells else { return false };
@@ -115,7 +115,7 @@ fn has_space_columns(row: &TextRow) -> bool {
     !row.cells.is_empty() && row.cells.chunks(3).all(of_point)
 }
 
-/// The kind by the name of the file, if its content is triplets or a calibration.
+/// Kind of a file by its name, if its contents are triplets or a calibration.
 fn kind_by_name(document: &Document) -> Option<usize> {
     let table = document.table.as_ref().ok()?;
     let stem = base_name(document.stem).to_lowercase();

@@ -1,5 +1,5 @@
-//! Frame-DIAS (DKH): `.rd`, rows of coordinates under a line of counts. A companion `.set` has the names of
-//! the points and the rate of the camera.
+//! Frame-DIAS (DKH): `.rd` files with rows of coordinates below a line of counts. A companion `.set` file
+//! contains the names of the points and the rate of the camera.
 
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::format::FileFormat;
@@ -11,15 +11,15 @@ use crate::import::reader::{
 };
 use crate::import::source::base_name;
 
-/// Number of cells in the first line: frames, points, time from frame to frame.
+/// Number of cells in the first line: number of frames, number of points, and time from frame to frame.
 const COUNTS: usize = 3;
 /// Extension of the table.
 const EXTENSION: &str = ".rd";
-/// Keys of the `.set`.
+/// Keys in the `.set` file.
 const RATE: &str = "CameraSpeed";
 const NAMES: &str = "PointName";
 const INTERVAL: &str = "RecInterval";
-/// Longest time from frame to frame, s; a larger third number has another meaning.
+/// Longest time from frame to frame, s; a larger third number in the first line has another meaning.
 const LONGEST_STEP_S: f64 = 10.0;
 
 pub(crate) struct FrameDias;
@@ -29,7 +29,8 @@ impl FileFormat for FrameDias {
         "framedias"
     }
 
-    /// The file has no names: its first line has to fit the rows below, or its extension has to be `.rd`.
+    /// The file contains no names, so its first line has to match the rows below, or its extension has to be
+    /// `.rd`.
     fn recognises(&self, document: &Document) -> Option<String> {
         let table = document.table.as_ref().ok()?;
         let counts = FrameDiasCounts::find(table)?;
@@ -102,13 +103,13 @@ impl FrameDiasCounts {
     }
 }
 
-/// Refuses the table with the line of a row.
+/// Refuses the table, and names the line of a row.
 fn refuse_row<T>(table: &DelimitedTable, row: usize, problem: &str, advice: &str) -> ImportResult<T> {
     let line = table.head.get(row).map_or(1, |row| row.line);
     Err(ImportError::columns(table.file, line, problem, advice))
 }
 
-/// Number of points in a row, which must be that of the first line.
+/// Number of points in a row, which must match the first line.
 fn count_points(table: &DelimitedTable, counts: FrameDiasCounts) -> ImportResult<usize> {
     let row = table.head.get(1).ok_or_else(|| ImportError::header_only(table.file, 1))?;
     let cells = row.used_width();
@@ -140,7 +141,7 @@ fn check_frame_count(
     refuse_row(table, 0, &problem, "the file is cut short or was edited: save it again")
 }
 
-/// Content of the `.set`.
+/// Contents of the `.set` file.
 #[derive(Debug, Clone, Default, PartialEq)]
 struct FrameDiasSettings {
     file: Option<String>,
@@ -175,7 +176,7 @@ impl FrameDiasSettings {
         self.file.as_deref().unwrap_or_default()
     }
 
-    /// Names of the points; a list of another length is refused, because it belongs to another file.
+    /// Names of the points. A list of another length is refused, because it belongs to another file.
     fn names(&self, table: &DelimitedTable, points: usize) -> ImportResult<Vec<String>> {
         if self.names.is_empty() {
             return Ok((1..=points).map(|point| format!("point{point}")).collect());
@@ -192,7 +193,8 @@ impl FrameDiasSettings {
         refuse_row(table, 0, &problem, advice)
     }
 
-    /// Rate of the camera; refuses one that contradicts the times, unless they are those of playback.
+    /// Frame rate of the camera. A rate that contradicts the times is refused, unless they are those of
+    /// playback.
     fn frame_rate(
         &self,
         table: &DelimitedTable,
@@ -226,7 +228,7 @@ impl FrameDiasSettings {
     }
 }
 
-/// `"a","b"` as names; a name may hold a comma.
+/// Splits `"a","b"` into names; a name may contain a comma.
 fn split_quoted_names(list: &str) -> Vec<String> {
     let (mut names, mut open) = (vec![String::new()], false);
     for c in list.chars() {

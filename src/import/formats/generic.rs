@@ -10,7 +10,7 @@ use crate::import::reader::{
 };
 use crate::toml_file::suggest_key;
 
-/// Keys of clocks; the first that is given counts.
+/// Keys of clocks, in order of preference.
 const CLOCKS: [&str; 3] = ["frame", "time", "time-ms"];
 
 pub(crate) struct GenericFormat;
@@ -20,7 +20,7 @@ impl FileFormat for GenericFormat {
         "generic"
     }
 
-    /// Never: without `--columns` nothing gives the columns a meaning.
+    /// Never recognises a table: without `--columns` nothing gives the columns a meaning.
     fn recognises(&self, _document: &Document) -> Option<String> {
         None
     }
@@ -45,12 +45,12 @@ impl FileFormat for GenericFormat {
 }
 
 const NUMBER_ADVICE: &str = "correct the column number; columns count from 1";
-/// Most cells of a row that a refusal shows.
+/// Maximum number of cells of a row in an error message.
 const MOST_SHOWN: usize = 16;
-/// Most characters of such a cell.
+/// Maximum number of characters of such a cell.
 const LONGEST_SHOWN: usize = 24;
 
-/// The refusal of a table without names for its columns; it shows the first row with numbers for the columns.
+/// Error for a table whose columns are not named; it shows the first row, with the numbers of the columns.
 pub(crate) fn unnamed_columns_error(table: &DelimitedTable) -> ImportError {
     let first = table.head.first();
     let shown = |(at, cell): (usize, &String)| {
@@ -70,10 +70,10 @@ pub(crate) fn unnamed_columns_error(table: &DelimitedTable) -> ImportError {
     ImportError::columns(table.file, table.first_line(), problem, advice)
 }
 
-/// 0-based columns with their keys.
+/// Columns, counted from 0, with their keys.
 struct ColumnPositions {
     columns: Vec<(&'static str, usize)>,
-    /// Row of the head with the names.
+    /// Index of the row with the names in the head of the table.
     header: Option<usize>,
 }
 
@@ -132,7 +132,7 @@ impl ColumnPositions {
         Err(ImportError::columns(table.file, table.first_line(), problem, NUMBER_ADVICE))
     }
 
-    /// Refuses a column that is used twice.
+    /// Refuses a column that is used for two keys.
     fn check_distinct(&self, table: &DelimitedTable) -> ImportResult<()> {
         let pairs = self.columns.iter().enumerate().flat_map(|(index, first)| {
             self.columns.iter().skip(index + 1).map(move |second| (first, second))
@@ -156,14 +156,14 @@ impl ColumnPositions {
         self.columns.iter().find(|(known, _)| *known == key).map(|(_, at)| *at)
     }
 
-    /// The column of the clock; where every row is a frame, the first column of a point.
+    /// The column of the clock; if every row is a frame, the first column of a point.
     fn clock_column(&self) -> usize {
         let positions = ["tip-x", "head-x", "x"];
         CLOCKS.iter().chain(&positions).find_map(|key| self.column_of(key)).unwrap_or(0)
     }
 
-    /// Index of the first row below the header whose clock is a number. A row above it that holds positions
-    /// is damaged, and refused.
+    /// Index of the first row below the header whose clock is a number. A row before it that contains
+    /// positions is damaged, and is refused.
     fn first_data_row(&self, table: &DelimitedTable) -> ImportResult<usize> {
         let from = self.header.map_or(0, |header| header + 1);
         let number = |row: &TextRow, at: usize| {
@@ -184,8 +184,8 @@ impl ColumnPositions {
         Err(ImportError::header_only(table.file, table.head.last().map_or(1, |row| row.line)))
     }
 
-    /// Whether all used cells except the clock are numbers or empty. Lines of settings above a table have
-    /// other cells too.
+    /// Whether the used cells, except clock and track, are numbers or empty, with at least one number. Lines
+    /// of settings above a table also contain text.
     fn is_row_of_numbers(&self, number: impl Fn(&TextRow, usize) -> CellNumber, row: &TextRow) -> bool {
         let others = self.columns.iter().filter(|(key, at)| *key != "track" && *at != self.clock_column());
         let found: Vec<CellNumber> = others.map(|(_, at)| number(row, *at)).collect();
@@ -221,10 +221,10 @@ impl ColumnPositions {
     }
 }
 
-/// The refusal of names that no row has together. It shows the row that has most of them.
+/// Error for names of columns that no single row contains; it shows the row that contains most of them.
 fn no_such_column_error(table: &DelimitedTable, names: &[&str]) -> ImportError {
     let hits = |row: &TextRow| names.iter().filter(|name| row.has(name)).count();
-    // (reversed, because `max_by_key` takes the last of equal rows)
+    // (reversed, because `max_by_key` returns the last of equal rows)
     let best = table.head.iter().rev().max_by_key(|row| hits(row));
     let header: Vec<&str> =
         best.map(|row| row.texts().into_iter().filter(|text| !text.is_empty()).collect()).unwrap_or_default();
@@ -237,9 +237,9 @@ fn no_such_column_error(table: &DelimitedTable, names: &[&str]) -> ImportError {
     ImportError::columns(table.file, best.map_or(1, |row| row.line), problem, advice)
 }
 
-// Clocks that `--columns` leaves unused or takes for positions.
+// Clocks that `--columns` leaves unused or mistakes for positions.
 
-/// Last words in the name of a clock; a unit may follow.
+/// Words at the end of the name of a clock; a unit may follow.
 const TIME_WORDS: [&str; 2] = ["t", "time"];
 const FRAME_WORDS: [&str; 2] = ["frame", "frames"];
 const TIME_UNIT_WORDS: [&str; 4] = ["s", "sec", "seconds", MILLISECONDS];
@@ -248,12 +248,12 @@ const MILLISECONDS: &str = "ms";
 #[derive(Clone, Copy, PartialEq)]
 enum ClockKind {
     Frames,
-    /// Times; their unit, s.
+    /// Times, with their unit in seconds.
     Times(f64),
 }
 
-/// Refuses a position whose column is named like a clock. Also refuses an unused clock in front of a point's
-/// columns if it differs from the named one.
+/// Refuses a position whose column is named like a clock. Also refuses an unused clock directly before a
+/// column of a point if it differs from the named clock.
 ///
 /// # Errors
 /// [`ImportError`] naming the column and the row.
@@ -279,7 +279,7 @@ pub(super) fn check_unused_clocks(
     Ok(())
 }
 
-/// Refuses the unused clock `other` if it differs from the named one.
+/// Refuses the unused clock `other` if it differs from the named clock.
 fn compare_clock(
     table: &DelimitedTable,
     line: usize,

@@ -65,9 +65,9 @@ fn no_header_error(table: &DelimitedTable) -> ImportError {
     ImportError::columns(table.file, table.first_line(), problem, advice)
 }
 
-// Common to all tables of ImageJ: the direction of y, and a refusal at the header.
+// Common to all tables of ImageJ: the direction of y, and errors at the header.
 
-/// Facts from the documentation, for all three tables.
+/// Facts from the documentation that hold for all three tables.
 pub(crate) fn imagej_facts() -> Facts {
     let why = "ImageJ counts y from the top of the picture, unless `Invert Y coordinates` was ticked in \
         Analyze > Set Measurements"
@@ -75,7 +75,7 @@ pub(crate) fn imagej_facts() -> Facts {
     Facts { y_axis: Some((YAxis::Down, why)), ..Facts::default() }
 }
 
-/// Refuses the table with the line of its header.
+/// Refuses the table, and names the line of its header.
 fn refuse_header<T>(
     table: &DelimitedTable,
     row: &TextRow,
@@ -86,12 +86,13 @@ fn refuse_header<T>(
     Err(ImportError::wrong_table(table.location(row.line, 1), found, expected, advice))
 }
 
-// The table of the plugin Manual Tracking: whole pixels, a row a click.
+// The table of the plugin Manual Tracking: whole pixels, one row per click.
 
-/// Starts of two names that end in a degree sign, which may be in any encoding or lost.
+/// Beginnings of two column names that end in a degree sign; its encoding is unknown, and it may be lost.
 const MANUAL_TRACK: &str = "Track n";
 const MANUAL_SLICE: &str = "Slice n";
-/// Most characters of such a name, because the degree sign may have become two.
+/// Maximum number of characters of such a name; a wrong encoding may turn the degree sign into two
+/// characters.
 const MANUAL_NAME_LENGTH: usize = MANUAL_TRACK.len() + 3;
 
 fn find_numbered_column(names: &[&str], start: &str) -> Option<usize> {
@@ -142,12 +143,12 @@ pub(crate) fn read_manual_tracking<'a>(
 
 // MTrackJ's table of points: coordinates and times with their units in the header.
 
-/// Columns that number clusters, tracks and points. The number of a point starts again in each track and is
-/// not a frame.
+/// Columns that number clusters, tracks and points. The numbers of points start again in each track and are
+/// not frame numbers.
 const MTRACKJ_CLUSTER: &str = "CID";
 const MTRACKJ_TRACK: &str = "TID";
 const MTRACKJ_POINT: &str = "PID";
-/// Units in which the times number the frames.
+/// Units for which the times are frame numbers.
 const FRAME_UNITS: [&str; 2] = ["frame", "frames"];
 
 pub(crate) fn is_mtrackj_header(names: &[&str]) -> bool {
@@ -214,7 +215,7 @@ pub(crate) fn read_mtrackj<'a>(
     Ok(export)
 }
 
-/// Advises to set the frame interval, without which every time is 0.
+/// Replaces the error for a repeated time by advice to set the frame interval, without which every time is 0.
 fn no_interval_error(error: ImportError) -> ImportError {
     match error {
         ImportError::DuplicateRow { place, what: "time", found, track, first } => ImportError::wrong_table(
@@ -227,15 +228,16 @@ fn no_interval_error(error: ImportError) -> ImportError {
     }
 }
 
-// ImageJ's Results table: a row a measurement.
+// ImageJ's Results table: one row per measurement.
 
-/// Columns of a point: its centroid, or else its centre of mass. `BX` and `BY` are a corner.
+/// Columns of the position of a point: its centroid, or else its centre of mass. `BX` and `BY`, a corner of
+/// the bounding box, are not read.
 const POSITIONS: [[&str; 2]; 2] = [["X", "Y"], ["XM", "YM"]];
 const SLICE: &str = "Slice";
 const FRAME: &str = "Frame";
-/// Column with the counter of the multi-point tool to which a point belongs.
+/// Column that gives the counter of the multi-point tool to which a point belongs.
 const COUNTER: &str = "Counter";
-/// Measurements that mark an ImageJ table if its first column has no name.
+/// Measurements that identify an ImageJ table if its first column has no name.
 const MEASUREMENTS: [&str; 13] = [
     "Area",
     "Mean",
@@ -252,7 +254,8 @@ const MEASUREMENTS: [&str; 13] = [
     "Label",
 ];
 
-/// Whether a header has positions with a slice, or a first column without a name and ImageJ's measurements.
+/// Whether a header contains positions and a slice, or a first column without a name and ImageJ's
+/// measurements.
 pub(crate) fn is_results_header(names: &[&str]) -> bool {
     let has = |name: &str| names.contains(&name);
     let measured = MEASUREMENTS.iter().any(|name| has(name));
@@ -307,7 +310,8 @@ pub(crate) fn read_results<'a>(
     Ok(export)
 }
 
-/// The column of the slice, or of the frame in a hyperstack. Of both, the one that changes.
+/// Column that counts the frames: `Slice`, or `Frame` in a hyperstack. If the table has both, the one whose
+/// values change; it is refused if both change.
 fn clock_column(table: &DelimitedTable, row: &TextRow) -> ImportResult<usize> {
     let at = |name: &str| row.position(name);
     match (at(SLICE), at(FRAME)) {
@@ -340,7 +344,7 @@ fn clock_column(table: &DelimitedTable, row: &TextRow) -> ImportResult<usize> {
     }
 }
 
-/// Whether a column has different texts.
+/// Whether the texts in a column differ.
 fn column_varies(table: &DelimitedTable, cell: usize) -> ImportResult<bool> {
     let mut rows = table.rows(1);
     let mut first: Option<String> = None;
@@ -355,7 +359,7 @@ fn column_varies(table: &DelimitedTable, cell: usize) -> ImportResult<bool> {
     Ok(false)
 }
 
-/// Explains several points in a slice, which the table does not tell apart.
+/// Explains that a slice contains several points, which the table does not distinguish.
 fn several_points_error(error: ImportError, counted: bool) -> ImportError {
     let ImportError::DuplicateRow { place, found, first, .. } = error else { return error };
     let of = if counted { " and counter" } else { "" };

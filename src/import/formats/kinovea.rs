@@ -1,5 +1,5 @@
 //! Kinovea: trajectories as CSV and as TXT, and the tables of its kinematics windows. Projects (`.kva`) and
-//! tables of chronometers are refused with advice on the export that has the positions.
+//! tables of chronometers are refused with advice on the export that contains the positions.
 
 mod text;
 
@@ -14,17 +14,17 @@ use crate::import::reader::{
 use crate::recording::quality::{Check, QualityFinding, Severity};
 use text::TITLE;
 
-/// Root of a project.
+/// Beginning of the root element of a project.
 const PROJECT: &str = "<KinoveaVideoAnalysis";
-/// Characters at the start of a file in which the root of a project is searched.
+/// Number of characters at the start of a file in which the root element of a project is sought.
 const PROJECT_START_CHARACTERS: usize = 1000;
-/// First column of the trajectories, in every language of the program.
+/// Name of the first column of the trajectories, in every language of the program.
 const TIME: &str = "Time";
-/// Ends of the column names of a point.
+/// Endings of the names of the two columns of a point.
 const AXES: [&str; 2] = ["/X", "/Y"];
 /// Name of the only point of a plain track.
 const PLAIN_TRACK_KEY: &str = "0";
-/// Ends of the row names of chronometers.
+/// Endings of the row names of chronometers.
 const CHRONOMETER: [&str; 2] = ["(Cumulative)", "(Duration)"];
 pub(crate) struct Kinovea;
 
@@ -113,7 +113,7 @@ fn unknown_table_error(table: &DelimitedTable) -> ImportError {
     ImportError::columns(table.file, table.first_line(), problem, advice)
 }
 
-/// Reads the CSV of the trajectories: a row a frame, with empty cells where a track has no position.
+/// Reads the CSV of the trajectories: one row per frame, with empty cells where a track has no position.
 fn read_trajectories<'a>(document: &'a Document, table: &'a DelimitedTable) -> ImportResult<TrackFile<'a>> {
     let Some(header) = table.head.first() else { return Err(unknown_table_error(table)) };
     let names: Vec<&str> = header.texts().into_iter().take(header.used_width()).collect();
@@ -135,7 +135,7 @@ fn read_trajectories<'a>(document: &'a Document, table: &'a DelimitedTable) -> I
     Ok(export)
 }
 
-/// The name of a plain track, or of an object and its point.
+/// Name of a plain track, or name of an object and its point.
 fn track_name(path: &str) -> &str {
     match path.rsplit_once('/') {
         Some((name, PLAIN_TRACK_KEY)) if !name.is_empty() => name,
@@ -143,10 +143,10 @@ fn track_name(path: &str) -> &str {
     }
 }
 
-/// The export that has the positions.
+/// Advice on the export that contains the positions.
 const EXPORT_MENU: &str = "in Kinovea use File > Export and there the CSV of the trajectories";
 
-/// Note on what Kinovea's preferences decide and its tables do not say.
+/// Note on the units and the direction of y, which depend on Kinovea's preferences and are not in its tables.
 const PREFERENCES_NOTE: &str = "Kinovea writes times in the unit of its preferences, and positions \
     with y up in the calibrated unit or, if its preferences say so, in image pixels with y down; the file \
     does not say which";
@@ -155,13 +155,13 @@ pub(crate) fn kinovea_facts() -> Facts {
     Facts { time: TimeUnit::Unknown, ..Facts::default() }
 }
 
-// Tables of Kinovea's kinematics windows: one filtered series a column, times in whole milliseconds.
+// Tables of Kinovea's kinematics windows: one filtered series per column, times in whole milliseconds.
 
-/// End of the first column's name in every language of the program.
+/// Ending of the name of the first column in every language of the program.
 const MILLISECONDS: &str = "(ms)";
-/// Rate, frames/s, above which samples share a millisecond, so that only the last of them is written.
+/// Frame rate, 1/s, above which several samples fall into the same millisecond and only the last is written.
 const HIGHEST_RATE_HZ: f64 = 1000.0;
-/// Names of times of other programs.
+/// Names that other programs give to times.
 const OTHER_TIME_NAMES: [&str; 2] = ["t", "T"];
 
 /// Whether a table has times in whole milliseconds, and series whose names are not those of coordinates.
@@ -177,7 +177,7 @@ pub(crate) fn is_window_header(table: &DelimitedTable, names: &[&str]) -> bool {
         && is_whole_column(table, 0)
 }
 
-/// Whether two names differ only in x and y, as `tipX` and `tipY`.
+/// Whether two names differ only in x and y, such as `tipX` and `tipY`.
 fn has_coordinate_pair(series: &[&str]) -> bool {
     let names: Vec<String> = series.iter().map(|name| name.to_lowercase()).collect();
     names.iter().any(|name| name.contains('x') && names.contains(&name.replace('x', "y")))
@@ -189,7 +189,8 @@ fn is_coordinate(name: &str) -> bool {
         .any(|word| matches!(word, "x" | "y" | "z" | "px" | "py" | "frame"))
 }
 
-/// Reads a table of the kinematics windows with `--columns`, because it does not say what its series are.
+/// Reads a table of the kinematics windows, which needs `--columns` because it does not say what its series
+/// are.
 pub(crate) fn read_window<'a>(
     document: &'a Document<'a>,
     table: &DelimitedTable,
@@ -241,7 +242,7 @@ fn samples_lost_error(table: &DelimitedTable, rate_hz: f64) -> ImportError {
     )
 }
 
-/// The finding on a row every millisecond: the camera ran at 1000 frames/s, or faster and samples are lost.
+/// Finding about rows at every millisecond: the camera ran at 1000 frames/s, or faster with samples lost.
 fn lost_samples_finding(export: &TrackFile) -> Option<QualityFinding> {
     let times = export.clocks.first()?.times();
     let every = times.len() > 1 && times.windows(2).all(|pair| pair[1] - pair[0] == 1.0);
@@ -255,7 +256,7 @@ fn lost_samples_finding(export: &TrackFile) -> Option<QualityFinding> {
     every.then(|| new_finding(Check::SamplesLost, Severity::Serious, value, found, advice))
 }
 
-/// Whether every cell is a whole number.
+/// Whether every cell of a column in the head of the table is a whole number.
 fn is_whole_column(table: &DelimitedTable, column: usize) -> bool {
     let whole = |row: &TextRow| {
         let number = row.cells.get(column).map(|cell| table.parse_cell(cell));

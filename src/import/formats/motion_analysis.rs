@@ -1,4 +1,4 @@
-//! motion-analysis-2d (Saga University): one row a frame, times with four decimals.
+//! motion-analysis-2d (Saga University): one row per frame, times with four decimals.
 
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::format::FileFormat;
@@ -7,9 +7,10 @@ use crate::import::reader::{DelimitedTable, Document, Facts, TableLayout, TrackF
 
 /// Names of the first columns.
 const CLOCK: [&str; 2] = ["frame_no", "time"];
-/// Ends of the column names of a point.
+/// Endings of the names of the two columns of a point.
 const AXES: [&str; 2] = ["-x", "-y"];
-/// Ends of the column names of angles, which follow the points; a wrong encoding often damages the sign.
+/// Endings of the names of columns of angles, which follow the points; a wrong encoding often damages the
+/// Greek letter.
 const ANGLES: [&str; 3] = ["-\u{3b8}", "-\u{3f4}", "-theta"];
 
 pub(crate) struct MotionAnalysis;

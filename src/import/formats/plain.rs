@@ -13,7 +13,7 @@ use crate::import::reader::{
 use header::ColumnMeaning;
 
 pub(crate) const PLAIN_NAME: &str = "plain";
-/// Rows at the top in which the names are searched.
+/// Number of rows at the top in which the column names are sought.
 const HEADER_ROWS: usize = 6;
 const ADVICE: &str = "say which columns are meant by their numbers (from 1): --columns frame=A,tip-x=B,tip-y=C,head-x=D,head-y=E \
      with numbers for A to E";
@@ -80,13 +80,13 @@ impl FileFormat for PlainFormat {
     }
 }
 
-/// The row of names and what they mean.
+/// The row of column names, and the meanings of the names.
 struct PlainHeader<'t> {
     file: &'t str,
     index: usize,
     row: &'t TextRow,
     meanings: Vec<ColumnMeaning>,
-    /// The row of units below the names, where there is one.
+    /// The row of units below the names, if there is one.
     units: Option<&'t TextRow>,
 }
 
@@ -102,7 +102,7 @@ impl<'t> PlainHeader<'t> {
         })
     }
 
-    /// Takes the units from a row of their own below the names, if there is one.
+    /// Takes the units from a separate row below the names, if there is one.
     fn with_units(mut self, table: &'t DelimitedTable) -> Self {
         let words = |row: &&TextRow| !row.cells.iter().any(|cell| table.is_value(cell));
         let Some(row) = table.head.get(self.index + 1).filter(words) else { return self };
@@ -114,12 +114,12 @@ impl<'t> PlainHeader<'t> {
         self
     }
 
-    /// The columns of the wanted meaning.
+    /// Indices of the columns with the wanted meaning.
     fn columns_where(&self, wanted: impl Fn(&ColumnMeaning) -> bool) -> Vec<usize> {
         self.meanings.iter().enumerate().filter(|(_, meaning)| wanted(meaning)).map(|(at, _)| at).collect()
     }
 
-    /// The only column of the wanted meaning, if there is one; refuses several.
+    /// Index of the only column with the wanted meaning, if there is one; refuses several.
     fn only_column(
         &self,
         wanted: impl Fn(&ColumnMeaning) -> bool,
@@ -129,8 +129,8 @@ impl<'t> PlainHeader<'t> {
         if found.len() > 1 { Err(self.ambiguous_error(&found, what)) } else { Ok(found.first().copied()) }
     }
 
-    /// The columns of frames and of times. The first of several columns of times counts:
-    /// [`Self::compare_times`] refuses columns that differ.
+    /// The columns of frame numbers and of times. If there are several columns of times, the first is used,
+    /// and [`Self::compare_times`] refuses the table if they differ.
     fn clock_columns(&self) -> ImportResult<ClockColumns> {
         let frame = self.only_column(|meaning| *meaning == ColumnMeaning::Frame, "numbers of the frames")?;
         let times = self.columns_where(|meaning| matches!(meaning, ColumnMeaning::Time(_)));
@@ -149,7 +149,7 @@ impl<'t> PlainHeader<'t> {
         Ok((frame, times.first().map(|&at| (at, unit(at)))))
     }
 
-    /// Refuses columns of times that differ in a row.
+    /// Refuses a table in which columns of times differ in any row.
     fn compare_times(&self, table: &DelimitedTable, start: usize) -> ImportResult<()> {
         let clock = |(cell, meaning): (usize, &ColumnMeaning)| match meaning {
             ColumnMeaning::Time(TimeUnit::Seconds(unit)) => Some(ClockCell { cell, unit: *unit }),
@@ -203,7 +203,7 @@ impl<'t> PlainHeader<'t> {
         }
     }
 
-    /// The unit that all coordinates name.
+    /// The unit of all coordinates; refuses different units.
     fn coordinate_unit(&self) -> ImportResult<Option<(CoordinateUnit, String)>> {
         let mut units = self.meanings.iter().enumerate().filter_map(|(at, meaning)| match meaning {
             ColumnMeaning::Coordinate { unit, .. } => Some((at, *unit)),
@@ -216,7 +216,7 @@ impl<'t> PlainHeader<'t> {
         }
     }
 
-    /// Source of a column's unit, in words.
+    /// Text on where the unit of a column was found.
     fn unit_source(&self, at: usize) -> String {
         let (number, name) = (at + 1, self.column_name(at));
         let below = self.units.and_then(|row| Some((row.line, row.cells.get(at)?)));
@@ -230,7 +230,7 @@ impl<'t> PlainHeader<'t> {
         self.row.cell(at)
     }
 
-    /// Index of the first row of numbers: a row without any below the names is skipped.
+    /// Index of the first row of numbers. A row without numbers directly below the names is skipped.
     fn first_data_row(&self, table: &DelimitedTable) -> ImportResult<usize> {
         let below = self.index + 1;
         let row = table.head.get(below).ok_or_else(|| ImportError::header_only(table.file, self.row.line))?;
@@ -238,7 +238,7 @@ impl<'t> PlainHeader<'t> {
         Ok(if words && table.head.len() > below + 1 { below + 1 } else { below })
     }
 
-    /// Note on the columns that were read and those that were not.
+    /// Note on the clock, the units and the columns that were not read.
     fn column_notes(&self, layout: &TableLayout) -> Vec<String> {
         let clock = layout.frame.iter().chain(&layout.time);
         let clock: Vec<String> = clock.map(|&at| format!("`{}`", self.column_name(at))).collect();

@@ -1,4 +1,4 @@
-//! SLEAP: the analysis CSV and the tables of sleap-io with a row a point, an instance or a frame.
+//! SLEAP: the analysis CSV, and the tables of sleap-io with one row per point, per instance or per frame.
 
 use crate::import::error::{ImportError, ImportResult, TextLocation};
 use crate::import::format::FileFormat;
@@ -9,7 +9,7 @@ use crate::import::reader::{
     TextRow, Track, TrackCollector, TrackFile,
 };
 
-/// Separates track and node in the key of a row of one point; no name contains it.
+/// Separates the names of track and node in the key of a row with one point; no name contains it.
 const SEPARATOR: char = '\u{1f}';
 const TRACK_FIRST: &str = "give every instance a track of its own in SLEAP (run the inference with a \
     tracker, or at most one instance), and export again";
@@ -51,13 +51,13 @@ impl FileFormat for Sleap {
             collector.finish(document.file, RowOrder::Any).map_err(duplicate_instance_error)?;
         match (columns.node, columns.slots.as_slice(), tracks.as_mut_slice()) {
             (Some(_), ..) => name_by_node(&mut tracks),
-            // (the only node of the only instance gives the name)
+            // (a single node of a single instance gives its name to the track)
             (None, [InstanceColumns { nodes, .. }], [track]) if nodes.len() == 1 => {
                 track.name.clone_from(&nodes[0].name)
             }
             _ => {}
         }
-        // (a table of labels has the same columns as one of predictions)
+        // (a table of labels has the same columns as a table of predictions)
         let longest = clocks.iter().max_by_key(|clock| clock.len());
         let finding = longest.and_then(|clock| picked_frames_finding(document.file, clock));
         Ok(TrackFile {
@@ -76,7 +76,7 @@ fn facts() -> Facts {
     Facts::pixels_down("SLEAP writes image pixels, y downwards")
 }
 
-/// Reads an instance of a row. One with neither a track nor a position is skipped.
+/// Reads one instance of a row. An instance with neither a track nor a position is skipped.
 fn read_instance(
     table: &DelimitedTable,
     record: &RowView,
@@ -85,7 +85,7 @@ fn read_instance(
     collector: &mut TrackCollector,
 ) -> ImportResult<()> {
     let coordinate = |cell: usize, axis: &str, cells: &NodeCells| {
-        // (its name is put together only for a refusal)
+        // (the name of the column is composed only for an error)
         table.number_at(record, cell, axis).map_err(|_| {
             let name = format!("{}.{axis}", cells.name);
             table.not_a_number_error(record.line, cell, record.cell(cell), name.trim_start_matches('.'))
@@ -118,8 +118,8 @@ fn read_instance(
     Ok(())
 }
 
-/// Names the tracks of a table with a row a point: by their node, by their instance if it has only one node,
-/// or by both.
+/// Names the tracks of a table with one row per point: by their node, by their instance if it has only one
+/// node, or by both.
 fn name_by_node(tracks: &mut [Track]) {
     let parts = tracks.iter().filter_map(|track| track.name.split_once(SEPARATOR));
     let parts: Vec<(String, String)> = parts.map(|(a, b)| (a.to_owned(), b.to_owned())).collect();
@@ -134,7 +134,8 @@ fn name_by_node(tracks: &mut [Track]) {
     }
 }
 
-/// Explains two instances of one track, or of none, in one frame, which cannot be told apart.
+/// Explains that one frame contains two instances with the same track or with none, which cannot be
+/// distinguished.
 fn duplicate_instance_error(error: ImportError) -> ImportError {
     let ImportError::DuplicateRow { place, found, track, first, .. } = error else { return error };
     let name = track.trim_matches(SEPARATOR).replace(SEPARATOR, ":");
@@ -150,13 +151,13 @@ fn untracked_error(place: TextLocation, found: &str) -> ImportError {
     ImportError::wrong_table(place, found, "one instance of a track in a frame", TRACK_FIRST)
 }
 
-/// Column of the frame numbers, from 0.
+/// Column of the frame numbers, counted from 0.
 pub(crate) const FRAME: &str = "frame_idx";
 const TRACK: &str = "track";
 const NODE: &str = "node";
 /// Columns that name the video.
 const VIDEO: [&str; 3] = ["video_path", "video_idx", "video"];
-/// Prefix of instances that are numbered within each frame.
+/// Prefix of the names of instances that are numbered anew in each frame.
 const NUMBERED: &str = "inst";
 const ADVICE: &str = "export again with File > Export Analysis CSV, or `sio export FILE.slp -o FILE.csv`";
 
@@ -170,9 +171,9 @@ pub(crate) struct NodeCells {
 
 /// Source of the track of an instance.
 pub(crate) enum TrackSource {
-    /// A cell of its row.
+    /// A cell of the row.
     Cell(usize),
-    /// The name in its columns.
+    /// The name of the instance in the names of its columns.
     Name(String),
     Nobody,
 }
@@ -186,7 +187,7 @@ pub(crate) struct InstanceColumns {
 /// Columns of a table.
 pub(crate) struct SleapColumns {
     pub frame: usize,
-    /// Column that names the node, where every row is a point.
+    /// Column that names the node, if every row is a point.
     pub node: Option<usize>,
     pub slots: Vec<InstanceColumns>,
     video: Option<usize>,
@@ -241,7 +242,7 @@ impl SleapColumns {
         InstanceFields { has_frame: true, has_time: false, clock_cell: self.frame, points }
     }
 
-    /// Refuses a row of another length or of another video than the `video` of the rows before.
+    /// Refuses a row with a wrong number of cells, or of another video than the rows before (`video`).
     pub(crate) fn check_row(
         &self,
         table: &DelimitedTable,
@@ -265,7 +266,7 @@ impl SleapColumns {
     }
 }
 
-/// The nodes: columns `NAME.x` with `NAME.y` and `NAME.score`.
+/// The nodes, each with the columns `NAME.x`, `NAME.y` and perhaps `NAME.score`.
 ///
 /// # Errors
 /// Name of a node without y.
@@ -279,7 +280,7 @@ fn find_nodes(names: &[&str]) -> Result<Vec<NodeCells>, String> {
     columns.map(node).collect()
 }
 
-/// Sorts the nodes of a table with a row a frame into instances: their columns are `INSTANCE.NODE.x`.
+/// Groups the nodes of a table with one row per frame by instance: their columns are `INSTANCE.NODE.x`.
 fn find_instances(nodes: Vec<NodeCells>, at: impl Fn(&str) -> Option<usize>) -> Vec<InstanceColumns> {
     let mut slots: Vec<(String, InstanceColumns)> = vec![];
     for mut node in nodes {

@@ -8,11 +8,11 @@ use crate::import::reader::{
     DelimitedTable, Document, Facts, PointCells, TableLayout, TextRow, TrackFile, layout,
 };
 
-/// Rows at the top in which the names are searched.
+/// Number of rows at the top in which the column names are sought.
 const HEADER_ROWS: usize = 6;
-/// Positions in world coordinates, y upwards unless the axes were turned.
+/// Columns of positions in world coordinates, with y upwards unless the axes were turned.
 const WORLD: [&str; 2] = ["x", "y"];
-/// Positions in image pixels, y downwards. Tracker's `px` and `py` are momentum.
+/// Columns of positions in image pixels, with y downwards. Tracker's `px` and `py` are momentum.
 const IMAGE: [&str; 2] = ["pixelx", "pixely"];
 const MOMENTUM: [&str; 2] = ["px", "py"];
 const TIME: &str = "t";
@@ -56,7 +56,8 @@ impl FileFormat for TrackerFormat {
         }
         let notes = name_unnamed_points(&mut points, document.stem);
         let at = |name: &str| columns.iter().position(|column| *column == name);
-        // (speeds behind the positions are blank at the ends of a track, and editors cut blanks off)
+        // (speeds after the positions are blank at the ends of a track, and some editors remove trailing
+        // blanks)
         let layout = |time: Option<usize>, frame: Option<usize>, points: Vec<PointCells>| {
             let cells = points.iter().flat_map(|point| point.x.iter().chain(&point.y).copied());
             let width = cells.chain(time).chain(frame).max().map_or(0, |last| last + 1);
@@ -76,8 +77,8 @@ impl FileFormat for TrackerFormat {
     }
 }
 
-/// Facts of image pixels. World coordinates have the unit and the axes of the user's calibration, which the
-/// export does not name.
+/// Facts about image pixels or world coordinates. The unit and the axes of world coordinates are those of the
+/// user's calibration, which the export does not name.
 fn facts(pair: [&str; 2]) -> Facts {
     if pair == WORLD {
         let open = "Tracker's x and y point up unless its axes were turned; image pixels point down";
@@ -96,7 +97,7 @@ fn find_header(table: &DelimitedTable) -> Option<usize> {
     table.head.iter().take(HEADER_ROWS).position(is_header)
 }
 
-/// Whether the first row is only the name of a track.
+/// Whether the first row contains only the name of a track.
 fn has_title(table: &DelimitedTable) -> bool {
     let names = table.first_texts();
     find_header(table) == Some(1)
@@ -114,12 +115,12 @@ fn no_header_error(table: &DelimitedTable) -> ImportError {
     ImportError::columns(table.file, table.first_line(), problem, advice)
 }
 
-/// Index and text of a column's title: above the column, or else the nearest to the left.
+/// Index and text of the title of a column: the one above it, or else the nearest one to its left.
 fn find_title<'t>(titles: &[&'t str], column: usize) -> Option<(usize, &'t str)> {
     titles.iter().take(column + 1).rposition(|title| !title.is_empty()).map(|at| (at, titles[at]))
 }
 
-/// The points: an x, and the next y under the same title before another x.
+/// The points: each x with the y under the same title, or without titles with the next y before another x.
 fn find_points(columns: &[&str], titles: &[&str], [x_name, y_name]: [&str; 2]) -> Vec<PointCells> {
     let title_of = |column: usize| find_title(titles, column);
     let (mut points, mut seen) = (vec![], vec![]);
@@ -127,7 +128,7 @@ fn find_points(columns: &[&str], titles: &[&str], [x_name, y_name]: [&str; 2]) -
         let title = title_of(x);
         if let Some((at, _)) = title {
             if seen.contains(&at) {
-                continue; // (a second x under one title is a user's own column)
+                continue; // (a second x under the same title is the user's own column)
             }
             seen.push(at);
         }
@@ -139,7 +140,8 @@ fn find_points(columns: &[&str], titles: &[&str], [x_name, y_name]: [&str; 2]) -
     points
 }
 
-/// Names the points that have no title: a single one like its file, several by numbers. Gives notes on it.
+/// Names the points that have no title: a single point after its file, several points by numbers. Returns a
+/// note on each name.
 fn name_unnamed_points(points: &mut [PointCells], stem: &str) -> Vec<String> {
     let several = points.len() > 1;
     let unnamed = points.iter_mut().enumerate().filter(|(_, point)| point.name.is_empty());
@@ -167,7 +169,7 @@ fn no_positions_error(table: &DelimitedTable, row: &TextRow, columns: &[&str]) -
 
 // Tables of several tracks side by side, each with its own clock.
 
-/// A clock with its points.
+/// A clock and its points.
 struct ClockGroup {
     pub time: Option<usize>,
     pub frame: Option<usize>,
@@ -178,7 +180,7 @@ fn find_columns(columns: &[&str], name: &str) -> Vec<usize> {
     columns.iter().enumerate().filter(|(_, column)| **column == name).map(|(at, _)| at).collect()
 }
 
-/// Whether all columns of times are equal in every row, and all of frame numbers.
+/// Whether all columns of times are equal in every row, and all columns of frame numbers too.
 fn clocks_agree(table: &DelimitedTable, start: usize, columns: &[&str]) -> ImportResult<bool> {
     for clocks in [find_columns(columns, TIME), find_columns(columns, FRAME)] {
         let [first, others @ ..] = clocks.as_slice() else { continue };
@@ -192,7 +194,6 @@ fn clocks_agree(table: &DelimitedTable, start: usize, columns: &[&str]) -> Impor
     Ok(true)
 }
 
-/// Groups the points by their clock.
 fn group_by_clock(
     table: &DelimitedTable,
     row: &TextRow,
@@ -220,7 +221,7 @@ fn group_by_clock(
     Ok(groups)
 }
 
-/// The clock under the title of column `x`, or the nearest on its left.
+/// The clock under the same title as column `x`, or else the nearest clock to its left.
 fn clock_of_column(clocks: &[usize], titles: &[&str], x: usize) -> Option<usize> {
     let title = find_title(titles, x).map(|(at, _)| at);
     let under = |clock: &&usize| title.is_some() && find_title(titles, **clock).map(|(at, _)| at) == title;

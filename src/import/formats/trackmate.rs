@@ -39,7 +39,7 @@ impl FileFormat for TrackMate {
     }
 }
 
-/// The name of the root element, where it is one of TrackMate's.
+/// Name of the root element, if it is one of TrackMate's.
 fn root_element(document: &Document) -> Option<&'static str> {
     let element = XmlReader::root_name(document)?;
     [SIMPLE_ROOT, project::PROJECT_ROOT].into_iter().find(|known| element == *known)
@@ -92,9 +92,9 @@ fn read_simple_spot(xml: &XmlReader, element: &XmlElement, interval: Option<f64>
     Ok(Spot { line: element.line, frame, time, x, y })
 }
 
-// From spots to tracks.
+// Sorting of the spots into tracks.
 
-/// The exports that have positions.
+/// Advice on the exports that contain positions.
 pub(crate) const EXPORT_ADVICE: &str = "in TrackMate's display panel press Tracks, choose the tab Spots and then \
     Export to CSV; or run the action Export tracks to XML file";
 
@@ -115,11 +115,11 @@ pub(crate) struct Trajectory {
     pub spots: Vec<Spot>,
 }
 
-/// Content of a file of TrackMate.
+/// Contents of a file of TrackMate.
 #[derive(Default)]
 pub(crate) struct TrackMateFile<'a> {
     pub trajectories: Vec<Trajectory>,
-    /// Unit of the coordinates, and its source in words.
+    /// Unit of the coordinates, and text on where it was found.
     pub space_unit: Option<(String, String)>,
     pub time_unit: Option<String>,
     pub table: Option<&'a DelimitedTable<'a>>,
@@ -128,20 +128,20 @@ pub(crate) struct TrackMateFile<'a> {
     pub notes: Vec<String>,
 }
 
-/// Use of the times of a file.
+/// How the times of a file are used.
 struct SpotTimes {
-    /// Unit of the times; `None` where they only repeat the frames.
+    /// Unit of the times; `None` if the file has no times or they only repeat the frame numbers.
     unit: Option<TimeUnit>,
     note: Option<String>,
     finding: Option<QualityFinding>,
 }
 
 impl<'a> TrackMateFile<'a> {
-    /// Sorts the spots and makes the clocks and tracks.
+    /// Sorts the spots into clocks and tracks.
     ///
     /// # Errors
-    /// [`ImportError::DuplicateRow`] where a requested track has two spots in one frame,
-    /// [`ImportError::WrongTable`] where there are no tracks.
+    /// [`ImportError::DuplicateRow`] if a requested track has two spots in one frame,
+    /// [`ImportError::WrongTable`] if there are no tracks.
     pub(crate) fn into_track_file(
         mut self,
         document: &'a Document<'a>,
@@ -207,7 +207,7 @@ impl<'a> TrackMateFile<'a> {
         Ok((count > 0).then(|| new_finding(Check::BranchingTracks, Severity::Caution, value, found, advice)))
     }
 
-    /// Decides whether the times say more than the frames do.
+    /// Decides whether the times add information to the frame numbers.
     fn spot_times(&self, file: &str) -> SpotTimes {
         let mut spots = self.trajectories.iter().flat_map(|track| &track.spots);
         let none = SpotTimes { unit: None, note: None, finding: None };
@@ -244,7 +244,7 @@ impl<'a> TrackMateFile<'a> {
 }
 
 impl Trajectory {
-    /// The refusal of a second spot in one frame.
+    /// Error for two spots in one frame, if there are any.
     fn duplicate_spot_error(&self, file: &str) -> Option<ImportError> {
         let same = |pair: &&[Spot]| pair[0].frame.is_some() && pair[0].frame == pair[1].frame;
         let pair = self.spots.windows(2).find(same)?;
@@ -263,7 +263,7 @@ impl Trajectory {
     }
 }
 
-/// Whether the track is named by `--point`, or is called tip or head where no `--point` is given.
+/// Whether `--point` names the track, or, without any `--point`, the track is called tip or head.
 fn is_requested(options: &ImportOptions, name: &str) -> bool {
     let named = [options.tip.as_deref(), options.head.as_deref()];
     if named.iter().all(Option::is_none) {
@@ -282,7 +282,7 @@ fn no_tracks_error(document: &Document) -> ImportError {
     )
 }
 
-/// A unit of time by its name, s.
+/// Length of a unit of time, s, by its name.
 fn unit_seconds(unit: &str) -> Option<f64> {
     match unit {
         "s" | "sec" | "secs" | "second" | "seconds" => Some(1.0),
@@ -294,10 +294,10 @@ fn unit_seconds(unit: &str) -> Option<f64> {
     }
 }
 
-/// The unit of length that the file names; an unknown one gives a note.
+/// The unit of length that the file names; an unknown unit gives a note.
 fn length_unit(text: &str, place: &str, notes: &mut Vec<String>) -> Option<(CoordinateUnit, String)> {
     let name = text.trim().trim_matches(['(', ')']).trim();
-    // (only the micrometre has a sign beyond ASCII, which a wrong encoding damages)
+    // (micrometres are the only unit with a sign outside ASCII, which a wrong encoding damages)
     let sign = name.strip_suffix('m').unwrap_or_default();
     let lost = !sign.is_empty() && sign.chars().all(|c| c == '?' || !c.is_ascii());
     let unit = match name {

@@ -1,5 +1,5 @@
-//! trackpy: its table of linked features, saved with `to_csv`. y is in front of x, and an index without a
-//! name may be in front of both.
+//! trackpy: its table of linked features, saved with `to_csv`. The column y precedes x, and an index column
+//! without a name may precede both.
 
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::format::FileFormat;
@@ -10,12 +10,12 @@ use crate::import::reader::{
 
 const PARTICLE: &str = "particle";
 const FRAME: &str = "frame";
-/// Properties of a feature by trackpy's names.
+/// Properties of a feature, by their names in trackpy.
 const FEATURE_PROPERTIES: [&str; 6] = ["mass", "ecc", "signal", "raw_mass", "ep", "size"];
-/// Number of these names that mark a table without particles as trackpy's.
+/// Minimum number of these names that identifies a table without particles as trackpy's.
 const MIN_FEATURE_PROPERTIES: usize = 3;
 
-/// Rows at the top in which the names are searched: a user may have added lines above them.
+/// Number of rows at the top in which the column names are sought; a user may have added lines above them.
 const HEADER_ROWS: usize = 3;
 
 pub(crate) struct Trackpy;
@@ -66,7 +66,7 @@ impl FileFormat for Trackpy {
         if export.tracks.is_empty() {
             return Err(unlinked_error(table, row.line));
         }
-        // (pandas writes the numbers of particles as `0.0` where one is missing)
+        // (pandas writes the numbers of particles as `0.0` if any of them is missing)
         for track in &mut export.tracks {
             if let Some(whole) = track.name.strip_suffix(".0") {
                 track.name = whole.to_owned();
@@ -76,7 +76,7 @@ impl FileFormat for Trackpy {
     }
 }
 
-/// The refusal of a table that lacks a column of trackpy's.
+/// Error for a table that lacks one of trackpy's columns.
 fn no_column_error(table: &DelimitedTable, row: Option<&TextRow>, advice: &str) -> ImportError {
     let names = row.map(TextRow::texts).unwrap_or_default();
     let found = names.into_iter().take(12).collect::<Vec<_>>().join(", ");
@@ -84,10 +84,11 @@ fn no_column_error(table: &DelimitedTable, row: Option<&TextRow>, advice: &str) 
     ImportError::columns(table.file, row.map_or(1, |row| row.line), problem, advice)
 }
 
-/// The column of the frames. It is written twice where it is the index too.
+/// Index of the column of frame numbers. The table has two such columns if the frame number is also its
+/// index.
 ///
 /// # Errors
-/// [`ImportError::Unusable`] for two such columns that differ in a row.
+/// [`ImportError::Unusable`] if two such columns differ in a row.
 fn find_frame_column(table: &DelimitedTable, header: usize, names: &TextRow) -> ImportResult<Option<usize>> {
     let mut at = names.cells.iter().enumerate().filter(|(_, cell)| *cell == FRAME).map(|(index, _)| index);
     let Some(first) = at.next() else { return Ok(None) };
@@ -105,7 +106,7 @@ fn find_frame_column(table: &DelimitedTable, header: usize, names: &TextRow) -> 
     Ok(Some(first))
 }
 
-/// Line of the first row in which two cells differ.
+/// Line number of the first row in which two cells differ.
 fn first_difference(table: &DelimitedTable, start: usize, cells: [usize; 2]) -> ImportResult<Option<usize>> {
     let mut rows = table.rows(start);
     while let Some(record) = rows.next_row()? {
@@ -117,7 +118,7 @@ fn first_difference(table: &DelimitedTable, start: usize, cells: [usize; 2]) -> 
     Ok(None)
 }
 
-/// The refusal of features without particles.
+/// Error for features that are not linked to particles.
 fn unlinked_error(table: &DelimitedTable, line: usize) -> ImportError {
     ImportError::wrong_table(
         table.location(line, 1),

@@ -1,5 +1,5 @@
-//! TRC, the table of markers of motion-capture programs: lines of settings, then names of markers over three
-//! columns each.
+//! TRC, the table of markers of motion-capture programs: lines of settings, then the names of the markers,
+//! each above three columns.
 
 use crate::import::error::{ImportError, ImportResult, TextLocation};
 use crate::import::format::FileFormat;
@@ -17,7 +17,7 @@ const MAGIC: &str = "PathFileType";
 const CLOCK_CELLS: usize = 2;
 /// Number of columns of a marker: X, Y and Z.
 const AXES: usize = 3;
-/// Units in full, with their symbols.
+/// Names of units in full, with their symbols.
 const LONG_UNITS: [(&str, &str); 4] =
     [("millimeters", "mm"), ("centimeters", "cm"), ("meters", "m"), ("metres", "m")];
 
@@ -52,12 +52,12 @@ impl FileFormat for Trc {
     }
 }
 
-/// Lines 2 and 3: names and values.
+/// The settings in lines 2 and 3: names and values.
 struct TrcSettings<'t> {
     table: &'t DelimitedTable<'t>,
     names: &'t TextRow,
     values: &'t TextRow,
-    /// Row of the head with the names of the markers.
+    /// Index of the row with the names of the markers in the head of the table.
     markers: usize,
 }
 
@@ -79,7 +79,7 @@ impl<'t> TrcSettings<'t> {
         Some((text, self.table.cell_location(self.values.line, at)))
     }
 
-    /// A number above 0.
+    /// Value and place of a setting that must be a number above 0.
     fn positive_setting(&self, name: &str) -> ImportResult<(f64, TextLocation)> {
         let (text, place) =
             self.setting(name).unwrap_or_else(|| ("", self.table.location(self.values.line, 1)));
@@ -92,7 +92,7 @@ impl<'t> TrcSettings<'t> {
         Err(settings_error(place, &found, "a number above 0"))
     }
 
-    /// First row of data, and the cells of every marker.
+    /// Index of the first row of data, and the columns of every marker.
     fn marker_columns(&self, table: &DelimitedTable) -> ImportResult<(usize, Vec<PointCells>)> {
         let row = table.head.get(self.markers);
         let line = row.map_or(self.values.line, |row| row.line);
@@ -127,13 +127,13 @@ impl<'t> TrcSettings<'t> {
             Some((CoordinateUnit::parse(short)?, format!("{place} says Units {text}")))
         });
         let camera = self.positive_setting("CameraRate").or_else(|_| self.positive_setting("DataRate")).ok();
-        // (the rate of the rows counts: it differs from the camera's if they were resampled)
+        // (the rate of the rows is used; it differs from the camera's if they were resampled)
         let rows = self.positive_setting("DataRate").ok();
         let frame_rate_hz = rows.or(camera).map(|(rate, place)| (rate, format!("the settings in {place}")));
         Facts { unit, frame_rate_hz, time: TimeUnit::Seconds(1.0), ..Facts::default() }
     }
 
-    /// Refuses settings that the rows contradict.
+    /// Refuses a file whose settings contradict its rows.
     fn check_rows(&self, export: &TrackFile) -> ImportResult<()> {
         let Some(clock) = export.clocks.first() else { return Ok(()) };
         let (frames, place) = self.positive_setting("NumFrames")?;
@@ -155,7 +155,7 @@ impl<'t> TrcSettings<'t> {
         }
     }
 
-    /// The finding on rows at another rate than the camera's.
+    /// Finding about rows at another rate than the camera's.
     fn resampling_finding(&self) -> Option<QualityFinding> {
         let (camera_hz, place) = self.positive_setting("CameraRate").ok()?;
         let (rate_hz, _) = self.positive_setting("DataRate").ok()?;

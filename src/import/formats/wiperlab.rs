@@ -1,4 +1,4 @@
-//! This program's own `trace.csv`: metres, seconds, y upwards. It is read back bit for bit.
+//! This program's own `trace.csv`: metres, seconds, y upwards. The numbers are read back bit for bit.
 
 use crate::import::error::ImportResult;
 use crate::import::format::FileFormat;

@@ -1,5 +1,5 @@
-//! Rate, scale, direction of y and unit of the times. They come from the user, the file or the documentation
-//! of its format; an import that lacks one is refused with a question for it.
+//! Frame rate, scale, direction of y and unit of the times. They come from the user, the file or the
+//! documentation of its format; an import that lacks one is refused and asks for it.
 
 use super::timing::{RATE_AGREEMENT, times_fit_rate};
 use super::track_file::{CoordinateUnit, TimeUnit};
@@ -11,11 +11,11 @@ use crate::import::source::ImportReport;
 use crate::recording::clock;
 use crate::recording::files::YAxis;
 
-/// Implied rate, frames/s, at or below which times look like frame numbers: no camera that films a wiper is
-/// as slow.
+/// Frame rate, 1/s, up to which times that imply it look like frame numbers: no camera that films a wiper is
+/// so slow.
 const SLOWEST_HZ: f64 = 1.0;
 
-/// What the direction of y depends on, where the format has no words of its own.
+/// Explains what the direction of y depends on, if the format has no explanation of its own.
 const Y_AXIS_OPEN: &str = "world coordinates point up unless their axes were turned; image pixels point down";
 
 /// Facts that every import needs.
@@ -24,12 +24,12 @@ pub(crate) struct ImportCalibration {
     pub rate_hz: f64,
     pub scale: CoordinateScale,
     pub y_axis: YAxis,
-    /// Exposure of a frame, s.
+    /// Exposure time of a frame, s.
     pub exposure_s: Option<f64>,
 }
 
-/// Converts the times of every export to seconds or frames, and collects the other facts. The refusal names
-/// all that is missing at once, with what the files suggest.
+/// Converts the times of every export to seconds or frames, and collects the other facts. One error lists
+/// everything that is missing, with what the files suggest.
 pub(crate) fn calibrate(
     exports: &mut [TrackFile],
     options: &ImportOptions,
@@ -94,7 +94,8 @@ fn ask_scale(exports: &[TrackFile]) -> String {
     format!("--scale S           {hint}")
 }
 
-/// Converts times to seconds, or to frames where `declared` says so. Gives false where their unit is unknown.
+/// Converts times to seconds, or to frame numbers if `declared` says so. Returns false if the unit of the
+/// times is unknown and the rows have no frame numbers.
 fn convert_times(export: &mut TrackFile, declared: Option<TimeColumn>) -> bool {
     let numbered = export.clocks.iter().all(|clock| clock.frame.is_some());
     let factor = match (declared, export.facts.time) {
@@ -114,7 +115,7 @@ fn convert_times(export: &mut TrackFile, declared: Option<TimeColumn>) -> bool {
             return numbered;
         }
     };
-    // (1e-3 is no double: a product with it rounds twice, a quotient by 1000 once)
+    // (a double cannot hold 1e-3 exactly: multiplying by it rounds twice, dividing by 1000 rounds once)
     let divide = if factor < 1.0 { (1.0 / factor).round() } else { 1.0 };
     for time in export.clocks.iter_mut().filter_map(|clock| clock.time.as_mut()) {
         if factor < 1.0 { time.divide(divide) } else { time.scale(factor) }
@@ -122,7 +123,7 @@ fn convert_times(export: &mut TrackFile, declared: Option<TimeColumn>) -> bool {
     true
 }
 
-/// The declared rate, or else that of the camera's record, or else that of times declared to be real.
+/// The declared frame rate, or else that of the camera's record, or else that of times declared to be real.
 fn frame_rate_hz(
     exports: &[TrackFile],
     options: &ImportOptions,
@@ -153,7 +154,7 @@ fn frame_rate_hz(
     Ok(implied)
 }
 
-/// The declared exposure, or else that of the cameras' records. Refuses a record that differs.
+/// The declared exposure time, or else that of the cameras' records. Refuses a record that differs from it.
 fn exposure_s(
     exports: &[TrackFile],
     options: &ImportOptions,
@@ -175,7 +176,7 @@ fn exposure_s(
     Ok(Some(exposure_s))
 }
 
-/// Rate that the times of an export imply, frames/s.
+/// Frame rate that the times of an export imply, 1/s.
 fn implied_hz(export: &TrackFile) -> Option<f64> {
     let timed = export.clocks.iter().filter(|clock| clock.time.is_some());
     let longest = timed.max_by_key(|clock| clock.len())?;
@@ -193,7 +194,7 @@ fn implied_hz(export: &TrackFile) -> Option<f64> {
     Some(clock::simplest_rate(1.0 / fit.frame_s, |rate| times_fit_rate(&times, &frames, rate)))
 }
 
-/// The declared scale, or else a length unit of the file; a contradiction between them is a finding.
+/// The declared scale, or else a unit of length from the file; a contradiction between them gives a finding.
 fn coordinate_scale(
     exports: &[TrackFile],
     options: &ImportOptions,

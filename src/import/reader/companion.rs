@@ -1,5 +1,6 @@
-//! Companion files of an export. The record of a Photron camera (`.cih`, `.cihx`) has the recording rate, the
-//! saved step and the exposure; one that contradicts the options or the table belongs to another video.
+//! Companion files of an export. The record of a Photron camera (`.cih`, `.cihx`) contains the recording
+//! rate, the step between saved frames and the exposure time; a record that contradicts the options or the
+//! table belongs to another video.
 
 use super::timing::RATE_AGREEMENT;
 use crate::import::error::{ImportError, ImportResult};
@@ -25,11 +26,11 @@ fn point_names_file(file: &str) -> Option<String> {
         .map(|(start, end)| format!("{folder}{start}pointNames{end}"))
 }
 
-/// Takes rate and exposure from the camera's record of each file, where there is one.
+/// Reads rate and exposure time from the camera's record of each file, if there is one.
 ///
 /// # Errors
-/// [`ImportError::Format`] for a record that cannot be used or contradicts the options or the table. Where
-/// the rate is declared, a record without a rate or with fewer frames than the table is only a finding.
+/// [`ImportError::Format`] for a record that cannot be used or contradicts the options or the table. If the
+/// rate is declared, a record without a rate or with fewer frames than the table gives only a finding.
 pub(crate) fn read_camera_records(
     sources: &[ImportSource],
     exports: &mut [TrackFile],
@@ -54,7 +55,7 @@ fn record_finding(severity: Severity, value: (f64, &str), found: String) -> Qual
     new_finding(Check::CameraRecord, severity, value, found, "--frame-rate-hz counts")
 }
 
-/// Settings in a camera's record; rate and exposure with their lines.
+/// Settings in a camera's record; rate and exposure time have their line numbers.
 struct CameraSettings {
     rate_hz: (f64, usize),
     step: SavedStep,
@@ -62,7 +63,7 @@ struct CameraSettings {
 }
 
 impl CameraSettings {
-    /// Reads the settings. A record of fewer frames than the table has rows belongs to another video and is
+    /// Reads the settings. A record with fewer frames than the table has rows belongs to another video and is
     /// refused.
     fn read(record: &CameraRecord, export: &TrackFile) -> ImportResult<Self> {
         let rows = export.clocks.iter().map(Clock::len).max().unwrap_or(0);
@@ -76,8 +77,8 @@ impl CameraSettings {
     }
 }
 
-/// Takes the settings as facts of the export; refuses those that contradict the options, the table or another
-/// record.
+/// Stores the settings as facts of the export; refuses those that contradict the options, the table or
+/// another record.
 fn take_settings(
     record: &CameraRecord,
     settings: CameraSettings,
@@ -102,7 +103,7 @@ fn take_settings(
     Ok(())
 }
 
-/// Two records, or a record and the export itself, must agree.
+/// Refuses a value that contradicts `known`, the value from another record or from the export itself.
 fn check_agreement(
     record: &CameraRecord,
     known: &Fact<f64>,
@@ -122,7 +123,7 @@ fn is_near(one: f64, other: f64) -> bool {
     (one / other - 1.0).abs() <= RATE_AGREEMENT
 }
 
-/// The finding of a record that saved only every n-th frame. The table may count the saved pictures or the
+/// Finding about a camera that saved only every n-th frame. The table may count the saved pictures or the
 /// camera's frames, so the user has to declare the rate.
 fn saved_step_finding(
     record: &CameraRecord,
@@ -159,7 +160,8 @@ fn steps_by(clock: &Clock, step: usize) -> bool {
 
 // The record of a Photron camera: `.cih` has lines `Key : value`, `.cihx` has XML between binary data.
 
-/// An entry of a record: the start of its key in a `.cih`, in lower case, and its element in a `.cihx`.
+/// An entry of a record: the beginning of its key in a `.cih` file, in lower case, and its element in a
+/// `.cihx` file.
 #[derive(Clone, Copy)]
 struct CameraRecordKey {
     key: &'static str,
@@ -168,15 +170,15 @@ struct CameraRecordKey {
 
 const RATE: CameraRecordKey = CameraRecordKey { key: "record rate", element: "recordRate" };
 const FRAMES: CameraRecordKey = CameraRecordKey { key: "total frame", element: "totalFrame" };
-/// n, where every n-th frame of the recording was saved.
+/// Entry with the number n, if every n-th frame of the recording was saved.
 const STEP: CameraRecordKey = CameraRecordKey { key: "save step", element: "skipFrame" };
 const SHUTTER_NS: CameraRecordKey =
     CameraRecordKey { key: "shutter type2(nsec)", element: "shutterSpeedNsec" };
-/// Exposure, s, as `1/10000` or `0.0001`; a `.cihx` has only the 10000.
+/// Exposure time, s, as `1/10000` or `0.0001`; a `.cihx` file contains only the 10000.
 const SHUTTER: CameraRecordKey = CameraRecordKey { key: "shutter speed", element: "shutterSpeed" };
-/// Root element of a `.cihx`.
+/// Root element of a `.cihx` file.
 const CIHX: &str = "<cih>";
-/// Most characters of a value that a refusal shows.
+/// Maximum number of characters of a value in an error message.
 const LONGEST_SHOWN: usize = 40;
 
 const RECORD_ADVICE: &str = "give the rate at which the pictures that were tracked follow each other, --frame-rate-hz N, or \
@@ -186,21 +188,21 @@ pub(crate) struct CameraRecord<'a> {
     /// File as named by the user.
     pub name: &'a str,
     text: String,
-    /// Lines of the file above the text.
+    /// Number of lines of the file above the text.
     skipped: usize,
 }
 
-/// A value with its line, and the key or element as the file writes it.
+/// A value with its line number, and its key or element as the file writes it.
 struct CameraRecordValue<'r> {
     text: &'r str,
     line: usize,
     key: &'r str,
 }
 
-/// Step from one saved frame to the next, with its line.
+/// Number of frames from one saved frame to the next, with its line number.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SavedStep {
-    /// 1 where every frame was saved.
+    /// The step; 1 if every frame was saved.
     pub frames: usize,
     pub line: usize,
     /// The entry as the file writes it.
@@ -208,7 +210,7 @@ pub(crate) struct SavedStep {
 }
 
 impl<'a> CameraRecord<'a> {
-    /// The record in a companion file, if its extension is that of a record. Invalid bytes are replaced.
+    /// The record in a companion file, if the file has the extension of a record. Invalid bytes are replaced.
     pub(crate) fn parse(file: &'a CompanionFile) -> Option<Self> {
         let extension = file.name.rsplit_once('.').map(|(_, extension)| extension.to_lowercase())?;
         let text = String::from_utf8_lossy(&file.bytes);
@@ -221,7 +223,7 @@ impl<'a> CameraRecord<'a> {
         Some(Self { name: &file.name, text: text.to_owned(), skipped: before.matches('\n').count() })
     }
 
-    /// The values of an entry in the order of the file. A record that was saved again has its own value
+    /// The values of an entry in the order of the file. In a record that was saved again, its own value comes
     /// first.
     fn values(&self, entry: CameraRecordKey) -> Vec<CameraRecordValue<'_>> {
         if self.text.starts_with(CIHX) { self.xml_values(entry.element) } else { self.text_values(entry.key) }
@@ -248,7 +250,7 @@ impl<'a> CameraRecord<'a> {
         self.text.match_indices(&open).filter_map(element).collect()
     }
 
-    /// The rate at which the camera recorded, frames/s, with its line.
+    /// The rate at which the camera recorded, 1/s, with its line number.
     pub(crate) fn rate_hz(&self) -> ImportResult<(f64, usize)> {
         let Some(value) = self.values(RATE).into_iter().next() else {
             return Err(self.refusal(1, "no recording rate".to_owned(), "the entry `Record Rate(fps)`"));
@@ -258,7 +260,8 @@ impl<'a> CameraRecord<'a> {
         rate.ok_or_else(|| self.refusal(value.line, found(), "a number above 0"))
     }
 
-    /// The saved step. A `.cihx` has it in several places, and the largest counts.
+    /// The step between saved frames. A `.cihx` file contains it in several places, of which the largest
+    /// counts.
     pub(crate) fn saved_step(&self) -> ImportResult<SavedStep> {
         let mut values = self.values(STEP);
         if !self.text.starts_with(CIHX) {
@@ -284,7 +287,8 @@ impl<'a> CameraRecord<'a> {
         self.values(FRAMES).first()?.text.parse().ok()
     }
 
-    /// Exposure of a frame of a camera that takes `rate_hz` frames a second, s, with its line.
+    /// Exposure time of a frame, s, with its line number, for a camera that takes `rate_hz` frames per
+    /// second.
     ///
     /// # Errors
     /// [`ImportError::Format`] for an exposure longer than the time of a frame.

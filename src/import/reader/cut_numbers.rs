@@ -1,4 +1,4 @@
-//! Numbers of which a spreadsheet has saved only the digits that it showed.
+//! Numbers that a spreadsheet has cut to the digits that it showed.
 
 use crate::import::error::ImportResult;
 use crate::import::reader::findings::new_finding;
@@ -9,18 +9,18 @@ use crate::recording::quality::{Check, QualityFinding, Severity};
 const CUT_NUMBER_ADVICE: &str = "a spreadsheet shows numbers so and saves what it shows: import the tracking program's own \
     export, which no spreadsheet has saved";
 
-/// `1.23E+05`: the form of a number that does not fit its cell.
+/// Whether a text has the form `1.23E+05`, in which a spreadsheet shows a number that does not fit its cell.
 fn is_cut_number(text: &str) -> bool {
     let digits = text.strip_prefix('-').unwrap_or(text).as_bytes();
     matches!(digits, [a, b'.' | b',', b, c, b'E', b'+' | b'-', d, e]
         if [a, b, c, d, e].iter().all(|byte| byte.is_ascii_digit()))
 }
 
-/// Numbers in the columns `cells` that were cut to three digits, where others of the same column were not.
-/// `start` is the index of the first row of data in the table's head.
+/// Finding about numbers in the columns `cells` that were cut to three digits, while others in the same
+/// column were not. `start` is the index of the first row of data in the head of the table.
 ///
 /// # Errors
-/// A refusal of rows that cannot be read.
+/// The error of a row that cannot be read.
 pub(crate) fn cut_numbers_finding(
     table: &DelimitedTable,
     start: usize,
@@ -29,7 +29,7 @@ pub(crate) fn cut_numbers_finding(
     if !table.may_have_cut_numbers() {
         return Ok(None);
     }
-    // for each column: number of cut numbers, the first of them, and whether others are written out
+    // for each column: the number of cut numbers, the first of them, and whether others are written out
     let mut found = vec![(0_usize, None, false); cells.len()];
     let mut rows = table.rows(start);
     while let Some(record) = rows.next_row()? {

@@ -1,45 +1,49 @@
-//! The delimiter and the decimal mark of a table: those that explain the whole file best.
+//! The delimiter and the decimal mark of a table: those that best explain the whole file.
 
 use super::spreadsheet;
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::reader::number::{CellNumber, parse_number};
 use crate::import::reader::rows::{TextRow, parse_rows};
 
-/// Lines that decide the dialect: this number from the start of a file, and again from the rest of it.
+/// Number of lines that are sampled at the start of a file to find its dialect, and again in the rest of the
+/// file.
 const SAMPLE_LINES: usize = 1000;
-/// Largest size of either part of the sample, bytes: a cell of one digit takes thirty times its size in
+/// Maximum size of either part of the sample, bytes; a cell of one digit takes thirty times its size in
 /// memory.
 const SAMPLE_BYTES: usize = 1 << 20;
-/// Most columns of a table, enough for ten thousand points.
+/// Maximum number of columns of a table, enough for ten thousand points.
 const MOST_COLUMNS: usize = 20_000;
-/// Numbers count as cut in two if more than one row in this number has a fraction with a leading zero. By
-/// chance a tenth of all fractions have one.
+/// More than one row in this number must contain a fraction with a leading zero for its commas to count as
+/// decimal marks; by chance, a tenth of all fractions have one.
 const ROWS_PER_FRACTION: usize = 10;
-/// A row of data has more than this share of numbers.
+/// Fraction of numbers among the cells above which a row counts as data.
 const MOSTLY_NUMBERS: f64 = 0.5;
-/// Share where no row has [`MOSTLY_NUMBERS`]: three cells that name a picture and the two coordinates of a
-/// labelled point.
+/// The fraction that is used if no row exceeds [`MOSTLY_NUMBERS`], as in rows of three cells that name a
+/// picture and two coordinates of a labelled point.
 const FEW_NUMBERS: f64 = 1.0 / 3.0;
-/// Fewest cells of such a row: a sentence with a number in it splits into fewer.
+/// Minimum number of cells in a row with few numbers; a sentence that contains a number splits into fewer
+/// cells.
 const FEWEST_CELLS: usize = 5;
 /// Delimiter and decimal mark of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Dialect {
     pub delimiter: Delimiter,
-    /// Its decimal mark, `.` or `,`.
+    /// Decimal mark, `.` or `,`.
     pub decimal: char,
 }
 
 impl Dialect {
-    /// Delimiter and decimal mark, for the report.
+    /// Text on delimiter and decimal mark for the report.
     pub(crate) fn describe(&self) -> String {
         format!(", delimiter {}, decimal mark `{}`", self.delimiter.word(), self.decimal)
     }
 
-    /// Finds the delimiter that makes the most rows of numbers of one length, and then the decimal mark.
+    /// Finds the delimiter that makes the most rows of numbers with the same length, and then the decimal
+    /// mark.
     ///
     /// # Errors
-    /// [`ImportError`] when no delimiter makes columns, when there are no numbers, or when commas are both.
+    /// [`ImportError`] if no delimiter makes columns, if there are no numbers, or if the comma is both
+    /// delimiter and decimal mark.
     pub(crate) fn find(file: &str, text: &str) -> ImportResult<Self> {
         let declared = declared_delimiter(text);
         let of_the_table = |line: &NumberedLine| !(is_comment(line.1) || (declared.is_some() && line.0 == 1));
@@ -64,7 +68,7 @@ impl Dialect {
     }
 }
 
-/// The first lines that are not blank, and lines at even distances from the rest.
+/// The first lines that are not blank, and lines at even distances in the rest of the text.
 fn sample_lines(text: &str) -> Vec<NumberedLine<'_>> {
     let mut lines: Vec<NumberedLine> = vec![];
     let (mut number, mut at) = (0, 0);
@@ -95,7 +99,7 @@ fn sample_lines(text: &str) -> Vec<NumberedLine<'_>> {
     lines
 }
 
-/// Refuses rows of too many columns before their cells fill memory.
+/// Refuses rows with too many columns before their cells fill the memory.
 fn refuse_too_many_columns(file: &str, lines: &[NumberedLine]) -> ImportResult<()> {
     let columns = |text: &str, mark: u8| text.bytes().filter(|byte| *byte == mark).count() + 1;
     let most = |text: &str| {
@@ -116,8 +120,8 @@ fn refuse_too_many_columns(file: &str, lines: &[NumberedLine]) -> ImportResult<(
     }
 }
 
-/// How well `delimiter` explains the rows: the sum of the shares of numbers over rows of the median length.
-/// Rows count that have at least `cells` cells and more than the share `least` of numbers.
+/// Measures how well `delimiter` explains the rows: sum of the fractions of numbers over the rows of median
+/// length. Only rows with at least `cells` cells and a fraction of numbers above `least` count.
 fn delimiter_score(rows: &[TextRow], delimiter: Delimiter, (least, cells): (f64, usize)) -> f64 {
     let measured = rows.iter().map(|row| (row.cells.len(), numeric_share(&row.cells, delimiter)));
     let numeric: Vec<(usize, f64)> =
@@ -127,12 +131,12 @@ fn delimiter_score(rows: &[TextRow], delimiter: Delimiter, (least, cells): (f64,
     let usual = counts.get(counts.len() / 2).copied().unwrap_or(0);
     let always_empty = |i: usize| rows.iter().all(|row| row.cells.get(i).is_none_or(String::is_empty));
     if delimiter == Delimiter::Space && (1..usual.saturating_sub(1)).any(always_empty) {
-        return 0.0; // (spaces that align the columns)
+        return 0.0; // (the spaces align the columns)
     }
     numeric.iter().filter(|(count, _)| *count == usual).map(|(_, share)| share).sum()
 }
 
-/// Share of numbers among the cells that are not missing.
+/// Fraction of numbers among the cells that are not missing.
 fn numeric_share(cells: &[String], delimiter: Delimiter) -> f64 {
     let is_number =
         |text: &str| is_value(text, '.') || (delimiter != Delimiter::Comma && is_value(text, ','));
@@ -149,7 +153,7 @@ fn is_value(text: &str, decimal: char) -> bool {
     matches!(parse_number(text, decimal), CellNumber::Value(_))
 }
 
-/// The mark that more of the numbers contain. With a comma as delimiter it is the point.
+/// The decimal mark that occurs in more of the numbers. If the delimiter is a comma, it is the point.
 fn decimal_mark(rows: &[TextRow], delimiter: Delimiter) -> char {
     if delimiter == Delimiter::Comma {
         return '.';
@@ -163,7 +167,7 @@ fn is_numeric(row: &&TextRow) -> bool {
     row.cells.first().is_some_and(|cell| is_value(cell, '.'))
 }
 
-/// Refuses rows such as `1,5,2,5` under a header of two names: the comma is the decimal mark too.
+/// Refuses rows such as `1,5,2,5` under a header of two names, in which the comma is also the decimal mark.
 fn refuse_double_comma(file: &str, rows: &[TextRow]) -> ImportResult<()> {
     let text = |cell: &String| cell.is_empty() || parse_number(cell, '.') != CellNumber::Missing;
     // (several programs leave the column of row numbers without a name)
@@ -186,8 +190,8 @@ fn refuse_double_comma(file: &str, rows: &[TextRow]) -> ImportResult<()> {
     }
 }
 
-/// Refuses rows such as `0,000,10,050` without a header: no whole number has the leading zeros of every
-/// second cell.
+/// Refuses rows such as `0,000,10,050` without a header: cells with leading zeros in every second place are
+/// the fractions of numbers that were cut in two.
 fn refuse_split_numbers(file: &str, rows: &[&TextRow]) -> ImportResult<()> {
     let fraction = |cell: &String| {
         cell.strip_prefix('0').is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit()))
@@ -223,7 +227,7 @@ const COLUMNS_EXPECTED: &str = "columns separated by tabs, semicolons, commas or
 const COLUMNS_ADVICE: &str = "export again with one of these delimiters, and without units or brackets next to the \
     numbers";
 
-/// The refusal where no delimiter makes rows of numbers.
+/// Error for a text in which no delimiter makes rows of numbers.
 fn no_columns_error(file: &str, lines: &[NumberedLine]) -> ImportError {
     let starts_like_data = |line: &&NumberedLine| {
         line.1.trim_start_matches(['"', '-', '\u{2212}', ' ']).starts_with(|c: char| c.is_ascii_digit())
@@ -247,7 +251,7 @@ fn no_columns_error(file: &str, lines: &[NumberedLine]) -> ImportError {
     }
 }
 
-/// A quoted number with a comma, which is a decimal mark or separates thousands.
+/// A number in quotes with a comma, which is a decimal mark or separates thousands.
 fn find_quoted_comma(line: &str) -> Option<String> {
     let is_number = |part: &&str| {
         part.contains(',')
@@ -266,30 +270,30 @@ pub(crate) enum Delimiter {
     Tab,
     Semicolon,
     Comma,
-    /// One space; two in a row enclose an empty cell.
+    /// One space; two consecutive spaces enclose an empty cell.
     Space,
     /// Any run of spaces or tabs.
     Blanks,
 }
 
-/// In order of preference where several explain a file equally well: a comma may also be a decimal mark, a
-/// space may align columns.
+/// The delimiters, in order of preference if several explain a file equally well: a comma may also be a
+/// decimal mark, and spaces may align columns.
 pub(crate) const DELIMITERS: [Delimiter; 5] =
     [Delimiter::Tab, Delimiter::Semicolon, Delimiter::Comma, Delimiter::Space, Delimiter::Blanks];
-/// Start of the first line in which spreadsheets declare their delimiter.
+/// Beginning of the first line in which spreadsheets declare their delimiter.
 const DELIMITER_DECLARATION: &str = "sep=";
-/// A word for "missing" that starts like a comment.
+/// A word for "missing" that begins like a comment.
 const NOT_COMMENT: &str = "#n/a";
-/// Ends of the first cell of a row that starts like a comment.
+/// Characters that end the first cell of a row that begins like a comment.
 const CELL_ENDS: [char; 3] = [',', ';', '\t'];
-/// Marks of comments.
+/// Beginnings of comments.
 const COMMENTS: [&str; 4] = ["#", "//", "***", "%"];
 
-/// A line with its 1-based number.
+/// A line with its number, counted from 1.
 pub(crate) type NumberedLine<'a> = (usize, &'a str);
 
 impl Delimiter {
-    /// The byte, unless it is a run of blanks.
+    /// The byte of the delimiter; `None` for a run of blanks.
     pub(crate) fn byte(self) -> Option<u8> {
         match self {
             Self::Tab => Some(b'\t'),
@@ -300,7 +304,7 @@ impl Delimiter {
         }
     }
 
-    /// Whether it is not the blank between the words of a sentence.
+    /// Whether the delimiter differs from the blanks between the words of a sentence.
     pub(crate) fn separates_words(self) -> bool {
         matches!(self, Self::Tab | Self::Semicolon | Self::Comma)
     }
@@ -317,10 +321,10 @@ impl Delimiter {
 }
 
 /// Whether a line is a comment: it starts with `#`, `//`, `***` or `%`. The word `#N/A` does not start a
-/// comment, nor does a damaged cell of a spreadsheet, such as `#####` or `#REF!`, in front of numbers.
+/// comment, nor does a cell that a spreadsheet has damaged, such as `#####` or `#REF!`, before numbers.
 pub(crate) fn is_comment(line: &str) -> bool {
     if line.starts_with(|c: char| c.is_ascii_digit() || c == '-') {
-        return false; // (nearly every line)
+        return false; // (as for nearly every line)
     }
     let start = line.trim_start_matches([' ', '"']);
     let missing =

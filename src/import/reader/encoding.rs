@@ -1,25 +1,25 @@
-//! Decodes bytes to text: the only file that uses `encoding_rs`.
+//! Decodes bytes to text. This is the only file that uses `encoding_rs`.
 
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::reader::file_type;
 use encoding_rs::{Encoding, SHIFT_JIS, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 use std::borrow::Cow;
 
-/// Text of an export with the encoding it was in; line ends are `\n` or `\r\n`.
+/// Text of an export and its original encoding; lines end in `\n` or `\r\n`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct DecodedText<'a> {
     /// The text, without a byte-order mark.
     pub text: Cow<'a, str>,
-    /// Name of the encoding, as in the WHATWG standard.
+    /// Name of the encoding in the WHATWG standard.
     pub encoding: &'static str,
 }
 
-/// Decodes `bytes` in the encoding `wanted`. Without one, a byte-order mark decides; then strict UTF-8 is
-/// tried, then CP932 where the bytes look Japanese, then Windows-1252.
+/// Decodes `bytes` in the encoding `wanted`. If it is `None`, a byte-order mark decides; without one, strict
+/// UTF-8 is tried, then CP932 if the bytes look Japanese, otherwise Windows-1252.
 ///
 /// # Errors
-/// [`ImportError`] for files that are not text, unknown encodings and bytes that are not valid in the
-/// encoding.
+/// [`ImportError`] for files that are not text, for unknown encodings, and for bytes that are not valid in
+/// the encoding.
 pub(crate) fn decode_text<'a>(
     file: &str,
     bytes: &'a [u8],
@@ -45,7 +45,7 @@ pub(crate) fn decode_text<'a>(
     Ok(DecodedText { text: normalise_line_ends(text), encoding })
 }
 
-/// In files of old Macintosh programs a single carriage return ends a line.
+/// Replaces single carriage returns, which end lines in files of old Macintosh programs, by line feeds.
 fn normalise_line_ends(text: Cow<str>) -> Cow<str> {
     if !text.contains('\r') {
         return text;
@@ -75,9 +75,9 @@ fn detect_encoding<'a>(file: &str, bytes: &'a [u8]) -> ImportResult<(Cow<'a, str
     decode_as(file, bytes, UTF_8).or_else(|_| decode_as(file, bytes, other))
 }
 
-/// Whether bytes that are not UTF-8 are CP932. Nearly any bytes are valid in it, but kana and the common
+/// Whether bytes that are not UTF-8 are CP932. Nearly any bytes are valid CP932, but kana and the common
 /// kanji start with a byte from 0x81 to 0x9f, where Windows-1252 has quotation marks and dashes. At least
-/// half of the characters beyond ASCII must be such pairs.
+/// half of the characters outside ASCII must be such pairs.
 fn looks_japanese(bytes: &[u8]) -> bool {
     let (mut pairs, mut others, mut at) = (0, 0, 0);
     while let Some(&byte) = bytes.get(at) {

@@ -3,7 +3,7 @@
 
 use crate::import::error::ImportError;
 
-/// A kind of file, and the advice to its user.
+/// A kind of file, and advice to its user.
 type FileKind = (&'static str, &'static str);
 
 const PICTURE: FileKind = ("a picture", "track the points in the tracking program and export their table");
@@ -18,7 +18,7 @@ const CAMERA_RECORD: FileKind = (
      recording rate is read from it",
 );
 
-/// Kinds by their first bytes.
+/// Kinds of files by their first bytes.
 const BY_BYTES: [(&[u8], (&str, &str)); 27] = [
     (b"PK\x05\x06", ("an empty zip archive", "export the tracks as CSV")),
     (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", ("an old Excel workbook (.xls)", SHEET)),
@@ -65,7 +65,7 @@ const BY_BYTES: [(&[u8], (&str, &str)); 27] = [
     (b"\x00\x00\x01\xb3", VIDEO),
 ];
 
-/// Kinds of zip archives by names inside them; the first name that occurs counts.
+/// Kinds of zip archives by names inside them; the first of these names that occurs decides.
 const IN_ZIP: [(&[u8], (&str, &str)); 6] = [
     (b"opendocument.spreadsheet", ("an OpenDocument workbook (.ods)", SHEET)),
     (b"xl/", ("an Excel workbook (.xlsx)", SHEET)),
@@ -80,19 +80,20 @@ const IN_ZIP: [(&[u8], (&str, &str)); 6] = [
         ),
     ),
 ];
-/// Bytes at either end of a file in which names are searched: a zip archive has its first entries at the
-/// start and its directory at the end.
+/// Number of bytes at either end of a file in which names are sought: a zip archive has its first entries at
+/// the start and its directory at the end.
 const SEARCHED_BYTES: usize = 65_536;
 /// Types of the first box of an MP4 or QuickTime file.
 const MP4_BOXES: [&[u8]; 5] = [b"ftyp", b"moov", b"mdat", b"wide", b"free"];
-/// Versions of Python's pickle that start with their number.
+/// Versions of Python's pickle protocol; a file states its version in the second byte.
 const PICKLES: std::ops::RangeInclusive<u8> = 2..=5;
-/// Second byte of a C3D file, length of its blocks, and processor types of its parameter section.
+/// Second byte of a C3D file. `C3D_BLOCK` is the length of its blocks, bytes; `C3D_PROCESSORS` are the
+/// processor types in its parameter section.
 const C3D: u8 = 0x50;
 const C3D_BLOCK: usize = 512;
 const C3D_PROCESSORS: std::ops::RangeInclusive<u8> = 84..=86;
 
-/// Kinds by the start of the text, in lower case.
+/// Kinds of files by the beginning of their text, in lower case.
 const BY_TEXT: [(&str, (&str, &str)); 5] = [
     ("<!doctype html", ("a web page", "save the table itself, not the page around it")),
     ("<html", ("a web page", "save the table itself, not the page around it")),
@@ -106,8 +107,8 @@ const BY_TEXT: [(&str, (&str, &str)); 5] = [
     ),
     ("%!ps", ("a PostScript document", "export the numbers from the tracking program")),
 ];
-/// Kinds of XML by a text in the first part, in lower case; the first that occurs counts, and the last fits
-/// all.
+/// Kinds of XML files by a text near their start, in lower case; the first of these texts that occurs
+/// decides, and the last occurs in every XML file.
 const IN_MARKUP: [(&str, (&str, &str)); 6] = [
     ("<cih>", CAMERA_RECORD),
     (
@@ -142,16 +143,17 @@ const IN_MARKUP: [(&str, (&str, &str)); 6] = [
         ),
     ),
 ];
-/// The same for JSON.
+/// Kinds of JSON files by a text near their start, in lower case; the first of these texts that occurs
+/// decides, and the last, which is empty, always occurs.
 const IN_JSON: [(&str, (&str, &str)); 3] = [
     ("captureframerate", ("Kinovea's JSON", "in Kinovea use File > Export > CSV trajectories instead")),
     ("videoframerate", ("Kinovea's JSON", "in Kinovea use File > Export > CSV trajectories instead")),
     ("", ("JSON", "export the tracks as CSV")),
 ];
-/// Characters at the start of a file in which these are searched.
+/// Number of characters at the start of a file in which these texts are sought.
 const SEARCHED_CHARACTERS: usize = 4000;
 
-/// The refusal of a file whose bytes show that it is not text.
+/// Error for a file whose bytes show that it is not text.
 pub(crate) fn refuse_bytes(file: &str, bytes: &[u8]) -> Option<ImportError> {
     let found = BY_BYTES.iter().find(|kind| bytes.starts_with(kind.0)).map(|kind| kind.1);
     let found = found.or_else(|| kind_of_zip(bytes)).or_else(|| kind_by_layout(bytes));
@@ -173,7 +175,7 @@ fn contains_bytes(bytes: &[u8], name: &[u8]) -> bool {
     name.is_empty() || bytes.windows(name.len()).any(|part| part == name)
 }
 
-/// Kinds that need more than the first bytes.
+/// Kind of a file that its first bytes alone do not show.
 fn kind_by_layout(bytes: &[u8]) -> Option<FileKind> {
     let at = |index: usize| bytes.get(index).copied();
     if at(0) == Some(0) && bytes.get(4..8).is_some_and(|kind| MP4_BOXES.contains(&kind)) {
@@ -193,9 +195,9 @@ fn kind_by_layout(bytes: &[u8]) -> Option<FileKind> {
         .then_some(PICTURE)
 }
 
-/// The refusal of a text that is not a table.
+/// Error for a text that is not a table.
 pub(crate) fn refuse_text(file: &str, text: &str) -> Option<ImportError> {
-    // (tabs are kept: behind an empty first cell, `<` starts the name of a track)
+    // (tabs are kept: after an empty first cell, `<` starts the name of a track)
     let start = text.trim_start_matches([' ', '\r', '\n']).chars();
     let start = start.take(SEARCHED_CHARACTERS).collect::<String>().to_lowercase();
     let inside =
@@ -208,7 +210,7 @@ pub(crate) fn refuse_text(file: &str, text: &str) -> Option<ImportError> {
     found.map(|kind| wrong_kind_error(file, 1, kind))
 }
 
-/// The refusal of a text with a zero byte; `before` is the text in front of it.
+/// Error for a text with a zero byte; `before` is the text before that byte.
 pub(crate) fn refuse_zero_bytes(file: &str, before: &str) -> ImportError {
     let line = before.matches('\n').count() + 1;
     let advice =

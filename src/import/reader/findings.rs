@@ -1,4 +1,4 @@
-//! Findings on the quality of a recording that only its export shows: rounded times, lost points, doubtful
+//! Findings about the quality of a recording that only its export shows: rounded times, lost points, doubtful
 //! units.
 
 use super::timing::find_quantum_s;
@@ -8,22 +8,25 @@ use crate::recording::clock::OFF_GRID_LIMIT_FRAMES;
 use crate::recording::quality::{Check, QualityFinding, Severity};
 use std::collections::BTreeMap;
 
-/// Fewest frames in a row at exactly (0, 0) that look like a lost point: a single one may be on the origin.
+/// Minimum number of consecutive frames at exactly (0, 0) that look like a lost point; a point may be at the
+/// origin in a single frame.
 const ZERO_RUN: usize = 3;
-/// Both coordinates of a lost point as scripts around OpenCV write it. It is outside the picture, so one
-/// frame is enough.
+/// Both coordinates of a lost point as written by scripts around OpenCV. Such a point is outside the picture,
+/// so one frame is enough.
 const OUTSIDE_PICTURE: f64 = -1.0;
-/// Coordinates above this number look like pixels if their unit is a millimetre or larger: a view that
-/// resolves a lip is rarely wider than this in millimetres, and a picture hardly ever narrower in pixels.
+/// Limit above which coordinates look like pixels if their unit is a millimetre or larger: a view that
+/// resolves a lip is rarely wider than this in millimetres, and a picture is hardly ever narrower than this
+/// in pixels.
 const PIXEL_LIKE_LIMIT: f64 = 100.0;
-/// Smallest unit to which [`PIXEL_LIKE_LIMIT`] applies, m: in micrometres every view has larger numbers.
+/// Smallest unit to which [`PIXEL_LIKE_LIMIT`] applies, m; in micrometres, every view has coordinates above
+/// the limit.
 const MILLIMETRE_M: f64 = 1e-3;
-/// Fewest values from which "all are whole numbers" means pixels.
+/// Minimum number of values from which "all are whole numbers" means pixels.
 const FEWEST_WHOLE: usize = 8;
-/// Rounding of times, in frames, from which it is worth a caution: a tenth of a frame shifts the phase of a
-/// component at a fifth of the frame rate by 7 degrees.
+/// Rounding of times, in frames, above which the finding is a caution: a tenth of a frame shifts the phase of
+/// a component at a fifth of the frame rate by 7 degrees.
 const COARSE_FRAMES: f64 = 0.1;
-/// Largest relative difference of two equal units.
+/// Largest relative difference between units that count as equal.
 const SAME_UNIT: f64 = 1e-9;
 
 pub(crate) fn new_finding(
@@ -36,11 +39,11 @@ pub(crate) fn new_finding(
     QualityFinding::new(check, severity, value, unit, found).with_advice(advice)
 }
 
-/// Times that are rounded to a noticeable part of a frame.
+/// Finding about times that are rounded to a noticeable fraction of a frame.
 pub(crate) fn rounded_times_finding(file: &str, times: &[f64], rate_hz: f64) -> Option<QualityFinding> {
     let quantum_s = find_quantum_s(times).filter(|_| !times.is_empty())?;
     let frames = quantum_s * rate_hz;
-    // the rounding changes nothing where a frame lasts a whole number of quanta
+    // the rounding changes nothing if a frame lasts a whole number of quanta
     let even =
         (1.0 / rate_hz / quantum_s - (1.0 / rate_hz / quantum_s).round()).abs() <= 1e-6 && frames <= 1.0;
     let severity = if frames > COARSE_FRAMES { Severity::Caution } else { Severity::Note };
@@ -51,21 +54,21 @@ pub(crate) fn rounded_times_finding(file: &str, times: &[f64], rate_hz: f64) -> 
         .then(|| new_finding(Check::RoundedTimes, severity, (quantum_s, "s"), found, advice))
 }
 
-/// The rate that the times imply.
+/// Finding about the frame rate that the times imply.
 pub(crate) fn implied_rate_finding(file: &str, implied_hz: f64, playback: bool) -> QualityFinding {
     let meaning = if playback { "taken as playback: the times only count frames" } else { "as declared" };
     let found = format!("{file}: the times imply {implied_hz:.6} rows/s ({meaning})");
     new_finding(Check::ImpliedRate, Severity::Note, (implied_hz, "1/s"), found, "")
 }
 
-/// Times that are declared as seconds and look like frame numbers.
+/// Finding about times that are declared as seconds but look like frame numbers.
 pub(crate) fn counted_frames_finding(implied_hz: f64) -> QualityFinding {
     let found = format!("the times imply {implied_hz} frames/s: they look like frame numbers, not seconds");
     let advice = "if they are, say --time frames and give --frame-rate-hz";
     new_finding(Check::ImpliedRate, Severity::Serious, (implied_hz, "1/s"), found, advice)
 }
 
-/// A unit of the file that differs from that of `--scale`.
+/// Finding about a unit in the file that differs from that of `--scale`.
 pub(crate) fn unit_mismatch_finding(
     scale: CoordinateScale,
     unit: CoordinateUnit,
@@ -89,14 +92,15 @@ pub(crate) fn unit_mismatch_finding(
     (!agrees).then(|| new_finding(Check::Unit, Severity::Caution, (scale.metres(), "m"), found, advice))
 }
 
-/// A direction of y that differs from that of the format.
+/// Finding about a direction of y that differs from that of the format.
 pub(crate) fn y_axis_mismatch_finding(declared: &str, stated: &str, why: &str) -> QualityFinding {
     let found = format!("--y-axis says {declared}, but y points {stated} ({why})");
     let advice = "--y-axis counts; leave it out unless the picture or the coordinates were turned over";
     new_finding(Check::YAxis, Severity::Caution, (0.0, ""), found, advice)
 }
 
-/// Runs of exactly (0, 0) or (-1, -1), and coordinates that look like pixels but are declared as lengths.
+/// Findings about runs of exactly (0, 0) or (-1, -1), and about coordinates that look like pixels but are
+/// declared as lengths.
 pub(crate) fn position_findings(
     name: &str,
     x: &[Option<f64>],
@@ -138,7 +142,7 @@ pub(crate) fn position_findings(
     findings
 }
 
-/// First frame and length of the longest run of exactly (`value`, `value`).
+/// First frame and length of the longest run of frames at exactly (`value`, `value`).
 fn longest_run(x: &[Option<f64>], y: &[Option<f64>], value: f64) -> (usize, usize) {
     let (mut longest, mut run) = ((0, 0), 0);
     for (frame, (x, y)) in x.iter().zip(y).enumerate() {
@@ -150,7 +154,7 @@ fn longest_run(x: &[Option<f64>], y: &[Option<f64>], value: f64) -> (usize, usiz
     longest
 }
 
-/// Positions that were dropped for their low confidence.
+/// Finding about positions that were dropped because of their low confidence.
 pub(crate) fn rejected_finding(name: &str, count: usize, tracked: usize, limit: f64) -> QualityFinding {
     let share = count as f64 / tracked.max(1) as f64;
     let found = format!(
@@ -165,13 +169,13 @@ pub(crate) fn rejected_finding(name: &str, count: usize, tracked: usize, limit: 
 const PICKED_FRAMES_ADVICE: &str = "import the positions that the program finds in every frame of the video, not the labels \
     it is trained with";
 
-/// Rows whose frame numbers have no common step.
+/// Finding about rows whose frame numbers have no common step.
 pub(crate) fn picked_frames_finding(file: &str, clock: &Clock) -> Option<QualityFinding> {
     let frames: Vec<f64> = clock.frame.as_ref()?.iter().flatten().collect();
     let (first, last) = (*frames.first()?, *frames.last()?);
     let mut steps: BTreeMap<i64, usize> = BTreeMap::new();
     frames.windows(2).for_each(|pair| *steps.entry((pair[1] - pair[0]) as i64).or_default() += 1);
-    // (of equally common steps the smallest: the others are gaps)
+    // (the smallest of several equally common steps, because larger steps are gaps)
     let (usual, count) =
         steps.iter().rev().max_by_key(|step| *step.1).map(|(step, count)| (*step, *count))?;
     let of_all = 2 * count;

@@ -13,19 +13,19 @@ use crate::recording::FrameGrid;
 use crate::recording::clock::MAX_FRAMES;
 use crate::recording::files::YAxis;
 
-/// The clocks of the chosen tracks on one frame grid.
+/// The clocks of the chosen tracks, placed on one frame grid.
 pub(crate) struct ClockGrid {
     pub(crate) grid: FrameGrid,
     used: Vec<PlacedClock>,
 }
 
 struct PlacedClock {
-    /// Index of its file.
+    /// Index of the file of the clock.
     file: usize,
-    /// Its index in the file.
+    /// Index of the clock in its file.
     clock: usize,
     placed: RowFrames,
-    /// Added to its frames so that they count from the start of the grid.
+    /// Number that is added to the frames of the clock so that they count from the start of the grid.
     shift: i64,
 }
 
@@ -92,7 +92,7 @@ impl ClockGrid {
     }
 }
 
-/// Every clock of a chosen track once, with the shift to the frame numbers of the first.
+/// Places every clock of the chosen tracks once, with the shift to the frame numbers of the first clock.
 fn place_clocks(
     exports: &[TrackFile],
     chosen: &[Option<TrackIndex>; 2],
@@ -124,7 +124,7 @@ fn place_clocks(
     Ok(used)
 }
 
-/// A point on the frame grid.
+/// Columns of a point on the frame grid.
 #[derive(Default)]
 pub(crate) struct GridPositions {
     pub(crate) x: Vec<Option<f64>>,
@@ -133,7 +133,7 @@ pub(crate) struct GridPositions {
 }
 
 impl GridPositions {
-    /// Frames without a row are missing. The track's columns are moved out of it.
+    /// Moves the columns of a track onto the frame grid; frames without a row are missing.
     pub(crate) fn from_track(
         exports: &mut [TrackFile],
         clocks: &ClockGrid,
@@ -192,7 +192,7 @@ impl GridPositions {
 
     pub(crate) fn convert_to_metres(&mut self, calibration: &ImportCalibration) {
         let metres = calibration.scale.metres();
-        // 1e-3 is no double: a product with it rounds twice, a quotient by 1000 once
+        // a double cannot hold 1e-3 exactly: multiplying by it rounds twice, dividing by 1000 rounds once
         let parts = (1.0 / metres).round();
         let is_fraction =
             matches!(calibration.scale, CoordinateScale::Unit(_)) && metres < 1.0 && metres == 1.0 / parts;

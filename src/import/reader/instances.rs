@@ -1,11 +1,11 @@
-//! Collects the rows of instances (tracks, blocks) into clocks and tracks.
+//! Collects the rows of instances (tracks, blocks of rows) into clocks and tracks.
 
 use super::track_file::Column;
 use crate::import::error::{ImportError, ImportResult, TextLocation};
 use crate::import::reader::track_file::{Clock, Track};
 use std::collections::HashMap;
 
-/// Most tracks of a file; files with more hold unlinked detections.
+/// Maximum number of tracks in a file; files with more contain detections that are not linked.
 const MOST_TRACKS: usize = 20_000;
 
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -15,7 +15,7 @@ pub(crate) struct RowPosition {
     pub confidence: Option<f64>,
 }
 
-/// Frame or time of a row, and its line.
+/// Frame number or time of a row, and its line number.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct RowStamp {
     pub line: usize,
@@ -31,12 +31,12 @@ pub(crate) struct PointFields {
     pub has_confidence: bool,
 }
 
-/// Columns of every instance.
+/// Fields of every instance.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct InstanceFields {
     pub has_frame: bool,
     pub has_time: bool,
-    /// Index of the cell with frame or time, for messages.
+    /// Index of the cell with the frame number or the time, for messages.
     pub clock_cell: usize,
     pub points: Vec<PointFields>,
 }
@@ -44,9 +44,9 @@ pub(crate) struct InstanceFields {
 /// Order of the rows of an instance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum RowOrder {
-    /// By time: anything else is damage.
+    /// In order of time; any other order is an error.
     AsWritten,
-    /// Any: they are sorted.
+    /// In any order; the rows are sorted.
     Any,
 }
 
@@ -55,9 +55,9 @@ pub(crate) struct TrackCollector {
     shape: InstanceFields,
     known: HashMap<String, usize>,
     instances: Vec<CollectedInstance>,
-    /// Index of the instance of the last row: the next row is mostly of the same.
+    /// Index of the instance of the last row; the next row usually belongs to the same instance.
     last: usize,
-    /// Line of the first row beyond [`MOST_TRACKS`]; later rows are not collected.
+    /// Line number of the first row that exceeds [`MOST_TRACKS`], if there is one.
     too_many: Option<usize>,
 }
 
@@ -72,7 +72,7 @@ impl TrackCollector {
         Self { shape, known: HashMap::new(), instances: vec![], last: 0, too_many: None }
     }
 
-    /// Adds a row of the instance `key`: a position for each point of the shape.
+    /// Adds a row of the instance `key`, with a position for each point.
     pub(crate) fn add_row(&mut self, key: &str, stamp: RowStamp, positions: &[RowPosition]) {
         let same = |instance: &CollectedInstance| {
             instance.key.len() == key.len() && (key.is_empty() || instance.key == key)
@@ -119,12 +119,12 @@ impl TrackCollector {
         self.instances.len() - 1
     }
 
-    /// The clocks and tracks. A track has the name of its point, of its instance if that has only one point,
-    /// or both.
+    /// Returns the clocks and tracks. A track is named after its point, after its instance if that has only
+    /// one point, or after both.
     ///
     /// # Errors
-    /// [`ImportError::WrongTable`] for too many tracks, [`ImportError::DuplicateRow`] where an instance has
-    /// two rows of one frame and the rows may be in any order.
+    /// [`ImportError::WrongTable`] for too many tracks, [`ImportError::DuplicateRow`] if the rows may be in
+    /// any order and an instance has two rows in one frame.
     pub(crate) fn finish(self, file: &str, order: RowOrder) -> ImportResult<(Vec<Clock>, Vec<Track>)> {
         if let Some(line) = self.too_many {
             return Err(ImportError::wrong_table(
@@ -158,7 +158,7 @@ impl TrackCollector {
 }
 
 impl CollectedInstance {
-    /// Sorts the rows by frame, or by time where there are no frames.
+    /// Sorts the rows by frame number, or by time if they have no frame numbers.
     fn sort_rows(&mut self, file: &str) -> ImportResult<()> {
         let clock = &self.clock;
         let Some(column) = clock.frame.as_ref().or(clock.time.as_ref()) else { return Ok(()) };

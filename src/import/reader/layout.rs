@@ -14,13 +14,13 @@ use crate::import::reader::instances::{
 use crate::recording::quality::{Check, QualityFinding, Severity};
 use portable_math as math;
 
-/// Cells of a point. A coordinate is the sum of its cells: a reference and a displacement are two.
+/// Cells of a point. A coordinate is the sum of its cells, for example of a reference and a displacement.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct PointCells {
-    /// Name of the track; empty where the instance has the name.
+    /// Name of the track; empty if the instance gives the name.
     pub name: String,
     pub x: Vec<usize>,
-    /// Empty where the table has no y.
+    /// Empty if the table has no y.
     pub y: Vec<usize>,
     pub confidence: Option<usize>,
 }
@@ -40,12 +40,12 @@ impl PointCells {
     }
 }
 
-/// A rule by which a format marks a lost point with numbers.
+/// A rule by which the numbers of a row mark a lost point.
 #[derive(Clone, Copy)]
 pub(crate) struct LostRule {
-    /// Cell that the rule looks at; `None` means the position.
+    /// Cell to which the rule applies; `None` means the position.
     pub cell: Option<usize>,
-    /// Whether these numbers (x and y, or the cell twice) mean a lost point.
+    /// Whether two numbers mean a lost point: x and y of the position, or twice the number in the cell.
     pub is: fn(f64, f64) -> bool,
     /// The rule in words, e.g. `at exactly (0, 0)`.
     pub words: &'static str,
@@ -53,22 +53,23 @@ pub(crate) struct LostRule {
 
 #[derive(Clone)]
 pub(crate) struct TableLayout {
-    /// First row of data, as an index of the table's head.
+    /// Index of the first row of data in the head of the table.
     pub start: usize,
-    /// Cells that every row must have.
+    /// Minimum number of cells in a row.
     pub width: usize,
-    /// Cells that a row may have at most; empty ones may follow.
+    /// Maximum number of cells in a row; empty cells may follow.
     pub most: usize,
     pub frame: Option<usize>,
     pub time: Option<usize>,
-    /// Number of the first row where the table has neither frames nor times and every row is a frame.
+    /// Frame number of the first row, if the table has neither frame numbers nor times and every row is a
+    /// frame.
     pub first_frame: f64,
-    /// Cells that name the instance; empty where the table has only one.
+    /// Cells that name the instance; empty if the table has only one instance.
     pub key: Vec<usize>,
     /// Whether rows that do not name their instance are left out.
     pub skip_nameless: bool,
     pub order: RowOrder,
-    /// Whether the table has several clocks: rows without this clock and its positions are skipped.
+    /// Whether the table has several clocks, so that rows without this clock and its positions are skipped.
     pub of_others: bool,
     pub points: Vec<PointCells>,
     pub lost: Vec<LostRule>,
@@ -93,8 +94,8 @@ impl Default for TableLayout {
     }
 }
 
-/// Points whose columns come in pairs, x before y, from column `first` on. The names end in `ends`, and
-/// `rename` makes the name of the track of their common part.
+/// Points whose columns come in pairs, x before y, from column `first` on. The column names end in `ends`,
+/// and `rename` makes the name of the track from their common beginning.
 ///
 /// # Errors
 /// Index of the first column without a partner.
@@ -113,7 +114,7 @@ pub(crate) fn read_point_pairs(
 }
 
 impl TableLayout {
-    /// Points from row `start` of the head on, in rows of exactly `width` cells.
+    /// Layout with points in rows of exactly `width` cells, from row `start` of the head on.
     pub(crate) fn new(start: usize, width: usize, points: Vec<PointCells>) -> Self {
         Self { start, width, most: width, points, ..Self::default() }
     }
@@ -121,7 +122,7 @@ impl TableLayout {
     /// Reads every row.
     ///
     /// # Errors
-    /// [`ImportError`] for a row of another length and for a cell that is no number.
+    /// [`ImportError`] for a row with a wrong number of cells, and for a cell that is not a number.
     pub(crate) fn read_tracks<'a>(
         &self,
         document: &'a Document,
@@ -147,12 +148,13 @@ impl TableLayout {
         Ok(export)
     }
 
-    /// Whether the table has neither frames nor times, so that every row is a frame.
+    /// Whether the table has neither frame numbers nor times, so that every row is a frame.
     fn counts_rows(&self) -> bool {
         self.frame.is_none() && self.time.is_none()
     }
 
-    /// Collects the rows; gives how many positions each rule marks as lost, and how many rows are nameless.
+    /// Collects the rows; returns the number of positions that each rule marks as lost, and the number of
+    /// rows that do not name their instance.
     fn collect_rows(
         &self,
         table: &DelimitedTable,
@@ -194,7 +196,7 @@ impl TableLayout {
         Ok((lost, nameless))
     }
 
-    /// Every cell that is read as a number, each once.
+    /// Indices of the cells of the clock and the positions, without repetitions.
     fn number_cells(&self) -> Vec<usize> {
         let of_points = self.points.iter().flat_map(|point| point.x.iter().chain(&point.y).copied());
         let mut cells: Vec<usize> = self.frame.into_iter().chain(self.time).chain(of_points).collect();
@@ -236,7 +238,7 @@ impl TableLayout {
                     CellNumber::Value(value) => total += value,
                     CellNumber::Missing => return Ok(None),
                     CellNumber::Text => {
-                        // (its name is put together only for a refusal)
+                        // (the name of the coordinate is composed only for an error)
                         let name = axis_name(axis, &cells.name);
                         return Err(table.not_a_number_error(record.line, part, record.cell(part), &name));
                     }
@@ -278,14 +280,15 @@ fn blank_line_error(table: &DelimitedTable, line: usize) -> ImportError {
     ImportError::format(table.location(line, 1), "an empty line", expected, advice)
 }
 
-/// `x of tip`, or `x` where the track is named by its rows.
+/// Name of a coordinate in messages: `x of tip`, or `x` if the rows name the track.
 fn axis_name(axis: &str, point: &str) -> String {
     if point.is_empty() { axis.to_owned() } else { format!("{axis} of {point}") }
 }
 
-// Tables with a clock for each track: comparison of the clocks, and the tracks of each where they differ.
+// Tables with a clock for each track: comparison of the clocks, and separate reading of tracks whose clocks
+// differ.
 
-/// A column of times or frame numbers, and its unit in the unit of the comparison.
+/// A column of times or frame numbers; `unit` converts its values to the unit in which clocks are compared.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ClockCell {
     pub cell: usize,
@@ -297,14 +300,14 @@ pub(crate) struct ClockDifference {
     pub line: usize,
     /// Cell of the second clock.
     pub cell: usize,
-    /// Texts of the two cells; empty where a row has only one of them.
+    /// Texts of the two cells; a text is empty if the row lacks that clock.
     pub texts: [String; 2],
 }
 
 /// The first row, from row `start` of the head on, in which two clocks differ by more than their rounding.
 ///
 /// # Errors
-/// [`ImportError`] for rows that cannot be read, and for clocks that are no numbers.
+/// [`ImportError`] for rows that cannot be read, and for clocks that are not numbers.
 pub(crate) fn find_clock_difference(
     table: &DelimitedTable,
     start: usize,
@@ -328,7 +331,7 @@ pub(crate) fn find_clock_difference(
     Ok(None)
 }
 
-/// The value of a clock in a row, and the value of one unit in its last digit.
+/// Value of a clock in a row, and value of one unit in its last digit.
 fn read_clock(
     table: &DelimitedTable,
     record: &RowView,
@@ -344,7 +347,7 @@ fn read_clock(
     }
 }
 
-/// The value of one unit in the last digit of a written number.
+/// Value of one unit in the last digit of a written number.
 fn last_digit_value(text: &str, decimal: char) -> f64 {
     let (mantissa, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
     let decimals = mantissa.split_once(decimal).map_or(0, |(_, decimals)| decimals.len());
@@ -352,8 +355,8 @@ fn last_digit_value(text: &str, decimal: char) -> f64 {
     math::powi(10.0, exponent - i32::try_from(decimals).unwrap_or(0))
 }
 
-/// The tracks of a table with several clocks, one layout a clock. A clock skips the rows that are empty for
-/// it.
+/// Reads the tracks of a table with several clocks, with one layout per clock. Rows that are empty for a
+/// clock are skipped for that clock.
 ///
 /// # Errors
 /// As [`TableLayout::read_tracks`].

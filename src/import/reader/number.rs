@@ -2,11 +2,11 @@
 
 /// Words for a missing value, in lower case.
 const MISSING_WORDS: [&str; 9] = ["", "nan", "na", "none", "-", "*", "null", "#n/a", "n/a"];
-/// Longest number with a decimal comma or a typographic minus, bytes: 17 digits, an exponent and room to
-/// spare.
+/// Maximum length of a number with a decimal comma or a typographic minus, bytes; 17 digits and an exponent
+/// need less.
 const MAX_NUMBER_BYTES: usize = 64;
 
-/// Content of a cell.
+/// Contents of a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum CellNumber {
     /// One of the words for a missing value.
@@ -25,7 +25,7 @@ pub(crate) fn parse_number(text: &str, decimal: char) -> CellNumber {
     if is_missing(text) { CellNumber::Missing } else { parse_spelled(text, decimal) }
 }
 
-/// Parses a number. Rust also reads `inf`, `nan` and `infinity`, which are not numbers in a table.
+/// Parses a finite number. Rust also parses `inf`, `nan` and `infinity`, which are not numbers in a table.
 fn parse_finite(text: &str) -> Option<f64> {
     text.parse::<f64>().ok().filter(|value| value.is_finite())
 }
@@ -35,7 +35,7 @@ fn is_missing(text: &str) -> bool {
         || (is_minus(text.chars().next()) && text.chars().count() == 1)
 }
 
-/// The minus sign of mathematics, hyphens and dashes stand for minus in some locales.
+/// Whether a character is a minus sign; in some locales the mathematical minus, hyphens and dashes are used.
 fn is_minus(c: Option<char>) -> bool {
     matches!(c, Some('-' | '\u{2212}' | '\u{2010}'..='\u{2013}'))
 }

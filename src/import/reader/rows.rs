@@ -1,4 +1,4 @@
-//! Reads the rows of a table one by one: the only file that uses `csv`.
+//! Reads the rows of a table one by one. This is the only file that uses `csv`.
 
 use super::dialect::{Delimiter, NumberedLine, is_comment};
 use crate::import::error::{ImportError, ImportResult};
@@ -9,7 +9,7 @@ use csv::{ReaderBuilder, StringRecord};
 pub(crate) struct TextRow {
     pub line: usize,
     pub cells: Vec<String>,
-    /// Byte of the text at which it starts.
+    /// Byte offset in the text at which the row starts.
     pub(crate) start: usize,
 }
 
@@ -19,12 +19,12 @@ impl TextRow {
         self.cells.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1)
     }
 
-    /// A cell; empty beyond the end of the row.
+    /// Text of a cell; empty after the end of the row.
     pub(crate) fn cell(&self, index: usize) -> &str {
         self.cells.get(index).map_or("", String::as_str)
     }
 
-    /// The first cell; empty where there is none.
+    /// The first cell; empty if there is none.
     pub(crate) fn first_cell(&self) -> &str {
         self.cell(0)
     }
@@ -44,7 +44,7 @@ impl TextRow {
     }
 }
 
-/// A row while it is read.
+/// A row whose cells are borrowed from the reader.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RowView<'r> {
     pub line: usize,
@@ -57,7 +57,7 @@ impl<'r> RowView<'r> {
         self.cells.iter().map(|cell| trim_cell(cell).to_owned()).collect()
     }
 
-    /// A cell, trimmed and without its quotes; empty beyond the end of the row.
+    /// Text of a cell, trimmed and without its quotes; empty after the end of the row.
     pub(crate) fn cell(&self, index: usize) -> &'r str {
         self.cells.get(index).map_or("", trim_cell)
     }
@@ -77,7 +77,7 @@ impl<'r> RowView<'r> {
     }
 }
 
-/// Number of line ends in `bytes`.
+/// Number of line feeds in `bytes`.
 pub(crate) fn count_lines(bytes: &[u8]) -> usize {
     bytes.iter().filter(|byte| **byte == b'\n').count()
 }
@@ -86,7 +86,7 @@ pub(crate) fn count_lines(bytes: &[u8]) -> usize {
 fn trim_cell(cell: &str) -> &str {
     let plain = |byte: Option<&u8>| byte.is_some_and(|b| b.is_ascii_graphic() && *b != b'"');
     if plain(cell.as_bytes().first()) && plain(cell.as_bytes().last()) {
-        return cell; // (nearly every cell)
+        return cell; // (as for nearly every cell)
     }
     let trimmed = cell.trim();
     trimmed.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')).map_or(trimmed, str::trim)
@@ -98,12 +98,12 @@ pub(crate) struct RowReader<'t> {
     text: &'t str,
     delimiter: Delimiter,
     source: RecordReader<'t>,
-    /// Byte of the text at which the source starts.
+    /// Byte offset in the text at which `source` starts.
     base: usize,
-    /// Byte up to which lines are counted; `line` is the line there.
+    /// Byte offset up to which lines have been counted; `line` is the line number there.
     counted: usize,
     line: usize,
-    /// Byte at which the current row starts.
+    /// Byte offset at which the current row starts.
     pub start: usize,
     record: StringRecord,
 }
@@ -127,7 +127,7 @@ impl<'t> RecordReader<'t> {
         }
     }
 
-    /// Reads a row and gives its range of bytes, which includes the line ends in front of it.
+    /// Reads a row and returns its range of bytes, which includes the line ends before it.
     fn read_record(&mut self, record: &mut StringRecord) -> Option<(usize, usize)> {
         match self {
             Self::Csv(reader) => {
@@ -149,7 +149,7 @@ impl<'t> RecordReader<'t> {
 }
 
 impl<'t> RowReader<'t> {
-    /// The rows from byte `start` of `text` on; messages name `file`.
+    /// Reader of the rows from byte `start` of `text` on; errors name `file`.
     pub(crate) fn new(file: &'t str, text: &'t str, delimiter: Delimiter, start: usize) -> Self {
         Self {
             file,
@@ -167,8 +167,8 @@ impl<'t> RowReader<'t> {
     /// The next row. Comments and empty lines are skipped; rows of empty cells are not.
     ///
     /// # Errors
-    /// [`ImportError::Format`] for a quoted cell that does not end in its line.
-    #[allow(clippy::should_implement_trait)] // (a row lives until the next is read)
+    /// [`ImportError::Format`] if a quoted cell does not end in its line.
+    #[allow(clippy::should_implement_trait)] // (a row must not outlive the next call)
     pub(crate) fn next_row(&mut self) -> ImportResult<Option<RowView<'_>>> {
         let text = self.text;
         while let Some((from, to)) = self.source.read_record(&mut self.record) {
@@ -177,7 +177,8 @@ impl<'t> RowReader<'t> {
             let before = span.as_bytes().iter().take_while(is_end).count();
             let after = span.as_bytes()[before..].iter().rev().take_while(is_end).count();
             self.start = self.base + from + before;
-            // (the row itself has no line end unless it is refused)
+            // (line ends within the row are not counted: it is refused, or reading restarts after its first
+            // line)
             self.line += count_lines(&text.as_bytes()[self.counted..self.start]);
             self.counted = self.start + span.len() - before - after;
             let row = &span[before..span.len() - after];
@@ -204,14 +205,14 @@ impl<'t> RowReader<'t> {
         Ok(None)
     }
 
-    /// Reads on from a line end, byte `at` of the text.
+    /// Continues reading at a line end, byte `at` of the text.
     fn restart_at(&mut self, at: usize) {
         self.source = RecordReader::new(self.text.get(at..).unwrap_or_default(), self.delimiter);
         (self.base, self.counted) = (at, at);
     }
 }
 
-/// The lines as rows; a row with an open quotation mark goes on in the next line.
+/// Splits lines into rows of cells. A row with an open quotation mark continues in the next line.
 pub(crate) fn parse_rows(lines: &[NumberedLine], delimiter: Delimiter) -> Vec<TextRow> {
     let text: String = lines.iter().flat_map(|(_, line)| [*line, "\n"]).collect();
     let mut source = RecordReader::new(&text, delimiter);

@@ -1,4 +1,4 @@
-//! A delimited file: its first rows in memory, all rows one by one, and the place of a cell.
+//! A delimited file: its first rows in memory, a reader of all rows, and the place of a cell.
 
 use super::dialect::{declared_delimiter, is_comment};
 use crate::import::error::{CellProblem, ImportError, ImportResult, TextLocation};
@@ -7,27 +7,27 @@ use crate::import::reader::number::{CellNumber, parse_number};
 use crate::import::reader::rows::{RowReader, RowView, TextRow, count_lines, parse_rows};
 use crate::import::reader::spreadsheet;
 
-/// Rows that are kept for the search of headers; the longest known header has a dozen.
+/// Number of rows that are kept in memory to find headers; the longest known header has a dozen rows.
 const HEAD_ROWS: usize = 64;
-/// Start of a typographic minus sign in UTF-8 that was read as Windows-1252.
+/// Beginning of a typographic minus sign whose UTF-8 was read as Windows-1252.
 const BROKEN_MINUS: &str = "\u{e2}\u{2c6}";
-/// Most rows of a header behind comment marks: names and units.
+/// Maximum number of header rows after comment marks: names and units.
 const COMMENTED_ROWS: usize = 2;
 /// Tracker's mark of a file with several tracks.
 const MULTI_TRACK_MARK: &str = "#multi:";
-/// What belongs in a cell, by the decimal mark of the file.
+/// What a cell should contain, depending on the decimal mark of the file.
 const POINT_NUMBER: &str = "a number with a decimal point as in the rest of the file, or an empty cell";
 const COMMA_NUMBER: &str = "a number with a decimal comma as in the rest of the file, or an empty cell";
 
-/// A delimited file; comments are left out.
+/// A delimited file without its comments.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct DelimitedTable<'a> {
     /// File as named by the user.
     pub file: &'a str,
     pub dialect: Dialect,
-    /// Whether it starts with [`MULTI_TRACK_MARK`].
+    /// Whether the file starts with [`MULTI_TRACK_MARK`].
     pub multi: bool,
-    /// Its first rows that are not empty, with the header.
+    /// The first rows that are not empty, including the header.
     pub head: Vec<TextRow>,
     text: &'a str,
 }
@@ -36,7 +36,8 @@ impl<'a> DelimitedTable<'a> {
     /// Finds the dialect of a file and reads its first rows.
     ///
     /// # Errors
-    /// [`ImportError`] when no delimiter makes columns, when there are no numbers, or when commas are both.
+    /// [`ImportError`] if no delimiter makes columns, if there are no numbers, if the comma is both delimiter
+    /// and decimal mark, or if one of the rows cannot be read.
     pub(crate) fn parse(file: &'a str, text: &'a str) -> ImportResult<Self> {
         let dialect = Dialect::find(file, text)?;
         let multi = text.lines().next().is_some_and(|line| line.trim() == MULTI_TRACK_MARK);
@@ -57,8 +58,8 @@ impl<'a> DelimitedTable<'a> {
         Ok(table)
     }
 
-    /// Names of columns, and perhaps their units below, behind `#` or `%` directly above the first row of
-    /// numbers: what numpy's `savetxt` and scripts for gnuplot and MATLAB write.
+    /// Column names, perhaps with their units below, after `#` or `%` directly above the first row of
+    /// numbers, as written by numpy's `savetxt` and by scripts for gnuplot and MATLAB.
     fn names_in_comments(&self, first: &TextRow) -> Vec<TextRow> {
         let kind = |cell: &String| self.parse_cell(cell);
         let numbers = first.cells.iter().any(|cell| self.is_value(cell))
@@ -79,7 +80,7 @@ impl<'a> DelimitedTable<'a> {
         rows
     }
 
-    /// The cells of the line that ends before byte `end`, where it starts with a comment mark.
+    /// Cells of the line that ends before byte `end`, if it starts with a comment mark.
     fn comment_above(&self, end: usize) -> Option<TextRow> {
         let above = self.text.get(..end)?.strip_suffix('\n')?.trim_end_matches('\r');
         let start = above.rfind('\n').map_or(0, |end| end + 1);
@@ -89,22 +90,22 @@ impl<'a> DelimitedTable<'a> {
         Some(TextRow { line, cells, start })
     }
 
-    /// The rows from row `from` of the head on, rows of empty cells included.
+    /// Reader of the rows from row `from` of the head on, including rows of empty cells.
     pub(crate) fn rows(&self, from: usize) -> RowReader<'_> {
         self.rows_from(self.head.get(from).map_or(self.text.len(), |row| row.start))
     }
 
-    /// The rows from byte `start` of the text on.
+    /// Reader of the rows from byte `start` of the text on.
     fn rows_from(&self, start: usize) -> RowReader<'_> {
         RowReader::new(self.file, self.text, self.dialect.delimiter, start)
     }
 
-    /// Whether some number has an exponent as spreadsheets write it, so that a search for them is worth it.
+    /// Whether the text contains an exponent in the form of spreadsheets, so that it may contain cut numbers.
     pub(crate) fn may_have_cut_numbers(&self) -> bool {
         self.text.contains("E+") || self.text.contains("E-")
     }
 
-    /// Line of the first row.
+    /// Line number of the first row.
     pub(crate) fn first_line(&self) -> usize {
         self.head.first().map_or(1, |row| row.line)
     }
@@ -114,7 +115,7 @@ impl<'a> DelimitedTable<'a> {
         self.head.first().map(TextRow::texts).unwrap_or_default()
     }
 
-    /// The first of the `most` first rows that `accepts` takes, with its index.
+    /// The first row, among the `most` first ones, for which `accepts` returns true, with its index.
     pub(crate) fn find_row(
         &self,
         most: usize,
@@ -123,26 +124,26 @@ impl<'a> DelimitedTable<'a> {
         self.head.iter().enumerate().take(most).find(|(_, row)| accepts(row))
     }
 
-    /// Whether a cell holds a number.
+    /// Whether a cell contains a number.
     pub(crate) fn is_value(&self, cell: &str) -> bool {
         matches!(self.parse_cell(cell), CellNumber::Value(_))
     }
 
-    /// Reads a cell with the table's decimal mark.
+    /// Reads a cell with the decimal mark of the table.
     pub(crate) fn parse_cell(&self, cell: &str) -> CellNumber {
         parse_number(cell, self.dialect.decimal)
     }
 
-    /// Index of the first row of the head, from row `from` on, with a number in each of `cells`.
+    /// Index of the first row of the head, from row `from` on, that has a number in each of `cells`.
     pub(crate) fn first_numeric_row(&self, from: usize, cells: &[usize]) -> Option<usize> {
         let numbers = |row: &TextRow| cells.iter().all(|cell| self.is_value(row.cell(*cell)));
         (from..self.head.len()).find(|&row| numbers(&self.head[row]))
     }
 
-    /// A number or `None` for a missing one; `name` is that of the column.
+    /// Number in a cell; `None` if it is missing. `name` is the name of the column.
     ///
     /// # Errors
-    /// [`ImportError::Cell`] for anything else.
+    /// [`ImportError::Cell`] for any other text.
     pub(crate) fn number_at(&self, record: &RowView, cell: usize, name: &str) -> ImportResult<Option<f64>> {
         match self.parse_cell(record.cell(cell)) {
             CellNumber::Value(value) => Ok(Some(value)),
@@ -151,7 +152,7 @@ impl<'a> DelimitedTable<'a> {
         }
     }
 
-    /// As [`Self::number_at`], for a column that the table may not have.
+    /// Like [`Self::number_at`], for a column that the table may not have.
     pub(crate) fn optional_number_at(
         &self,
         record: &RowView,
@@ -161,7 +162,7 @@ impl<'a> DelimitedTable<'a> {
         cell.map_or(Ok(None), |cell| self.number_at(record, cell, name))
     }
 
-    /// Refuses a row of fewer than `width` cells, or with text beyond cell `most`.
+    /// Refuses a row with fewer than `width` cells, or with text after the first `most` cells.
     pub(crate) fn check_row_length(&self, record: &RowView, width: usize, most: usize) -> ImportResult<()> {
         if record.len() >= width && (record.len() <= most || record.used_width() <= most) {
             return Ok(());
@@ -169,12 +170,12 @@ impl<'a> DelimitedTable<'a> {
         Err(self.ragged_error(record.line, record.len(), width.max(1)))
     }
 
-    /// The refusal of a row with another number of cells than the table.
+    /// Error for a row with another number of cells than the table.
     pub(crate) fn ragged_error(&self, line: usize, found: usize, expected: usize) -> ImportError {
         ImportError::Ragged { place: self.location(line, 1), found, expected }
     }
 
-    /// The refusal of a cell that is no number.
+    /// Error for a cell that is not a number.
     pub(crate) fn not_a_number_error(&self, line: usize, cell: usize, text: &str, name: &str) -> ImportError {
         let other = if self.dialect.decimal == '.' { ',' } else { '.' };
         let advice = match parse_number(text, other) {
@@ -200,7 +201,8 @@ impl<'a> DelimitedTable<'a> {
         ImportError::cell(place, CellProblem::NotANumber, (name, text), (expected, advice))
     }
 
-    /// Refuses rows that start like a comment, where the first cell is a name: they would be skipped.
+    /// Refuses a row that starts like a comment in a table whose first column contains names; it would be
+    /// skipped.
     ///
     /// # Errors
     /// [`ImportError`] for the first such line below line `header`.
@@ -221,7 +223,7 @@ impl<'a> DelimitedTable<'a> {
         TextLocation { file: self.file.to_owned(), line, column }
     }
 
-    /// 1-based column of the first character of a cell.
+    /// Column number of the first character of a cell, counted from 1.
     pub(crate) fn text_column(&self, line: usize, cell: usize) -> usize {
         let Some(text) = self.text.lines().nth(line.saturating_sub(1)) else { return 1 };
         let Some(delimiter) = self.dialect.delimiter.byte() else { return column_of_word(text, cell) };
@@ -242,7 +244,7 @@ impl<'a> DelimitedTable<'a> {
     }
 }
 
-/// 1-based column of a word between runs of blanks.
+/// Column number of a word between runs of blanks, counted from 1.
 pub(crate) fn column_of_word(text: &str, word: usize) -> usize {
     let mut before = ' ';
     let starts = text.chars().enumerate().filter(|(_, c)| {

@@ -1,18 +1,19 @@
-//! Frame numbers of the rows: from the frame column, or else from the times on the grid that fits them.
+//! Frame numbers of the rows: from the frame column, or else from the grid that fits the times.
 
 use crate::import::error::{CellProblem, ImportError, ImportResult};
 use crate::import::reader::track_file::{Clock, TrackFile};
 use crate::recording::clock::{self, FrameFit, MAX_FRAMES, OFF_GRID_LIMIT_FRAMES};
 
-/// Largest `--frame-step` that a refusal suggests where the two rates have a whole ratio.
+/// Largest `--frame-step` that an error suggests, if the ratio of the two rates is a whole number.
 const LARGEST_STEP: f64 = 10.0;
-/// Largest frame number; no camera counts as far.
+/// Largest frame number; no camera counts that far.
 const LARGEST_FRAME: f64 = 1e12;
 
-/// Most frames a row, on average. Beyond, a number is damaged rather than frames lost.
+/// Maximum number of frames per row, on average. If there are more, a number is damaged rather than frames
+/// lost.
 pub(crate) const MOST_SPREAD: i64 = 1000;
 
-/// Timing as the user declares it.
+/// Timing as declared by the user.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct DeclaredTiming {
     pub rate_hz: f64,
@@ -21,32 +22,33 @@ pub(crate) struct DeclaredTiming {
     pub step: usize,
 }
 
-/// Frames of the rows of a clock.
+/// Frame numbers of the rows of a clock.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct RowFrames {
-    /// Frame of every row: the file's own numbers, or counted from its first row.
+    /// Frame number of every row: that of the file, or counted from the first row.
     pub frames: Vec<i64>,
-    /// Whether they are the file's own numbers.
+    /// Whether the frame numbers are those of the file.
     pub numbered: bool,
-    /// Time of the first row in the recording's own time, s.
+    /// Time of the first row, s, in the time of the recording.
     pub start_s: f64,
-    /// Rate that the time column implies, rows a second.
+    /// Rate that the times imply, 1/s: frames per second if the file numbers them, otherwise rows per second.
     pub implied_hz: Option<f64>,
 }
 
-/// A clock with the export it belongs to.
+/// A clock and the export that contains it.
 #[derive(Clone, Copy)]
 pub(crate) struct ClockRows<'e> {
     pub export: &'e TrackFile<'e>,
     pub clock: &'e Clock,
 }
 
-/// Gives every row its frame.
+/// Determines the frame number of every row.
 pub(crate) fn place_rows(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<RowFrames> {
     let (file, clock) = (rows.export.file, rows.clock);
     match clock.len() {
         0 => return Err(ImportError::header_only(file, 1)),
-        // (a numbered frame is enough for a point that was digitized once where others are tracked)
+        // (for a point that was digitised once while others are tracked, one row with a frame number is
+        // enough)
         1 if clock.frame.is_none() || rows.export.clocks.iter().all(|clock| clock.len() < 2) => {
             let place = format!("{file}:{}:1", clock.line_number(0));
             let (found, expected) = ("a single row of numbers", "one a frame and at least two");
@@ -65,7 +67,8 @@ pub(crate) fn place_rows(rows: ClockRows, declared: DeclaredTiming) -> ImportRes
     Ok(placed)
 }
 
-/// Refuses rows so far apart that a number must be damaged. This also bounds memory by the size of the file.
+/// Refuses rows that are so far apart that a number must be damaged. This also limits memory by the file's
+/// size.
 fn refuse_sparse(rows: ClockRows, placed: &RowFrames) -> ImportResult<()> {
     let jump = |row: usize| placed.frames[row] - placed.frames[row - 1];
     let span = placed.frames.last().zip(placed.frames.first()).map_or(0, |(last, first)| last - first);
@@ -78,7 +81,7 @@ fn refuse_sparse(rows: ClockRows, placed: &RowFrames) -> ImportResult<()> {
     Err(cell_error(rows, row, CellProblem::FarAway, found))
 }
 
-/// Refuses two clocks of a file whose frame numbers start at different times.
+/// Refuses two clocks of a file whose frame 0 is at different times.
 pub(crate) fn refuse_clock_mismatch(
     rows: ClockRows,
     placed: [&RowFrames; 2],
@@ -90,7 +93,7 @@ pub(crate) fn refuse_clock_mismatch(
     };
     let [Some(first_s), Some(other_s)] = placed.map(zero_s) else { return Ok(()) };
     let rounding_s = find_quantum_s(&rows.clock.times()).unwrap_or(0.0);
-    // (rates that differ by their tolerance drift apart over many frames)
+    // (rates that differ within their tolerance drift apart over many frames)
     let [first, other] = placed.map(|placed| placed.frames.first().copied().unwrap_or(0));
     let drift_s = RATE_AGREEMENT * (other - first).abs() as f64 / rate_hz;
     if (first_s - other_s).abs() <= 0.5 / rate_hz + rounding_s + drift_s {
@@ -101,7 +104,8 @@ pub(crate) fn refuse_clock_mismatch(
     Err(ImportError::grid_mismatch(rows.export.file, &found, &expected, "the other track"))
 }
 
-/// Frames from the first row of one clock to that of another; refuses a fraction of a frame.
+/// Number to add to the frames of `other` so that they count like those of `first`; refuses a fraction of a
+/// frame.
 pub(crate) fn frame_offset(
     first: (&TrackFile, &RowFrames),
     other: (&TrackFile, &RowFrames),
@@ -127,7 +131,7 @@ pub(crate) fn frame_offset(
     }
 }
 
-/// Takes the frame numbers of the file; the times only check the rate and give the start.
+/// Takes the frame numbers from the file; the times only check the rate and give the start time.
 fn place_by_number(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<RowFrames> {
     let clock = rows.clock;
     let mut frames: Vec<i64> = Vec::with_capacity(clock.len());
@@ -150,7 +154,7 @@ fn place_by_number(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<Ro
     let implied_hz =
         span_s.map(|span| (last - first) as f64 / span).filter(|rate| rate.is_finite() && *rate > 0.0);
     if let Some(implied) = implied_hz.filter(|_| !declared.playback) {
-        // rounded ends of a short record move the rate without contradicting it
+        // the rounding of the first and last time of a short record changes the implied rate
         let rounding_s = find_quantum_s(&clock.times()).unwrap_or(0.0);
         let expected_s = (last - first) as f64 / declared.rate_hz;
         if span_s.is_none_or(|span| (span - expected_s).abs() > rounding_s) {
@@ -162,7 +166,7 @@ fn place_by_number(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<Ro
     Ok(RowFrames { frames, numbered: true, start_s, implied_hz })
 }
 
-/// Multiplies numbers that count only the tracked frames by `--frame-step`.
+/// Multiplies frame numbers that count only the tracked frames by `--frame-step`.
 fn apply_frame_step(frames: &mut [i64], step: usize) -> ImportResult<()> {
     if step == 1 {
         return Ok(());
@@ -189,7 +193,7 @@ fn place_by_time(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<RowF
     Ok(RowFrames { frames, numbered: false, start_s, implied_hz: Some(1.0 / fit.frame_s) })
 }
 
-/// Fits the declared grid first, because coarsely rounded times do not show their own.
+/// Fits the declared grid first, because coarsely rounded times do not show their own grid.
 fn fit_declared_grid(
     rows: ClockRows,
     times: &[f64],
@@ -230,7 +234,7 @@ fn refuse_coarse_times(
     let span_s = times[times.len() - 1] - times[0];
     let mean_agrees =
         ((times.len() - 1) as f64 * row_s / span_s - 1.0).abs() <= RATE_AGREEMENT + quantum_s / span_s;
-    // (even steps mean another rate, not rounding)
+    // (even steps mean that the rate differs, not that the times are rounded)
     if most - least > quantum_s / 2.0 && mean_agrees {
         let problem = format!(
             "the times are rounded to {quantum_s} s, too coarsely to number the frames at {} frames/s; expected \
@@ -257,7 +261,7 @@ fn fit_shown_grid(rows: ClockRows, times: &[f64]) -> ImportResult<FrameFit> {
     Err(cell_error(rows, row, CellProblem::OffGrid, Some(times[row])))
 }
 
-/// A number for a message, without an exponent where that is short.
+/// Formats a number for a message, without an exponent if that is short.
 fn format_number(value: f64) -> String {
     if value == 0.0 || (1e-9..1e15).contains(&value.abs()) { value.to_string() } else { format!("{value:e}") }
 }
@@ -324,18 +328,19 @@ fn cell_error(rows: ClockRows, row: usize, problem: CellProblem, found: Option<f
     ImportError::cell(rows.export.row_location(rows.clock, row), problem, (name, &found), remedy)
 }
 
-/// Largest relative difference of two equal rates. Cameras hold theirs to parts in ten thousand; wrong rates
-/// differ by far more.
+/// Largest relative difference between rates that count as equal. Cameras hold their rate to parts in ten
+/// thousand; wrong rates differ by far more.
 pub(crate) const RATE_AGREEMENT: f64 = 0.01;
 
 /// Decimal places to which programs round times, s.
 const QUANTA_S: [f64; 8] = [1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7];
 
-/// Whether times lie on the grid of `rate_hz` that starts at the first one, within the rounding of both.
+/// Whether times lie on the grid of `rate_hz` that starts at the first time, within the rounding of the
+/// times.
 pub(crate) fn times_fit_rate(times: &[f64], frames: &[f64], rate_hz: f64) -> bool {
     let (Some(start), Some(first)) = (times.first(), frames.first()) else { return false };
     let half_quantum = find_quantum_s(times).map_or(1e-9, |q| q / 2.0 * (1.0 + 1e-6));
-    // (twice: the first time is rounded too)
+    // (twice, because the first time is rounded too)
     let fits =
         |(time, frame): (&f64, &f64)| (start + (frame - first) / rate_hz - time).abs() <= 2.0 * half_quantum;
     times.iter().zip(frames).all(fits)
@@ -386,7 +391,7 @@ mod tests {
                 "{rate}: {message}"
             );
         }
-        // evenly spaced times are another rate, with gaps or without
+        // evenly spaced times imply another rate, with gaps or without
         let gaps: Vec<f64> =
             rounded(1000.0).into_iter().enumerate().filter(|(i, _)| i % 50 != 7).map(|(_, t)| t).collect();
         for times in [rounded(1000.0), gaps] {

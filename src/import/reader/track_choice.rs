@@ -8,10 +8,10 @@ use crate::recording::quality::{Check, Severity};
 use crate::toml_file::suggest_key;
 use std::collections::HashMap;
 
-/// Most track names in a refusal: a file of detections has thousands.
+/// Maximum number of track names in an error message; a file of detections has thousands.
 const MOST_NAMES: usize = 30;
 
-/// Index of a track's export, and its index there.
+/// Index of the export of a track, and index of the track in that export.
 pub(crate) type TrackIndex = (usize, usize);
 
 /// Numbers the tracks of a file that share a name, so that each can be chosen.
@@ -43,7 +43,7 @@ pub(crate) fn number_repeated_names(exports: &mut [TrackFile]) {
     }
 }
 
-/// The tracks of tip and head: those that `--point` names, or else those called `tip` and `head`.
+/// Chooses the tracks of tip and head: those that `--point` names, or else those called `tip` and `head`.
 pub(crate) fn choose_tracks(
     exports: &[TrackFile],
     options: &ImportOptions,
@@ -62,14 +62,14 @@ pub(crate) fn choose_tracks(
         return Err(ImportError::point("head", found, expected, list_tracks(exports)));
     }
     let [tip, head] = chosen;
-    // (of several tracks of that name none is taken)
+    // (if several tracks have that name, none is chosen)
     let only =
         |point: &str| Some(tracks_called(exports, point)).filter(|found| found.len() == 1)?.first().copied();
     let left = |point, other: Option<TrackIndex>| only(point).filter(|track| Some(*track) != other);
     Ok([tip.or_else(|| left("tip", head)), head.or_else(|| left("head", tip))])
 }
 
-/// Tracks of that name; where there are none, those whose name differs in case only.
+/// Tracks with that name; if there are none, those whose name differs only in case.
 fn tracks_called(exports: &[TrackFile], name: &str) -> Vec<TrackIndex> {
     let exact = matching_tracks(exports, |_, track| track == name);
     if !exact.is_empty() {
@@ -78,7 +78,7 @@ fn tracks_called(exports: &[TrackFile], name: &str) -> Vec<TrackIndex> {
     matching_tracks(exports, |_, track| track.eq_ignore_ascii_case(name))
 }
 
-/// The tracks called `tip` and `head`, where no `--point` is given.
+/// Chooses the tracks called `tip` and `head`, if no `--point` is given.
 fn choose_by_default(exports: &[TrackFile]) -> ImportResult<[Option<TrackIndex>; 2]> {
     let [tip, head] = [tracks_called(exports, "tip"), tracks_called(exports, "head")];
     if tip.len() > 1 || head.len() > 1 || (tip.is_empty() && head.is_empty()) {
@@ -89,7 +89,7 @@ fn choose_by_default(exports: &[TrackFile]) -> ImportResult<[Option<TrackIndex>;
     Ok([tip.first().copied(), head.first().copied()])
 }
 
-/// A track by its name, by `FILE:NAME`, or by `FILE` when the file holds one track.
+/// Finds a track by its name, by `FILE:NAME`, or by `FILE` if the file contains only one track.
 fn find_track(exports: &[TrackFile], point: &'static str, name: &str) -> ImportResult<TrackIndex> {
     let file_is = |export: &TrackFile, file: &str| {
         export.file == file || export.file_name() == file || export.stem == file
@@ -124,13 +124,13 @@ fn matching_tracks(exports: &[TrackFile], accept: impl Fn(&TrackFile, &str) -> b
     accepted.map(|(file, track, _, _)| (file, track)).collect()
 }
 
-/// The question for the most similar name, with a blank behind it; empty if no name is similar.
+/// Question whether the most similar name was meant, followed by a blank; empty if no name is similar.
 fn suggest_track(name: &str, names: &[&str]) -> String {
     let suggestion = suggest_key(name, names);
     if suggestion.starts_with("did") { suggestion + " " } else { String::new() }
 }
 
-/// Advice where no track was found for `point` and others are left over.
+/// Advice if no track was found for `point` and other tracks remain.
 pub(crate) fn unchosen_advice(
     exports: &[TrackFile],
     chosen: &[Option<TrackIndex>; 2],
@@ -145,7 +145,7 @@ pub(crate) fn unchosen_advice(
     (!free.is_empty()).then(|| format!("{hint}{}: name it with --point {point}=NAME", list_tracks(exports)))
 }
 
-/// The tracks there are, with their files where there are several.
+/// Lists the tracks, with their files if there are several.
 fn list_tracks(exports: &[TrackFile]) -> String {
     let full = |export: &TrackFile, name: &str| {
         if exports.len() > 1 { format!("{}:{name}", export.file_name()) } else { name.to_owned() }

@@ -1,4 +1,4 @@
-//! The content of a file as its format reads it: clocks, tracks, and facts such as units.
+//! The contents of a file as its format reads them: clocks, tracks, and facts such as units.
 
 use super::Document;
 use crate::import::error::TextLocation;
@@ -8,20 +8,20 @@ use crate::import::source::base_name;
 use crate::recording::files::YAxis;
 use crate::recording::quality::QualityFinding;
 
-/// Frames and times of the rows of one or more tracks.
+/// Frame numbers and times of the rows of one or more tracks.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Clock {
-    /// 1-based line of every row.
+    /// Line number of every row, counted from 1.
     pub lines: Vec<u32>,
-    /// Index of the cell that holds frame or time, for messages.
+    /// Index of the cell with the frame number or the time, for messages.
     pub cell: usize,
-    /// Frame numbers, where the file has them.
+    /// Frame numbers, if the file has them.
     pub frame: Option<Column>,
-    /// Times, where the file has them, in the unit of [`Facts::time`].
+    /// Times, if the file has them, in the unit of [`Facts::time`].
     pub time: Option<Column>,
 }
 
-/// Line numbers as a clock keeps them.
+/// Converts line numbers to the type in which a clock stores them.
 pub(crate) fn clock_lines(lines: impl IntoIterator<Item = usize>) -> Vec<u32> {
     lines.into_iter().map(|line| u32::try_from(line).unwrap_or(u32::MAX)).collect()
 }
@@ -41,38 +41,39 @@ impl Clock {
     }
 }
 
-/// A point over the rows of its clock.
+/// Positions of a point in the rows of its clock.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Track {
     pub name: String,
-    /// Index of its clock.
+    /// Index of the clock of the track.
     pub clock: usize,
     pub x: Column,
     pub y: Option<Column>,
     pub confidence: Option<Column>,
 }
 
-/// A fact and its source, in words.
+/// A fact, and a text on its source.
 pub(crate) type Fact<T> = Option<(T, String)>;
 
-/// Facts that the file or the documentation of its format gives. The user has to give the others.
+/// Facts that the file or the documentation of its format gives. The user has to give the missing ones.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Facts {
     pub y_axis: Fact<YAxis>,
-    /// What the direction of y depends on where the format leaves it open; part of the question to the user.
+    /// Text on what the direction of y depends on, if the format leaves it open; part of the question to the
+    /// user.
     pub y_axis_open: Option<&'static str>,
     /// Length unit of the coordinates.
     pub unit: Fact<CoordinateUnit>,
-    /// Rate at which the camera recorded, frames/s; never one that may be that of playback.
+    /// Rate at which the camera recorded, 1/s; never a rate that may be that of playback.
     pub frame_rate_hz: Fact<f64>,
-    /// Exposure of a frame, s.
+    /// Exposure time of a frame, s.
     pub exposure_s: Fact<f64>,
     /// Unit of the times.
     pub time: TimeUnit,
 }
 
 impl Facts {
-    /// Image pixels with y downwards, with the source of both facts.
+    /// Facts about image pixels with y downwards; `why` is the source of both facts.
     pub(crate) fn pixels_down(why: &str) -> Self {
         let unit = Some((CoordinateUnit::Pixel, why.to_owned()));
         Self { y_axis: Some((YAxis::Down, why.to_owned())), unit, ..Self::default() }
@@ -84,14 +85,14 @@ impl Facts {
 pub(crate) struct TrackFile<'a> {
     pub file: &'a str,
     pub stem: &'a str,
-    /// The table that the clocks were read from, unless the file is XML or blocks.
+    /// The table from which the clocks were read; `None` for XML and for blocks of rows.
     pub table: Option<&'a DelimitedTable<'a>>,
     pub clocks: Vec<Clock>,
     pub tracks: Vec<Track>,
     pub facts: Facts,
     pub notes: Vec<String>,
     pub findings: Vec<QualityFinding>,
-    /// Names and titles, which are searched for the mark of synthetic data.
+    /// Names and titles, in which the mark of synthetic data is sought.
     pub texts: Vec<String>,
 }
 
@@ -104,7 +105,7 @@ impl<'a> TrackFile<'a> {
         base_name(self.file)
     }
 
-    /// Place of the frame or time of a row.
+    /// Place of the frame number or time of a row.
     pub(crate) fn row_location(&self, clock: &Clock, row: usize) -> TextLocation {
         let line = clock.line_number(row);
         let column = self.table.map_or(1, |table| table.text_column(line, clock.cell));
@@ -112,7 +113,7 @@ impl<'a> TrackFile<'a> {
     }
 }
 
-/// Numbers of a column. A missing one is stored as NaN and given out as `None`.
+/// Numbers of a column. A missing number is stored as NaN and returned as `None`.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Column(Vec<f64>);
 
@@ -141,7 +142,7 @@ impl Column {
         self.0.iter().any(|value| !value.is_nan())
     }
 
-    /// The numbers in another order: `order` lists the rows.
+    /// The numbers in the order of the row indices `order`.
     pub(crate) fn reorder(&self, order: &[usize]) -> Self {
         Self(order.iter().filter_map(|row| self.0.get(*row).copied()).collect())
     }
@@ -156,12 +157,12 @@ impl FromIterator<Option<f64>> for Column {
 /// Unit of a file's times.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) enum TimeUnit {
-    /// One unit in seconds.
+    /// Length of the unit, s.
     Seconds(f64),
-    /// Seconds, because nearly every table has them.
+    /// Seconds, assumed because nearly every table contains seconds.
     #[default]
     AssumedSeconds,
-    /// The format has several units and the file does not say which.
+    /// Unknown: the format allows several units, and the file does not name its unit.
     Unknown,
 }
 

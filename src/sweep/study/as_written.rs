@@ -1,4 +1,4 @@
-//! A study file as written: types and keys; values are checked later.
+//! A study file as written, with its keys and types; the values are checked later.
 
 use crate::feature::{define_entry, with_reading_keys};
 use crate::simulate::twin::Camera;
@@ -16,16 +16,16 @@ pub(crate) struct StudyFile {
     pub format: u32,
     /// Title for pages and figures.
     pub title: String,
-    /// Scene whose parameters vary; relative to this file.
+    /// Path of the scene whose parameters vary, relative to this file.
     pub scene: String,
-    /// Camera through which every run is seen.
+    /// Camera that films every run.
     pub camera: Camera,
-    /// Points drawn from the box of the axes; a grid if left out.
+    /// Sample of the box that the axes span; a grid if left out.
     pub sample: Option<SamplePlan>,
-    /// What varies.
+    /// Parameters that vary.
     #[serde(default)]
     pub axis: Vec<StudyAxisFile>,
-    /// What is read at every point.
+    /// Readings that are taken at every point.
     #[serde(default)]
     pub map: Vec<Map>,
 }
@@ -40,20 +40,20 @@ pub(crate) struct StudyAxisFile {
     pub from: Option<f64>,
     /// Last value, SI.
     pub to: Option<f64>,
-    /// Number of values of a grid.
+    /// Number of values, for a grid.
     pub points: Option<usize>,
-    /// How the values lie; "linear" if left out.
+    /// Spacing of the values; "linear" if left out.
     pub scale: Option<AxisSpacing>,
-    /// The values themselves, in place of from, to and points.
+    /// The values themselves, instead of from, to and points.
     pub values: Option<Vec<f64>>,
 }
 
 with_reading_keys!(define_entry {
     "What is read at every point."
     Map {
-        /// Different from every other map.
+        /// Name of the map, different from all others.
         name: String,
-        /// Ends of the colours, in the unit of the map; from the values if left out.
+        /// Values at the ends of the colour scale, in the unit of the map; its extremes if left out.
         range: Option<NumberPair>,
     }
 });

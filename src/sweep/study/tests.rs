@@ -74,7 +74,7 @@ fn a_study_is_read() {
     );
 }
 
-/// What is replaced, by what, and what the refusal says.
+/// Text that is replaced, its replacement, and parts of the error message.
 const REFUSED: [(&str, &str, &[&str]); 30] = [
     ("format = 1", "format = 2", &["s.toml: key `format`: found 2, expected 1"]),
     ("scene = \"x.toml\"", "scene = \" \"", &["s.toml: scene: found \" \"", "relative to this file"]),
@@ -211,7 +211,7 @@ fn the_fingerprint_sees_every_part_and_their_borders() {
 
 const AXES: [&str; 3] = ["friction.a", "friction.c", "drive.amplitude_m"];
 
-/// A study of three parameters; `keys` are those of every axis.
+/// A study of three parameters; `keys` are added to every axis.
 fn of_three(sample: &str, keys: &str) -> Result<Study, StudyError> {
     let axes = AXES.map(|name| format!("[[axis]]\nname = \"{name}\"\nfrom = 0.01\nto = 0.1\n{keys}\n"));
     let (head, maps) = (STUDY.split("[[axis]]").next().unwrap(), STUDY.split_once("[[map]]").unwrap().1);

@@ -1,4 +1,4 @@
-//! The flat table of DLTdv and Argus: one row a frame, without its number; columns `NAME_cam1_X`,
+//! The flat table of DLTdv and Argus: one row per frame, without frame numbers, and columns `NAME_cam1_X`,
 //! `NAME_cam1_Y`, ...
 
 use super::{FIRST_PIXEL, SEVERAL_CAMERAS, camera_track_name, pixel_facts};
@@ -8,7 +8,7 @@ use crate::recording::files::YAxis;
 
 /// Text between the name of a point and its camera.
 const CAMERA: &str = "_cam";
-/// Ends of x and y columns, and the program that writes them.
+/// Endings of the names of x and y columns, and the program that writes them.
 const AXES: [(&str, &str, DltdvWriter); 4] = [
     ("_U", "_V", DltdvWriter::Version8),
     ("_X", "_Y", DltdvWriter::Unknown),
@@ -43,7 +43,7 @@ impl<'t> DltdvColumn<'t> {
         let (axes, is_x, rest) =
             ends.into_iter().find_map(|(axes, end, is_x)| Some((axes, is_x, name.strip_suffix(end)?)))?;
         let (point, camera) = rest.rsplit_once(CAMERA)?;
-        let camera = camera.strip_prefix('_').unwrap_or(camera); // (Argus: `_cam_1_x`)
+        let camera = camera.strip_prefix('_').unwrap_or(camera); // (Argus writes `_cam_1_x`)
         let is_number = !camera.is_empty() && camera.bytes().all(|byte| byte.is_ascii_digit());
         is_number.then_some(Self { point, camera, axes, is_x })
     }
@@ -87,7 +87,7 @@ pub(crate) fn read_flat_table<'a>(
     Ok(export)
 }
 
-/// The points: every x has its y to the right.
+/// The points; the column of each x must be followed by that of its y.
 fn point_columns(
     table: &DelimitedTable,
     row: &TextRow,
@@ -113,13 +113,13 @@ fn point_columns(
     Ok(points)
 }
 
-/// Number of empty rows below the header: they are frames too.
+/// Number of empty rows directly below the header; they count as frames.
 fn count_empty_rows(table: &DelimitedTable, header: usize) -> ImportResult<f64> {
     let mut rows = table.rows(header);
     let (mut count, mut in_data) = (0.0, false);
     while let Some(record) = rows.next_row()? {
         match (in_data, record.is_empty()) {
-            (false, _) => in_data = true, // (the header)
+            (false, _) => in_data = true, // (this row is the header)
             (true, true) => count += 1.0,
             (true, false) => break,
         }

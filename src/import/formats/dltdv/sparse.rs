@@ -9,11 +9,12 @@ use crate::import::reader::{
 use crate::recording::files::YAxis;
 use std::collections::BTreeMap;
 
-/// First line of positions in pictures; tables of positions in space and of residuals have others.
+/// First line of a table of positions in pictures; tables of positions in space and of residuals have other
+/// first lines.
 const TITLE: &str = "sparse format camera coordinates";
 const EXPORT_AGAIN: &str = "the file was cut short or edited: export it again";
 
-/// Positions of a pair of columns by row.
+/// Positions in a pair of columns, by row number.
 type SparseFrames = BTreeMap<u64, SparsePosition>;
 
 #[derive(Default)]
@@ -60,7 +61,7 @@ pub(crate) fn read_sparse_table<'a>(
                     first: entry.line,
                 });
             }
-            // (zero means missing)
+            // (a zero means a missing value)
             *coordinate = value.filter(|value| *value != 0.0);
             entry.line = record.line;
             count += 1;
@@ -134,9 +135,9 @@ fn read_triplet(
 /// Names for the pairs of columns.
 struct SparsePointNames {
     points: Vec<String>,
-    /// Cameras of a point; `None` without a list of names.
+    /// Number of cameras that filmed each point; `None` without a list of names.
     cameras: Option<u64>,
-    /// Whether the list is one of version 8.
+    /// Whether DLTdv 8 wrote the list of names.
     version_8: bool,
     pairs: u64,
 }
@@ -165,8 +166,8 @@ impl SparsePointNames {
         Ok(Self { points, cameras: Some(pairs / count), version_8: title.contains("DLTdv8"), pairs })
     }
 
-    /// Name of a pair of columns, counted from 0: first all cameras of the first point, then those of the
-    /// second.
+    /// Name of a pair of columns, counted from 0. The pairs of all cameras for the first point come first,
+    /// then those for the second point.
     fn name_of_pair(&self, pair: u64) -> String {
         let Some(cameras) = self.cameras else {
             let columns = format!("columns{}-{}", 2 * pair + 1, 2 * pair + 2);

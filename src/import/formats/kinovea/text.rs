@@ -1,4 +1,4 @@
-//! Kinovea's text export, made for gnuplot: a block of rows for each track, with times of its own.
+//! Kinovea's text export, made for gnuplot: a block of rows for each track, with its own times.
 
 use super::{PREFERENCES_NOTE, kinovea_facts};
 use crate::import::error::{CellProblem, ImportError, ImportResult, TextLocation};
@@ -13,11 +13,11 @@ use portable_math as math;
 pub(super) const TITLE: &str = "#Kinovea";
 /// Line that names the columns.
 const COLUMNS: &str = "#T X Y";
-/// Cells of a row with one point.
+/// Number of cells in a row with one point.
 const CELLS: usize = 3;
-/// Parts of a time code, from hours to fractions of a second.
+/// Number of parts of a time code, from hours to fractions of a second.
 const CODE_PARTS: usize = 4;
-/// Longest part of a time code, digits.
+/// Maximum number of digits in a part of a time code.
 const CODE_DIGITS: usize = 9;
 
 pub(crate) fn read_text_export<'a>(document: &'a Document<'a>) -> ImportResult<TrackFile<'a>> {
@@ -40,10 +40,11 @@ pub(crate) fn read_text_export<'a>(document: &'a Document<'a>) -> ImportResult<T
     Ok(TrackFile { clocks, tracks, facts, notes, ..TrackFile::for_document(document) })
 }
 
-/// The form of a file's numbers. In old versions the decimal marks of times and positions may differ.
+/// The form of the numbers in a file. Old versions of Kinovea may use different decimal marks for times and
+/// positions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct NumberStyle {
-    /// Whether times are `h:mm:ss:cc`.
+    /// Whether times are time codes `h:mm:ss:cc`.
     code: bool,
     time_mark: char,
     position_mark: char,
@@ -86,7 +87,7 @@ impl NumberStyle {
     }
 }
 
-/// Seconds of `h:mm:ss:cc`; the last part is a decimal fraction.
+/// Converts a time code `h:mm:ss:cc` to seconds; the last part is a decimal fraction.
 fn time_code_s(cell: &str) -> Option<f64> {
     let (sign, digits) = cell.strip_prefix('-').map_or((1.0, cell), |rest| (-1.0, rest));
     let parts: Vec<&str> = digits.split(':').collect();
@@ -108,14 +109,14 @@ struct KinoveaTextReader<'f> {
     block: Option<TrackBlock>,
     clocks: Vec<Clock>,
     tracks: Vec<Track>,
-    /// Tracks without a name so far.
+    /// Number of tracks without a name so far.
     unnamed: usize,
 }
 
 /// Rows of one track.
 struct TrackBlock {
     name: String,
-    /// Cells of a row and the rows; `None` before the first row.
+    /// Number of cells in a row, and the rows; `None` before the first row.
     rows: Option<(usize, TrackCollector)>,
 }
 
@@ -168,7 +169,6 @@ impl KinoveaTextReader<'_> {
         Ok(())
     }
 
-    /// Ends the current track.
     fn end_track(&mut self) -> ImportResult<()> {
         let Some(TrackBlock { name, rows: Some((_, collector)) }) = self.block.take() else { return Ok(()) };
         let (clocks, mut tracks) = collector.finish(self.file, RowOrder::AsWritten)?;
@@ -186,7 +186,8 @@ impl KinoveaTextReader<'_> {
     }
 }
 
-/// Fields of a block. The points of an object are numbered, because this export does not name them.
+/// Fields of the rows of a block. The points of an object are numbered, because this export does not name
+/// them.
 fn block_shape(name: &str, points: usize) -> InstanceFields {
     let called = |index: usize| if points == 1 { name.to_owned() } else { format!("{name}/{}", index + 1) };
     let points = (0..points)

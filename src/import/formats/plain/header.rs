@@ -1,8 +1,8 @@
-//! The meaning of the column names of a plain table: clock, coordinates and their units.
+//! Meanings of the column names of a plain table: clock, coordinates and their units.
 
 use crate::import::reader::{CoordinateUnit, TimeUnit};
 
-/// Names of columns of frame numbers, in small letters and without separators.
+/// Names of columns of frame numbers, in lower case and without separators.
 const FRAMES: [&str; 16] = [
     "frame",
     "frames",
@@ -23,14 +23,14 @@ const FRAMES: [&str; 16] = [
 ];
 /// Names of columns of times, with the unit that a name implies.
 const TIMES: [(&[&str], Option<TimeUnit>); 4] = [
-    // (the last one is jikan: time)
+    // (the last name is jikan: time)
     (&["t", "time", "zeit", "temps", "tempo", "tiempo", "\u{6642}\u{9593}"], None),
-    // (seconds, milliseconds, or since 1970)
+    // (seconds or milliseconds, possibly since 1970)
     (&["timestamp"], Some(TimeUnit::Unknown)),
     (&["seconds", "second", "sec", "timesec"], Some(TimeUnit::Seconds(1.0))),
     (&["milliseconds", "millisecond", "msec", "ms", "timems", "timemsec"], Some(TimeUnit::Seconds(1e-3))),
 ];
-/// Names of columns that name the object of a row.
+/// Names of columns that identify the object of a row.
 const KEYS: [&str; 10] =
     ["id", "track", "trackid", "objectid", "object", "particle", "marker", "point", "label", "name"];
 const CONFIDENCES: [&str; 4] = ["confidence", "likelihood", "score", "conf"];
@@ -58,13 +58,13 @@ const NOT_POSITIONS: [&str; 18] = [
 /// Separators between the parts of a name.
 const SEPARATORS: [char; 5] = ['_', '.', '-', ' ', ':'];
 
-/// Meaning of a column.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum ColumnMeaning {
     Frame,
     Time(TimeUnit),
     Key,
-    /// A coordinate of a point (axis 0 is x, 1 is y). The name is empty if the table has only one point.
+    /// A coordinate of a point (axis 0 is x, 1 is y). The name of the point is empty if the table has only
+    /// one.
     Coordinate {
         point: String,
         axis: usize,
@@ -100,7 +100,7 @@ impl ColumnMeaning {
         }
     }
 
-    /// Takes a unit from the row below, if the name has none. Gives whether it did.
+    /// Takes a unit from the row below, if the name has none; returns whether the row gave a unit.
     pub(crate) fn take_unit(&mut self, text: &str) -> bool {
         match self {
             Self::Coordinate { unit: unit @ None, .. } => {
@@ -116,7 +116,7 @@ impl ColumnMeaning {
     }
 }
 
-/// A name and the unit behind it: `x (mm)`, `x [mm]`, `tip_x_px`.
+/// Splits a name with a unit after it: `x (mm)`, `x [mm]`, `tip_x_px`.
 fn split_unit(name: &str) -> (&str, Option<&str>) {
     let name = name.trim();
     for (open, close) in [('(', ')'), ('[', ']')] {
@@ -150,7 +150,7 @@ fn parse_clock(base: &str, unit: Option<&str>) -> Option<ColumnMeaning> {
     })
 }
 
-/// The point and the axis of `tip_x`, `tip.x`, `x_tip`, `X tip` or `x`.
+/// Point and axis of a name such as `tip_x`, `tip.x`, `x_tip`, `X tip` or `x`.
 fn parse_coordinate(base: &str) -> Option<(String, usize)> {
     let axis = |part: &str| ["x", "y"].iter().position(|axis| part.eq_ignore_ascii_case(axis));
     if let Some(axis) = axis(base) {
@@ -164,7 +164,7 @@ fn parse_coordinate(base: &str) -> Option<(String, usize)> {
     position.then(|| (point.to_owned(), axis))
 }
 
-/// The point and the axis of `TipX`, of a word in another script with `X` behind it, and of `x1`.
+/// Point and axis of a name without separators: `TipX`, a word in another script followed by `X`, or `x1`.
 fn parse_joined_coordinate(base: &str) -> Option<(&str, usize)> {
     let is_number = |rest: &&str| !rest.is_empty() && rest.chars().all(|c| c.is_ascii_digit());
     if let Some(number) = base.strip_prefix(['x', 'X', 'y', 'Y']).filter(is_number) {
@@ -172,17 +172,17 @@ fn parse_joined_coordinate(base: &str) -> Option<(&str, usize)> {
     }
     let axis = ['X', 'Y'].iter().position(|axis| base.ends_with(*axis))?;
     let point = &base[..base.len() - 1];
-    // (`MAX` and `vx` are words of their own)
+    // (in a word of capitals such as `MAX`, the last letter is not an axis)
     let ends_word = point.ends_with(|c: char| c.is_lowercase() || c.is_ascii_digit() || !c.is_ascii());
     ends_word.then_some((point, axis))
 }
 
-/// A name and its last part.
+/// Splits a name into its beginning and its last part.
 fn split_last_part(name: &str) -> Option<(&str, &str)> {
     name.rsplit_once(SEPARATORS).map(|(point, last)| (point.trim_end_matches(SEPARATORS), last))
 }
 
-/// A name in small letters without separators.
+/// The name in lower case, without separators.
 fn squeeze_name(name: &str) -> String {
     name.chars().filter(|c| !SEPARATORS.contains(c)).flat_map(char::to_lowercase).collect()
 }

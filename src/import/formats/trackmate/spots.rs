@@ -5,9 +5,10 @@ use crate::import::error::{ImportError, ImportResult};
 use crate::import::reader::{CellNumber, DelimitedTable, Document, RowView, TextRow};
 use std::collections::HashMap;
 
-/// Rows at the top in which the names are searched: old versions have one header row, later ones up to four.
+/// Number of rows at the top in which the column names are sought: old versions have one header row, later
+/// ones up to four.
 const HEADER_ROWS: usize = 4;
-/// Columns that only the tables of edges and tracks have, and the name of the table.
+/// Columns that occur only in tables of edges or of tracks, each with the name of its table.
 const OTHER_TABLES: [(&str, &str); 5] = [
     ("SPOT_SOURCE_ID", "edges"),
     ("EDGE_TIME", "edges"),
@@ -19,7 +20,7 @@ const POSITION: [&str; 2] = ["POSITION_X", "POSITION_Y"];
 const FRAME: &str = "FRAME";
 const TRACK: &str = "TRACK_ID";
 
-/// What shows that a table is one of TrackMate's.
+/// Feature of a table that identifies it as TrackMate's.
 pub(crate) fn recognise_spots(table: &DelimitedTable) -> Option<String> {
     if let Some(row) = find_header(table) {
         return Some(format!("line {} names POSITION_X and FRAME as TrackMate does", row.1.line));
@@ -34,7 +35,7 @@ fn find_header<'t>(table: &'t DelimitedTable) -> Option<(usize, &'t TextRow)> {
     table.find_row(HEADER_ROWS, named)
 }
 
-/// Row and cell of a column that only another table of TrackMate's has, and the name of that table.
+/// Row and cell of a column that occurs only in other tables of TrackMate, and the name of that table.
 fn find_other_table<'t>(table: &'t DelimitedTable) -> Option<(&'t TextRow, usize, &'static str)> {
     let shows = |row: &'t TextRow| {
         let tracks = row.has(TRACK);
@@ -58,7 +59,7 @@ fn wrong_table_error(table: &DelimitedTable) -> ImportError {
     ImportError::wrong_table(place, found, expected, EXPORT_ADVICE)
 }
 
-/// Cells of a spot.
+/// Columns of a table of spots.
 struct SpotCells {
     id: Option<usize>,
     track: usize,
@@ -67,7 +68,7 @@ struct SpotCells {
     time: Option<usize>,
     position: [usize; 2],
     quality: bool,
-    /// Cells of every row.
+    /// Number of cells in every row.
     width: usize,
 }
 
@@ -161,7 +162,7 @@ fn read_rows(
     Ok(())
 }
 
-/// Refuses rows whose cells are shifted: TrackMate does not quote names with commas.
+/// Refuses a row whose cells are shifted by a comma in a name, because TrackMate does not quote names.
 fn check_shift(table: &DelimitedTable, record: &RowView, cells: &SpotCells) -> ImportResult<()> {
     let whole = |cell: usize| record.cell(cell).parse::<i64>().is_ok();
     if record.len() == cells.width && cells.id.is_none_or(whole) {

@@ -1,4 +1,4 @@
-//! XML as opening and closing tags with their places: the only file that uses `quick_xml`.
+//! XML as opening and closing tags with their places. This is the only file that uses `quick_xml`.
 //!
 //! Tags are read one by one, so that deep nesting takes no stack. Only the five predefined entities and
 //! character references are resolved; a document type, which could define others, is refused.
@@ -12,18 +12,18 @@ use quick_xml::reader::Reader;
 
 const REMEDY: &str = "save or export it again from TrackMate";
 
-/// The elements of a document in their order.
+/// Reads the tags of a document in their order.
 pub(crate) struct XmlReader<'a> {
     file: &'a str,
     text: &'a str,
     reader: Reader<&'a [u8]>,
     /// Number of open elements.
     depth: usize,
-    /// Byte up to which lines are counted, and the line there.
+    /// Byte offset up to which lines have been counted, and the line number there.
     counted: (usize, usize),
 }
 
-/// Start or end of an element; an element without content has both.
+/// Start or end of an element; an element without content gives both.
 pub(crate) enum XmlTag<'a> {
     Open(XmlElement<'a>),
     Close(BytesEnd<'a>),
@@ -43,7 +43,7 @@ impl XmlElement<'_> {
 }
 
 impl XmlTag<'_> {
-    /// Whether this is the end of an element of that name.
+    /// Whether this is the end of an element with that name.
     pub(crate) fn closes(&self, name: &str) -> bool {
         matches!(self, Self::Close(end) if end.name().as_ref() == name)
     }
@@ -56,7 +56,7 @@ impl<'a> XmlReader<'a> {
         Self { file: document.file, text: document.text, reader, depth: 0, counted: (0, 1) }
     }
 
-    /// Name of the root element, if the text starts as XML.
+    /// Name of the root element, if the text begins like XML.
     pub(crate) fn root_name(document: &Document) -> Option<String> {
         if !document.text.trim_start().starts_with('<') {
             return None;
@@ -70,8 +70,8 @@ impl<'a> XmlReader<'a> {
     /// The next tag; `None` after the last one.
     ///
     /// # Errors
-    /// [`ImportError::WrongTable`] for text that is not well-formed, that ends within an element, or that has
-    /// a document type.
+    /// [`ImportError::WrongTable`] if the text is not well-formed, ends within an element, or has a document
+    /// type.
     pub(crate) fn next_tag(&mut self) -> ImportResult<Option<XmlTag<'a>>> {
         loop {
             let start = self.clamp_offset(self.reader.buffer_position());
@@ -122,10 +122,10 @@ impl<'a> XmlReader<'a> {
         Ok(None)
     }
 
-    /// An attribute that the element must have.
+    /// Value of an attribute that the element must have.
     ///
     /// # Errors
-    /// [`ImportError::WrongTable`] where it is missing.
+    /// [`ImportError::WrongTable`] if it is missing.
     pub(crate) fn required_attribute(&self, element: &XmlElement, name: &str) -> ImportResult<String> {
         self.attribute(element, name)?.ok_or_else(|| {
             let found = format!("<{}> without {name}", element.bytes.name().as_ref());
@@ -134,10 +134,10 @@ impl<'a> XmlReader<'a> {
         })
     }
 
-    /// A number that the element must have; `None` for a word that means a missing one.
+    /// Number in an attribute that the element must have; `None` for a word that means a missing value.
     ///
     /// # Errors
-    /// [`ImportError::Cell`] for anything else.
+    /// [`ImportError::WrongTable`] if the attribute is missing, [`ImportError::Cell`] for any other text.
     pub(crate) fn number_attribute(&self, element: &XmlElement, name: &str) -> ImportResult<Option<f64>> {
         let text = self.required_attribute(element, name)?;
         match parse_number(text.trim(), '.') {
@@ -164,7 +164,7 @@ impl<'a> XmlReader<'a> {
         usize::try_from(offset).unwrap_or(usize::MAX).min(self.text.len())
     }
 
-    /// Line of byte `at`, which must not be before that of the last call.
+    /// Line number at byte `at`, which must not precede the byte of the previous call.
     fn line_at(&mut self, at: usize) -> usize {
         let (from, line) = self.counted;
         let line = line + count_lines(self.text.as_bytes().get(from..at).unwrap_or_default());
