@@ -27,11 +27,13 @@ use hybrid_ode::{fixed_step, taylor};
 use std::ops::ControlFlow;
 
 /// A run, with its settings and its state between phases.
-pub(super) struct EventLoop<'a, W> {
+pub(super) struct EventLoop<'a> {
     system: &'a DrivenBlade,
     scene: &'a Scene,
     effort: SolverOptions,
-    watch: &'a mut W,
+    /// Not a type parameter: every observer of a run would otherwise have its own copy of the loop and of the
+    /// integrator, and no run is faster for it.
+    watch: &'a mut dyn RunWatcher,
     t: f64,
     work: WorkCounters,
     transitions: u64,
@@ -65,12 +67,12 @@ enum NextPhase {
 /// not decide it.
 type PendingTransition = Option<(TipMode, Option<TransitionCause>)>;
 
-impl<'a, W: RunWatcher> EventLoop<'a, W> {
+impl<'a> EventLoop<'a> {
     pub(super) fn new(
         system: &'a DrivenBlade,
         scene: &'a Scene,
         effort: SolverOptions,
-        watch: &'a mut W,
+        watch: &'a mut dyn RunWatcher,
     ) -> Self {
         let (_, fastest) = time_scales_rad_per_s(&system.linkage);
         let shortest_period_s = std::f64::consts::TAU / fastest;
@@ -398,6 +400,10 @@ fn cause_of_change(from: TipMode, to: TipMode) -> TransitionCause {
     }
 }
 
+/// Observer of the steps of a reference method. It is no type parameter, because the code of these methods
+/// would be compiled again for every observer.
+type StepObserver<'a, const N: usize> = &'a mut dyn FnMut(&AcceptedStep<'_, N>) -> ControlFlow<()>;
+
 /// Integrates a phase by the method of the run, from one horizon to the next.
 ///
 /// `horizon(t)` is the latest time up to which the integration from `t` may run; the phase stops where
@@ -420,23 +426,16 @@ pub(super) fn integrate_phase<const N: usize, P: TaylorPhase<N, GUARDS>>(
                 let observe = |step: &AcceptedStep<'_, N>, tape: &P::Tape| observe(step, Some(tape));
                 taylor::integrate_taylor(phase, start, until, relative, room, work, observe)
             }
-            IntegrationMethod::RungeKutta => {
-                hybrid_ode::integrate(phase, start, until, relative, work, |step| observe(step, None))
-            }
-            IntegrationMethod::Slack => {
-                let observe = |step: &AcceptedStep<'_, N>| observe(step, None);
-                hybrid_ode::integrate_with_locator(
-                    EventLocator::Slack,
-                    phase,
-                    start,
-                    until,
-                    relative,
-                    work,
-                    observe,
-                )
+            IntegrationMethod::RungeKutta | IntegrationMethod::Slack => {
+                let locator = match effort.method {
+                    IntegrationMethod::Slack => EventLocator::Slack,
+                    _ => EventLocator::Bracket,
+                };
+                let observe: StepObserver<'_, N> = &mut |step| observe(step, None);
+                hybrid_ode::integrate_with_locator(locator, phase, start, until, relative, work, observe)
             }
             IntegrationMethod::FixedStep(scheme) => {
-                let observe = |step: &AcceptedStep<'_, N>| observe(step, None);
+                let observe: StepObserver<'_, N> = &mut |step| observe(step, None);
                 fixed_step::integrate_fixed(phase, start, until, &scheme.integrator_options(), work, observe)
             }
         };

@@ -1,6 +1,6 @@
 //! Lift-off, flight, landing, and the impact without collision that resolves the Painlevé paradox.
 
-use super::{EventLoop, NextPhase, PendingTransition, RunWatcher, TipStrike, integrate_phase};
+use super::{EventLoop, NextPhase, PendingTransition, TipStrike, integrate_phase};
 use crate::model::flight::FlightState;
 use crate::model::{LinkDirections, Pose};
 use crate::simulate::flight::{FlightPhase, LANDING, flight_state_from, flight_state_vector};
@@ -12,7 +12,7 @@ use crate::simulate::solution_segment::{SegmentSolution, SolutionSegment};
 use crate::simulate::{Impact, RunStatus, TransitionCause};
 use hybrid_ode::{HybridPhase, PhaseEndCause as Ended, PhaseStart};
 
-impl<W: RunWatcher> EventLoop<'_, W> {
+impl EventLoop<'_> {
     /// Decides what follows when the normal force reaches zero.
     pub(super) fn lose_contact(&mut self, pose: &Pose, before: PendingTransition) -> NextPhase {
         self.lift_off(FlightState { pose: *pose, gap_m: 0.0, gap_rate_m_per_s: 0.0 }, before)
