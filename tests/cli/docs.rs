@@ -47,7 +47,7 @@ const OTHERWISE: &[(&str, &str, How, &str)] = &[
     (".ci/advisories/README.md", ".ci/deny", Elsewhere, ".ci/run runs it"),
     (
         "CONTRIBUTING.md",
-        "cargo test --test browser -- --ignored",
+        "cargo test --test figures browser:: -- --ignored",
         Elsewhere,
         "needs Chromium; .ci/run runs it",
     ),

@@ -1,5 +1,7 @@
 //! Figures and pages: drawn for every medium, looked at by a rasteriser.
 
+#[path = "../common/browser.rs"]
+mod driver;
 #[path = "../common/files.rs"]
 mod files;
 #[path = "../../examples/gallery.rs"]
@@ -19,6 +21,7 @@ mod sketch_file;
 #[path = "../common/small_fit.rs"]
 mod small_fit;
 
+mod browser;
 mod comparison;
 mod gallery;
 mod hard_reports;

@@ -1,4 +1,5 @@
-//! Exact answers: equations, identities, convergence, and what a run may not do.
+//! Exact answers (equations, identities, convergence, and what a run may not do), published numbers, and
+//! known values that are found again.
 
 #[path = "../common/belt.rs"]
 mod belt;
@@ -42,6 +43,7 @@ mod multitaper;
 mod paper_scheme;
 mod plausibility;
 mod quality;
+mod recover;
 mod ridge;
 mod section;
 mod sensitivity;
@@ -53,3 +55,4 @@ mod strokes;
 mod sweep;
 mod tilt;
 mod transitions;
+mod validate;

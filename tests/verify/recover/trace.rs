@@ -10,7 +10,7 @@ use wiperlab::simulate::SolverOptions;
 use wiperlab::simulate::scene::Scene;
 use wiperlab::simulate::twin::{Camera, TrackingModel, add_tracking_noise, film_scene};
 
-const SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
+const SCENE: &str = include_str!("../../../data/scenes/actual-blade.toml");
 /// A fifth of a second around the flip.
 const SPAN_S: [f64; 2] = [0.58, 0.8];
 const CAMERA: Camera = Camera { frame_rate_hz: 5_000.0, exposure_s: 5e-5 };
@@ -130,7 +130,7 @@ fn a_scene_of_another_time_does_not_drive_a_trace() {
 /// `cargo run --release --example recovery` fits traces with the parameters of this job.
 #[test]
 fn the_job_of_the_recovery_study_fits_traces() {
-    let job = include_str!("../../examples/recovery/job.toml");
+    let job = include_str!("../../../examples/recovery/job.toml");
     let (parameters, _) = job.split_once("[[component]]").unwrap();
     let job = Job::parse("job.toml", &format!("{parameters}\n[[trace]]\n")).unwrap();
     assert_eq!((job.traces.len(), job.parameters.len()), (1, 5));

@@ -1,24 +1,13 @@
 //! The page and the figures in a browser: nothing is asked of the network, nothing is cut off, dark and
 //! light, on screen and on paper.
 //!
-//! These tests need Chromium, named by the variable CHROMIUM or found on PATH: `cargo test --test browser --
-//! --ignored`.
+//! These tests need Chromium, named by the variable CHROMIUM or found on PATH: `cargo test --test figures
+//! browser:: -- --ignored`.
 
-#[path = "../common/browser.rs"]
-mod driver;
-#[path = "../common/files.rs"]
-mod files;
-#[path = "../common/hostile.rs"]
-mod hostile;
-#[path = "../common/project.rs"]
-mod project;
-#[path = "../common/small_fit.rs"]
-#[allow(dead_code, reason = "what is written is read by the browser here")]
-mod small_fit;
-
-use driver::Browser;
-use files::files;
-use project::Project;
+use crate::driver::Browser;
+use crate::files::files;
+use crate::hostile;
+use crate::project::Project;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -51,7 +40,7 @@ fn requests(browser: &Browser) -> Vec<String> {
 }
 
 #[test]
-#[ignore = "needs Chromium: cargo test --test browser -- --ignored"]
+#[ignore = "needs Chromium: cargo test --test figures browser:: -- --ignored"]
 fn a_page_asks_for_nothing_and_complains_of_nothing() {
     let (project, mut browser) = (Project::copied(), Browser::start());
     for fit in [TWIN, PUBLISHED] {
@@ -83,7 +72,7 @@ const TOO_WIDE: &str =
     .map(e => `${e.tagName}.${e.className}: ${e.scrollWidth} of ${e.clientWidth}`)";
 
 #[test]
-#[ignore = "needs Chromium: cargo test --test browser -- --ignored"]
+#[ignore = "needs Chromium: cargo test --test figures browser:: -- --ignored"]
 fn nothing_scrolls_sideways_on_a_telephone_a_tablet_and_a_wide_screen() {
     let (project, mut browser) = (Project::copied(), Browser::start());
     for fit in [TWIN, PUBLISHED] {
@@ -109,7 +98,7 @@ fn nothing_scrolls_sideways_on_a_telephone_a_tablet_and_a_wide_screen() {
 }
 
 #[test]
-#[ignore = "needs Chromium: cargo test --test browser -- --ignored"]
+#[ignore = "needs Chromium: cargo test --test figures browser:: -- --ignored"]
 fn the_first_screen_holds_the_answer() {
     let (project, mut browser) = (Project::copied(), Browser::start());
     for fit in [TWIN, PUBLISHED] {
@@ -171,7 +160,7 @@ fn shown_s(browser: &mut Browser) -> Vec<f64> {
 }
 
 #[test]
-#[ignore = "needs Chromium: cargo test --test browser -- --ignored"]
+#[ignore = "needs Chromium: cargo test --test figures browser:: -- --ignored"]
 fn the_pointer_reads_values_and_a_drag_enlarges() {
     let (project, mut browser) = (Project::copied(), Browser::start());
     browser.resize(1000, 1200);
@@ -226,7 +215,7 @@ fn the_pointer_reads_values_and_a_drag_enlarges() {
 }
 
 #[test]
-#[ignore = "needs Chromium: cargo test --test browser -- --ignored"]
+#[ignore = "needs Chromium: cargo test --test figures browser:: -- --ignored"]
 fn keys_alone_reach_the_contents_the_cursor_and_the_animation() {
     let (project, mut browser) = (Project::copied(), Browser::start());
     browser.resize(1000, 900);
@@ -273,7 +262,7 @@ fn keys_alone_reach_the_contents_the_cursor_and_the_animation() {
 }
 
 #[test]
-#[ignore = "needs Chromium: cargo test --test browser -- --ignored"]
+#[ignore = "needs Chromium: cargo test --test figures browser:: -- --ignored"]
 fn a_page_without_its_script_is_complete() {
     let (project, mut browser) = (Project::copied(), Browser::start());
     let page = report(&project, TWIN).join("index.html");
@@ -297,7 +286,7 @@ fn a_page_without_its_script_is_complete() {
 }
 
 #[test]
-#[ignore = "needs Chromium: cargo test --test browser -- --ignored"]
+#[ignore = "needs Chromium: cargo test --test figures browser:: -- --ignored"]
 fn a_page_of_several_fits_is_as_quiet_and_as_narrow() {
     let (project, mut browser) = (Project::copied(), Browser::start());
     project.run_to(
@@ -369,7 +358,7 @@ fn brightness(browser: &mut Browser, property: &str) -> f64 {
 }
 
 #[test]
-#[ignore = "needs Chromium: cargo test --test browser -- --ignored"]
+#[ignore = "needs Chromium: cargo test --test figures browser:: -- --ignored"]
 fn page_and_figures_follow_the_readers_light() {
     let (project, mut browser) = (Project::copied(), Browser::start());
     let page = report(&project, TWIN).join("index.html");
@@ -404,7 +393,7 @@ const TEXTS_OUTSIDE: &str = "[...document.querySelectorAll('svg')].flatMap(svg =
 })";
 
 #[test]
-#[ignore = "needs Chromium: cargo test --test browser -- --ignored"]
+#[ignore = "needs Chromium: cargo test --test figures browser:: -- --ignored"]
 fn text_stays_inside_every_figure_on_screen_and_in_print() {
     let (project, mut browser) = (Project::copied(), Browser::start());
     let known = project.path("known.svg");
@@ -428,7 +417,7 @@ fn text_stays_inside_every_figure_on_screen_and_in_print() {
 }
 
 #[test]
-#[ignore = "needs Chromium: cargo test --test browser -- --ignored"]
+#[ignore = "needs Chromium: cargo test --test figures browser:: -- --ignored"]
 fn a_page_prints_on_a_sane_number_of_pages() {
     let (project, mut browser) = (Project::copied(), Browser::start());
     browser.open(&report(&project, TWIN).join("index.html"));
@@ -444,7 +433,7 @@ fn a_page_prints_on_a_sane_number_of_pages() {
 }
 
 #[test]
-#[ignore = "needs Chromium: cargo test --test browser -- --ignored"]
+#[ignore = "needs Chromium: cargo test --test figures browser:: -- --ignored"]
 fn hostile_names_are_shown_as_text() {
     let (project, mut browser) = (hostile::project(), Browser::start());
     browser.open(&project.path("reports").join(hostile::FIT).join("index.html"));
@@ -497,7 +486,7 @@ fn opened_animation(browser: &mut Browser, folder: &Path) {
 }
 
 #[test]
-#[ignore = "needs Chromium: cargo test --test browser -- --ignored"]
+#[ignore = "needs Chromium: cargo test --test figures browser:: -- --ignored"]
 fn the_links_of_the_animation_stay_joined_and_keep_their_lengths() {
     let (project, mut browser) = (Project::copied(), Browser::start());
     opened_animation(&mut browser, &report(&project, TWIN));
@@ -521,7 +510,7 @@ fn the_links_of_the_animation_stay_joined_and_keep_their_lengths() {
 }
 
 #[test]
-#[ignore = "needs Chromium: cargo test --test browser -- --ignored"]
+#[ignore = "needs Chromium: cargo test --test figures browser:: -- --ignored"]
 fn the_animation_says_one_state_and_one_pace_at_a_time() {
     let (project, mut browser) = (Project::copied(), Browser::start());
     opened_animation(&mut browser, &report(&project, TWIN));
@@ -544,7 +533,7 @@ fn the_animation_says_one_state_and_one_pace_at_a_time() {
 }
 
 #[test]
-#[ignore = "needs Chromium: cargo test --test browser -- --ignored"]
+#[ignore = "needs Chromium: cargo test --test figures browser:: -- --ignored"]
 fn a_reader_who_asked_for_less_motion_sees_the_poses_stand_still() {
     let (project, mut browser) = (Project::copied(), Browser::start());
     let folder = report(&project, TWIN);

@@ -8,7 +8,7 @@ use wiperlab::fit::result::FitStatus;
 use wiperlab::fit::uncertainty::ParameterVerdict;
 use wiperlab::simulate::scene::Scene;
 
-const SCENE: &str = include_str!("../../data/scenes/published-experiment.toml");
+const SCENE: &str = include_str!("../../../data/scenes/published-experiment.toml");
 
 const JOB: &str = r#"format = 1
 title = "Two frequencies"

@@ -1,7 +1,7 @@
 //! The search on models with known answers; what becomes of a fit that is cut or resumed is in
 //! `tests/regress/resume.rs`.
 
-use crate::ringing::ringing;
+use super::ringing::ringing;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use wiperlab::checkpoint;

@@ -12,7 +12,7 @@ use wiperlab::simulate::SolverOptions;
 use wiperlab::simulate::scene::Scene;
 use wiperlab::simulate::twin::{Camera, TrackingModel, add_tracking_noise, film_scene};
 
-const SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
+const SCENE: &str = include_str!("../../../data/scenes/actual-blade.toml");
 const CAMERA: Camera = Camera { frame_rate_hz: 5000.0, exposure_s: 5e-5 };
 /// A tenth of a pixel of 20 um.
 const NOISE_M: f64 = 2e-6;
