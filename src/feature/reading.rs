@@ -289,7 +289,10 @@ impl Reading {
             | Self::BandLevel { band, .. }
             | Self::DampingRatio(band)
             | Self::CycleFrequency { band, .. } => Some(band),
-            _ => None,
+            Self::MeanDeflection(_)
+            | Self::DeflectionAtSpeed { .. }
+            | Self::Interval { .. }
+            | Self::Contact(_) => None,
         }
     }
 
@@ -298,7 +301,13 @@ impl Reading {
         match self {
             Self::MeanDeflection(window) | Self::DeflectionAtSpeed { window, .. } => Some(window),
             Self::Contact(contact) => contact.window(),
-            _ => self.band().map(|band| &band.window),
+            Self::Frequency(_)
+            | Self::Amplitude(_)
+            | Self::Rms(_)
+            | Self::BandLevel { .. }
+            | Self::DampingRatio(_)
+            | Self::CycleFrequency { .. } => self.band().map(|band| &band.window),
+            Self::Interval { .. } => None,
         }
     }
 
@@ -308,7 +317,11 @@ impl Reading {
             Self::MeanDeflection(_) | Self::DeflectionAtSpeed { .. } => Some(LengthCalibration::Position),
             Self::Amplitude(_) | Self::Rms(_) => Some(LengthCalibration::Size { floor_m: 0.0 }),
             Self::BandLevel { floor_m, .. } => Some(LengthCalibration::Size { floor_m: *floor_m }),
-            _ => None,
+            Self::Frequency(_)
+            | Self::DampingRatio(_)
+            | Self::CycleFrequency { .. }
+            | Self::Interval { .. }
+            | Self::Contact(_) => None,
         }
     }
 
