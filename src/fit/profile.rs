@@ -182,7 +182,8 @@ struct ProfileWalker {
     /// Whether the inner minimisation at the current place has ended.
     followed: bool,
     next_step: f64,
-    /// Nearest place above the threshold, with the square root of its rise in cost.
+    /// Coordinate of the nearest place where the cost exceeds the threshold, and the square root of the rise
+    /// in cost there.
     outside: Option<(f64, f64)>,
     /// Crossing found, and number of probes already made behind it.
     crossing: Option<(f64, usize)>,

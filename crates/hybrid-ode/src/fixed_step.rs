@@ -6,7 +6,7 @@ use super::{
     AcceptedStep, DenseOutput, HybridPhase, ObserverReply, PhaseEnd, PhaseEndCause, PhaseStart, WorkCounters,
 };
 
-/// Method that locates the end of a phase within a step in which a guard has fallen below zero.
+/// How the end of a phase is located once a guard is found below zero at the end of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum FixedStepLocator {
     /// The end of the step: the error is of order 1 in the step length, whatever the order of the method.

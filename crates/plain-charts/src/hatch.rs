@@ -18,7 +18,7 @@ const TOUCHING_DISTANCE: f64 = 1.5;
 const STROKE_WIDTH: u32 = 3;
 
 impl HatchPattern {
-    /// Directions of the lines, y downwards.
+    /// Directions of the lines, with y pointing down.
     fn directions(self) -> &'static [CanvasPoint] {
         const D: f64 = std::f64::consts::FRAC_1_SQRT_2;
         match self {

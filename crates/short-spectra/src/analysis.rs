@@ -245,8 +245,8 @@ impl SpectralAnalysis {
         Ok(Attempt { leaves_only_noise, trend_competes, analysis })
     }
 
-    /// Adds the power density, the noise floor and, for each component, the probability that noise gives so
-    /// steady a line.
+    /// Adds the power density, the noise floor and, for each component without a drift range, the probability
+    /// that noise alone produces as steady a line.
     fn with_densities(mut self, frame_rate_hz: f64) -> Self {
         let padded = 2 * (self.spectrum.amplitude_m.len() - 1);
         let density = |samples: &[Option<f64>]| {

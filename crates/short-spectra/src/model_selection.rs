@@ -241,7 +241,7 @@ impl<'a> ModelSelector<'a> {
         self.fit_if_better(parts, &with)
     }
 
-    /// Cycles of a peak in the record.
+    /// Frequency of a peak as a number of cycles in the length of the record.
     pub(super) fn cycles_of_peak(&self, peak: &Peak) -> f64 {
         peak.frequency_hz / self.resolution_hz()
     }

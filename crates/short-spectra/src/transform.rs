@@ -64,7 +64,8 @@ impl RealTransform {
 // cosine, and takes the cosine from libm instead.
 
 thread_local! {
-    /// Number of parts of a turn in the plan that is being made; zero outside of planning.
+    /// Number of equal parts into which the twiddle factors of the plan being made divide a full turn; zero
+    /// while no plan is being made.
     static TWIDDLE_DIVISIONS: Cell<usize> = const { Cell::new(0) };
 }
 

@@ -36,7 +36,7 @@ pub struct JobCondition {
     pub set: Vec<(String, f64)>,
     /// Whether its features are only predicted, never fitted.
     pub held_out: bool,
-    /// Calibration errors of the camera that recorded the features; `None` without a recording.
+    /// Standard deviations of the calibration of the recording's camera; `None` without a recording.
     pub camera: Option<FeatureCamera>,
 }
 

@@ -31,8 +31,8 @@ pub struct TraceSearchOutcome {
     pub best: usize,
     /// Whether the checkpoint asked to stop.
     pub stopped: bool,
-    /// Intervals and doubts at the best end; `None` if the search was stopped, or if the covariance at the
-    /// best end does not exist.
+    /// Intervals of the estimates at the best end, and reasons to doubt them; `None` if the search was
+    /// stopped, or if the covariance at the best end does not exist.
     pub assessment: Option<TraceAssessment>,
 }
 

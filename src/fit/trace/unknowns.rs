@@ -39,8 +39,8 @@ impl CameraUnknown {
 /// Kind of an unknown.
 #[derive(Debug, Clone, PartialEq)]
 pub enum UnknownKind {
-    /// A parameter that all scenes share; its coordinate is its logarithm, or the value in units
-    /// of its range.
+    /// A parameter that all scenes share. Its coordinate is the logarithm of its value or, with linear
+    /// bounds, the value divided by the width of the bounds.
     Parameter {
         /// Name in the table of parameters.
         name: String,

@@ -169,7 +169,7 @@ fn no_positions_error(table: &DelimitedTable, row: &TextRow, columns: &[&str]) -
 
 // Tables of several tracks side by side, each with its own clock.
 
-/// A clock and its points.
+/// Columns of one clock, and the points that it times.
 struct ClockGroup {
     pub time: Option<usize>,
     pub frame: Option<usize>,

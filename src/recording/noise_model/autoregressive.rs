@@ -13,7 +13,7 @@ pub struct AutoregressiveNoise {
     coefficients: Vec<f64>,
 }
 
-/// The coefficients describe no stationary process, or the standard deviation is not a positive number.
+/// The coefficients do not describe a stationary process, or the standard deviation is not a positive number.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
     "found a standard deviation of {sd} and the coefficients {coefficients:?} of noise, expected a positive number and at most {MOST_COEFFICIENTS} coefficients of a stationary process"

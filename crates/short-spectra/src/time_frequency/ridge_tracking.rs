@@ -37,8 +37,8 @@ const CURVATURE_BIAS: f64 = 0.4154 / 24.0;
 /// Ratio of this bias to the standard deviation of the frequency above which the fit of a point may change
 /// its rate.
 const SIGNIFICANT_CURVATURE: f64 = 0.5;
-/// Largest difference of the fit at an end from the ridge in the middle of its outermost segment,
-/// resolutions.
+/// Largest difference, resolutions, between the frequency of the ridge at the centre of its outermost segment
+/// and that of a fit at the end of the record. Applies to fits of at least one segment.
 const END_AGREEMENT: f64 = 0.25;
 
 #[derive(Clone, Copy)]
