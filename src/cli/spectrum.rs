@@ -200,7 +200,8 @@ impl SpectrumRequest {
         let frames = self.window.resolve_frames(&recording, &instants).map_err(Failure::input)?;
         let grid = recording.grid();
         let samples = self.channel.samples(&recording);
-        let inside = samples.get(frames.clone()).unwrap_or_default(); // a resolved window lies inside the recording
+        // (a resolved window lies inside the recording)
+        let inside = samples.get(frames.clone()).unwrap_or_default();
         let record = SampledRecord { samples: inside, frame_rate_hz: grid.frame_rate_hz, exposure_s };
         let refuse = |error| {
             Failure::Input(format!("{}, {} in `{}`: {error}", recording.name(), self.channel, self.window))

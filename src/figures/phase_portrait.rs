@@ -82,7 +82,8 @@ fn draw_panel(part: &PortraitPart, frames: Mark) -> Panel {
 /// axis.
 fn deflection_limits_mm(part: &PortraitPart) -> (f64, f64) {
     const AXIS_MARGIN: f64 = 0.05;
-    const LEAST_SPAN: f64 = 1e-4; // ratio to the values; a smaller span is rounding error, and too small for tick labels
+    // as a ratio to the values; a smaller span is rounding error, and too small for tick labels
+    const LEAST_SPAN: f64 = 1e-4;
     let all = part.measured.iter().chain(&part.model).flatten().map(|(x, _)| x * 1e3);
     let (low, high) = value_span(all.filter(|x| x.is_finite()));
     let room = (AXIS_MARGIN * (high - low)).max(LEAST_SPAN * low.abs().max(high.abs()));

@@ -1,4 +1,6 @@
 //! Published numbers are met.
 
+#[path = "../validate/published.rs"]
 mod published;
+#[path = "../validate/section.rs"]
 mod section;

@@ -5,9 +5,9 @@ use wiperlab::model::section::{BladeEstimate, BladeSection};
 use wiperlab::simulate::scene::Scene;
 use wiperlab::text::round_to_digits;
 
-const EXAMPLE: &str = include_str!("../../../data/sections/example.toml");
-const ACTUAL: &str = include_str!("../../../data/scenes/actual-blade.toml");
-const LIGHT: &str = include_str!("../../../data/scenes/light-blade.toml");
+const EXAMPLE: &str = include_str!("../../data/sections/example.toml");
+const ACTUAL: &str = include_str!("../../data/scenes/actual-blade.toml");
+const LIGHT: &str = include_str!("../../data/scenes/light-blade.toml");
 
 /// The example with the lengths of a scene's links, for a piece whose neck has the mass of the scene's.
 fn of_the_size_of(scene: &Scene) -> BladeEstimate {
