@@ -21,6 +21,8 @@ mod scenes;
 mod score;
 #[path = "../../examples/spectra/signal.rs"]
 mod signal;
+#[path = "../common/thorough.rs"]
+mod thorough;
 
 mod allocations;
 mod analysis;

@@ -1,6 +1,7 @@
 //! Features of a recording whose camera is no caliper: what its offset and scale do to a fit that frees them,
 //! and to one that holds them.
 
+use crate::thorough::is_thorough;
 use std::ops::ControlFlow;
 use wiperlab::checkpoint::NullSink;
 use wiperlab::fit::evaluation::{FailureReason, RunFailure};
@@ -170,6 +171,9 @@ fn a_camera_that_is_held_bends_the_parameters() {
     let a = result.parameters["friction.a"].estimate;
     let missed = result.features.iter().filter(|f| !f.pass).count();
     assert!((a / TRUTH[1] - 1.0).abs() > 0.1 && missed > 0, "{a} {missed}");
+    if !is_thorough() {
+        return;
+    }
     let plain = found(&exact(), 0.0, 0.0);
     assert!((plain.parameters["friction.a"].estimate / TRUTH[1] - 1.0).abs() < 1e-4);
 }
@@ -190,6 +194,9 @@ fn an_offset_that_nobody_would_believe_speaks_against_the_model() {
 fn a_prediction_allows_for_the_camera_of_its_recording() {
     let free = found(JOB, 0.7e-3, 0.0);
     assert!(free.held_out[0].pass && free.held_out[0].model_seen.is_none(), "{:?}", free.held_out);
+    if !is_thorough() {
+        return;
+    }
     assert!(!found(&exact(), 0.7e-3, 0.0).held_out[0].pass);
     assert!(!found(JOB, 2.5e-3, 0.0).held_out[0].pass);
 }
