@@ -10,4 +10,4 @@ static FORMAT: LazyLock<String> = LazyLock::new(|| {
     name
 });
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| wiperlab_fuzz::check(&FORMAT, data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| wiperlab_fuzz::imports::check(&FORMAT, data));

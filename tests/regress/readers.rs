@@ -2,6 +2,8 @@
 
 #[path = "../../fuzz/src/readers.rs"]
 mod fuzzed;
+#[path = "../../fuzz/src/imports.rs"]
+mod fuzzed_imports;
 
 use fuzzed::READERS;
 use rand::{Rng, SeedableRng};
@@ -13,6 +15,21 @@ const DAMAGED: usize = 1_000;
 /// What a slip of the hand or of a disk puts into a file.
 const PIECES: [&str; 16] =
     ["", "-", "0", "9", "1e999", "nan", "-0.0", "\"", "]", "[", "=", "\n", ",", "\u{feff}", "\0", "null"];
+
+/// The fuzzer is a workspace of its own: this builds its checks, and tries them on its seeds.
+#[test]
+fn every_fixture_passes_the_check_of_the_fuzzer() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
+    let mut checked = 0;
+    for format in wiperlab::import::format_names() {
+        let Ok(fixtures) = std::fs::read_dir(folder.join(format.replace('-', "_"))) else { continue };
+        for fixture in fixtures {
+            fuzzed_imports::check(format, &std::fs::read(fixture.unwrap().path()).unwrap());
+            checked += 1;
+        }
+    }
+    assert!(checked > 50, "{checked}");
+}
 
 #[test]
 fn a_seed_is_read_and_whatever_is_damaged_is_refused_or_used() {
