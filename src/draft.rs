@@ -100,9 +100,9 @@ pub(crate) enum ParameterRole {
 const FALLING: [f64; 2] = [0.03, 0.6];
 /// Bounds of the friction coefficient at high speed.
 const STAYING: [f64; 2] = [0.1, 0.8];
-/// Bounds of the decay rate of the friction, in units of the reciprocal of the maximum head speed. Between
-/// them, the friction decays over an eighth of that speed to five times that speed; outside them it looks
-/// constant.
+/// Bounds of the decay rate of the friction, multiplied by the maximum head speed. Within them, the speed
+/// over which the friction decays is between an eighth of the maximum head speed and five times that speed;
+/// outside them, the friction looks constant.
 const DECAY: [f64; 2] = [0.2, 8.0];
 /// Bounds of the natural frequency of the neck, Hz, around the 195 Hz of the blade in the paper.
 const NECK_HZ: [f64; 2] = [60.0, 600.0];
@@ -116,7 +116,8 @@ const PRELOAD: ParameterRole = ParameterRole::Yours(Some(0.05));
 const MEASURED: ParameterRole = ParameterRole::Yours(None);
 /// Natural frequency or angle, known from a blade of the same kind.
 const SIMILAR: ParameterRole = ParameterRole::Guessed(0.2);
-/// Damping ratio, with the largest standard deviation that a job allows: those of rubbers differ by factors.
+/// Damping ratio, with the largest standard deviation that a job allows: the damping ratios of different
+/// rubbers differ severalfold.
 const UNKNOWN: ParameterRole = ParameterRole::Guessed(0.5);
 
 /// Parameters of the blade, the shoulder and the friction in the order of a draft, with their roles.

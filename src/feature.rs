@@ -1,7 +1,6 @@
 //! Features: values that the same code computes from a recording and from the synthetic recording of a model,
 //! for jobs and studies. Every kind is a row of the table in `feature/reading.rs`; `docs/fits.md` and
 //! `docs/sweeps.md` list the kinds.
-//! list them.
 //!
 //! The instants of a window are found in each recording separately, so model and measurement need not share a
 //! clock. Values that only a simulated run can give are computed from its [`RunRecord`].
@@ -59,8 +58,8 @@ impl Feature {
         self.reading.read(None, &FeatureReader::new(recording, instants))
     }
 
-    /// Evaluates the feature with a reader that other features share. A frequency is that of the component
-    /// assigned to the `target`, Hz ([`Reading::read`]).
+    /// Evaluates the feature with a reader that other features share. The value of a frequency feature is the
+    /// frequency of the component assigned to `target`, Hz ([`Reading::read`]).
     ///
     /// # Errors
     /// [`MissingValue`] with the reason.

@@ -37,7 +37,8 @@ pub trait CheckpointRecord: Clone + Debug + PartialEq {
     /// they are equal.
     fn difference(&self, other: &Self) -> Option<[String; 2]>;
 
-    /// Sentence on the difference between two headers with equal fingerprints; `None` if they are equal.
+    /// Sentence on the difference between the bodies of two headers with equal fingerprints; `None` if the
+    /// bodies are equal.
     fn problem_difference(found: &Self::Body, expected: &Self::Body) -> Option<String>;
 }
 

@@ -79,7 +79,8 @@ const MOST_FITTED: usize = 12_000;
 const SHARE_BEFORE_REVERSAL: f64 = 0.3;
 /// Lower and upper limit of the band of a component in a job, in units of its frequency.
 const BAND_FACTORS: [f64; 2] = [0.6, 1.5];
-/// Fraction of the Nyquist frequency above which the exposure and the tracker attenuate too much.
+/// Highest frequency used, divided by the Nyquist frequency; above it, the exposure and the tracker attenuate
+/// too much.
 const HIGHEST_SHARE: f64 = 0.8;
 /// Frequency that separates the ring-down of the head (78 Hz in the paper) from the stick-slip cycle (about
 /// 900 Hz), Hz.
@@ -152,8 +153,8 @@ impl DraftFindings {
         })
     }
 
-    /// Findings for a model that is driven between two times, s; `moving` is the position of the head, or of
-    /// the tip that follows it.
+    /// Findings for a model that is simulated between two times, s; `moving` is the position of the head or,
+    /// if the head was not tracked, of the tip.
     fn from_driving_trace(
         recording: &Recording,
         exposure_s: Option<f64>,

@@ -14,10 +14,11 @@ const TILT_SD_DEG: f64 = 0.3;
 const SCALE_SD: f64 = 0.005;
 /// Standard deviation of the distance of a marker from the point that it stands for, m.
 const OFFSET_SD_M: f64 = 0.002;
-/// Standard deviation of the camera's clock against that of the stroke, s, if the motion of the tip defines
-/// it.
+/// Standard deviation of the offset between the clocks of the camera and of the stroke, s, if the head was
+/// not tracked.
 const CLOCK_SD_S: f64 = 0.005;
-/// Standard deviation of the offset, m, if the origin of the picture is arbitrary.
+/// Standard deviation of the offset of a position, m, if the stroke does not start at the origin of the
+/// picture.
 const ORIGIN_SD_M: f64 = 0.1;
 
 /// Writes a job for a recording; `paths` are the paths of recording and scene, relative to the job. The job

@@ -90,7 +90,8 @@ impl ContactReading {
     }
 }
 
-/// Start and end of a window, s: exact for times and for instants, accurate to a frame for a phase.
+/// Start and end of a window, s. An end given as a time or relative to an instant is exact; an end given as a
+/// phase is accurate to a frame.
 fn window_ends_s(window: &Window, reader: &FeatureReader, run: &RunRecord) -> Result<[f64; 2], MissingValue> {
     let frames = reader.window_frames(window)?;
     let end = |end: WindowEnd, open_s: f64, frame: usize| {
@@ -112,8 +113,8 @@ fn stick_lengths_s(run: &RunRecord, [from, to]: [f64; 2]) -> impl Iterator<Item 
     run.stick_s.iter().map(move |[start, end]| end.min(to) - start.max(from)).filter(|length| *length > 0.0)
 }
 
-/// Time, s, of the first transition for which `is` is true, or of the end of a run that ended with the status
-/// `end`.
+/// Time of the first transition for which `is` is true, s. If there is none and the run ended with the status
+/// `end`, the time at which the run ended.
 fn first_time_s(
     run: &RunRecord,
     is: impl Fn(&Transition) -> bool,

@@ -1,5 +1,5 @@
-//! Mean deflections: over a window, and over those of its frames in which the head has a given speed. Over
-//! the speeds of a stroke, the latter form the friction curve.
+//! Mean deflection in a window, or in those frames of a window in which the head has a given speed. The means
+//! at several speeds of a stroke form the friction curve.
 
 use super::missing::{FEWEST_AT_SPEED, MissingValue};
 use super::reader::FeatureReader;
@@ -46,9 +46,9 @@ pub(super) fn read_deflection_at_speed(
     Err(MissingValue::Speed { found: count, low_m_per_s, high_m_per_s, least_m_per_s, most_m_per_s })
 }
 
-/// Length of the blocks in which the speed of the head is measured, s. At 5,000 frames/s, an error of a tenth
-/// of a pixel of 20 um causes an error of 4e-5 m/s. Between two blocks, the speed during a stroke at 1 Hz
-/// deviates from a straight line by less than a thousandth of its maximum.
+/// Length of the blocks in which the speed of the head is measured, s. At 5,000 frames/s, position errors of
+/// 2 um (a tenth of a pixel) cause a speed error of 4e-5 m/s. Between two blocks, the speed during a stroke
+/// at 1 Hz deviates from a straight line by less than a thousandth of its maximum.
 pub(crate) const SPEED_BLOCK_S: f64 = 0.02;
 /// Minimum number of tracked frames in a block.
 const FEWEST_IN_BLOCK: usize = 5;

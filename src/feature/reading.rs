@@ -13,11 +13,11 @@ use crate::toml_file::{KeyRefusal, suggest_key};
 use portable_math as math;
 use serde::Serialize;
 
-/// Scale of the difference between two times that may be zero or negative, s: a tenth of a stick of half a
-/// second.
+/// Unit in which two values of a time that may be zero or negative are compared, s: a tenth of a stick that
+/// lasts half a second.
 pub(crate) const TIME_SCALE_S: f64 = 0.05;
-/// Default number of bands of a log-spectrum. Over an octave, the width of each is about the change of a
-/// stick-slip frequency due to friction.
+/// Default number of bands of a log-spectrum. If the bands span an octave, the width of each is about the
+/// amount by which friction changes a stick-slip frequency.
 const DEFAULT_LINES: usize = 12;
 /// Maximum number of bands of a log-spectrum and of speeds of a friction curve: each becomes a separate
 /// feature.
@@ -32,7 +32,8 @@ pub enum Reading {
     Amplitude(FeatureBand),
     /// Root mean square of a band, m.
     Rms(FeatureBand),
-    /// Level of one band of a log-spectrum, m: root mean square of the band and of a floor, in quadrature.
+    /// Level of one band of a log-spectrum, m: the root mean square of the band, to which a floor is added in
+    /// quadrature.
     BandLevel {
         /// The band.
         band: FeatureBand,
@@ -330,8 +331,8 @@ impl Reading {
         matches!(self, Self::Contact(contact) if contact.needs_audit())
     }
 
-    /// Evaluates the reading. A frequency is that of the component assigned to `target`, Hz, according to
-    /// [`super::ASSIGN_WIDTH`] and [`super::ASSIGN_DB`]; without a target, that of the strongest component.
+    /// Evaluates the reading. A frequency reading evaluates the component assigned to `target`, Hz, according
+    /// to [`super::ASSIGN_WIDTH`] and [`super::ASSIGN_DB`]; without a target, the strongest component.
     ///
     /// # Errors
     /// [`MissingValue`] with the reason. A run that ended early has only those values that describe its end.

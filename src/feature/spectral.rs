@@ -144,11 +144,11 @@ pub struct FeatureBand {
 }
 
 // The frequency of a stick-slip cycle drifts with the speed of the tip, so it is measured in short segments.
-// The frequency in a segment is its mean over the segment. The measured range is therefore narrower than the
-// true one, at either end by the drift within half a segment; this holds for model and measurement alike.
+// The frequency in a segment is the mean over the segment. Each end of the measured range therefore lies
+// inside the true range, by the drift within half a segment; this holds for model and measurement alike.
 
-/// Ratio of the amplitude in a segment to the largest amplitude of all segments, below which the cycle has
-/// not started or has decayed.
+/// Minimum ratio of the amplitude in a segment to the largest amplitude of all segments. At a lower ratio,
+/// the cycle has not started or has decayed.
 pub(crate) const LEAST_SEGMENT_AMPLITUDE: f64 = 0.2;
 
 /// The component in every segment in which its amplitude is sufficient.
@@ -205,10 +205,10 @@ fn segment_starts(window: usize, frames: usize) -> Option<impl Iterator<Item = u
 }
 
 // Damping from the logarithmic decrement between the two halves of a window of length T. A decaying sinusoid
-// in the second half is `exp(-d T/2)` times that in the first half, with another phase. Its amplitudes in the
-// two halves, measured with the same Hann window at any frequency near its own, have exactly this ratio: `d =
-// 2 ln(a1 / a2) / T` and `zeta = d / sqrt(d^2 + (2 pi f)^2)`. Errors come from the trend, neighbouring
-// components and noise.
+// in the second half is `exp(-d T/2)` times that in the first half, with another phase. The amplitudes in the
+// two halves have exactly this ratio if both are measured with the same Hann window at the same frequency
+// near that of the sinusoid: `d = 2 ln(a1 / a2) / T` and `zeta = d / sqrt(d^2 + (2 pi f)^2)`. Errors come
+// from the trend, neighbouring components and noise.
 
 /// Smallest amplitude in the second half, in standard deviations of the noise. At 3, the relative error of
 /// the amplitude is a third, and noise alone seldom reaches that level.

@@ -60,8 +60,8 @@ pub(crate) fn choose_format(
     };
     let format = FORMATS.iter().copied().find(|format| format.name() == name);
     let format = format.ok_or_else(|| unknown_format_error(name))?;
-    // (a table that its own program's format refuses is refused with --format too, but not with --columns,
-    // because the user then says which columns are positions)
+    // (a table that the format of its own program refuses is refused even if --format names another format,
+    // but not with --columns, because the user then says which columns are positions)
     let mut checked = documents.iter().filter(|_| options.columns.is_none());
     match checked.find_map(|document| refusal_by_others(format, document, options)) {
         Some(refusal) => Err(refusal),

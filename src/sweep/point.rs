@@ -14,8 +14,8 @@ use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Number of evaluations of the right-hand side after which a run is ended: some hundred times that of a
-/// reversal, a few seconds of computing.
+/// Maximum number of evaluations of the right-hand side in a run: several hundred times the number for one
+/// reversal, or a few seconds of computing.
 const MOST_EVALUATIONS: u64 = 20_000_000;
 
 /// Outcome of a point.

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 /// Maximum count of numbers in memory, values and coordinates together.
 const MOST_NUMBERS: usize = 2_000_000;
-/// Maximum number of points; so many give a correlation to better than 0.01.
+/// Maximum number of points; with this number, the error of a correlation is below 0.01.
 const MOST_POINTS: usize = 200_000;
 /// Minimum number of pairs for a correlation.
 const FEWEST_PAIRS: usize = 20;

@@ -101,7 +101,8 @@ impl Study {
         self.sample.is_none() && self.axes.len() <= 2 && self.point_count() <= MOST_MAPPED
     }
 
-    /// Whether a sheet with all maps is drawn; a single map that is drawn itself needs no sheet.
+    /// Whether a figure with all maps (or with the rank correlations) is drawn; it is not if the only map has
+    /// a figure of its own.
     pub(crate) fn has_sheet(&self) -> bool {
         self.maps.len() > 1 || !self.is_mapped()
     }

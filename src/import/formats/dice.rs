@@ -9,8 +9,8 @@ use crate::import::reader::{
 use crate::recording::files::YAxis;
 
 const FRAME: &str = "FRAME";
-/// Columns with the centre of the subset in the reference picture; those in `DISPLACEMENT` give its
-/// displacement since then.
+/// Columns with the centre of the subset in the reference picture; the columns in `DISPLACEMENT` contain the
+/// displacement from there.
 const REFERENCE: [&str; 2] = ["COORDINATE_X", "COORDINATE_Y"];
 const DISPLACEMENT: [&str; 2] = ["DISPLACEMENT_X", "DISPLACEMENT_Y"];
 const SIGMA: &str = "SIGMA";
@@ -18,7 +18,7 @@ const STATUS: &str = "STATUS_FLAG";
 /// Values of [`STATUS`] for a correlated frame: `CORRELATION_SUCCESSFUL`, `INITIALIZE_..._SUCCESSFUL` and
 /// `SEARCH_..._SUCCESSFUL` of DICe's `Status_Flag`. Other values mark failures or averages of other subsets.
 const SUCCESSFUL: [f64; 7] = [0.0, 1.0, 2.0, 3.0, 4.0, 6.0, 18.0];
-/// Text in the comments before the statement whether displacements are from frame to frame.
+/// Text in the comments before `true` or `false`, which states whether displacements are from frame to frame.
 const INCREMENTAL: &str = "Incremental correlation:";
 /// Maximum number of lines in the comment block.
 const PREAMBLE_LINES: usize = 64;

@@ -193,7 +193,7 @@ impl FrameDiasSettings {
         refuse_row(table, 0, &problem, advice)
     }
 
-    /// Frame rate of the camera. A rate that contradicts the times is refused, unless they are those of
+    /// Frame rate of the camera. A rate that contradicts the times is refused, unless the times are those of
     /// playback.
     fn frame_rate(
         &self,

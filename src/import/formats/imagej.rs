@@ -254,8 +254,8 @@ const MEASUREMENTS: [&str; 13] = [
     "Label",
 ];
 
-/// Whether a header contains positions and a slice, or a first column without a name and ImageJ's
-/// measurements.
+/// Whether a header belongs to a Results table. It contains positions and a slice; or its first column has no
+/// name, and others have the names of ImageJ's measurements.
 pub(crate) fn is_results_header(names: &[&str]) -> bool {
     let has = |name: &str| names.contains(&name);
     let measured = MEASUREMENTS.iter().any(|name| has(name));
@@ -310,8 +310,8 @@ pub(crate) fn read_results<'a>(
     Ok(export)
 }
 
-/// Column that counts the frames: `Slice`, or `Frame` in a hyperstack. If the table has both, the one whose
-/// values change; it is refused if both change.
+/// Column that counts the frames: `Slice`, or `Frame` in a hyperstack. If the table has both, the column
+/// whose values change is used; the table is refused if both change.
 fn clock_column(table: &DelimitedTable, row: &TextRow) -> ImportResult<usize> {
     let at = |name: &str| row.position(name);
     match (at(SLICE), at(FRAME)) {

@@ -11,8 +11,8 @@ use crate::import::source::ImportReport;
 use crate::recording::clock;
 use crate::recording::files::YAxis;
 
-/// Frame rate, 1/s, up to which times that imply it look like frame numbers: no camera that films a wiper is
-/// so slow.
+/// Times that imply a frame rate up to this value, 1/s, look like frame numbers: no camera that films a wiper
+/// is so slow.
 const SLOWEST_HZ: f64 = 1.0;
 
 /// Explains what the direction of y depends on, if the format has no explanation of its own.
@@ -154,7 +154,8 @@ fn frame_rate_hz(
     Ok(implied)
 }
 
-/// The declared exposure time, or else that of the cameras' records. Refuses a record that differs from it.
+/// The declared exposure time, or else that of the first camera's record. Refuses a record with another
+/// exposure time.
 fn exposure_s(
     exports: &[TrackFile],
     options: &ImportOptions,

@@ -13,8 +13,8 @@ const SAMPLE_LINES: usize = 1000;
 const SAMPLE_BYTES: usize = 1 << 20;
 /// Maximum number of columns of a table, enough for ten thousand points.
 const MOST_COLUMNS: usize = 20_000;
-/// More than one row in this number must contain a fraction with a leading zero for its commas to count as
-/// decimal marks; by chance, a tenth of all fractions have one.
+/// If more than one row in this number contains a fraction with a leading zero, the commas of the table count
+/// as decimal marks; by chance, a tenth of all fractions have a leading zero.
 const ROWS_PER_FRACTION: usize = 10;
 /// Fraction of numbers among the cells above which a row counts as data.
 const MOSTLY_NUMBERS: f64 = 0.5;
@@ -120,8 +120,8 @@ fn refuse_too_many_columns(file: &str, lines: &[NumberedLine]) -> ImportResult<(
     }
 }
 
-/// Measures how well `delimiter` explains the rows: sum of the fractions of numbers over the rows of median
-/// length. Only rows with at least `cells` cells and a fraction of numbers above `least` count.
+/// Measures how well `delimiter` explains the rows: the fraction of numbers in a row, summed over all rows of
+/// median length. Only rows with at least `cells` cells and a fraction of numbers above `least` count.
 fn delimiter_score(rows: &[TextRow], delimiter: Delimiter, (least, cells): (f64, usize)) -> f64 {
     let measured = rows.iter().map(|row| (row.cells.len(), numeric_share(&row.cells, delimiter)));
     let numeric: Vec<(usize, f64)> =
@@ -321,7 +321,7 @@ impl Delimiter {
 }
 
 /// Whether a line is a comment: it starts with `#`, `//`, `***` or `%`. The word `#N/A` does not start a
-/// comment, nor does a cell that a spreadsheet has damaged, such as `#####` or `#REF!`, before numbers.
+/// comment; nor does a cell that a spreadsheet has damaged, such as `#####` or `#REF!`, if numbers follow.
 pub(crate) fn is_comment(line: &str) -> bool {
     if line.starts_with(|c: char| c.is_ascii_digit() || c == '-') {
         return false; // (as for nearly every line)

@@ -45,7 +45,8 @@ impl PointCells {
 pub(crate) struct LostRule {
     /// Cell to which the rule applies; `None` means the position.
     pub cell: Option<usize>,
-    /// Whether two numbers mean a lost point: x and y of the position, or twice the number in the cell.
+    /// Whether two numbers mean a lost point. They are x and y of the position; if `cell` is given, both are
+    /// the number in that cell.
     pub is: fn(f64, f64) -> bool,
     /// The rule in words, e.g. `at exactly (0, 0)`.
     pub words: &'static str,

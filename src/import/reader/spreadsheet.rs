@@ -24,7 +24,7 @@ const LONGEST_MONTH: usize = 4;
 /// Separators in a date.
 const DATE_MARKS: [char; 6] = ['.', '-', '/', ' ', '\'', ','];
 
-/// What a spreadsheet has done to the number in a cell, with advice; `None` for an undamaged number.
+/// Damage that a spreadsheet has done to the number in a cell, with advice; `None` for an undamaged number.
 pub(crate) fn describe_damage(text: &str) -> Option<&'static str> {
     let signs: [(bool, &str); 4] = [
         (is_hidden(text), HIDDEN),

@@ -201,8 +201,8 @@ impl<'a> DelimitedTable<'a> {
         ImportError::cell(place, CellProblem::NotANumber, (name, text), (expected, advice))
     }
 
-    /// Refuses a row that starts like a comment in a table whose first column contains names; it would be
-    /// skipped.
+    /// Refuses a row that starts like a comment in a table whose first column contains names; the row would
+    /// otherwise be skipped.
     ///
     /// # Errors
     /// [`ImportError`] for the first such line below line `header`.
