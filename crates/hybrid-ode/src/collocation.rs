@@ -99,8 +99,8 @@ impl CollocationRule {
     }
 
     /// Integral (`once`) and double integral (`twice`) from 0 to `x` of the Legendre polynomials of `2 x -
-    /// 1`, for each degree below the number of nodes. `int P_m = (P_(m+1) - P_(m-1)) / (2 (2 m + 1))`; the
-    /// same rule, applied twice, gives the double integral.
+    /// 1`, for each degree below the number of nodes. The integral is `int P_m = (P_(m+1) - P_(m-1)) / (2 (2
+    /// m + 1))`; this formula, applied twice, gives the double integral.
     #[inline(always)]
     pub fn integrals_by_degree<R: LaneNumber>(
         &self,

@@ -241,8 +241,8 @@ mod tests {
         assert_eq!(fall(-1.0, &[0.0, 0.0, 0.0], 2, 1.0), GuardFall::At(0.0));
     }
 
-    /// A root of multiplicity 20 makes a sixth of the step zero to rounding; halving that part further would
-    /// not end.
+    /// Around a root of multiplicity 20, the polynomial is zero to rounding over a sixth of the step; halving
+    /// that part further would not end.
     #[test]
     fn a_flat_touch_ends_the_search() {
         let found = fall(1.0, &[1.0; 20], 0, 1.0);

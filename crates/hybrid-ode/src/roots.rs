@@ -24,8 +24,8 @@ const COARSE_TO_BERNSTEIN: [[f64; COARSE_SAMPLES]; COARSE_SAMPLES] = bernstein_f
 const FINE_TO_BERNSTEIN: [[f64; FINE_SAMPLES]; FINE_SAMPLES] = bernstein_from_samples(0);
 const INNER_TO_BERNSTEIN: [[f64; FINE_SAMPLES - 1]; FINE_SAMPLES - 1] = bernstein_from_samples(1);
 
-/// Whether a guard with these coarse samples and one check sample, at the fraction 7/8, stays above zero. The
-/// smallest Bernstein coefficient must exceed the interpolation error at the check sample, with a margin.
+/// Whether a guard stays above zero, judged from its coarse samples and one check sample at the fraction 7/8.
+/// The smallest Bernstein coefficient must exceed the interpolation error at the check sample, with a margin.
 #[inline]
 pub(crate) fn is_root_free(samples: &[f64; COARSE_SAMPLES], check: f64) -> bool {
     /// Safety factor: the check sample shows the interpolation error at one place; elsewhere it may be

@@ -107,9 +107,9 @@ const SLIVER_STEP: f64 = 64.0;
 /// Largest value of a guard at its located zero, as a fraction of its largest sample. If the value is larger,
 /// the polynomial through the samples has a root that the guard does not have, and a shorter step is taken.
 const MOST_GUARD_REMAINDER: f64 = 1e-3;
-/// Step length, in units of the rounding error of the time, below which a shorter step reveals no more about
-/// a guard: within it, a guard that starts at a double zero changes by less than the rounding error of the
-/// state.
+/// Step length, in units of the rounding error of the time, below which shortening a step reveals nothing
+/// more about a guard: over this length, a guard that starts at a double zero changes by less than the
+/// rounding error of the state.
 const SHORTEST_TELLING_STEP: f64 = 1e8;
 
 /// First event of a step.
@@ -324,8 +324,8 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> AdaptiveRun<'a, N
         const ROUNDS: usize = 4;
         /// Fraction of the step above which a correction is dropped, because the guard only grazes zero.
         const GRAZING: f64 = 1e-3;
-        /// Fraction of the step over which the slope of the guard is measured, about the relative error of a
-        /// correction.
+        /// Span over which the slope of the guard is measured, as a fraction of the step. The relative error
+        /// of a correction is about as large.
         const PROBE: f64 = 1e-6;
         if fraction * stages.h <= 4.0 * f64::EPSILON * stages.t.abs() {
             return (stages.t, stages.y);

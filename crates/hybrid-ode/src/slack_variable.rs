@@ -18,11 +18,11 @@ pub(super) struct StatePoint<const N: usize> {
     pub y: [f64; N],
 }
 
-/// Number of steps in `s` of the first descent. A descent determines only the time: the method's own step
-/// then gives the state, and further descents remove the remaining value of the guard.
+/// Number of steps in `s` of the first descent. A descent determines only the time. The state then follows
+/// from a step of the integration method, and further descents remove the remaining value of the guard.
 const FIRST_STEPS: u32 = 4;
-/// Maximum number of further descents; two or three are usual. Close to a double zero a descent may leave up
-/// to a sixth of the way to the zero.
+/// Maximum number of further descents; two or three are usual. Close to a double zero, up to a sixth of the
+/// way to the zero may remain after a descent.
 const MOST_DESCENTS: usize = 40;
 /// If a descent is shorter than this fraction of the way from the start to the zero, its own result for the
 /// state is accurate enough for any method.
@@ -30,8 +30,8 @@ const SHORT: f64 = 1e-3;
 /// Largest fraction of its length by which a short descent misses the zero. If that distance is below the
 /// rounding error of the time, the zero is reached.
 const MOST_REMAINDER: f64 = 1e-4;
-/// Span of the central difference for the rate of the guard, as a fraction of the step. The error of the
-/// rate, about 1e-10 of it, shifts the end of one descent and is removed by the next descent.
+/// Span of the central difference for the rate of the guard, as a fraction of the step. The relative error of
+/// the rate, about 1e-10, shifts the end of a descent; the next descent removes this shift.
 const PROBE: f64 = 1e-5;
 /// Smallest rate of fall at the start of a descent, relative to the mean rate down to the zero; near a
 /// maximum of the guard the slopes in `s` have a pole. The relative rate is 1 for a linear fall and 2 for the
@@ -75,8 +75,8 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> SlackVariable<'a,
         (along(probe) - along(-probe)) / (2.0 * probe)
     }
 
-    /// Whether a descent may start at `at`, a time `ahead_s` before the zero: the guard must fall there, not
-    /// much more slowly than on average.
+    /// Whether a descent may start at `at`, a time `ahead_s` before the zero: the guard must fall there at
+    /// `LEAST_FALL` times its mean rate or faster.
     pub(super) fn can_descend(&mut self, at: &StatePoint<N>, ahead_s: f64) -> bool {
         let value = self.guard_value(at);
         let flow = self.derivative(at);

@@ -33,8 +33,8 @@ pub struct TaylorExpansion<const N: usize, const G: usize> {
     pub states: [[f64; N]; TERMS],
     /// Coefficients of the guards, one row per power; the first is infinity for a guard that does not apply.
     pub guards: [[f64; G]; TERMS],
-    /// Sizes of the last coefficient but one and of the last coefficient of further quantities that follow
-    /// from the states and must converge too, as multiples of their scale.
+    /// Convergence check of further quantities that follow from the states: sizes of their last coefficient
+    /// but one and of their last coefficient, divided by their scale.
     pub followers: [f64; 2],
     /// Series of the exponent `x >= 0`, if the equations contain a term in `exp(-x)` that may vary much over
     /// a step.
@@ -149,8 +149,8 @@ pub(crate) fn order_for_tolerance(relative: f64) -> usize {
 }
 
 /// Fraction of the tolerance that a step may use. The errors of thousands of steps add up, and an unstable
-/// motion amplifies them: after hundreds of events the worst event is off by 10 to 50 times the error of a
-/// step. With this fraction it is off by about the tolerance.
+/// motion amplifies them: after hundreds of events, the error of the worst event is 10 to 50 times the error
+/// of a step. With this fraction, the error of the worst event is about the tolerance.
 const STEP_SHARE: f64 = 0.02;
 
 /// A step is lengthened by up to this factor to end at the stop time, so that no tiny step remains.

@@ -239,8 +239,8 @@ fn linear_ticks(low: f64, high: f64, most: usize) -> Vec<Tick> {
     (first as i64..=last as i64).map(|k| Tick { value: value(k), label: Some(label(value(k))) }).collect()
 }
 
-/// Multiples that are labelled in a decade, with the smallest distance between two of them, in decades; the
-/// first list that fits is used.
+/// Lists of the multiples to label in each decade, each with the smallest distance between two of its
+/// multiples, in decades. The first list that fits is used.
 const LOG_LABEL_MULTIPLES: [(&[i32], f64); 2] = [(&[1, 2, 3, 5, 7], 0.154), (&[1, 2, 5], 0.301)];
 
 /// Ticks at the powers of ten and their multiples, some of them labelled. `room` is the ratio of the length

@@ -106,7 +106,7 @@ pub(super) fn colour_at(heat: &HeatMap, (x, y): (AxisScale, AxisScale), at: (f64
 const CELL_RESOLUTIONS: [(usize, usize, u32); 6] =
     [(480, 240, 96), (320, 180, 64), (240, 135, 48), (200, 110, 32), (160, 90, 24), (120, 68, 16)];
 const MAX_CELL_BYTES: usize = 150_000;
-/// Excess length and thickness of a line over its cells, canvas units, so that no background shows between
+/// Length and thickness by which a line exceeds its cells, canvas units, so that no background shows between
 /// lines.
 const CELL_OVERLAP: i64 = 2;
 

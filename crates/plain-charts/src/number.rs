@@ -137,7 +137,8 @@ pub fn to_ascii(printed: &str) -> String {
 /// Maximum number of decimals, more than the accuracy of any measurement here; a smaller deviation is rounded
 /// up to 1 in the last decimal.
 const MOST_DECIMALS: i32 = 6;
-/// Powers of ten of the larger of value and deviation for which both are written in plain digits.
+/// Range of powers of ten in which a value and its deviation are both written in plain digits; the power of
+/// the larger of the two decides.
 const PLAIN_POWERS_WITH_SD: std::ops::RangeInclusive<i32> = -4..=6;
 
 /// A value with one digit of its standard deviation, in units of the last digit shown: `78.40(3)` for 78.40

@@ -418,7 +418,7 @@ pub(super) fn series_attributes(index: usize, series: &Series, placed: &PanelLay
     format!("class=\"series\" data-label=\"{label}\"{detail}")
 }
 
-/// Number of steps of a value over the y axis, enough for an enlarged curve on a screen.
+/// Number of steps of the y axis to which values are rounded, enough for an enlarged curve on a screen.
 const VALUE_STEPS: f64 = 1e4;
 
 /// Attributes with the full data: start and step of the grid, offset and unit of the values, and each value

@@ -6,8 +6,8 @@ use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 
 /// Ratio of the mean width of a sans-serif letter to the font size.
 pub(super) const LETTER: f64 = 0.58;
-/// The same ratio for the widest fallback font of browsers (DejaVu Sans), plain and bold; lines must fit in
-/// this font.
+/// Ratio of the mean width of a letter to the font size for the widest fallback font of browsers (DejaVu
+/// Sans), plain and bold; lines must fit in this font.
 pub(super) const WIDE_LETTER: f64 = 0.63;
 pub(super) const WIDE_BOLD_LETTER: f64 = 0.7;
 const ELLIPSIS: char = '\u{2026}';

@@ -1,7 +1,7 @@
 //! Draws from the standard normal distribution by the ziggurat method of Doornik ("An improved ziggurat
 //! method to generate normal random samples", 2005). Layers and use of random bits are those of the crate
-//! `rand_distr`: the draws are the same, except for the last bits of draws beyond 3.65, which need a
-//! logarithm.
+//! `rand_distr`, so the draws are the same. Only the last bits of draws above 3.65 in size may differ,
+//! because they need a logarithm.
 
 use super::{exp, ln};
 use rand::Rng;

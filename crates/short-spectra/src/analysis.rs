@@ -177,9 +177,10 @@ impl SpectralAnalysis {
         Ok(best.with_densities(record.frame_rate_hz))
     }
 
-    /// Analyses each stretch between the steps of a piece. For each stretch it takes the first range of
-    /// frames that leaves only noise, or else the first whose trend has no fast waves. Fitting a trend
-    /// through a step takes many times as long as fitting the oscillation that the step starts.
+    /// Analyses each stretch between the steps of a piece. The result for a stretch is that of the first
+    /// range of frames that leaves only noise, or else of the first range whose trend has no fast waves.
+    /// Fitting a trend through a step takes many times as long as fitting the oscillation that the step
+    /// starts.
     fn analyse_between_steps(record: &SampledRecord, settings: &SpectrumSettings) -> Vec<Self> {
         let of_stretch = |tries: &Vec<Range<usize>>| {
             let mut parts =

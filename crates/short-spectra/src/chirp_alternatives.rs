@@ -17,8 +17,8 @@ const TERM_PARAMETERS: f64 = 4.0;
 const EXTRA_PARAMETERS: f64 = 1.0;
 /// Distance, resolutions, within which terms may be parts of one oscillation.
 const NEARBY_RESOLUTIONS: f64 = 5.0;
-/// Number of blocks that represent the record: over one block, a difference of a few cycles changes the phase
-/// little.
+/// Number of blocks that represent the record: a shift of the frequency by a few cycles in the record hardly
+/// changes the phase within a block.
 const BLOCKS: usize = 128;
 /// Limits of the time, in lengths of the record, in which an amplitude may fall to zero.
 const LINEAR_DECAY_ENDS: (f64, f64) = (0.1, 4.0);
@@ -78,8 +78,8 @@ impl ModelSelector<'_> {
         terms.map(|k| DoubtfulTerm { index: k, criterion: criterion(k) }).collect()
     }
 
-    /// Indices of terms that may be parts of one oscillation: in their place, a constant drift or a linear
-    /// fall explains more.
+    /// Indices of terms that may be parts of one oscillation: an oscillation of constant drift or linear fall
+    /// in their place explains more.
     pub(super) fn unsteady_terms(&self, fit: &ModelFit) -> Vec<usize> {
         let terms = fit.model.terms();
         let steady = self.bic_of(&fit.model);

@@ -14,8 +14,8 @@ const MOST_TREND_SHIFT: f64 = 3.0;
 /// Largest ratio of the residual around a component to its amplitude; above it, a second line or a drift
 /// explains as much.
 const MOST_RESIDUAL: f64 = 0.25;
-/// Distance of two oscillations, resolutions, below which one could be taken for the other: for equal pairs
-/// half a resolution apart at 50 dB, one oscillation fits as well as two.
+/// Distance of two oscillations, resolutions, below which they may be only one: at half a resolution and 50
+/// dB, a single oscillation fits a pair of equal amplitudes as well as two do.
 const LEAST_SEPARATION: f64 = 0.5;
 /// Range of a drift, resolutions, that two lines cannot imitate: pairs up to 1.7 resolutions apart looked
 /// like one component that drifts by up to five.

@@ -18,9 +18,9 @@ pub struct Component {
     /// cycles counted while it was followed.
     pub range_hz: Option<FrequencyRange>,
     /// Start, s from the first frame analysed; `None` for a component present from the first frame on. For a
-    /// component found in a piece of a long record: the start of the piece, if it is present by then.
+    /// component found in a piece of a long record and present when the piece starts: the start of the piece.
     pub begins_s: Option<f64>,
-    /// Amplitude, m; for a decaying component, at its start or the start of the record.
+    /// Amplitude, m; for a decaying component, at its own start or that of the record, whichever is later.
     pub amplitude_m: f64,
     /// Standard deviation of the amplitude, m.
     pub amplitude_sd_m: f64,
@@ -33,8 +33,8 @@ pub struct Component {
     /// Cramér-Rao bound of the frequency, Hz, for this component alone in a record without gaps, in white
     /// noise of the size found around it.
     pub cramer_rao_hz: f64,
-    /// Probability that noise gives so steady a line (Thomson's F over the tapers): small for a steady
-    /// oscillation, near one for a ring-down.
+    /// Probability that noise alone produces as steady a line (Thomson's F over the tapers): small for a
+    /// steady oscillation, near one for a ring-down.
     pub line_probability: Option<f64>,
     /// Method that estimated it.
     pub estimator: Estimator,
@@ -184,7 +184,7 @@ pub struct AliasSource {
     pub exposure_passes: Option<f64>,
 }
 
-/// A component; the frequency of another component is a fraction of its own.
+/// A component whose frequency, times a fraction, is the frequency of another component.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Subharmonic {
     /// Frequency of the component, Hz.
@@ -213,7 +213,7 @@ pub struct MainsMultiple {
     pub multiple: usize,
 }
 
-/// A component; the frequency of another component is a multiple of its own.
+/// A component whose frequency, times a whole number, is the frequency of another component.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Harmonic {
     /// Frequency of the component, Hz.

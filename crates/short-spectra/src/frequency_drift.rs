@@ -18,8 +18,9 @@ const SLOW_COMPONENT: (f64, f64) = (4.0, 0.25);
 const BAND_MARGIN: f64 = 2.0;
 /// Fraction of followed segments from which a component counts as followed everywhere.
 pub(super) const FULLY_FOLLOWED: f64 = 0.9;
-/// Shorter segments, as fractions of the best length, that are tried if less was followed, and the increase
-/// of the fraction that they must bring: noise hides a component in short segments.
+/// Shorter segments, as fractions of the best length, that are tried if less than `FULLY_FOLLOWED` was
+/// followed, and the smallest increase of the followed fraction for which they are used: noise hides a
+/// component in short segments.
 const SHORTER_SEGMENTS: [f64; 3] = [0.8, 0.65, 0.5];
 const LEAST_GAIN: f64 = 0.1;
 /// Standard deviation of the instant of a cycle, cycles: the shape of a cycle changes with its frequency, so

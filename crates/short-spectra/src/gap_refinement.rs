@@ -30,9 +30,9 @@ pub(crate) const REFINED_MISSING: f64 = 0.10;
 pub(super) const MOST_REFINED: usize = MAX_COMPONENTS;
 /// Number of frames for each unknown below which the fit would follow the noise.
 const FRAMES_PER_UNKNOWN: usize = 4;
-/// The residual is white if its mean square is below this multiple of that of noise. With sixty fourth
-/// differences, noise exceeds it once in a thousand records, and a misfit as large as the noise leaks no more
-/// than the noise does.
+/// The residual is white if its mean square is below this multiple of that of noise. With 60 differences of
+/// fourth order, noise exceeds this limit once in a thousand records; a misfit as large as the noise leaks no
+/// more than the noise does.
 const WHITE_RATIO: f64 = 2.0;
 /// Minimum number of fourth differences that can tell noise from a cycle.
 const FEWEST_DIFFERENCES: usize = 20;
@@ -55,7 +55,7 @@ pub(super) struct RefinedComponent {
     /// Frequency, cycles in the record.
     pub cycles: f64,
     pub amplitude_m: f64,
-    /// `None` if the residual is not white, which leaves them undetermined.
+    /// Standard deviations; `None` if the residual is not white, because they are then undetermined.
     pub deviations: Option<RefinedDeviations>,
 }
 

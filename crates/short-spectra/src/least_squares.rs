@@ -26,8 +26,9 @@ const SMALLEST_STEP: f64 = 1e-6;
 /// Ratio of an eigenvalue of the normal matrix, scaled to a unit diagonal, to the largest eigenvalue, below
 /// which the data do not determine its direction.
 const SINGULAR_DIRECTION: f64 = 1e-10;
-/// Smallest squared pivot of that matrix above which the data determine all directions: each column then
-/// keeps at least a thousandth of its length perpendicular to the columns before it.
+/// Smallest squared pivot of the normal matrix, scaled to a unit diagonal, above which the data determine all
+/// directions: each column then keeps at least a thousandth of its length perpendicular to the columns before
+/// it.
 const WELL_POSED_PIVOT: f64 = 1e-6;
 /// Largest growth over the record, nepers: a growth by a factor of 400 is a transient at the end of the
 /// record.

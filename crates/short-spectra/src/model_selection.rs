@@ -31,8 +31,8 @@ const RELAXATION_NEPERS: [f64; 8] = [5.0, 15.0, 45.0, 135.0, -5.0, -15.0, -45.0,
 const MOST_RELAXATIONS: usize = 3;
 /// Number of frames per unknown below which the fit would follow the noise.
 const FRAMES_PER_UNKNOWN: usize = 4;
-/// Number of frames per column that a trend alone needs, because noise cannot imitate it: a cubic takes four
-/// frames and leaves as many.
+/// Number of frames per column that a trend alone needs, for example eight for the four columns of a cubic.
+/// This is less than `FRAMES_PER_UNKNOWN`, because noise cannot imitate a trend.
 pub(super) const FRAMES_PER_COLUMN: usize = 2;
 /// A relaxation must lower the misfit by the square of this many standard deviations of the noise: eight
 /// decays are tried, and one in 10,000 noise records reaches this limit.
@@ -298,7 +298,7 @@ impl<'a> ModelSelector<'a> {
     }
 
     /// The model with the relaxation that lowers the misfit most, if by more than noise. A relaxation found
-    /// before may have absorbed part of another, which then shows only when both are fitted again.
+    /// before may have absorbed a part of the new one, which then appears only when both are fitted again.
     fn with_relaxation(&self, fit: &ModelFit) -> Option<SineModel> {
         let parts = &fit.model;
         let relaxations = parts.relaxations().len();

@@ -31,7 +31,8 @@ pub(crate) const FLOOR_LINES: f64 = 5.0;
 const MOST_PADDED: usize = 1 << 24;
 /// Number of values from which threads share the work; fewer take a millisecond or two.
 const PARALLEL_FROM: usize = 1 << 17;
-/// Fraction of the sum of powers below which the remaining power without one taper is rounding error.
+/// A sum of powers without one taper that is below this fraction of the sum over all tapers is rounding
+/// error.
 const ROUNDING: f64 = 1e-15;
 
 /// A multitaper estimate; one value per bin, from 0 to half the frame rate.

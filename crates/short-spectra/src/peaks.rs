@@ -17,14 +17,14 @@ const TRIALS_PER_RESOLUTION: f64 = 3.0;
 const LOBE: f64 = 2.0;
 /// Assumed ratio of sidelobes to those of the window, because a real component is neither steady nor alone.
 const SIDELOBE_MARGIN: f64 = 1.5;
-/// The same ratio below [`MIN_CYCLES`]: a residue of the trend is not a sine, and its sidelobes fall more
-/// slowly.
+/// Assumed ratio of sidelobes to those of the window below [`MIN_CYCLES`]: a residue of the trend is not a
+/// sine, and its sidelobes fall more slowly.
 const TREND_MARGIN: f64 = 4.0;
-/// Smallest ratio of a listed amplitude to that of the largest resolvable component: -50 dB. A cubic absorbs
-/// a little of a tone, which appears 56 dB below a tone of twelve cycles.
+/// Smallest ratio of a listed amplitude to that of the largest resolvable component: -50 dB. The part of a
+/// tone of twelve cycles that a cubic absorbs appears 56 dB below the tone.
 const DYNAMIC_RANGE: f64 = 3.2e-3;
-/// A second maximum counts if the spectrum falls below this fraction of it towards every larger one: 3 dB,
-/// half its power.
+/// A maximum counts if, on the way to every larger maximum, the spectrum falls below this fraction of its
+/// height: 3 dB, half the power.
 const VALLEY_RATIO: f64 = FRAC_1_SQRT_2;
 /// Smallest width of the median of the noise floor, resolutions, so that a component does not set its own
 /// floor.

@@ -118,7 +118,7 @@ impl Periodogram {
         Self::amplitude_with_weights(&self.weights, values, cycles)
     }
 
-    /// The amplitude of such an oscillation, m, with other weights.
+    /// Amplitude of an oscillation of `cycles` cycles, m, in the spectrum with the given weights.
     pub(super) fn amplitude_with_weights(weights: &[f64], values: &[f64], cycles: f64) -> f64 {
         let turn = std::f64::consts::TAU * cycles / values.len() as f64;
         let add = |(re, im): (f64, f64), (i, (x, w)): (usize, (&f64, &f64))| {
@@ -175,8 +175,8 @@ pub(super) fn upper_median(mut values: Vec<f64>) -> Option<f64> {
 
 /// Bin width, resolutions, above which bins miss the top of a sidelobe, which is one resolution wide.
 const COARSE_BINS: f64 = 0.25;
-/// Number of bins by which the distance of two peaks is then reduced: half a bin for each peak, and one bin
-/// because the top of a sidelobe may lie between two bins.
+/// Number of bins by which the distance of two peaks is reduced if the bins are that coarse: half a bin for
+/// each peak, and one bin because the top of a sidelobe may lie between two bins.
 const ROUNDED_BINS: usize = 2;
 
 /// An amplitude spectrum with the sidelobes of its window.
@@ -192,8 +192,8 @@ pub(super) struct WindowedSpectrum<'a> {
     pub least_m: f64,
 }
 
-/// Largest value of a window's transform, relative to that at zero, at or beyond each distance, in bins. Gaps
-/// in the record raise it.
+/// For each distance in bins, the largest value of a window's transform at that distance or farther, divided
+/// by its value at zero. Gaps in the record raise these values.
 pub(super) fn sidelobe_maxima(lobe: Vec<f64>, frames: usize, padded: usize) -> Vec<f64> {
     let mut envelope = lobe;
     for k in (0..envelope.len().saturating_sub(1)).rev() {

@@ -35,7 +35,8 @@ const MAINS_DEVIATIONS: f64 = 3.0;
 const MAINS_HZ: [usize; 2] = [50, 60];
 /// Highest multiple of the mains frequency that a lamp shows; it flickers at the second multiple.
 const MOST_MAINS: usize = 12;
-/// Accuracy with which a frequency must be known to be compared with the mains, Hz: multiples are ten apart.
+/// Accuracy with which a frequency must be known to be compared with the mains, Hz: different multiples of 50
+/// and 60 Hz are at least 10 Hz apart.
 const MAINS_WITHIN_HZ: f64 = 0.5;
 
 /// Finds the relations of components, largest first.
@@ -138,8 +139,9 @@ fn find_subharmonic(base: &Component, other: &Component, at: &RecordContext) -> 
     None
 }
 
-/// Component `k` as a sideband of a larger one: it lies at the frequency of another component, or twice that,
-/// from the carrier, or has a mirror image of similar amplitude on the other side.
+/// Component `k` as a sideband of a larger one. Its distance from the carrier is the frequency of another
+/// component or twice that frequency, or it has a mirror image of similar amplitude on the other side of the
+/// carrier.
 fn find_sideband(components: &[Component], k: usize, at: &RecordContext) -> Option<Sideband> {
     let c = &components[k];
     let carriers = components.iter().filter(|carrier| carrier.amplitude_m > c.amplitude_m);

@@ -6,8 +6,8 @@ use super::peaks::Peak;
 use super::periodogram::upper_median;
 use super::settings::MIN_CYCLES;
 
-/// Half width of the neighbourhood of a component whose residual gives its noise, resolutions; 48 independent
-/// values of the spectrum determine the noise to 10 %.
+/// Half width of the neighbourhood of a component in which its noise is estimated from the residual,
+/// resolutions; 48 independent values of the spectrum determine the noise to 10 %.
 pub(super) const NEIGHBOURHOOD: f64 = 12.0;
 /// Smallest half width of the neighbourhood of a slow component, resolutions, and the factor by which the
 /// detection level rises there. Six values determine the noise poorly: with a probability of one in 100,000,
@@ -56,8 +56,9 @@ impl ModelSelector<'_> {
         next_to.iter().fold(0.0, |most: f64, a| most.max(*a))
     }
 
-    /// Whether a slow term exceeds the residual near it by the factor of the detection level. The noise level
-    /// is uncertain there: few values determine it, and they include the residuals of other slow terms.
+    /// Whether the amplitude of a slow term exceeds the residual near it times the detection ratio. The noise
+    /// near a slow term is uncertain: few values determine it, and they include the residuals of other slow
+    /// terms.
     pub(super) fn exceeds_residual(&self, fit: &ModelFit, k: usize) -> bool {
         let (parts, term) = (&fit.model, &fit.model.terms()[k]);
         let least_m = fit.peaks.detection * self.residual_near(fit, term);
@@ -102,8 +103,8 @@ impl ModelSelector<'_> {
         peak.amplitude_m > fit.peaks.detection * noise_m
     }
 
-    /// Whether a peak stands out from the octaves around it; an oscillation that begins inside the record
-    /// raises its own neighbourhood.
+    /// Whether a peak stands out from the noise in the octaves around it. A narrower neighbourhood would not
+    /// do, because an oscillation that begins inside the record raises the residual there.
     pub(super) fn stands_out_widely(&self, fit: &ModelFit, peak: &Peak) -> bool {
         let noise_m = self.octave_noise_sd(fit, self.cycles_of_peak(peak));
         self.periodogram.noise_sd_m(peak.amplitude_m) > fit.peaks.detection * noise_m

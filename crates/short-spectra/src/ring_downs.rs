@@ -32,11 +32,11 @@ const TRANSIENT_NEPERS: f64 = 8.0;
 const OCTAVE: f64 = 20.0;
 /// Maximum number of steps of the search for the placement of a term; each halving counts as a step.
 const MOST_MOVES: usize = 30;
-/// Number of cycles in the record up to which a decay may be the residue of a step: twice that of the peaks
-/// of a step.
+/// Number of cycles in the record up to which a decay may be the residue of a step: twice the number up to
+/// which a step causes peaks.
 const SLOW_CYCLES: f64 = 2.0 * STEP_CYCLES;
-/// Largest decay before the first frame of a term, nepers, with which the oscillation may have begun with the
-/// record, its start hidden by other terms.
+/// A term may have begun with the record, its start hidden by other terms, if it would have decayed by at
+/// most this much before its first frame, nepers.
 const MOST_NEPERS_LOST: f64 = 2.0;
 /// Fraction of the sum of squares of a record below which a misfit is rounding error, being a difference of
 /// such sums.
@@ -86,8 +86,8 @@ struct Decays {
 }
 
 impl Decays {
-    /// Keeps a decay if it is larger than those before. It lowers the sum of squares by twice `square`;
-    /// `half` is `square` in units of the variance of the noise.
+    /// Keeps a decay if it stands out more or explains more than those before. The decay lowers the sum of
+    /// squares by twice `square`; `half` is `square` in units of the variance of the noise.
     fn keep_larger(&mut self, term: SineTerm, half: f64, square: f64) {
         if self.stands_out.is_none_or(|(least, _)| half > least) {
             self.stands_out = Some((half, term));
@@ -105,8 +105,8 @@ impl Decays {
 }
 
 impl ModelSelector<'_> {
-    /// Models with one more decaying oscillation, or with one in the place of a doubtful term or of
-    /// relaxations: the first half-wave of a ring-down looks like a relaxation.
+    /// Models with one more decaying oscillation, either added to the terms or in the place of a doubtful
+    /// term or of relaxations: the first half-wave of a ring-down looks like a relaxation.
     pub(super) fn with_ring_downs(&self, fit: &ModelFit, doubtful: &[DoubtfulTerm]) -> Vec<SineModel> {
         let parts = &fit.model;
         let terms = parts.terms();

@@ -10,8 +10,8 @@ use super::time_frequency::FrequencyRange;
 /// Largest range of a drift, resolutions, that two beating lines may cause. The lines lie at most four
 /// resolutions apart, but where they nearly cancel, the frequency swings beyond both.
 const WIDEST_BEAT: f64 = 10.0;
-/// Maximum number of steps by which a trend may grow in the place of a slow ring-down; together they have as
-/// many unknowns as the ring-down.
+/// Maximum number of steps by which a trend may grow in the place of a slow ring-down; these steps together
+/// add as many unknowns as the ring-down has.
 const MOST_TREND_GROWTH: usize = 3;
 /// Difference of two criteria that is decisive: odds of a hundred to one.
 const DECISIVE_DIFFERENCE: f64 = 10.0;

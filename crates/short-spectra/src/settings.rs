@@ -40,7 +40,7 @@ impl Default for SpectrumSettings {
 pub(crate) const ZERO_PADDING: usize = 8;
 /// Default maximum number of components listed.
 pub const MAX_COMPONENTS: usize = 8;
-/// Minimum number of frames with a value: a cubic takes four and leaves as many.
+/// Minimum number of frames with a value: twice the four that determine a cubic.
 pub const MIN_SAMPLES: usize = 8;
 /// Minimum number of cycles of a resolvable component: with fewer, the lobe of the window, two resolutions
 /// wide on either side, reaches its own mirror image and the trend.

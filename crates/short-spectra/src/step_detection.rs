@@ -8,12 +8,12 @@ const TRANSITION_BOUNDS: (f64, f64) = (0.25, 0.75);
 /// Starts tried after a step, in widths of its transition: the tail of an exponential step can be described
 /// by relaxations.
 const STEP_WIDTHS_AFTER: [f64; 5] = [1.0, 2.0, 3.0, 5.0, 8.0];
-/// Smallest ratio of the length of a record to that of the return from a dip. A record with a dip is near one
-/// level before and after it and returns in a jump, faster than any slow wave.
+/// Smallest ratio of the length of a record to that of the return from a dip. The record has about one level
+/// before and after the dip, and returns to it in a jump, faster than any slow wave.
 const DIP_FRACTION: usize = 20;
 
-/// First frames to try after a step, earliest first. None if the record changes sides repeatedly, as an
-/// oscillation does, or takes more than a third of its length for the step, as a trend does.
+/// First frames to try after a step, earliest first. Empty if the record changes sides repeatedly, as an
+/// oscillation does, or if the step takes more than a third of the record, as a trend does.
 pub(super) fn starts_after_step(samples: &[Option<f64>]) -> Vec<usize> {
     let Some((leaves, arrives)) = find_single_step(samples) else { return Vec::new() };
     let width = (arrives - leaves).max(1);
@@ -29,14 +29,14 @@ pub(super) fn starts_after_step(samples: &[Option<f64>]) -> Vec<usize> {
 const STEP_WIDTHS_BESIDE: [f64; 2] = [1.0, 5.0];
 /// Maximum number of steps of a piece of a record; more changes of side are an oscillation.
 const MAX_STEPS: usize = 4;
-/// Ratio of the length of a record to the distance of the frames that give its slope, and smallest ratio to
-/// the length of a step; a trend describes slower changes.
+/// Ratio of the length of a record to two other lengths: to the distance of the frames from which its slope
+/// is measured, and to the longest step. A trend describes slower changes.
 const SLOPE_FRACTION: usize = 16;
 /// Largest ratio of the length of a record to that of a stretch to try.
 const LEAST_STRETCH_FRACTION: usize = 8;
 
-/// The stretches between the steps of a record, in order, each with the frames to try: first from near the
-/// steps, then from farther away. Without a step, the whole record.
+/// The stretches between the steps of a record, in order, each with the ranges of frames to try: first the
+/// range that reaches close to the steps, then one that keeps farther away. Without a step, the whole record.
 pub(super) fn stretches_between_steps(samples: &[Option<f64>]) -> Vec<Vec<Range<usize>>> {
     let frames = samples.len();
     let sided = classify_sides(&remove_median_slope(samples));

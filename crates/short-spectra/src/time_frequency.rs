@@ -65,8 +65,9 @@ pub(super) fn choose_segment_layout(
     SegmentLayout::with_overlap(record, lengths[shortest], OVERLAP, MOST_COLUMNS)
 }
 
-/// Ratio of the geometric mean of the squared maxima of the columns to the power of noise in a bin, which is
-/// inversely proportional to the length. This mean weighs columns with a large and a small component alike.
+/// Ratio of the geometric mean of the squared maxima of the columns to the power of noise in a bin. That
+/// power is inversely proportional to the length of a segment. The geometric mean weighs columns with a large
+/// and a small component alike.
 fn peak_concentration(
     samples: &[Option<f64>],
     layout: &SegmentLayout,
@@ -271,9 +272,9 @@ impl Spectrogram {
     }
 }
 
-/// Default band of the drifting component, Hz: from four times the largest slow component, if there is one,
-/// and at least the frequency of which the record holds four segments of `SEGMENT_CYCLES` cycles, up to nine
-/// tenths of half the frame rate.
+/// Default band of the drifting component, Hz. The lower end is four times the frequency of the largest slow
+/// component, if there is one, and at least the frequency at which the record holds four segments of
+/// `SEGMENT_CYCLES` cycles. The upper end is nine tenths of half the frame rate.
 #[must_use]
 pub fn default_band_hz(frames: usize, frame_rate_hz: f64, slow_hz: Option<f64>) -> (f64, f64) {
     let top = DEFAULT_BAND_TOP * frame_rate_hz / 2.0;

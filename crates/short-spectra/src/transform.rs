@@ -69,8 +69,8 @@ thread_local! {
     static TWIDDLE_DIVISIONS: Cell<usize> = const { Cell::new(0) };
 }
 
-/// Largest difference of the system's cosine from ours: many units in the last place, and much less than two
-/// cosines of a plan differ.
+/// Largest difference between the system's cosine and ours: many units in the last place, but much less than
+/// the difference between two cosines of a plan.
 const COSINE_TOLERANCE: f64 = 1e-14;
 
 /// A number of a transform.
@@ -85,7 +85,7 @@ pub(super) fn with_exact_twiddles<T>(parts: usize, plan: impl FnOnce() -> T) -> 
     made
 }
 
-/// The exact cosine of the part of a turn whose cosine a number approximates; any other number unchanged.
+/// The exact cosine if a number approximates the cosine of a part of a turn; otherwise the number itself.
 fn exact_cosine(number: f64) -> f64 {
     let parts = TWIDDLE_DIVISIONS.get() as f64;
     let (size, quarter) = (number.abs(), parts / 4.0);

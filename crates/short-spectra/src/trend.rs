@@ -30,8 +30,8 @@ pub enum Detrend {
     /// A polynomial of this degree, at most `HIGHEST_DEGREE`.
     Polynomial(usize),
     /// Everything slower than this frequency, Hz: a line and every cosine of half-waves over the record below
-    /// it. This is a linear projection on the frames present, so it does not delay, and attenuates nothing
-    /// above the frequency; it takes at most 46 half-waves.
+    /// this frequency, at most 46. This is a linear projection on the frames present, so it causes no delay
+    /// and attenuates nothing above the frequency.
     HighPass(f64),
 }
 

@@ -27,8 +27,8 @@ pub(super) fn assign_label_rows(panel: &Panel, x: &CanvasAxis) -> Vec<Option<usi
     rules.into_iter().map(|row| row.map(|row| row + taken)).chain(captions).collect()
 }
 
-/// The lowest free row for every label. Labels do not overlap the title, whose lines end at `title_ends`, the
-/// lowest line first.
+/// The lowest free row for every label, without overlap with the title. `title_ends` are the ends of the
+/// lines of the title, the lowest line first.
 fn stack_labels(labels: &[(&str, f64)], x: &CanvasAxis, title_ends: &[f64]) -> Vec<Option<usize>> {
     let place = |at: f64| x.canvas_position(at).filter(|at| *at >= x.from && *at <= x.to);
     let mut order: Vec<(usize, f64)> =

@@ -22,8 +22,8 @@ const SIGNIFICANT_DECAY: f64 = 3.0;
 /// If the trend could not grow further, an oscillation with fewer cycles than this multiple of the waves of
 /// the trend may be a part of a step.
 const EXHAUSTED_TREND_WAVES: f64 = 2.0;
-/// If the trend has more than `FEWEST_COLUMNS` columns, those of a cubic, an oscillation of fewer cycles than
-/// this may be a part of what the trend describes, such as the shaking of a camera.
+/// An oscillation of fewer cycles than this may be a part of what the trend describes, such as the shaking of
+/// a camera. Applies only if the trend has more than `FEWEST_COLUMNS` columns, the number of a cubic.
 const SLOW_CYCLES: f64 = 6.5;
 const FEWEST_COLUMNS: usize = 4;
 /// Number of other transients near a transient from which it counts as crowded.
@@ -33,7 +33,7 @@ const CROWD_NEIGHBOURS: usize = 2;
 const FRAGMENT_RESOLUTIONS: f64 = 2.0;
 /// Standard deviation of the shift of a frequency by an unresolved companion, resolutions, per unit of the
 /// ratio of residual to amplitude. In fifty pairs of equal amplitudes, half a resolution to one resolution
-/// apart, the largest shift was 4.6.
+/// apart, the largest shift was 4.6 in the same unit.
 const COMPANION_SHIFT: f64 = 2.0;
 /// Standard deviation of a frequency that no oscillation explains, resolutions: uniform within one resolution
 /// of its peak.

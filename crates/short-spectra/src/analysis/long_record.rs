@@ -27,8 +27,8 @@ const STEADY_SCATTER_IN_NOISE: f64 = 1.7;
 const UNIFORM_WIDTH_IN_SD: f64 = 3.464_101_615_137_754_6;
 /// Half width of the neighbourhood whose median is the noise, resolutions.
 const NEIGHBOURHOOD: f64 = 40.0;
-/// Ratio of a peak to that noise above which it is a component; noise reaches it in one of a hundred spectra
-/// of a million frames.
+/// Ratio of a peak to the noise of its neighbourhood above which it is a component; noise alone reaches this
+/// ratio in one of a hundred spectra of a million frames.
 const DETECTION: f64 = 4.5;
 
 pub(super) fn analyse_long_record(

@@ -3,7 +3,7 @@
 //!
 //! Time runs over a segment as `x` from -1 to 1: `(1 + s x) (p cos phi + q sin phi)`, `phi = a x + b x^2 + c
 //! x^3`. With segments of `T` seconds the frequency is `(a + 2 b x + 3 c x^2) / (pi T)`. The slope of the
-//! amplitude and the frequency can be told apart because both parts of the amplitude share one slope.
+//! amplitude is distinct from the frequency, because `p` and `q` share the one slope `s`.
 
 use crate::periodogram::{self, upper_median};
 use crate::transform::RealTransform;
@@ -17,8 +17,8 @@ pub(super) const LINEAR_UNKNOWNS: usize = 5;
 pub(super) const CURVED_UNKNOWNS: usize = 6;
 /// Maximum number of steps; five are usual.
 const MOST_STEPS: usize = 20;
-/// A step that changes the phase at the ends of the segment by less than this, rad, is the last: the error
-/// after it is of the order of its square.
+/// A step that changes the phase at the ends of the segment by less than this, rad, is the last: the
+/// remaining error is of the order of the square of this change.
 const SMALLEST_PHASE_STEP: f64 = 1e-3;
 /// First damping of a step that does not lower the misfit, as a fraction of the diagonal.
 const FIRST_DAMPING: f64 = 1e-2;
@@ -212,7 +212,7 @@ impl<const N: usize> ChirpFit<N> {
 const LOBE: f64 = 2.0;
 /// Number of multiples of the frequency that do not count as noise, because a cycle need not be a sine.
 const HARMONICS: usize = 3;
-/// Smallest width of the band whose median gives the noise, resolutions.
+/// Smallest width of the band from whose median the noise is estimated, resolutions.
 const FEWEST_RESOLUTIONS: f64 = 20.0;
 /// Minimum number of bins of a median; if fewer remain, the multiples count as noise too.
 const FEWEST_BINS: usize = 8;

@@ -1,21 +1,21 @@
 //! Courses: the parts of a ridge in which the frequencies of the segments agree, so that they follow one
 //! component.
 //!
-//! A ridge has points wherever the amplitude exceeds the noise by more than noise alone reaches once in a
-//! hundred records. Two kinds of points do not belong to a course. In a simulated record, which has no noise,
-//! residues while nothing moves exceed rounding errors, although they lie far below every colour of the map.
-//! And if the frequency of a cycle swings several times within a segment, its sidebands are as high as the
-//! carrier, and the strongest line changes from segment to segment.
+//! A ridge has points wherever the ratio of amplitude to noise exceeds what noise alone reaches in one of a
+//! hundred records. Two kinds of points do not belong to a course. First, a simulated record has no noise, so
+//! residues while nothing moves count as points: they exceed rounding errors, although they lie far below
+//! every colour of the map. Second, if the frequency of a cycle swings several times within a segment, its
+//! sidebands are as high as the carrier, and the strongest line changes from segment to segment.
 
 use super::{Ridge, RidgePoint, Spectrogram};
 use portable_math as math;
 
 /// Range of amplitudes of a course, and of the colours of a spectrogram, dB.
 pub const DYNAMIC_RANGE_DB: f64 = 60.0;
-/// Largest difference of frequency between segments that share three quarters of their frames, beyond the
-/// change by the fitted rates, resolutions; the neighbours of a frequency range must agree within the same
-/// quarter. In the weakest component of a ridge, noise causes less than a tenth of it, and a single component
-/// has no other reason to jump.
+/// Largest difference of frequency between segments that share three quarters of their frames, after the
+/// change by the fitted rates is subtracted, resolutions. The neighbours that determine a frequency range
+/// must agree equally well. Noise in the weakest component of a ridge causes less than a tenth of this
+/// difference, and a single component has no other reason to jump.
 const MAX_FREQUENCY_STEP: f64 = 0.25;
 /// Distance of segments that share three quarters of their frames, segments.
 const USUAL_HOP: f64 = 0.25;

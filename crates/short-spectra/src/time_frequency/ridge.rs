@@ -40,9 +40,9 @@ pub struct RidgeEnd {
 /// Course of a component over time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ridge {
-    /// The points, in order of time. A point needs a fitted amplitude that exceeds the noise next to it by
-    /// more than noise alone reaches once in a hundred records and that does not fall to zero within the
-    /// segment. At least three consecutive segments must have points; elsewhere the ridge is interrupted.
+    /// The points, in order of time. A point needs a ratio of amplitude to noise that noise alone reaches in
+    /// only one of a hundred records, and an amplitude that does not fall to zero within the segment. At
+    /// least three consecutive segments must have points; elsewhere the ridge is interrupted.
     pub points: Vec<RidgePoint>,
     /// The frequency at the first frame, if the ridge reaches the first segment and the fit extends that far.
     pub start: Option<RidgeEnd>,
@@ -56,7 +56,7 @@ pub struct Ridge {
 
 /// Distance, resolutions, within which neighbours agree.
 const AGREEMENT_RESOLUTIONS: f64 = 0.25;
-/// Number of standard deviations of their difference within which neighbours agree.
+/// Neighbours also agree if they differ by at most this many standard deviations of the difference.
 const AGREEMENT_DEVIATIONS: f64 = 4.0;
 /// Distance of points with nearly independent noise, segments.
 const INDEPENDENT_SEGMENTS: f64 = 0.5;
@@ -82,17 +82,17 @@ impl Ridge {
         self.points.chunk_by(|a, b| b.time_s - a.time_s < 1.5 * self.hop_s)
     }
 
-    /// Lowest and highest frequency, including those at the two ends of the record if they are known to a
-    /// quarter of a resolution. A point counts only if the frequency extrapolated from a neighbour agrees
-    /// with it within a quarter of a resolution or four standard deviations, so that a single bad point sets
-    /// neither limit. `None` if no point is confirmed.
+    /// Lowest and highest frequency. The frequency at an end of the record counts if its standard deviation
+    /// is below a quarter of a resolution. A point counts only if the frequency extrapolated from a neighbour
+    /// agrees with it within a quarter of a resolution or four standard deviations, so that a single bad
+    /// point sets neither limit. `None` if no point is confirmed.
     #[must_use]
     pub fn range_hz(&self) -> Option<FrequencyRange> {
         frequency_range(self)
     }
 
-    /// Whether the frequency changes: points half a segment apart scatter about their mean by more than their
-    /// standard deviations explain in all but one of a thousand records.
+    /// Whether the frequency changes: points half a segment apart scatter about their mean by more than
+    /// errors of their standard deviations would cause in one of a thousand records.
     #[must_use]
     pub fn is_drifting(&self) -> bool {
         has_significant_drift(self)
@@ -149,8 +149,8 @@ fn end_mismatch_hz(end: &RidgeEnd, point: &RidgePoint) -> f64 {
     (end.frequency_hz - led_hz).abs() / 3.0
 }
 
-/// Half of the change of the frequency within a cycle, Hz: at an instant within a cycle, whose form changes
-/// with it, the frequency has no meaning.
+/// Half of the change of the frequency within a cycle, Hz: a frequency describes a whole cycle, not an
+/// instant within it.
 fn change_within_cycle_hz(point: &RidgePoint) -> f64 {
     (point.rate_hz_per_s / point.frequency_hz / 2.0).abs()
 }
@@ -168,7 +168,7 @@ fn curvature_bias_hz(ridge: &Ridge) -> f64 {
     curvature * ridge.segment_s * ridge.segment_s / 24.0
 }
 
-/// Whether the frequency extrapolated from a neighbour agrees; the only point of a part is confirmed.
+/// Whether a point agrees with the frequency extrapolated from a neighbour, or is the only point of its part.
 fn is_confirmed(ridge: &Ridge, part: &[RidgePoint], index: usize) -> bool {
     let point = &part[index];
     let agrees = |other: &RidgePoint| {

@@ -21,7 +21,8 @@ const TRIALS: f64 = 10.0;
 const FARTHEST_FROM_PATH: f64 = 1.0;
 /// Standard deviation of a frequency due to leakage of other components into a fit, resolutions.
 const LEAKAGE_SD: f64 = 0.002;
-/// The same standard deviation at the end of a fit whose rate may change, resolutions of that fit.
+/// Standard deviation of a frequency due to leakage at the end of a fit whose rate may change, resolutions of
+/// that fit.
 const END_LEAKAGE_SD: f64 = 0.01;
 /// Lengths of the fits at an end of the record, segments: to estimate the change of the rate takes a longer
 /// stretch than to estimate the rate.
@@ -29,13 +30,14 @@ const END_SEGMENTS: [f64; 6] = [1.75, 1.3, 1.0, 0.75, 0.55, 0.4];
 /// Minimum number of cycles in a fit at an end that is shorter than a segment: other components leak into
 /// short fits.
 const END_CYCLES: f64 = 8.0;
-/// Number of standard deviations of their difference from which a shorter fit contradicts a longer one.
+/// A shorter fit contradicts a longer one if they differ by more than this many standard deviations of the
+/// difference.
 const CONTRADICTS: f64 = 3.5;
-/// Ratio of the bias of the fitted frequency due to a changing rate, with the sine weights, to the change of
-/// the rate from one segment to the next: `<x^4>/<x^2>/24`.
+/// Bias of a fitted frequency due to a changing rate, divided by the change of the rate from one segment to
+/// the next: `<x^4>/<x^2>/24` for the sine weights.
 const CURVATURE_BIAS: f64 = 0.4154 / 24.0;
-/// Ratio of this bias to the standard deviation of the frequency above which the fit of a point may change
-/// its rate.
+/// Ratio of the bias of a frequency due to a changing rate to its standard deviation, above which the rate
+/// may change in the fit of a point.
 const SIGNIFICANT_CURVATURE: f64 = 0.5;
 /// Largest difference, resolutions, between the frequency of the ridge at the centre of its outermost segment
 /// and that of a fit at the end of the record. Applies to fits of at least one segment.
@@ -386,7 +388,8 @@ impl PathLevels<'_> {
     }
 }
 
-/// Moves the sums on by one column; returns the bin that each came from.
+/// Advances the sums by one column; returns for each bin the bin of the previous column from which its sum
+/// comes.
 fn advance_column(sums: &mut Vec<f64>, costs: &[f64]) -> Vec<u32> {
     let bins = sums.len();
     let reach = costs.len() - 1;

@@ -124,7 +124,7 @@ pub(super) fn find_transients(record: &SampledRecord, settings: &SpectrumSetting
 
 /// The components of a piece that do not last for the whole record: those whose power exceeds the normal
 /// power at their frequency, and those that end within the piece. Components that end within a cycle are left
-/// out, because every step gives one.
+/// out, because every step causes one.
 fn read_piece(record: &SampledRecord, settings: &SpectrumSettings, piece: &UnusualPiece) -> Vec<Transient> {
     let rate_hz = record.frame_rate_hz;
     let passes = |brief: &Transient| {
@@ -192,7 +192,7 @@ pub(super) struct UnusualPiece {
     pub frames: Range<usize>,
     /// Ratio of the power to the normal power in each bin.
     excess: Vec<f64>,
-    /// Excess that noise alone hardly reaches.
+    /// Excess that noise alone exceeds anywhere in a record only with the probability [`FALSE_ALARM`].
     level: f64,
 }
 
