@@ -164,8 +164,8 @@ fn check_column(column: &str, values: &[Option<f64>], expected: usize) -> Result
     }))
 }
 
-/// Frames of the interpolating polynomial. Half way between two frames at 5,000 frames/s, six frames give a
-/// 900 Hz sine 0.8 % too small; a straight line gives it 16 % too small.
+/// Number of frames through which the interpolating polynomial passes. Half way between two frames at 5,000
+/// frames/s, six frames give a 900 Hz sine 0.8 % too small; a straight line gives it 16 % too small.
 pub(crate) const STENCIL: usize = 6;
 /// A time counts as the time of a frame if it is this close to it, in frames. Times near 1 s at 1e5 frames/s
 /// have far smaller rounding errors.
@@ -188,7 +188,8 @@ impl Recording {
     }
 }
 
-/// Index of the frame at `place`, a time in frames; `None` between frames. The index may exceed the column.
+/// Index of the frame at `place`, a time in frames; `None` between frames. The index may lie past the end of
+/// the column.
 pub(crate) fn frame_at(place: f64) -> Option<usize> {
     let nearest = place.round();
     (nearest >= 0.0 && (place - nearest).abs() < ON_FRAME_TOLERANCE).then_some(nearest as usize)
@@ -197,7 +198,8 @@ pub(crate) fn frame_at(place: f64) -> Option<usize> {
 /// Lagrange polynomial through the six frames from `first` on, evaluated at `place`, a time in frames; `None`
 /// if a frame is missing.
 pub(crate) fn lagrange_through_six(column: &[Option<f64>], first: usize, place: f64) -> Option<f64> {
-    /// Denominators of the polynomial: products of the distances of a frame from the other five.
+    /// Denominators of the polynomial: for each frame, the product of its signed distances from the other
+    /// five.
     const APART: [f64; STENCIL] = [-120.0, 24.0, -12.0, 12.0, -24.0, 120.0];
     let place = place - first as f64;
     let mut sum = 0.0;

@@ -144,8 +144,8 @@ impl Observer for () {
 /// Accuracy, work limit and method of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SolverOptions {
-    /// Relative tolerance: the error of a Runge-Kutta step. The error of a Taylor step is a fraction of it,
-    /// so that transition times have errors of about this number of seconds. Fixed steps ignore it.
+    /// Relative error allowed in a Runge-Kutta step. In a Taylor step, a fraction of it is allowed, so that
+    /// the errors of transition times, in s, are about as large as the tolerance. Fixed steps ignore it.
     pub relative_tolerance: f64,
     /// Number of evaluations of the right-hand side after which the run ends ([`RunStatus::WorkLimit`]).
     pub most_evaluations: u64,

@@ -92,7 +92,7 @@ pub struct ModelParameter {
     pub symbol: &'static str,
     /// Unit as shown to users.
     pub unit: &'static str,
-    /// Physical quantity; if it can be written in two ways, two rows have the same one.
+    /// Physical quantity; if it can be written in two ways, two rows have the same quantity.
     pub quantity: ParameterQuantity,
     /// Default value of the quantity; `None` if a scene must give it.
     pub default: Option<f64>,

@@ -12,8 +12,8 @@
 //! For a rectangle this is `g = h/2` and `J = m (h^2 + t^2)/12`. A blade is long compared with its thickness
 //! and bends as a plate, with `E' = E/(1 - nu^2)` in place of Young's modulus; rubber keeps its volume, so
 //! `nu = 1/2`. A link turns on a hinge of thickness `t` and height `L`. A link without a hinge bends over its
-//! own height; the spring of the model then gives the same deflection under a force at the bottom as this
-//! bending, with `s` the height above the bottom:
+//! own height; the model's spring is then chosen so that a force at the bottom deflects the bottom as far as
+//! this bending does. With `s` the height above the bottom:
 //!
 //! ```text
 //! with a hinge     k = E' b t^3/(12 L)
@@ -36,8 +36,8 @@ use std::fmt::Write;
 const DIGITS: usize = 4;
 /// Number of entries in the table.
 const COUNT: usize = 15;
-/// Smallest value of an input in a finite difference, as a fraction of the input: a dimension stays above
-/// zero even if its standard deviation exceeds it.
+/// Smallest value of an input in a finite difference, as a fraction of the input: the limit keeps a dimension
+/// above zero even if the standard deviation exceeds the dimension.
 const LEAST_SHARE: f64 = 0.1;
 
 /// A number of the `[blade]` table.

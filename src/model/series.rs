@@ -138,8 +138,8 @@ pub(super) struct RecurrenceConstants {
     pub w: LinkPair,
     pub per_force: LinkPair,
     pub mobility: f64,
-    /// Coefficients in `u''` of the accelerations and of the remaining part of `q'`, and coefficients in `N`
-    /// of the accelerations.
+    /// Coefficients in the equation for `u''`, of the accelerations and of the remaining part of `q'`; then
+    /// the coefficients of the accelerations in the equation for `N`.
     pub drop: LinkPair,
     pub drop_rest: LinkPair,
     pub normal: LinkPair,

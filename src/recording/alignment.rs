@@ -14,7 +14,7 @@ pub struct Alignment {
     pub along_m: f64,
     /// Offset of the model's head drop, m.
     pub drop_m: f64,
-    /// Point whose paths are aligned.
+    /// Point whose path in the model is aligned with its recorded path.
     pub followed: AlignmentPoint,
     /// Standard deviation of the time shift, s; infinite if the path does not determine the shift, `None` if
     /// no path is fitted.
@@ -109,16 +109,16 @@ fn head_at(recording: &Recording, t: f64) -> Option<f64> {
     recording.interpolate_column(&recording.traces().head_x_m, t)
 }
 
-/// Travel of the head in a short time after a turn, m; its sign is the direction after the turn. The time is
-/// the longest of a few whose end is tracked.
+/// Travel of the head in a short time after a turn, m; its sign is the direction after the turn. Of a few
+/// trial times, the longest at whose end the head is tracked is used; 0 if there is none.
 fn head_turn_m(recording: &Recording, turn_s: f64) -> f64 {
     const TIMES_S: [f64; 4] = [0.04, 0.02, 0.01, 0.005];
     let travel = |time_s: &f64| Some(head_at(recording, turn_s + time_s)? - head_at(recording, turn_s)?);
     TIMES_S.iter().find_map(travel).unwrap_or_default()
 }
 
-/// Time shift, of a series of evenly spaced ones, at which the recorded path differs least from the model's
-/// path apart from a constant offset; for a recording without a turn.
+/// Time shift at which the recorded path differs least from the model's path, apart from a constant offset.
+/// The trial shifts are evenly spaced. The function is used if recording or model has no turn.
 fn best_overlap_shift_s(measured: &Recording, model: &Recording, by: AlignmentPoint) -> f64 {
     const PLACES: u32 = 200;
     const FRAMES: usize = 100;
@@ -173,7 +173,7 @@ impl AlignmentStep {
         let points: Vec<(f64, f64)> = used_frames(measured).filter_map(point).collect();
         let count = points.len() as f64;
         let ([mean_speed, mean_m], [spread, both]) = central_moments(&points);
-        // a model that is late by some time lags by its speed times that time
+        // if the model is late by a time, its position lags by its speed times this time
         let time_s = if spread > 0.0 { -both / spread } else { 0.0 };
         let residual = |p: &(f64, f64)| p.1 - mean_m + time_s * (p.0 - mean_speed);
         let left: f64 = points.iter().map(|p| math::powi(residual(p), 2)).sum();

@@ -14,7 +14,7 @@ use serde::Serialize;
 use std::ops::Range;
 pub use window::{Window, WindowEnd, WindowError};
 
-/// A quantity that is followed over the frames, m.
+/// A quantity with one value per frame, m.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 pub enum Channel {
     /// Deflection of the blade, `tip_x - head_x` = `v3 - v`.
@@ -148,7 +148,7 @@ impl TrackPoints {
 
 /// Frame number and position, m, of every tracked frame.
 pub(super) fn present_points(samples: &[Option<f64>]) -> Vec<(usize, f64)> {
-    // (a vector that grows would add a fifth to the time of the search for instants)
+    // (the reallocations of a growing vector would make the search for instants a fifth slower)
     let mut points = Vec::with_capacity(samples.len());
     points.extend(samples.iter().enumerate().filter_map(|(frame, x)| x.map(|x| (frame, x))));
     points

@@ -1,14 +1,14 @@
 //! Frame numbers from a column of times; the times may be rounded, and rows may be missing.
 
 /// Largest distance of a time from its frame, frames. Rounding to half a frame moves a time by up to a
-/// quarter of a frame; for more than a third, the nearest frame is uncertain.
+/// quarter of a frame; at more than a third, the nearest frame is uncertain.
 pub(crate) const OFF_GRID_LIMIT_FRAMES: f64 = 0.3;
 
 /// Longest grid, frames: 17 minutes at 10,000 frames/s. A larger jump in the times is damage.
 pub(crate) const MAX_FRAMES: f64 = 10_000_000.0;
 
-/// Fraction of a row's distance from the grid by which the phase of the grid is corrected. If the seed is 1 %
-/// off, the phase lags by a tenth of a frame.
+/// Fraction of a row's distance from the grid by which the phase of the grid is corrected. If the time per
+/// frame of the seed is 1 % off, the phase lags by a tenth of a frame.
 const PHASE_GAIN: f64 = 0.1;
 /// Maximum number of digits to which a fitted frame rate is rounded.
 const RATE_DIGITS: usize = 16;
@@ -87,7 +87,7 @@ pub(crate) fn simplest_rate(fitted: f64, explains: impl Fn(f64) -> bool) -> f64 
     rounded.find(|&rate| explains(rate)).unwrap_or(fitted)
 }
 
-/// Intercept and slope of the least-squares line of time over frame number.
+/// Intercept and slope of the least-squares line of time against frame number.
 fn fit_line(frames: &[usize], times_s: &[f64]) -> (f64, f64) {
     let count = frames.len() as f64;
     let mean_frame = frames.iter().map(|&n| n as f64).sum::<f64>() / count;

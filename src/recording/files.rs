@@ -36,7 +36,7 @@ pub enum FilesError {
     Refused {
         /// File as named by the user.
         file: String,
-        /// The rest of the message, from the line or the key on.
+        /// The rest of the message; it begins with the line or the key.
         problem: String,
     },
 }

@@ -23,7 +23,7 @@ const BLOCK_S: f64 = 8e-3;
 /// Minimum number of frames of a block: in a shorter block, a cubic removes most of the correlation between
 /// neighbouring frames.
 const LEAST_BLOCK: usize = 24;
-/// Maximum number of frames that are used, spread over the recording: they give a correlation to 0.01.
+/// Maximum number of frames that are used, spread over the recording: they determine a correlation to 0.01.
 const MOST_FRAMES: usize = 6_000;
 /// Minimum number of degrees of freedom of an estimate.
 const FEWEST_FRAMES: usize = 100;
@@ -66,8 +66,8 @@ pub(super) fn block_length(frame_rate_hz: f64) -> usize {
     ((BLOCK_S * frame_rate_hz).round() as usize).max(LEAST_BLOCK)
 }
 
-/// Measures the noise of a recording along the sweep and in height. Each is measured on its own channel; if
-/// that fails, the noise of the other stands in.
+/// Measures the noise of a recording along the sweep and in height. Each of the two is measured on its own
+/// channel. If one measurement fails, the result of the other stands for both.
 pub(crate) fn measure_noise(recording: &Recording) -> RecordingNoise {
     let (traces, length) = (recording.traces(), block_length(recording.grid().frame_rate_hz));
     let head = BlockCut { length, degree: 3, covariate: None };

@@ -11,7 +11,7 @@ use std::io::Cursor;
 
 /// Maximum memory for a picture, bytes: 60 million pixels in four channels.
 const MOST_BYTES: usize = 256 << 20;
-/// Number of grey levels of a picture in a figure: a pixel takes half a byte, so that four pictures fit on a
+/// Number of grey levels of a picture in a figure: a pixel then needs half a byte, and four pictures fit on a
 /// page.
 const GREYS: u16 = 16;
 /// Maximum number of samples of the picture along either side of a pixel of a figure.
@@ -150,10 +150,10 @@ impl std::fmt::Debug for RecordingVideo<'_> {
     }
 }
 
-/// Largest distance of the origin from the picture's corner, pixels; an origin a thousand pictures away is a
-/// mistake.
+/// Largest distance of the origin from the corner of the picture, pixels; a larger distance, a thousand
+/// pictures or more, is a mistake.
 const MOST_PIXELS: f64 = 1e7;
-/// Admissible length of a pixel, m: from a microscope to far more than a camera on a wiper shows.
+/// Admissible length of a pixel, m: from that of a microscope to far more than that of a camera on a wiper.
 const LENGTHS_M: std::ops::RangeInclusive<f64> = 1e-9..=1.0;
 
 /// `[video]`: pictures of frames, for figures.

@@ -1,5 +1,5 @@
-//! Work-precision study: error and cost of every method on a scene, relative to a reference run with a
-//! tolerance tenfold tighter than any studied.
+//! Work-precision study: error and cost of every method on a scene, relative to a reference run whose
+//! tolerance is a tenth of the tightest tolerance studied.
 //!
 //! The study compares transition times, the deflection at common times, and two spectral components. The
 //! caller measures the run times.

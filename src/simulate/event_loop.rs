@@ -31,8 +31,8 @@ pub(super) struct EventLoop<'a> {
     system: &'a DrivenBlade,
     scene: &'a Scene,
     effort: SolverOptions,
-    /// Not a type parameter: every observer of a run would otherwise have its own copy of the loop and of the
-    /// integrator, and no run is faster for it.
+    /// A trait object, because a type parameter would compile the loop and the integrator again for every
+    /// observer and make no run faster.
     watch: &'a mut dyn RunWatcher,
     t: f64,
     work: WorkCounters,
@@ -320,9 +320,9 @@ impl<'a> EventLoop<'a> {
             }
             Ended::StepTooSmall => NextPhase::End(RunStatus::Diverged),
             Ended::Guard(JAMS) if self.is_at_pole(&phase, &pose) => self.resolve_jam(&pose, mode),
-            // a series or interpolant that extends past the tip's rest may put the indicator below zero,
-            // because steeply falling friction grows without bound there; the indicator itself has not
-            // fallen, so the phase continues from this state
+            // the indicator has not fallen in this state, so the phase continues from it; a step past the
+            // tip's rest evaluates friction at negative speed, where a steeply falling law grows without
+            // bound and may put the indicator below zero.
             Ended::Guard(JAMS) => {
                 self.recent.note_event(self.t);
                 self.shorten_slip_step();
@@ -357,10 +357,10 @@ impl<'a> EventLoop<'a> {
 
     /// Whether the tip is about to jam. Near the Painlevé paradox, the indicator vanishes as the square root
     /// of the remaining time, and the normal force grows without bound. No step resolves the last instant; a
-    /// step that passes it because of rounding finds a normal force that pulls.
+    /// step that passes this instant because of rounding yields a negative normal force.
     fn is_at_pole(&self, phase: &SlipPhase<'_>, pose: &Pose) -> bool {
-        /// An empirical limit. Of runs with 300 random blades with heavy heads, those that ended at the
-        /// paradox had an indicator of at most 5e-6 in size, all others one of at least 0.5.
+        /// Empirical limit on the indicator. In runs of 300 random blades with heavy heads, its size was at
+        /// most 5e-6 in those that ended at the paradox, and at least 0.5 in all others.
         const VANISHED: f64 = 1e-4;
         let (_, forces) = phase.slip_forces(pose, &self.system.contact_instant(self.t, pose, self.lean));
         forces.indicator < VANISHED
@@ -400,8 +400,8 @@ fn cause_of_change(from: TipMode, to: TipMode) -> TransitionCause {
     }
 }
 
-/// Observer of the steps of a reference method. It is no type parameter, because the code of these methods
-/// would be compiled again for every observer.
+/// Observer of the steps of a reference method. It is a trait object, because a type parameter would compile
+/// these methods again for every observer.
 type StepObserver<'a, const N: usize> = &'a mut dyn FnMut(&AcceptedStep<'_, N>) -> ControlFlow<()>;
 
 /// Integrates a phase by the method of the run, from one horizon to the next.
@@ -457,8 +457,8 @@ pub(super) struct ChatterDetector {
 impl ChatterDetector {
     /// Number of the latest events that are considered.
     const WINDOW: usize = 64;
-    /// These events count as chattering if they lie within this fraction of the blade's shortest period; real
-    /// stick-slip cycles take about a period each.
+    /// These events count as chattering if all of them occur within this fraction of the blade's shortest
+    /// period; a real stick-slip cycle alone lasts about a period.
     const SHARE: f64 = 1e-6;
 
     pub(super) fn new(period_s: f64) -> Self {

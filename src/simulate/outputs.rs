@@ -78,7 +78,7 @@ impl Observer for StickIntervals {
 /// Largest angle of a link from the vertical.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct LargestTilt {
-    /// The largest angle at the ends of pieces, rad; a swing has many pieces.
+    /// The largest angle, rad, found at the ends of pieces only; a swing has many pieces.
     pub largest_rad: f64,
     /// Time of the largest angle, s.
     pub at_s: f64,
@@ -128,8 +128,8 @@ impl<A: Observer> Observer for &mut A {
     forward_to_observers!(self: (**self));
 }
 
-/// Extremes and energy balance of a run. In balance, the drive's power equals the sum of storage, damping,
-/// friction and losses of impacts.
+/// Extremes and energy balance of a run. The energy supplied by the drive should equal the change of the
+/// stored energy plus the losses in damping, friction and impacts.
 #[derive(Debug, Clone, Default)]
 pub struct EnergyAudit {
     start_energy_j: Option<f64>,
@@ -328,7 +328,7 @@ pub(crate) struct ShutterObserver<I: Iterator<Item = [f64; 2]>, F: FnMut(&BladeP
 
 impl<I: Iterator<Item = [f64; 2]>, F: FnMut(&BladePoints)> ShutterObserver<I, F> {
     /// `intervals` are the times at which the shutter opens and closes, s, in rising order and without
-    /// overlap. An interval that is still open at the end of the run gives no mean.
+    /// overlap. An interval that is still open at the end of the run produces no mean.
     pub(crate) fn new(intervals: I, sink: F) -> Self {
         Self { intervals: intervals.peekable(), sink, sum: [0.0; 4], open_s: 0.0 }
     }

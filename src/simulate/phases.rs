@@ -14,7 +14,8 @@ use portable_math as math;
 pub const GUARDS: usize = 7;
 /// Guards of the neck's angle in all phases: the forward and the backward corner of the shoulder.
 pub(crate) const SHOULDER_GUARDS: [usize; 2] = [3, 4];
-/// Guards of the level of neck and lip in all phases: past level, the hinge would lie below the glass.
+/// Guards of neck and lip in all phases; a guard falls to zero when its link is level. Past level, the hinge
+/// would lie below the glass.
 pub(crate) const LEVEL_GUARDS: [usize; 2] = [5, 6];
 
 /// Slip: the tip's speed in the direction of slip reaches zero.
@@ -231,8 +232,9 @@ enum Link {
 }
 
 impl<'a> StickPhase<'a> {
-    /// Cosine at which the follower counts as level, 1e-3 rad before it is. At level itself the follower's
-    /// rate is 0/0 and its cosine does not change sign; 1e-3 rad before, the state loses about nine bits.
+    /// Cosine at which the follower counts as level, 1e-3 rad before it actually is level. At level itself,
+    /// the follower's rate is 0/0 and its cosine does not change sign. At 1e-3 rad before level, the state
+    /// has lost about nine bits of precision.
     const LEAST_COSINE: f64 = 1e-3;
 
     /// Stick that holds the tip at its position in a pose with both links above level.

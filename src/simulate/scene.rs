@@ -127,8 +127,8 @@ impl Scene {
         self.values.get("contact.restitution").copied().unwrap_or(0.0)
     }
 
-    /// The same scene with one parameter set; the parameter replaces an equivalent one in which the scene
-    /// gave the same quantity.
+    /// The same scene with one parameter set; if the scene gives the same quantity by an equivalent
+    /// parameter, that parameter is removed.
     ///
     /// # Errors
     /// [`SceneError::Key`] for an unknown name or a value out of range.

@@ -52,9 +52,9 @@ pub struct TangentRunner {
 }
 
 impl TangentRunner {
-    /// A runner whose derivatives within a step have the relative accuracy `relative`, for searches that need
-    /// no more; at the ends of steps, they are far more accurate. The default accuracy is the tolerance of
-    /// the run; `relative` does not change the tolerance.
+    /// A runner whose derivatives have the relative accuracy `relative` within a step and are far more
+    /// accurate at its ends; for searches that need no more. The default accuracy is the tolerance of the
+    /// run, which `relative` does not change.
     #[must_use]
     pub fn with_accuracy(relative: f64) -> Self {
         Self { room: TangentWorkspace::default(), accuracy: Some(relative) }

@@ -61,7 +61,7 @@ pub enum TwinViewError {
 /// averages over the part of its exposure between `start_s` and `stop_s`.
 ///
 /// # Errors
-/// [`TwinViewError`]. A run that stops early, but after two frames, gives a shorter recording.
+/// [`TwinViewError`]. A run that stops early but after at least two frames produces a shorter recording.
 pub fn film_scene(
     scene: &Scene,
     camera: &Camera,

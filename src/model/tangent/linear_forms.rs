@@ -67,8 +67,8 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         form
     }
 
-    /// Linear form of a quantity at these instants; `y2` is eliminated in stick. It is zero for a force,
-    /// whose form [`Self::force_form`] gives.
+    /// Linear form of a quantity at these instants; `y2` is eliminated in stick. For a force, it is zero;
+    /// [`Self::force_form`] computes the form of a force.
     pub(crate) fn channel_form(&self, at: &LinkAttitudes, quantity: ModelChannel) -> LinearForm {
         let (mut form, l, one) = (LinearForm::default(), self.lengths(), LaneVector::splat(1.0));
         let gap = if self.is_in_flight() { one } else { LaneVector::ZERO };

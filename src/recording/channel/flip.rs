@@ -7,7 +7,8 @@ use std::ops::Range;
 const START_SHARE: f64 = 0.05;
 /// Fraction of the change at which the flip ends.
 const END_SHARE: f64 = 0.95;
-/// Number of tracked frames on either side of the turn that always count for the level before the turn.
+/// Number of tracked frames on either side of the turn that the median for the level before the turn always
+/// includes.
 const NEAR_TURN: usize = 5;
 /// Minimum number of tracked frames for the level after the turn: noise dominates a median of fewer frames.
 const FEWEST_POINTS: usize = 8;
@@ -61,7 +62,8 @@ pub(super) fn find_flip(
     Some((start, interpolate_crossing(points, &share, end.checked_sub(1)?, END_SHARE)))
 }
 
-/// Points between the stop of the tip and the turn, in either order, and a few points about the turn.
+/// Points between the stop of the tip and the turn, whichever is earlier, and at least [`NEAR_TURN`] points
+/// on either side of the turn.
 fn level_before(points: &[(usize, f64)], around: &TurnNeighbourhood) -> Range<usize> {
     let frames = [around.turn, around.hold.unwrap_or(around.turn)];
     let [turn, hold] = frames.map(|frame| index_at_frame(points, frame));

@@ -11,9 +11,9 @@ use std::ops::Range;
 ///
 /// | name | from | to |
 /// |---|---|---|
-/// | `before` | the start of the recording, or where the reversal before it has settled | the tip stops (`hold`) |
+/// | `before` | start of the recording, or settling of the previous reversal | the tip stops (`hold`) |
 /// | `stick` | the tip stops (`hold`) | the deflection leaves its level (`flip`) |
-/// | `flip` | the deflection leaves its level (`flip`) | it has reached its level on the other side and the tip has slipped again (settled) |
+/// | `flip` | the deflection leaves its level (`flip`) | the deflection has reached its level on the other side and the tip has slipped again (settled) |
 /// | `after` | settled | the tip stops at the next reversal (`hold`), or the end of the recording |
 ///
 /// The tip still sticks during most of `flip`, while the head passes over it. During `stick` the blade rests,

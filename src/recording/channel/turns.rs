@@ -109,10 +109,11 @@ const LEFT_FRAMES: usize = 3;
 const SEEDS: isize = 4;
 /// Half the number of frames whose median is the first estimate of the position of a hold.
 const SEED_HALF: usize = 5;
-/// Smallest travel of the head during a hold, in tolerances. A tip that only follows a slow head stays within
-/// the tolerance for at most two tolerances of the head's travel, and noise adds less than two.
+/// Smallest travel of the head during a hold, in tolerances. If the tip only follows a slow head, it leaves
+/// the tolerance before the head has travelled two tolerances; noise adds less than two to this travel.
 const HEAD_TOLERANCES: f64 = 6.0;
-/// Limit on the extrapolation back to the start or end of a hold, frames.
+/// Maximum number of frames from the first point outside a hold back to the extrapolated start or end of the
+/// hold.
 const MOST_EXTRAPOLATED: f64 = 5.0;
 /// Exponent of the tip's path after release: its acceleration starts at zero, so the path grows as the cube
 /// of time.

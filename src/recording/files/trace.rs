@@ -61,7 +61,7 @@ pub fn push_trace_row(text: &mut String, time_s: f64, cells: impl IntoIterator<I
     text.push('\n');
 }
 
-/// Adds the shortest text that reads back to the same number, with an exponent only if plain digits would be
+/// Appends the shortest text that parses to the same number; it has an exponent only if plain digits would be
 /// long.
 fn push_number(text: &mut String, value: f64) {
     // (writing to a String cannot fail)
@@ -259,7 +259,7 @@ fn farthest_off_grid(times_s: &[f64], frames: &[usize], frame_rate_hz: f64) -> (
     off.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, 0.0))
 }
 
-/// The rate with the fewest digits that explains the times as well as the fitted one does.
+/// The rate with the fewest digits that explains the times as well as the fitted rate does.
 fn simplest_frame_rate_hz(times_s: &[f64], fit: &FrameFit) -> f64 {
     let fitted = 1.0 / fit.frame_s;
     let allowed = SNAP_FRAMES.max(1.5 * farthest_off_grid(times_s, &fit.frames, fitted).1);

@@ -87,8 +87,8 @@ fn predict_value(coefficients: &[f64], values: &[f64]) -> f64 {
     coefficients.iter().zip(values.iter().rev()).map(|(a, b)| a * b).sum()
 }
 
-/// Coefficients of a process of the next higher order, from those of the present order and the reflection
-/// coefficient of the next (Levinson's recursion; Percival and Walden 1993, section 9.4).
+/// Coefficients of the process of the next higher order, from those of the present order and the reflection
+/// coefficient `kappa` of the next order (Levinson's recursion; Percival and Walden 1993, section 9.4).
 pub(super) fn raise_order(coefficients: &[f64], kappa: f64) -> Vec<f64> {
     let turned = coefficients.iter().rev();
     let mut longer: Vec<f64> = coefficients.iter().zip(turned).map(|(a, b)| a - kappa * b).collect();
@@ -111,8 +111,8 @@ fn reflection_coefficients(coefficients: &[f64]) -> Vec<f64> {
 
 // Whitening with missing frames. The map is the inverse of the lower Cholesky factor of the covariance of the
 // present frames. It is computed from the innovations of a Kalman filter over the last few frames (Jones
-// 1980, *Technometrics* 22). The gains of the filter do not depend on the data, so they are computed once. A
-// gap is a prediction over several frames.
+// 1980, *Technometrics* 22). The gains of the filter do not depend on the data, so they are computed once.
+// Across a gap, the filter predicts over several frames.
 
 /// Noise of the last frames, beginning with the latest.
 type NoiseMemory = [f64; MOST_COEFFICIENTS];
@@ -181,7 +181,7 @@ impl Whitener {
     }
 }
 
-/// Covariance of the noise of the last frames, given the present frames before.
+/// Covariance of the noise of the last frames, conditional on the present frames before them.
 struct PredictionCovariance {
     order: usize,
     covariance: [NoiseMemory; MOST_COEFFICIENTS],

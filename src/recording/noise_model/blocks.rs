@@ -4,7 +4,7 @@
 use crate::recording::channel::median_in_place;
 use portable_math as math;
 
-/// Minimum number of frames of a block, as a fraction of its length.
+/// Minimum number of present frames of a block, as a fraction of its length.
 const LEAST_SHARE: f64 = 0.5;
 /// Minimum number of degrees of freedom of a block.
 const LEAST_LEFT: usize = 4;
@@ -46,8 +46,8 @@ impl NoiseBlock {
     }
 }
 
-/// Projects the columns out of the values; returns the logarithm of the determinant of the columns' Gram
-/// matrix.
+/// Subtracts from the values their projection on the columns, and makes the columns orthogonal. Returns the
+/// logarithm of the determinant of the Gram matrix of the given columns.
 pub(super) fn project_out(columns: &mut [Vec<f64>], values: &mut [f64]) -> f64 {
     let mut log = 0.0;
     for j in 0..columns.len() {

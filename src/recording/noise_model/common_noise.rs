@@ -11,7 +11,8 @@ use portable_math as math;
 
 /// Number of frames of a short block: a parabola leaves three quarters of the degrees of freedom.
 const SHORT_BLOCK: usize = 12;
-/// Smallest significant share, in its standard deviations; chance exceeds it in one recording of 370.
+/// A share is significant if it exceeds this number of its standard deviations; by chance, a share does so in
+/// one recording of 370.
 const CLEAR_DEVIATIONS: f64 = 3.0;
 /// Minimum number of blocks: the scatter over fewer blocks is too uncertain.
 const FEWEST_BLOCKS: usize = 30;

@@ -15,7 +15,8 @@ const LONG_GAP: f64 = 0.05;
 /// Smallest fraction of an amplitude that the exposure should pass at the highest usable frequency. A loss of
 /// a tenth exceeds the uncertainty of the scale.
 const EXPOSURE_PASSES: f64 = 0.9;
-/// Largest relative difference between a step and a whole pixel: scales are given to three digits.
+/// Largest relative difference between a step and a pixel at which the step counts as a whole pixel: scales
+/// are given to three digits.
 const PIXEL_NEARNESS: f64 = 0.01;
 /// Confidence below which a position is doubtful: the default cut-off of DeepLabCut (`pcutoff`).
 const LOW_CONFIDENCE: f64 = 0.6;
@@ -27,8 +28,8 @@ const MOST_DOUBTFUL: f64 = 0.5;
 /// Rates at which video is played back, 1/s (film, PAL, NTSC and their doubles).
 const PLAYBACK_RATES_HZ: [f64; 8] =
     [24_000.0 / 1001.0, 24.0, 25.0, 30_000.0 / 1001.0, 30.0, 50.0, 60_000.0 / 1001.0, 60.0];
-/// Largest relative difference from a playback rate: it covers rounded times and still separates 29.97 from
-/// 30.
+/// Largest relative difference at which a rate counts as a playback rate: it allows for rounded times and
+/// still separates 29.97 from 30.
 const PLAYBACK_NEARNESS: f64 = 1e-3;
 
 /// Whether `rate_hz` is a playback rate. The time column of a video file often has this rate instead of the

@@ -121,8 +121,8 @@ impl Quality {
         [("tip-x", &self.tip_x), ("tip-y", &self.tip_y), ("head-x", &self.head_x), ("head-y", &self.head_y)]
     }
 
-    /// Standard deviation of the noise of the deflection, m, from the noise of tip and head; each counts at
-    /// least with the rounding error of its step.
+    /// Standard deviation of the noise of the deflection, m, from the noise of tip and head; the noise of
+    /// each is taken as at least the rounding error of its step.
     pub(super) fn deflection_floor_m(&self) -> Option<f64> {
         let variance = |c: &ChannelQuality| {
             Some(math::powi(c.noise_m?, 2).max(math::powi(c.step_m.unwrap_or(0.0), 2) / 12.0))

@@ -9,8 +9,8 @@ use std::f64::consts::PI;
 
 /// Fraction of repeated frames that is serious: frequencies are then wrong, not only a few samples.
 const MANY_REPEATED: f64 = 0.01;
-/// The tolerated number of repeats is this multiple of one plus the number that rounding is expected to
-/// cause.
+/// Ratio of the tolerated number of repeats to `1 + expected`, where `expected` is the number of repeats that
+/// rounding is expected to cause.
 const BY_ROUNDING: f64 = 3.0;
 /// No repeat is tolerated if rounding is expected to cause fewer repeats than this.
 const NO_REPEATS: f64 = 0.01;
@@ -79,8 +79,8 @@ fn check_repeated_frames(traces: &Traces, measured: &Quality) -> Option<QualityF
 }
 
 /// Probability that all columns repeat by chance. For a column with step `q` and noise `s` it is
-/// `q/(2 sqrt(pi) s)`: the step times the density at zero of the difference of two values. `None` if noise
-/// does not move both points, or if repeats by chance are too likely to be judged.
+/// `q/(2 sqrt(pi) s)`: the step times the probability density of the difference of two values, taken at zero.
+/// `None` if noise does not move both points, or if repeats by chance are too likely to be judged.
 fn repeat_probability(measured: &Quality) -> Option<f64> {
     let moved = |channel: &ChannelQuality| channel.noise_m.is_some_and(|noise| noise > LEAST_NOISE_M);
     let unchanged = |channel: &ChannelQuality| {

@@ -39,7 +39,8 @@ const LINES_SD: f64 = 9.5;
 /// Smallest ratio of an outlier's miss to the largest miss around it. The largest of six misses of white
 /// noise reaches 3 standard deviations once in 60 cases.
 const MORE_THAN_AROUND: f64 = 4.0;
-/// Distances, in frames, of the points around an outlier: the nearest points whose own cubic does not use it.
+/// Distances, in frames, from an outlier to the points around it: the nearest points whose own cubic does not
+/// use the outlier.
 const AROUND: std::ops::RangeInclusive<usize> = 3..=5;
 /// Fraction of outliers that calls for a caution: each outlier is an impulse that raises the noise of a
 /// spectrum.

@@ -21,23 +21,23 @@ const MOST_BRIDGED: usize = 6;
 /// Minimum number of segments: the median power of a band is then known to 20 %, enough to exclude a random
 /// walk.
 const FEWEST_SEGMENTS: usize = 32;
-/// Maximum number of segments, spread over the recording: they give the median to 7 %.
+/// Maximum number of segments, spread over the recording: they determine the median power to 7 %.
 const MOST_SEGMENTS: usize = 256;
 /// Edges of the bands, bins: a band is about a third of an octave and at least two bins wide. Motion and
 /// trend lie below the first edge.
 const EDGES: [usize; 12] = [3, 5, 7, 10, 13, 16, 20, 25, 32, 40, 50, 64];
 /// Number of bands of a plateau.
 const PLATEAU: usize = 3;
-/// Largest power ratio within a plateau, 3 dB. Over three bands, the power of a random walk, 1/f^2, falls by
-/// 4 dB or more.
+/// Largest power ratio within a plateau, 3 dB. Across three bands, the power of a random walk, 1/f^2, falls
+/// by 4 dB or more.
 const FLAT: f64 = 2.0;
 /// The power must be low in all bands from this multiple of the cut-off frequency on.
 const ABOVE: f64 = 1.6;
-/// Largest power in these bands, as a fraction of the power of the plateau: 8 dB less, which a mean of three
-/// frames just reaches.
+/// Largest power in these bands, as a fraction of the power of the plateau: -8 dB, which the moving average
+/// over three frames just reaches.
 const FALLEN: f64 = 0.16;
-/// Smallest ratio of power over the steepest octave, 10 dB: a random walk falls by 6 dB, a filter of second
-/// order by 12 dB.
+/// Smallest ratio of the powers at the two ends of the steepest octave, 10 dB: a random walk falls by 6 dB, a
+/// filter of second order by 12 dB.
 const STEEP: f64 = 10.0;
 /// Ratio of the median to the lower quartile of the power of noise in a bin. Its expected value is ln
 /// 2/ln(4/3) = 2.41; with 32 segments, it lies in this range.
@@ -67,8 +67,8 @@ fn first_band_from(bin: f64) -> usize {
     EDGES.iter().position(|&edge| edge as f64 >= bin).unwrap_or(EDGES.len()).min(EDGES.len() - 2)
 }
 
-/// Whether the power falls steeply from band `end` on, the first band below half the plateau's level, and
-/// stays low.
+/// Whether the power falls steeply and stays low. `end` is the first band whose power is below half the
+/// plateau's level; the fall may start one band earlier.
 fn falls_steeply(bands: &[PrefilterBand], end: usize, level: f64) -> bool {
     let stays =
         bands[first_band_from(ABOVE * EDGES[end] as f64)..].iter().all(|band| band.power <= FALLEN * level);

@@ -17,15 +17,16 @@ use glass_line::{GlassLine, TipPath};
 use portable_math as math;
 use serde::Serialize;
 
-/// Minimum number of frames with a height: fewer do not show how their errors are correlated.
+/// Minimum number of frames with a height: fewer do not determine the correlation of the errors.
 const FEWEST_FRAMES: usize = 50;
 /// Smallest travel of the tip within a stroke, m: about the height of a blade. As the lip bends, its tracked
 /// point moves up and down by some 10 um, which is 0.1 degrees over this travel.
 const LEAST_TRAVEL_M: f64 = 5e-3;
-/// Smallest fraction of the frames on one line: with fewer frames on it, the line is not the glass.
+/// Smallest fraction of the frames in which the tip lies on the fitted line; with fewer frames, the line is
+/// not the glass.
 const LEAST_ON_GLASS: f64 = 0.5;
-/// Smallest significant slope or curvature, in its standard deviations; chance exceeds it in one level
-/// recording of 370.
+/// A slope or curvature is significant if it exceeds this number of its standard deviations; by chance, it
+/// does so in one level recording of 370.
 const CLEAR_DEVIATIONS: f64 = 3.0;
 /// Smallest sag of a curved path, m; a smaller one is rounding of a path without noise.
 const LEAST_SAG_M: f64 = 1e-9;
@@ -126,8 +127,8 @@ pub fn measure_tilt(
     Ok(CameraTilt { angle_rad, sd_rad, curvature, centre_m, travel_m, frames: on_line, frames_off_glass })
 }
 
-/// Step in which the heights of the tip are written, m. Heights that never change show no step; then the
-/// coarsest step of the other columns is taken.
+/// Step in which the heights of the tip are written, m. If the heights never change, their step is unknown,
+/// and the coarsest step of the other columns is used.
 fn height_step_m(measured: &Quality) -> f64 {
     let tip_y = &measured.tip_y;
     let coarsest = || measured.channels().into_iter().filter_map(|(_, q)| q.step_m).fold(0.0, f64::max);

@@ -44,7 +44,8 @@ pub(crate) struct AccuracyRow {
     pub state_rms: f64,
     /// Largest error of the deflection, relative to its range.
     pub state_worst: f64,
-    /// Errors of the low and the high component, Hz; `None` unless run and reference both show the component.
+    /// Errors of the frequencies of the low and the high component, Hz; `None` unless the component is found
+    /// in both the run and the reference.
     pub components_hz: [Option<f64>; 2],
 }
 
@@ -126,7 +127,7 @@ pub(crate) struct ComponentPair {
     pub hz: [Option<f64>; 2],
 }
 
-/// Finds the components of every run in the same frames, whenever the run's own release occurs.
+/// Finds the components of every run in the same frames, regardless of the time of the run's own release.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ComponentReader {
     frames: Range<usize>,

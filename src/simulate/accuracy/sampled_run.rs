@@ -5,7 +5,7 @@ use crate::simulate::outputs::{SampleObserver, Transitions};
 use crate::simulate::scene::Scene;
 use crate::simulate::{RunResult, SolverOptions, Transition, run_scene_with};
 
-/// Maximum number of samples of a comparison: a longer run has a lower sampling rate.
+/// Maximum number of samples of a comparison; in a long run, the sampling rate is lowered accordingly.
 const MOST_SAMPLES: f64 = 1e5;
 
 /// Transitions and samples of a run.

@@ -8,7 +8,7 @@ use serde::Serialize;
 use std::sync::Arc;
 
 /// An instant that lies before a knot by less than this number of frames counts as the knot, so that no tiny
-/// piece remains. In this time, the jump of the third derivative moves the position by 1e-18 of its effect
+/// piece remains. The jump of the third derivative changes the position over this time by 1e-18 of the change
 /// over a frame.
 const NEAR_FRAMES: f64 = 1e-6;
 

@@ -40,9 +40,9 @@ impl EventLoop<'_> {
 
     /// Order of the zero of the gap at lift-off: the order of the largest term of the gap's series over a
     /// short time. The order is 1 after a rebound, 2 after a jump of the forces, and 3 after the normal force
-    /// passes zero, where the gap's acceleration is zero except for errors. A rebound that falls back has
-    /// order 1 whatever the other terms are; otherwise a smaller positive term of lower order only widens the
-    /// gap.
+    /// passes zero, where the gap's acceleration is zero except for errors. A rebound whose gap decelerates
+    /// has order 1 regardless of the other terms. In other cases, a lower-order term may be neglected if it
+    /// is positive and smaller, because it only widens the gap.
     pub(super) fn gap_order(&self, state: &FlightState) -> u8 {
         /// Length of this short time, as a fraction of the shortest period.
         const SHARE: f64 = 1e-3;
@@ -175,18 +175,17 @@ impl EventLoop<'_> {
         }
     }
 
-    /// Computes the impact with the scene's restitution, or with zero restitution if its train of rebounds
-    /// counts as over. The remaining rebounds, of total duration `T (1 + e + e^2 + ...)`, transmit the same
-    /// impulse as contact in that time, so that closing the train early moves the tip by at most the height
-    /// of a rebound.
+    /// Computes the impact with the scene's restitution, or with zero restitution if the train of rebounds
+    /// counts as over. The remaining rebounds last `T (1 + e + e^2 + ...)` and transmit the same impulse as
+    /// contact during that time. Ending the train early therefore moves the tip by at most the height of a
+    /// rebound.
     fn rebound_or_close(&mut self, strike: TipStrike) -> Option<(FlightState, ImpactOutcome)> {
-        /// A rebound shorter than this fraction of the shortest period closes its train. The fraction is ten
-        /// times the limit of chattering, so that the train closes first.
+        /// A rebound shorter than this fraction of the shortest period ends its train. The fraction is ten
+        /// times that of chattering, so that the train ends before it counts as chattering.
         const RESOLUTION: f64 = 1e-5;
-        /// A rebound shorter than this fraction of the shortest period counts as short, and the second number
-        /// is the maximum number of consecutive short rebounds in a train, which might never end for a
-        /// restitution near 1. With a restitution of 0.99, it takes 690 rebounds from `SHORT` to
-        /// `RESOLUTION`.
+        /// A rebound shorter than this fraction of the shortest period counts as short. A train has at most
+        /// `MOST_SHORT` consecutive short rebounds, because it might never end for a restitution near 1. With
+        /// a restitution of 0.99, rebounds shorten from `SHORT` to `RESOLUTION` in 690 rebounds.
         const SHORT: f64 = 1e-2;
         const MOST_SHORT: u32 = 1000;
         let rebound = self.solve_strike(&strike)?;

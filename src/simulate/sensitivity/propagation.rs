@@ -71,9 +71,9 @@ impl<'a, O> TangentPropagator<'a, O> {
         room: &'a mut TangentWorkspace,
         [tolerance, accuracy]: [f64; 2],
     ) -> Self {
-        /// The rate of a guard has the error of the solution. If the rate exceeds this fraction of its terms,
-        /// and this multiple of the tolerance times its terms, derivatives of the transition time have errors
-        /// of about a thousandth.
+        /// Smallest rate of a guard, as a fraction of the sum of its absolute terms: the larger of `GRAZING`
+        /// and `TOLERANCES` times the tolerance. The rate has the error of the solution, so that at this
+        /// limit derivatives of the transition time have relative errors of about a thousandth.
         const GRAZING: f64 = 1e-6;
         const TOLERANCES: f64 = 1e3;
         let TangentWorkspace { blocks, works } = room;

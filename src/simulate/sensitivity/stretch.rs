@@ -103,8 +103,8 @@ pub(super) struct StretchPlanner {
 impl StretchPlanner {
     /// A planner for this relative tolerance; `fastest` is a first guess of the largest rate, 1/s.
     ///
-    /// For a sine over `z` radians, `s` nodes have the error `z^(s + 2) s! / (4 s^2 (2 s)!)`: the first
-    /// Legendre polynomial that the approximation of the second derivative lacks, integrated twice.
+    /// For a sine over `z` radians, `s` nodes have the error `z^(s + 2) s! / (4 s^2 (2 s)!)`: this is the
+    /// first Legendre polynomial missing from the approximation of the second derivative, integrated twice.
     pub(crate) fn new(relative: f64, fastest: f64) -> Self {
         let mut limits = [0.0; MOST_NODES + 1];
         let mut ratio = 1.0; // (2 s)! / s!

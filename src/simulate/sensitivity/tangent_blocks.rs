@@ -329,7 +329,7 @@ pub(super) fn rates_after(motion: &TaylorMotion, mode: TipMode, x: f64) -> [f64;
 }
 
 impl StateTangent {
-    /// Adds the change of the state in the change `time` of the instant.
+    /// Adds the change of the state that a change `time` of its instant causes: `rates` times `time`.
     pub(super) fn shift_in_time(&mut self, rates: &[f64; 6], time: LaneVector) {
         let ([theta, phi], [theta_rate, phi_rate]) = (&mut self.angle, &mut self.rate);
         let rows = [theta, phi, theta_rate, phi_rate, &mut self.gap_m, &mut self.gap_rate];

@@ -164,7 +164,7 @@ impl ChannelWeights {
     }
 
     pub(super) fn over_interval(place: &StretchPlace, [from, to]: [f64; 2], order: usize) -> Self {
-        /// Phase of the fastest derivative over which four nodes have an error of 1e-11, rad.
+        /// Phase of the fastest derivative, rad, over which the rule with four nodes has an error of 1e-11.
         const RESOLVED: f64 = 0.6;
         let mut out = Self::empty();
         let mut powers = [from, to];

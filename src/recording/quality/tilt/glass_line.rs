@@ -110,19 +110,19 @@ fn stroke_means<'a>(
 /// Number of blocks of frames for the first line: enough for a robust median slope, few enough to use all
 /// pairs.
 const SLOPE_BLOCKS: usize = 64;
-/// Smallest distance of two blocks whose slope is used, as a fraction of the travel: noise dominates shorter
-/// distances.
+/// Smallest distance between two blocks for their slope to be used, as a fraction of the travel: noise
+/// dominates the slope over a shorter distance.
 const OUTLYING_PLACES: f64 = 0.25;
-/// Largest distance from the line of a tip on the glass, in standard deviations; chance exceeds it in 1 frame
-/// of 16,000.
+/// A tip farther from the line than this number of standard deviations is off the glass; by chance, a tip on
+/// the glass is farther in 1 frame of 16,000.
 const NEAR_DEVIATIONS: f64 = 4.0;
 /// Median of |x| of a standard normal variable.
 const NORMAL_MEDIAN: f64 = 0.674_489_75;
 /// A tip within this distance of the line always counts as on the glass, m: the rounding of a trace without
 /// noise.
 const LEAST_DISTANCE_M: f64 = 1e-9;
-/// Largest distance of a position outside the travel, as a fraction of the travel; positions farther out are
-/// outliers.
+/// Largest distance by which a position may lie outside the travel, as a fraction of the travel; a position
+/// farther out is an outlier.
 const BEYOND_STEPS: f64 = 0.1;
 /// Maximum number of iterations; the frames on the glass rarely change after five.
 const MOST_REPETITIONS: usize = 30;
@@ -193,8 +193,8 @@ fn median_or_zero(values: impl Iterator<Item = f64>) -> f64 {
     median_in_place(&mut values.collect::<Vec<_>>()).unwrap_or(0.0)
 }
 
-/// Maximum number of frames; of a longer recording, only every n-th frame is used. They give the angle far
-/// better than needed.
+/// Maximum number of frames; of a longer recording, only every n-th frame is used. These frames determine the
+/// angle far better than needed.
 const MOST_FRAMES: usize = 100_000;
 /// Fraction of the positions at either end that the travel of a stroke leaves out, because they may be
 /// outliers.
@@ -262,15 +262,15 @@ fn stroke_travel_m(stroke: &[TipPoint]) -> f64 {
 /// Maximum number of values for the correlation of errors. Longer recordings are averaged in groups of
 /// frames, which preserves the slow errors that matter for a slope.
 const MOST_VALUES: usize = 20_000;
-/// Largest lag in the sum of correlations, in units of that sum; the limit is five correlation times (Sokal
-/// 1997). Longer lags only add noise.
+/// Ratio of the largest lag in the sum of correlations to the number of correlated values; the largest lag is
+/// then five correlation times (Sokal 1997). Longer lags only add noise.
 const WINDOW: f64 = 2.5;
 /// Smallest fraction of the variance of the errors that is assumed to remain in the residuals of a fit. For
 /// errors that are correlated over the whole recording, the computed fraction would be smaller.
 const LEAST_LEFT: f64 = 0.1;
 
 /// Long-run variance of the heights about the line, m^2: the variance of a frame times the number of frames
-/// over which errors are correlated. The variance of a sum of `n` errors is `n` times this variance.
+/// over which errors are correlated. The sum of `n` errors has `n` times this variance.
 pub(super) fn long_run_variance(path: &TipPath, line: &GlassLine) -> f64 {
     let group = path.points.len().div_ceil(MOST_VALUES);
     let values = group_averages(path, line, group);
