@@ -1,5 +1,5 @@
-//! Work that runs without the interpreter lock, in threads that a forked process creates anew, and that
-//! Ctrl-C ends.
+//! Runs work without the interpreter lock. Ctrl-C ends the work, and a forked process creates its threads
+//! anew.
 
 use crate::errors;
 use pyo3::prelude::*;

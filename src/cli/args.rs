@@ -31,8 +31,8 @@ pub(crate) struct GlobalArgs {
     pub csv_dialect: CsvDialect,
 }
 
-/// Maximum number of threads, more than a machine has cores. Each thread needs megabytes, so that a hundred
-/// thousand would bring down the machine.
+/// Maximum number of threads; few machines have as many cores. Each thread needs megabytes of memory, so that
+/// a hundred thousand threads would bring down the machine.
 const MOST_THREADS: usize = 1024;
 
 fn parse_threads(text: &str) -> Result<usize, String> {

@@ -75,7 +75,7 @@ impl CheckpointWriter {
         })
     }
 
-    /// Locks the file; if it is resumed and has a header, `take` reads it.
+    /// Locks the journal. If the journal is resumed and has a header, `take` reads its contents.
     fn open_with<R: CheckpointRecord, T>(
         path: &Path,
         resume: bool,
@@ -109,7 +109,8 @@ impl CheckpointWriter {
         Ok((opened, Some(taken)))
     }
 
-    /// Plans how a journal with this end is continued; `None` if it has no complete header.
+    /// Plans how a resumed journal is continued after `end`; `end` is `None` if the journal has no complete
+    /// header.
     fn plan_resume(&mut self, name: &str, is_empty: bool, end: Option<CheckpointEnd>) {
         self.due = Some(match end {
             None => {

@@ -89,7 +89,7 @@ impl CollectArgs {
     }
 }
 
-/// The shards, out of `of`, of which not all points are known; in ascending order.
+/// Numbers of the shards of which a point is missing, for a division into `of` shards; in ascending order.
 fn incomplete_tasks(points: &PointCollection<File>, of: usize) -> Outcome<TaskList> {
     Shard::new(0, of).ok_or_else(|| too_many_shards(of))?;
     let mut due = vec![false; of];

@@ -155,13 +155,14 @@ impl<I: Iterator<Item = String>> Read for ChunkReader<I> {
 pub(crate) struct OutputFolder {
     folder: PathBuf,
     writer: WritePolicy,
-    /// Location of the nameless files until then: the folder, or its nearest existing parent.
+    /// Folder of the nameless files until they are complete: the final folder, or its nearest existing
+    /// parent.
     temporary_folder: PathBuf,
 }
 
 impl OutputFolder {
-    /// Checks before the work that `folder` exists or can be created, that it is writable, and that it
-    /// contains nothing that the files `names` must not replace. This is checked again when the files are
+    /// Checks, before the results are computed, that `folder` exists or can be created, that it is writable,
+    /// and that the files `names` may replace what it contains. This is checked again when the files are
     /// written.
     pub(crate) fn check(folder: &Path, writer: &WritePolicy, names: &[&str]) -> Outcome<Self> {
         let near = Self::find_writable_ancestor(folder)?;
@@ -299,7 +300,7 @@ impl FigureArgs {
 pub(crate) struct StreamedTable {
     pub file: PendingFile,
     row: String,
-    /// Rows that are held back until there are enough rows for a table, and number of rows still missing.
+    /// Rows held back until the table has its minimum number of rows, and number of rows still missing.
     held: String,
     missing: usize,
     /// Time spent on formatting and writing, which does not count towards the time of the run.

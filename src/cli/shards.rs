@@ -35,8 +35,8 @@ pub(crate) fn shard_files(folder: &Path) -> Outcome<Vec<(Shard, PathBuf)>> {
     Ok(shards)
 }
 
-/// Calls `each` with those records of another shard that are `wanted`. A shard of another problem or version
-/// is refused; a damaged shard is left to `wiperlab collect`.
+/// Reads another shard: calls `each` with its records if they are `wanted`. A shard of another problem or
+/// version is refused; a damaged shard is left to `wiperlab collect`.
 pub(crate) fn scan_shard<R: CheckpointRecord>(
     path: &Path,
     header: &CheckpointHeader<R::Body>,

@@ -171,7 +171,7 @@ fn submission_failure(script: &str, submitted: &str, complaint: &str) -> Failure
     Failure::Internal(format!("{script}: `{}` failed: {complaint}; {state}", slurm::SBATCH))
 }
 
-/// Path of the program to start for tasks, if this code runs within another process.
+/// Path of the program that is started for tasks, if this code runs within another process such as Python.
 static EXECUTABLE_PATH: OnceLock<PathBuf> = OnceLock::new();
 
 /// Sets the path of the program; only the first call counts.

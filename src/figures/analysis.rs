@@ -32,7 +32,8 @@ impl AnalysedWindow<'_> {
 
 // Spectra of a recording and of a model in the same window.
 
-/// Ratio to the amplitude of the model's largest component below which a component of the model is left out.
+/// A component of the model is left out if the ratio of its amplitude to that of the model's largest
+/// component is below this value.
 const LEAST_OF_MODEL: f64 = 1e-3;
 
 /// The spectra and components of a recording and of a model in the same window. Leaves out components of the
@@ -98,8 +99,8 @@ pub(super) fn spectrum_level(analysis: &SpectralAnalysis, amplitude_m: &[f64]) -
         .then(|| SpectrumLevel { frequency_hz: frequency_hz.clone(), amplitude_m: amplitude_m.to_vec() })
 }
 
-/// A component with the amplitude of the spectrum at its frequency. The fitted amplitude may lie above the
-/// peak of the spectrum: it may be that at the start of a decay, or the mean of a drifting component.
+/// A component, drawn at the height of the spectrum at its frequency. Its fitted amplitude may be larger:
+/// that of a decay is the amplitude at the start, and that of a drifting component is a mean.
 pub(super) fn label_component(c: &Component, spectrum: &Spectrum) -> LabelledComponent {
     let bin_hz = spectrum.frequency_hz.get(1).copied().unwrap_or(f64::INFINITY);
     let height_m = spectrum.amplitude_m.get((c.frequency_hz / bin_hz).round() as usize).copied();
@@ -238,7 +239,8 @@ impl AnalysedWindow<'_> {
 const POINTS_A_CYCLE: f64 = 12.0;
 /// Maximum number of points of a fitted line; more would lie closer together than pixels.
 const MOST_POINTS: f64 = 40_000.0;
-/// A component decays if its damping ratio exceeds this many standard deviations.
+/// A component counts as decaying if its damping ratio exceeds this multiple of the ratio's standard
+/// deviation.
 const DECAYS: f64 = 3.0;
 
 impl AnalysedWindow<'_> {
@@ -364,8 +366,8 @@ mod tests {
 
     const RATE_HZ: f64 = 5000.0;
 
-    /// The plotted spectrum of a record with noise and with one frame in `lost` missing, and the spectrum of
-    /// the record without noise.
+    /// The plotted spectrum of a record with noise, and the spectrum of the same record without noise; every
+    /// `lost`-th frame is missing.
     fn drawn(of_m: impl Fn(f64) -> f64, noise_m: f64, lost: usize) -> (SpectraPlot, SpectrumCurve) {
         let mut seed = 7_u64;
         let mut draw = || {

@@ -277,8 +277,8 @@ const RELEASE_LEAD: f64 = 0.02;
 const FOLLOW_UP: f64 = 0.3;
 
 impl PlaybackPace {
-    /// The hold of the tip, and then, still slower, its release with some cycles; both are limited to
-    /// `within`. `None` if nothing is left within that limit.
+    /// Two parts: the hold of the tip and, slowed down more, its release with some cycles. Both are limited
+    /// to the interval `within`; `None` if both lie outside that interval.
     #[must_use]
     pub fn around_hold([hold_s, release_s]: [f64; 2], within: [f64; 2]) -> Option<Self> {
         let length = release_s - hold_s;

@@ -216,8 +216,8 @@ fn draw_cells(shown: &CornerPlot) -> Vec<Series> {
     let pairs = || (0..count).flat_map(|i| (0..i).map(move |j| (i, j)));
     let pair = |(i, j): (usize, usize)| (&shown.parameters[i], &shown.parameters[j]);
     let diagonal = || shown.parameters.iter().enumerate();
-    // `point` needs the values of the column's and the row's parameter, `upright` a value and a height in a
-    // diagonal cell
+    // `point` converts a value of the column's parameter and one of the row's parameter; `upright` converts a
+    // value and a height in a diagonal cell
     let point = |(i, j): (usize, usize), x: f64, y: f64| {
         clip_to_cell((cell_position(x, spans[j]), cell_position(y, spans[i])), cell_centre(shown, i, j))
     };
@@ -302,7 +302,7 @@ fn clip_to_cell((x, y): (f64, f64), at: (f64, f64)) -> Option<(f64, f64)> {
     (x.abs() <= HALF && y.abs() <= HALF).then_some((at.0 + x, at.1 + y))
 }
 
-/// The ranges outside the bounds that the diagonal cells show.
+/// Shaded bands in the diagonal cells over those parts of the shown ranges that lie outside the bounds.
 fn out_of_bounds_ribbons(shown: &CornerPlot) -> Vec<Ribbon> {
     let strip = |(i, known): (usize, &CornerParameter)| {
         let (span, at) = (shown_range(known), cell_centre(shown, i, i));

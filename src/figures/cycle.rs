@@ -39,7 +39,7 @@ const AXIS_MARGIN: f64 = 1.12;
 const LABEL_POSITIONS: [f64; 3] = [0.24, 0.52, 0.79];
 /// Number of letters after which the name of a target is cut.
 const MAX_LABEL_LETTERS: usize = 12;
-/// Lines closer together than this have their names at different positions; fraction of the height.
+/// Distance between two lines below which their names have different positions, as a fraction of the height.
 const CLOSE_LEVELS: f64 = 0.09;
 /// Distance of a name from its line, fraction of the height.
 const LABEL_OFFSET: f64 = 0.022;
@@ -122,12 +122,13 @@ fn cycle_series(shown: &CycleOverSpeed) -> impl Iterator<Item = Series> {
 
 // The cycle of a condition against the speed of the tip.
 
-/// Neighbouring frequencies whose ratio is larger belong to different components.
+/// Two neighbouring frequencies belong to different components if the ratio of the higher to the lower one
+/// exceeds this value.
 const COMPONENT_RATIO: f64 = 2.5;
 /// A cycle is called constant if its frequency range is below this fraction of its mean frequency.
 const CONSTANT_TOLERANCE: f64 = 0.03;
-/// The cycle depends on the speed if the mean frequencies at the faster and at the slower half of the speeds
-/// differ by more than this fraction of the frequency range.
+/// The cycle rises or falls with the speed if the mean frequency at the faster half of the points differs
+/// from that at the slower half by more than this fraction of the frequency range.
 const MIN_SPEED_TREND: f64 = 0.2;
 
 /// The figure of a condition; `None` if neither recording nor model shows a cycle.
@@ -164,8 +165,8 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     Some(case.figure_block("cycle", words, draw_figure(&shown)))
 }
 
-/// Lowest frequency of the stick-slip cycle, Hz. If a ridge jumps between the cycle and the slow swing of the
-/// head, there is a wide gap between their frequencies.
+/// Lowest frequency of the stick-slip cycle, Hz: the frequency above the highest wide gap, since a ridge may
+/// jump between the cycle and the slow swing of the head; 0 without such a gap.
 fn cycle_threshold_hz(mut all: Vec<f64>) -> f64 {
     all.sort_by(f64::total_cmp);
     let gap = all.windows(2).rev().find(|pair| pair[1] > COMPONENT_RATIO * pair[0]);

@@ -49,8 +49,8 @@ pub struct EvidencePlot {
     pub parts: Vec<EvidencePart>,
 }
 
-/// A residual whose ratio to the noise is at most this counts as noise only; the noise is known to a few per
-/// cent.
+/// A residual counts as noise only if the ratio of its root mean square to the noise is at most this value;
+/// the value exceeds 1 since the noise is known only to a few per cent.
 pub(crate) const NOTHING_LEFT: f64 = 1.1;
 /// Heights of the panels, mm.
 const HEIGHT_MM: f64 = 30.0;
@@ -144,8 +144,8 @@ fn sample_curve(course: &TimeCurve, factor: f64) -> Option<SampledSeries> {
 const AROUND_RELEASE_S: (f64, f64) = (0.005, 0.03);
 /// Length of the worst part, s: a dozen cycles of the high component.
 const LATE_S: f64 = 0.015;
-/// Smallest fraction of frames with a value that the worst part needs; in a part with fewer values the mean
-/// square scatters more, and could be the largest by chance.
+/// Minimum fraction of the frames of the worst part that have a value. The mean square of fewer values
+/// scatters more, and could be the largest by chance.
 const LEAST_PRESENT: f64 = 0.5;
 
 /// The figure of a condition; `None` without a recording, or if recording and model move in opposite
@@ -192,7 +192,7 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
 }
 
 /// Start and end, s, of the part of length [`LATE_S`] with the largest mean square residual, within a time
-/// interval. An interval shorter than that is returned whole; `None` if it contains no value.
+/// interval. An interval shorter than [`LATE_S`] is returned whole; `None` if the interval contains no value.
 fn worst_s(residual: &MotionTraces, channel: Channel, (from_s, to_s): (f64, f64)) -> Option<(f64, f64)> {
     let first = residual.time_s.partition_point(|t| *t < from_s);
     let end = residual.time_s.partition_point(|t| *t <= to_s);
@@ -226,7 +226,8 @@ fn channel_between(motion: &MotionTraces, channel: Channel, (from_s, to_s): (f64
     all.filter(|(t, _)| **t >= from_s && **t <= to_s).map(|(t, x)| x.map(|x| (*t, x))).collect()
 }
 
-/// A smooth curve from the states of the model; `None` if its frames are at least as close together.
+/// A smooth curve from the states of the model; `None` if the frames of the recording are at least as close
+/// together as these states.
 fn model_states_curve(
     case: &ConditionComparison,
     channel: Channel,
@@ -298,7 +299,7 @@ fn figure_text(
     FigureText { caption, details }
 }
 
-/// For a fit to traces: sentence on the misfit of the longest segments, at each of which the model restarts.
+/// Sentence on the misfit of a fit to traces in its longest segments; the model restarts at each segment.
 fn describe_segments(case: &ConditionComparison) -> Option<String> {
     let misfit = case.result.misfit.as_ref()?;
     let own = |found: &&ChannelMisfit| found.recording == case.name();

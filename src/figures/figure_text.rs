@@ -24,7 +24,7 @@ impl ConditionComparison<'_> {
         format!("{}{of}", truncate_text(&self.job.title, TITLE_LETTERS))
     }
 
-    /// The line under a heading, which says if no traces are published.
+    /// The line under a heading: `text`, preceded by a note if no traces are published.
     pub(crate) fn heading_note(&self, text: &str) -> String {
         about(if self.recording().is_none() { NO_TRACES } else { "" }, text)
     }

@@ -38,8 +38,8 @@ pub struct TimeHistory {
 const HEIGHT_MM: f64 = 24.0;
 const ENLARGED_HEIGHT_MM: f64 = 32.0;
 const RESIDUAL_HEIGHT_MM: f64 = 13.0;
-/// Height of a window's row, and smallest height of the panel of windows, which leaves room for its label,
-/// mm.
+/// Height of a window's row, and minimum height of the panel of windows, mm; the label of a lower panel would
+/// not fit.
 const ROW_MM: f64 = 3.0;
 const LEAST_ROWS_MM: f64 = 12.0;
 /// A quantity whose values span less than this, m, is drawn in micrometres.
@@ -197,8 +197,8 @@ pub(super) fn length_unit(values: impl Iterator<Item = f64>) -> (&'static str, f
 
 // Shaded spans of the stick intervals.
 
-/// Smallest gap between short sticks that are drawn separately, as a fraction of the shown time; it is less
-/// than a millimetre on a page.
+/// Neighbouring sticks are drawn as one span if their durations and the gap between them are below this
+/// fraction of the shown time; on a page, it is less than a millimetre.
 const MIN_STICK_GAP: f64 = 0.005;
 
 const STICKS_LABEL: &str = "tip sticks (model)";

@@ -51,7 +51,7 @@ pub(crate) fn draw_figures(title: &str, blade: &Linkage) -> [Figure; 2] {
     [Figure { columns: 1, ..answer }, figure(swing, "The links at both ends of a swing", shapes.collect())]
 }
 
-/// The main result with its numbers; the same for both figures if there is no stable mode.
+/// The main result with its numbers, or the statement that there is no stable mode.
 fn claim_sentence(numbers: Vec<String>, before: &str, after: &str) -> String {
     if numbers.is_empty() {
         return "The blade has no stable mode".to_owned();

@@ -55,8 +55,8 @@ pub fn draw_figure(shown: &PhasePortrait) -> Figure {
     }
 }
 
-/// Maximum number of measured states that are drawn as circles; more states are drawn as dots, which do not
-/// overlap in a narrow figure.
+/// Maximum number of measured states of a part that are drawn as circles. If a part has more, all parts have
+/// dots, which do not overlap in a narrow figure.
 const MOST_CIRCLES: usize = 80;
 
 /// Symbol of the measured states, the same in all parts. A line from frame to frame would mostly show the
@@ -82,7 +82,8 @@ fn draw_panel(part: &PortraitPart, frames: Mark) -> Panel {
 /// axis.
 fn deflection_limits_mm(part: &PortraitPart) -> (f64, f64) {
     const AXIS_MARGIN: f64 = 0.05;
-    // as a ratio to the values; a smaller span is rounding error, and too small for tick labels
+    // smallest margin, relative to the largest value; a smaller one is rounding error and too small for tick
+    // labels
     const LEAST_SPAN: f64 = 1e-4;
     let all = part.measured.iter().chain(&part.model).flatten().map(|(x, _)| x * 1e3);
     let (low, high) = value_span(all.filter(|x| x.is_finite()));
@@ -94,9 +95,9 @@ fn deflection_limits_mm(part: &PortraitPart) -> (f64, f64) {
 /// that neighbouring cycles remain distinct.
 pub(crate) const MAX_VELOCITY_NOISE: f64 = 0.1;
 /// Longest time between the two frames of a central difference, in periods of the fastest component. A fifth
-/// of a period reduces the velocity amplitude by 6 %, in recording and model alike. At 900 Hz with 2 um of
-/// position noise, it gives a velocity noise of 13 mm/s; a twentieth of a period would reduce the amplitude
-/// by 0.4 % but give 51 mm/s, a quarter of a typical velocity range.
+/// of a period reduces the velocity amplitude by 6 %, in recording and model alike; at 900 Hz with 2 um of
+/// position noise, the velocity noise is 13 mm/s. With a twentieth of a period, the reduction would be only
+/// 0.4 %, but the velocity noise 51 mm/s, a quarter of a typical velocity range.
 const MAX_DIFFERENCE_PERIODS: f64 = 0.2;
 
 /// Central difference: velocity from the positions in two frames, equally far before and after.
@@ -114,9 +115,10 @@ impl CentralDifference {
         Self { half_frames: 1, frame_rate_hz }
     }
 
-    /// The shortest difference that keeps the velocity noise below [`MAX_VELOCITY_NOISE`] times the velocity
-    /// range, m/s, for white position noise, m. It spans at most a fifth of a period of the fastest
-    /// component, Hz; if that frequency is unknown, it is the difference between neighbouring frames.
+    /// The shortest difference whose velocity noise, for white position noise, m, is below
+    /// [`MAX_VELOCITY_NOISE`] times the velocity range, m/s. The time between its frames is at most a fifth
+    /// of a period of the fastest component, Hz, even if the noise is then larger. If that frequency is
+    /// unknown, the difference is that between neighbouring frames.
     pub(crate) fn for_noise(rate_hz: f64, noise_m: f64, swing_m_per_s: f64, fastest_hz: Option<f64>) -> Self {
         let shortest = Self::of_neighbouring_frames(rate_hz);
         let least = (shortest.noise_m_per_s(noise_m) / (MAX_VELOCITY_NOISE * swing_m_per_s)).ceil();
@@ -170,8 +172,8 @@ pub(crate) fn swing_m_per_s(states: &[PhasePoint]) -> Option<f64> {
     velocities().reduce(f64::max).zip(velocities().reduce(f64::min)).map(|(high, low)| high - low)
 }
 
-// Parts of the portrait: one after the release, and one at the top speed of the head, or at that of the tip
-// if it sticks then.
+// Parts of the portrait: one after the release, and one at the top speed of the head. If the tip sticks at
+// that time, the second part is at the top speed of the tip.
 
 /// Numbers of cycles that remain readable: few of the low component, whose loops shift, and more of the high
 /// component, whose loops repeat.
@@ -179,8 +181,8 @@ const LOW_CYCLES: f64 = 3.0;
 const HIGH_CYCLES: f64 = 12.0;
 /// Longest part, s, and length of a part if no frequency is known: some tens of cycles of the high component.
 const LONGEST_S: f64 = 0.06;
-/// Minimum number of samples of the model in half a difference, so that linear interpolation follows its
-/// path.
+/// Minimum number of samples of the model in half the time between the two frames of a difference, so that
+/// linear interpolation follows the path of the model.
 const SAMPLES_APART: f64 = 2.0;
 /// Largest fraction of a part for which the tip may stick.
 const MOST_STUCK: f64 = 0.8;
@@ -538,8 +540,8 @@ mod tests {
                 "{noise} of {swing}"
             );
         }
-        // for a component of a tenth of that amplitude, no difference that follows it is quiet enough, so the
-        // longest permitted difference is used
+        // with a velocity range of 0.1 m/s, the noise of every permitted difference is too large, so the
+        // longest permitted one is used
         let drowned = CentralDifference::for_noise(2e5, NOISE_M, 0.1, Some(FASTEST_HZ));
         assert_eq!(drowned.half_frames, 22);
         assert!(drowned.noise_m_per_s(NOISE_M) > MAX_VELOCITY_NOISE * 0.1);

@@ -77,7 +77,8 @@ fn rest_span_s(motion: &RunMotion, turn_s: f64) -> Option<[f64; 2]> {
     motion.stick_s.iter().filter(near).max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0]))).copied()
 }
 
-/// Index of the first sample from `from` on whose deflection is at most `share` times that at `from`.
+/// Index of the first sample, from index `from` on, whose deflection is at most `share` times that of sample
+/// `from`.
 fn head_over_tip_index(samples: &[ModelSample], from: usize, share: f64) -> Option<usize> {
     let deflection = |s: &ModelSample| s.tip_x_m - s.head_x_m;
     let after = samples.get(from..)?;

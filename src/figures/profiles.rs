@@ -31,8 +31,8 @@ pub struct ParameterProfile {
     pub truth: Option<f64>,
     /// Values of the parameter, ascending, each with the rise of the least cost at that value.
     pub points: Vec<(f64, f64)>,
-    /// Values of the parameter, each with the rise of the cost by the linear model at the estimate; empty if
-    /// that model does not determine the parameter.
+    /// Values of the parameter, each with the rise of the cost that the linear model at the estimate
+    /// predicts; empty if that model does not determine the parameter.
     pub linear: Vec<(f64, f64)>,
     /// The 95 % interval that the page states; `None` for an open end.
     pub stated: [Option<f64>; 2],
@@ -131,13 +131,13 @@ fn closed_interval(parameter: &FreeParameter, found: &ParameterResult) -> [Optio
     found.profile_95.map(|end| end.filter(inside))
 }
 
-/// Half width of the drawn parabola, in half widths of the linear interval; the parabola reaches the top of
-/// the axes.
+/// Ratio of the half width of the drawn parabola to that of the linear interval; large enough that the
+/// parabola reaches the top of the axes.
 const REACH: f64 = 2.0;
 
-/// The cost by the linear model: a parabola in the search scale that crosses the threshold at the ends of the
-/// linear interval. An end may have been cut at a bound, so the longer half is used; empty if both ends are
-/// at bounds.
+/// Rise of the cost according to the linear model: a parabola in the search scale that crosses the threshold
+/// at the ends of the linear interval. One end may have been cut at a bound, so the parabola uses the longer
+/// half of the interval; empty if both ends are at bounds.
 fn linear_model_parabola(
     parameter: &FreeParameter,
     found: &ParameterResult,
@@ -248,7 +248,7 @@ fn interval_bar(
     })
 }
 
-/// Shaded spans of the shown ranges outside the bounds.
+/// Shaded spans of those parts of the shown range that lie outside the bounds.
 fn out_of_bounds_spans(profile: &ParameterProfile, factor: f64, (low, high): (f64, f64)) -> Vec<ShadedSpan> {
     let (lower, upper) = (profile.bounds.0 * factor, profile.bounds.1 * factor);
     let band = |from, to| ShadedSpan::new("out of bounds", Colour::Grey, from, to);
@@ -272,7 +272,8 @@ fn x_limits(profile: &ParameterProfile, top: f64) -> (f64, f64) {
     (low - room, high + room)
 }
 
-/// Value at which the line from the neighbour below the top to a point above the top crosses the top.
+/// Value at which the profile crosses the top, interpolated between a point above the top and its neighbour
+/// below.
 fn crossing_at_top(profile: &ParameterProfile, at: usize, (value, rise): (f64, f64), top: f64) -> f64 {
     let neighbours =
         [at.checked_sub(1), at.checked_add(1)].into_iter().flatten().filter_map(|i| profile.points.get(i));
@@ -347,7 +348,7 @@ fn is_closed(profile: &ParameterProfile) -> bool {
     profile.intervals[0].is_some_and(|ends| ends.iter().all(Option::is_some))
 }
 
-/// Clause such as "A from 0.1 to 0.2", or on the end that is open.
+/// Clause on the interval, such as "A from 0.1 to 0.2"; it names an end that is open.
 fn describe_interval(profile: &ParameterProfile) -> String {
     let [lower, upper] = profile.intervals[0].unwrap_or_default();
     let (unit, factor) = choose_prefix(&profile.unit, [profile.estimate]);

@@ -32,7 +32,7 @@ pub struct PullPlot {
 /// Height of a row, and smallest height of the axes, mm.
 const ROW_MM: f64 = 5.0;
 const LEAST_MM: f64 = 14.0;
-/// Half width of the interval in which a correct model lies in 95 % of all cases, standard deviations.
+/// Half width of the interval that contains 95 % of the pulls of a correct model, standard deviations.
 const WITHIN_95: f64 = 1.96;
 /// Number of letters after which a name is cut in the heading.
 const LETTERS: usize = 16;

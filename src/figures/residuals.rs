@@ -22,7 +22,7 @@ pub struct ResidualDiagnostics {
     pub histogram: Vec<(f64, f64, f64)>,
     /// Lags, s, and the autocorrelation of the residual.
     pub correlation: Vec<(f64, f64)>,
-    /// Value below which the autocorrelation of white noise lies in size at 95 % of the lags.
+    /// Value that the absolute autocorrelation of white noise exceeds at only 5 % of the lags.
     pub white_95: f64,
     /// Frequencies, Hz, each with the ratio of the power density of the residual to that of the noise.
     pub spectrum: Vec<(f64, f64)>,
@@ -116,7 +116,7 @@ fn draw_growth(shown: &ResidualDiagnostics) -> Option<Panel> {
 
 // Comparison of the residual of a condition with white noise.
 
-/// Number of bins of the histogram, and its smallest half width, standard deviations of the noise.
+/// Number of bins of the histogram, and minimum half width of its range, standard deviations of the noise.
 const HISTOGRAM_BINS: usize = 40;
 const MIN_HISTOGRAM_RANGE: f64 = 4.0;
 /// Longest lag, in frames and as a fraction of the recording.
@@ -130,8 +130,8 @@ const MAX_SPECTRUM_POINTS: usize = 300;
 const TAPERS: usize = 9;
 /// Half width of a two-sided 95 % interval, standard deviations.
 const Z_95: f64 = 1.96;
-/// A residual counts as white noise if its root mean square, in units of the noise, is below 1 plus this
-/// value and the correlation of neighbouring frames is below this value in size.
+/// A residual counts as white noise if the ratio of its root mean square to the noise is below 1 plus this
+/// value and the absolute correlation of neighbouring frames is below this value.
 const WHITE_NOISE_TOLERANCE: f64 = 0.1;
 
 /// The figure of a condition; `None` without a recording, with too few frames, or if recording and model move
@@ -190,7 +190,8 @@ fn claim_sentence(rms: f64, neighbours: f64) -> String {
     format!("The residual is {is} noise: {size} times its size, correlation {r}")
 }
 
-/// Density of the values in bins of a range symmetric about zero.
+/// Histogram of the values, over a range symmetric about zero: lower edge, upper edge and density of each
+/// bin.
 fn histogram_bins(values: &[f64]) -> Vec<(f64, f64, f64)> {
     let end = values.iter().map(|x| x.abs()).filter(|x| x.is_finite()).fold(MIN_HISTOGRAM_RANGE, f64::max);
     let width = 2.0 * end / HISTOGRAM_BINS as f64;
@@ -206,7 +207,7 @@ fn histogram_bins(values: &[f64]) -> Vec<(f64, f64, f64)> {
     counts.into_iter().enumerate().map(bin).collect()
 }
 
-/// Autocorrelation at lags of one frame and more, from the pairs of frames in which both have a value.
+/// Lags, s, from one frame upwards, and the autocorrelation from the pairs of frames that both have a value.
 fn autocorrelation(left: &[Option<f64>], rate_hz: f64) -> Vec<(f64, f64)> {
     let values = || left.iter().flatten();
     let count = values().count().max(1) as f64;
@@ -222,8 +223,8 @@ fn autocorrelation(left: &[Option<f64>], rate_hz: f64) -> Vec<(f64, f64)> {
     (1..=longest).filter_map(at).collect()
 }
 
-/// Ratio of the power density to that of white noise of unit variance, averaged to a limited number of
-/// points.
+/// Frequencies, Hz, and the ratio of the power density to that of white noise of unit variance; neighbouring
+/// frequencies are averaged if there are too many.
 fn power_density(left: &[Option<f64>], rate_hz: f64) -> Vec<(f64, f64)> {
     let Ok(found) = Multitaper::new(left, rate_hz, left.len(), TAPERS) else { return Vec::new() };
     let white = 2.0 / rate_hz;

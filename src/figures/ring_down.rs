@@ -117,7 +117,8 @@ fn thin_trace(trace: &RingDownTrace, factor: f64) -> Vec<Option<(f64, f64)>> {
     }
 }
 
-/// Dots if they are distinct in a journal column; otherwise a line, which also needs fewer bytes.
+/// Dots if neighbouring dots are distinct at the width of a journal column; otherwise a line, which also
+/// makes a smaller file.
 fn frame_mark(trace: &RingDownTrace) -> Mark {
     const MOST_DOTS: usize = 400;
     if trace.time_s.len() > MOST_DOTS { Mark::Thin } else { Mark::Dots }

@@ -48,7 +48,7 @@ pub struct SpectrogramPlot {
     pub title: String,
     /// Quantity, such as "deflection".
     pub quantity: String,
-    /// How the spectrogram was made, such as the length of the sliding window; empty for none.
+    /// Note on the settings of the spectrogram, such as the length of the sliding window; empty for none.
     pub note: String,
     /// Whether the motion is synthetic.
     pub synthetic: bool,
@@ -202,8 +202,8 @@ pub(crate) fn describe_ridge_segments(
 
 // Data of a spectrogram and of its ridge.
 
-/// Completes a plot with the times, frequencies and amplitudes of a spectrogram, up to a number of frequency
-/// bins, and with the parts of its ridge, which gaps separate.
+/// Adds to a plot the times, frequencies and amplitudes of a spectrogram, up to a number of frequency bins,
+/// and the parts of its ridge with gaps between them.
 pub(super) fn fill_map(
     plot: SpectrogramPlot,
     spectrogram: &time_frequency::Spectrogram,

@@ -200,7 +200,7 @@ impl SpectrumLevel {
     }
 }
 
-/// Radius of the circle around the complex amplitude of a bin that contains 95 % of the noise, in units of
+/// Radius of the circle that contains 95 % of the noise around the complex amplitude of a bin, in units of
 /// the root mean square of the noise: `sqrt(-ln 0.05)` (Rayleigh distribution of the magnitude).
 const CIRCLE_95: f64 = 1.730_818_382_602_285_7;
 

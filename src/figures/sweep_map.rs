@@ -205,8 +205,8 @@ impl ReasonPatterns {
         Self(given)
     }
 
-    /// One hatch for each reason that occurs in a map, in the order of the table of reasons; `cell` gives the
-    /// area of a point.
+    /// One hatch for each reason that occurs in a map, in the order of the table of reasons; `cell` returns
+    /// the rectangle of a point.
     pub(crate) fn reason_hatches(
         &self,
         reasons: &[Option<MissingReason>],
@@ -296,10 +296,10 @@ pub(in crate::figures) fn axis_label(axis: &SweepAxis) -> String {
 
 // Colour limits of a map.
 
-/// Quantiles of the values at the first and the last colour, if values beyond them are outliers.
+/// Quantiles of the values that set the first and the last colour if values outside them are outliers.
 const COLOUR_QUANTILES: [f64; 2] = [0.02, 0.98];
-/// Distance of an extreme value from its quantile above which it counts as an outlier, as a multiple of the
-/// range between the quantiles.
+/// The smallest or largest value counts as an outlier if its distance from the nearer quantile exceeds this
+/// multiple of the range between the quantiles.
 const OUTLIER_DISTANCE: f64 = 0.25;
 /// Minimum number of values for which outliers are sought.
 const MIN_OUTLIER_SAMPLES: usize = 8;
@@ -314,7 +314,8 @@ pub(super) fn colour_limits(values: &[Option<f64>]) -> Option<(f64, f64)> {
     sorted.sort_by(f64::total_cmp);
     let last = sorted.len() - 1;
     let [low, high] = COLOUR_QUANTILES.map(|share| share * last as f64);
-    // rounded inwards, so that even the extreme of a few values can be an outlier
+    // indices rounded inwards, so that the extreme of a few values is not its own quantile and can be an
+    // outlier
     let (low, high) = (sorted[low.ceil() as usize], sorted[high.floor() as usize]);
     let between = high - low;
     let end = |share: f64, extreme: f64| {

@@ -8,10 +8,10 @@ use plain_charts::{ChartAxis, Colour, ErrorBar, FULL_WIDTH_MM, Figure, Mark, Pan
 
 /// Number of samples of the motion per frame.
 pub(crate) const MOTION_SAMPLES: f64 = 8.0;
-/// Number of frames in an enlarged part, and number of these before its central instant.
+/// Number of frames in an enlarged part, and number of these frames before the release.
 const ENLARGED: f64 = 40.0;
 const BEFORE: f64 = 10.0;
-/// Fraction of the run after which a stick counts as late.
+/// A stick counts as late if it ends after this fraction of the run.
 const LATE: f64 = 0.75;
 /// Height of a panel, mm.
 const PANEL_MM: f64 = 40.0;
@@ -170,8 +170,8 @@ fn draw_camera_panel(twin: &TwinPlot) -> Panel {
     Panel { title, ..Panel::new(ChartAxis::time(), y, 0.8 * PANEL_MM, series) }
 }
 
-/// Ends, s, of the longest stick and of the last late stick, of those sticks that an enlarged part fits
-/// around.
+/// Names and instants, s, of the ends of the longest stick and of the last late stick. A stick is ignored if
+/// the enlarged part around its end would extend beyond the run.
 fn release_instants(twin: &TwinPlot) -> Vec<(&'static str, f64)> {
     let grid = twin.tracked.grid();
     let (start_s, end_s) = (grid.start_s, grid.time_s(grid.frames.saturating_sub(1)));

@@ -61,7 +61,7 @@ pub struct Instant {
     pub time_s: f64,
     /// Head, hinge and tip of the model.
     pub joints_m: [(f64, f64); 3],
-    /// The tracked head and tip; at the height of the model's point if no height was tracked.
+    /// The tracked head and tip; a point without a tracked height has the height of the model's point.
     pub tracked_m: [(f64, f64); 2],
     /// The frame of the video.
     pub frame: Frame,

@@ -2,12 +2,12 @@
 
 use plain_charts::number::{format_decimals, format_digits, format_short, format_with_sd, to_ascii, typeset};
 
-/// Prefixes with the factors to them, the smallest prefix last.
+/// Prefixes, from the largest to the smallest, each with the factor from the unit without a prefix.
 const PREFIXES: [(&str, f64); 3] = [("", 1.0), ("m", 1e3), ("\u{b5}", 1e6)];
 /// Units that get no prefix or have another name in text: name in files, name in text, and factor.
 const UNPREFIXED_UNITS: [(&str, &str, f64); 5] =
     [("1", "", 1.0), ("", "", 1.0), ("kg", "g", 1e3), ("kg m2", "g mm\u{b2}", 1e9), ("s/m", "s/m", 1.0)];
-/// Smallest value for which a larger prefix is kept: 0.2 N is as readable as 200 mN.
+/// A larger prefix is kept if the number is then at least this: 0.2 N is as readable as 200 mN.
 const LEAST_UNPREFIXED: f64 = 0.1;
 
 /// A unit with the prefix that makes the largest of some values readable, and the factor to that unit; the

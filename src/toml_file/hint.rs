@@ -3,7 +3,8 @@
 use crate::text::round_to_digits;
 use toml::de::DeValue;
 
-/// Number of digits of a converted number, since a product of decimal numbers may have too many.
+/// Number of digits to which a converted number is rounded; the product of two decimal numbers may have many
+/// more.
 const DIGITS: usize = 6;
 
 /// Prefixes of units with their factors.
@@ -82,7 +83,8 @@ fn suggest_without_unit(key: &str, text: &str) -> Option<String> {
     if unit.is_empty() {
         return None;
     }
-    // (the key `_n_per_m` ends in the unit of a denominator)
+    // (a key of a quotient, such as `_n_per_m`, ends in the unit of its denominator; there is no conversion
+    // for it)
     let mut prefixes = PREFIXES.iter().filter(|_| !key.contains("_per_"));
     let size = prefixes.find_map(|(prefix, factor)| {
         let rest = unit.strip_prefix(prefix)?;

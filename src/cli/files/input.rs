@@ -11,8 +11,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Name that stands for standard input on the command line.
 const STANDARD_INPUT: &str = "-";
-/// Size limit of a TOML file. A job with a thousand components has a quarter of this size. Parsing needs up
-/// to a hundred times as much memory.
+/// Size limit of a TOML file. A job with a thousand components has a quarter of this size. Parsing a file
+/// needs up to a hundred times its size in memory.
 const TOML_LIMIT: ReadLimit =
     ReadLimit { largest: FileSize(500_000), advice: "this is no file that people write; name another one" };
 /// Size limit of the result of a fit: about a hundred times the size of the results in this repository.

@@ -140,7 +140,7 @@ pub(crate) enum OutputCommand {
 }
 
 impl OutputCommand {
-    /// Name of the command on the command line; the marker has the same name.
+    /// Name of the command on the command line and in the marker.
     pub(crate) fn command_name(self) -> String {
         format!("{self:?}").to_lowercase()
     }

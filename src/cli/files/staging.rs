@@ -2,9 +2,9 @@
 //!
 //! Order of the steps: all files are flushed to the disk before any of them gets its name. Then the folder's
 //! marker is written and flushed; it lists the new files and those that they replace. Then the files are
-//! renamed one by one, and their names are flushed. Finally the marker is written that lists the files that
-//! are there. Thus a reader finds each file complete, either old or new, even after a power failure, and the
-//! next run of the command can prove what it finds.
+//! renamed one by one, and their names are flushed. Finally a marker is written that lists only the files now
+//! in the folder. Thus a reader finds each file complete, either old or new, even after a power failure, and
+//! the next run of the command can prove which files a command made.
 
 use super::guard::{OutputGuard, refuse_measured};
 use super::marker::{CsvDialect, FolderMarker, HashingReader, MARKER_FILE, MarkedFile, WritePolicy};
@@ -21,8 +21,8 @@ use tempfile::NamedTempFile;
 
 /// Prefix and suffix of temporary names.
 const TEMPORARY_NAME: (&str, &str) = (".wiperlab-", ".tmp");
-/// Age above which a temporary file without a lock was left by a program that was killed: a temporary file is
-/// locked within microseconds of its creation, until the program ends.
+/// A temporary file that is older than this and has no lock was left by a program that was killed: a program
+/// locks its temporary files within microseconds of their creation, until it ends.
 const ABANDONED_AFTER: Duration = Duration::from_secs(60);
 
 /// Files of a command under temporary names. They are removed if this is dropped before
@@ -118,8 +118,8 @@ fn rename_staged(files: Vec<StagedFile>) -> Outcome<()> {
 struct MarkerUpdate<'a> {
     folder: &'a Path,
     before: &'a FolderMarker,
-    /// Lists the new and the replaced hash of every file, so that it is valid before, during and after the
-    /// renaming.
+    /// Lists the hashes of the new and of the replaced contents of every file, so that this marker is valid
+    /// before, during and after the renaming.
     pending: FolderMarker,
     after: FolderMarker,
     outdated: Vec<String>,

@@ -11,8 +11,8 @@ use std::collections::BTreeMap;
 /// State of a job in a list of jobs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum BatchJobState {
-    /// The job has a result of this version of the job and of the program, whose search had converged; with
-    /// the outcome of that fit.
+    /// The job has a result that belongs to the present job and version of the program, and whose search
+    /// converged; the value is the outcome of that fit.
     Done(CommandOutcome),
     /// The job has no such result.
     Due,

@@ -92,8 +92,8 @@ fn parent_folder(name: &str) -> String {
     name.rsplit_once('/').map_or_else(String::new, |(folder, _)| folder.to_owned())
 }
 
-/// A path in the folder `within`, without `.` and `..`. An absolute path, or a path that leaves the project,
-/// is returned as written.
+/// The path `path` in the folder `within`, with `.` and `..` resolved. An absolute path, or a path that
+/// leaves the project, is returned as written.
 fn normalise_path(within: &str, path: &str) -> String {
     let whole = Path::new(within).join(path);
     let mut parts: Vec<String> = Vec::new();

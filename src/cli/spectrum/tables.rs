@@ -89,8 +89,8 @@ pub(crate) fn description_json(request: &SpectrumRequest, studied: &StudiedWindo
     })
 }
 
-/// Contents of `spectrum.csv`, with one row per bin; cells are empty if a long record, or one with gaps, has
-/// no such value.
+/// Contents of `spectrum.csv`, with one row per bin. A cell is empty if the analysis has no such value, as
+/// for a long record or one with gaps.
 pub(crate) fn spectrum_csv(analysis: &SpectralAnalysis) -> Vec<u8> {
     let spectrum = &analysis.spectrum;
     let cell = |text: &mut String, value: Option<f64>| match value {

@@ -33,8 +33,8 @@ impl LoadedStudy {
         )
     }
 
-    /// Runs those points of a part that no journal contains, and appends them to its journal; returns `false`
-    /// if interrupted.
+    /// Runs those points of a part that no journal contains, and appends them to the journal of the part;
+    /// returns `false` if interrupted.
     pub(crate) fn solve_part(&self, part: &StudyPart, global: &GlobalArgs) -> Outcome<bool> {
         let (header, name) = (self.header(), part.journal.display().to_string());
         let points = self.study.point_count();

@@ -77,7 +77,8 @@ fn text_at(text: &str, at: (f64, f64)) -> TextAnnotation {
     TextAnnotation::new(text, Colour::Black, at)
 }
 
-/// The enlarged tip in the last shown part, in which it slips.
+/// The panel of the enlarged tip, as wide as the path of the tip in the last shown part, in which the tip
+/// slips.
 pub(super) fn draw_tip_panel(animation: &Animation, height_mm: f64) -> Panel {
     /// Margins beside the path of the tip and below the glass, in units of the length of that path.
     const ROOM: f64 = 0.12;
@@ -108,8 +109,8 @@ fn pose_labels(poses: &[LabelledPose], height: f64, row: f64, apart: f64) -> Vec
     labels
 }
 
-/// The drawn poses: at both ends of the hold and, if the tip passes the head during the hold, at that
-/// instant.
+/// The drawn poses: at both ends of the hold and, if the head passes over the resting tip during the hold, at
+/// that instant.
 fn key_poses(animation: &Animation) -> Vec<LabelledPose> {
     let [from_s, to_s] = animation.hold_s;
     let at = |time_s: f64| animation.samples.iter().find(|s| s.time_s >= time_s);

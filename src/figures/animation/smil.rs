@@ -61,7 +61,7 @@ fn pose_key_frames(animation: &Animation, plot: &PanelPlacement) -> KeyFrames<6>
     animation.samples.iter().filter_map(point).collect()
 }
 
-/// Simplified key frames of `N` numbers of each pose, from index `from` on.
+/// Key frames of `N` consecutive numbers of each pose, beginning at index `from`; simplified.
 fn select_numbers<const N: usize>(poses: &KeyFrames<6>, from: usize) -> KeyFrames<N> {
     let some: KeyFrames<N> =
         poses.iter().map(|(share, all)| (*share, std::array::from_fn(|k| all[from + k]))).collect();
@@ -175,8 +175,8 @@ fn moving_head(animation: &Animation, plot: &PanelPlacement) -> String {
     )
 }
 
-/// Changes of visibility of a contact mode, as fractions of the playback time: whether the tip is in that
-/// mode from then on.
+/// Changes of visibility of a contact mode: fractions of the playback time, each with `true` if the tip is in
+/// that mode from then on.
 fn mode_intervals(animation: &Animation, mode: TipMode) -> Vec<(f64, bool)> {
     let mut spells: Vec<(f64, bool)> = animation
         .modes

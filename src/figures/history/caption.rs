@@ -18,8 +18,8 @@ use crate::text::{
 /// Times by which the enlarged part begins before and ends after the release, s: a few cycles of the high
 /// component.
 const ZOOM_S: (f64, f64) = (0.005, 0.03);
-/// Maximum number of reversals whose instants are all marked; of more reversals only the first is marked,
-/// since labels need room.
+/// Maximum number of reversals that are all marked. If there are more, only the first one is marked, since
+/// the labels need room.
 const MOST_TURNS: usize = 4;
 /// Maximum number of windows drawn.
 const MOST_WINDOWS: usize = 10;
@@ -147,7 +147,8 @@ fn whose_motion(case: &ConditionComparison) -> String {
     }
 }
 
-/// The compared channel, the root mean square of its residual, m, and the ratio of that to the noise.
+/// The compared channel, the root mean square of its residual, m, and the ratio of this root mean square to
+/// the noise.
 fn rms_difference(
     case: &ConditionComparison,
     within_s: Option<(f64, f64)>,
@@ -227,7 +228,8 @@ fn describe_overlay(case: &ConditionComparison) -> String {
     )
 }
 
-/// Clause on the uncertainty of the clock; empty if this is below half a frame.
+/// Clause on the uncertainty of the time shift between the clocks; empty if the uncertainty is below half a
+/// frame.
 fn describe_clock_uncertainty(case: &ConditionComparison, shift_sd_s: f64) -> String {
     let frame_s = 1.0 / case.measured_or_model().recording.grid().frame_rate_hz;
     match shift_sd_s {
@@ -276,8 +278,8 @@ fn describe_early_end(case: &ConditionComparison) -> Option<String> {
         .then(|| format!("The model's run ended early, at {at} s: {}.", run.status.meaning()))
 }
 
-/// Sentence on the release. It uses the values of the fit, so that all pages agree; if the fit has no such
-/// feature, the release is measured from the recording or the model.
+/// Sentence on the release. Its values are those of the fit, so that all pages agree; if the fit has no
+/// feature for the release, they are measured in the recording or in the model.
 fn describe_release(case: &ConditionComparison) -> Option<String> {
     const RELEASE: Reading =
         Reading::Interval { interval: ReversalInterval::ReleaseAfterReversal, reversal: 1 };

@@ -21,7 +21,7 @@ pub enum SpectrogramSide {
 pub struct SpectrogramComparison {
     /// Heading.
     pub title: String,
-    /// How the spectrograms were made; empty for none.
+    /// Note on the settings of the spectrograms; empty for none.
     pub note: String,
     /// Whether the measured motion is synthetic.
     pub synthetic: bool,

@@ -11,9 +11,9 @@ use portable_math as math;
 const CLEAR: f64 = 0.5;
 /// Smallest fraction of points with a value for which trends are stated.
 const MOSTLY_KNOWN: f64 = 0.5;
-/// Significant digits of the end that is larger in size.
+/// Number of significant digits of the end of the range with the larger absolute value.
 const DIGITS: i32 = 3;
-/// Powers of ten of that end for which both ends have the same number of decimals.
+/// Both ends have the same number of decimals if the power of ten of that end is in this range.
 const PLAIN: std::ops::RangeInclusive<i32> = -3..=4;
 
 /// Range and trends of a map.

@@ -81,7 +81,7 @@ fn a_loss_of_power_leaves_every_file_old_or_new_and_a_torn_marker_proves_nothing
     let folder = TempDir::new().unwrap();
     let at = folder.path();
     staged(at, OutputCommand::Sweep, &OLD).unwrap().commit().unwrap();
-    // before any renaming: whatever became of the temporary files, none of them is an output
+    // power fails before any renaming: the temporary files may be damaged, but none of them is an output
     let staging = staged(at, OutputCommand::Sweep, &NEW).unwrap();
     for (i, staged) in staging.files.iter().enumerate() {
         let file = File::options().write(true).open(staged.file.path()).unwrap();
