@@ -49,7 +49,7 @@ const MAX_SPEED_CHANGE: f64 = 0.4;
 /// Smallest speed at which the tip counts as moving, in standard deviations of the measured speed of a tip at
 /// rest.
 const MIN_SPEED_SD: f64 = 5.0;
-/// Maximum number of points of each of the three kinds.
+/// Maximum number of points in each list of [`MeasuredFriction`].
 const MAX_POINTS: usize = 60;
 
 impl MeasuredFriction {

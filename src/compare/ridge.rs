@@ -11,7 +11,8 @@ use std::ops::Range;
 
 /// Segment lengths to try, relative to the default length, in ascending order.
 const SEGMENT_LENGTH_FACTORS: [f64; 8] = [0.15, 0.2, 0.3, 0.45, 0.7, 1.0, 1.4, 2.0];
-/// Number of adjoining segments that a record must be long enough for; with fewer, the ridge has no course.
+/// Minimum number of adjoining segments in a record, which limits their length; with fewer, the ridge has no
+/// course.
 const MIN_SEGMENTS: f64 = 3.0;
 /// Fraction of the longest course above which a course counts as equally long.
 const NEARLY_BEST: f64 = 0.95;

@@ -19,10 +19,10 @@ use rayon::prelude::*;
 /// Number of Gauss-Newton steps of a refit: twins differ by a few deviations, where the linear
 /// model nearly holds.
 const REFIT_STEPS: usize = 3;
-/// Damping of a refit, equal to a prior with a standard deviation of the length of the box: negligible in
-/// any informative direction.
+/// Damping of a refit. It acts as a prior whose standard deviation is the side length of the box, and is
+/// negligible in any informative direction.
 const REFIT_DAMPING: f64 = 1.0;
-/// Minimum number of twins for a spread.
+/// Minimum number of refits from which a spread is computed.
 pub(crate) const MIN_TWINS: usize = 8;
 
 /// Result of the refits.

@@ -18,8 +18,8 @@ use portable_math::StandardNormal;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Maximum number of Gauss-Newton steps. Three reach rounding errors from a few deviations away, a dozen
-/// from far away.
+/// Maximum number of Gauss-Newton steps. Three steps converge to rounding errors from a few deviations away,
+/// a dozen from far away.
 const MAX_STEPS: usize = 60;
 /// Maximum number of halvings of a step that raises the cost.
 const MAX_HALVINGS: usize = 12;
@@ -107,7 +107,7 @@ impl CameraFit {
         self.free_numbers().map(|(camera, k)| camera.place[k])
     }
 
-    /// The observation as the camera shows it, with its errors.
+    /// The observation with the estimated scale and offset of its camera applied.
     pub(crate) fn apply(&self, target: &TargetValue, observation: &Observation) -> Observation {
         let Some(calibration) = target.calibration else { return *observation };
         let camera = self.0.iter().find(|camera| camera.condition == calibration.condition);
@@ -116,13 +116,14 @@ impl CameraFit {
         Observation { value: camera.map_or(observation.value, apply), ..*observation }
     }
 
-    /// Value of a feature as the camera shows it, with its errors.
+    /// Value of a feature with the estimated scale and offset of its camera applied.
     pub(crate) fn apply_to_value(&self, target: &TargetValue, observed: &Observed) -> Option<f64> {
         observed.observation().map(|observation| self.apply(target, observation).value)
     }
 
     /// Projects the columns of `jacobian` onto the complement of the derivatives by the camera unknowns, with
-    /// the weights of the cost. Its first rows are the features, its last rows the camera unknowns.
+    /// the weights of the cost. The first rows of `jacobian` are the features, its last rows the camera
+    /// unknowns.
     pub(crate) fn project_jacobian(
         &self,
         jacobian: DMatrix<f64>,
@@ -159,8 +160,8 @@ impl CameraFit {
         self.free_numbers().enumerate().map(estimate).collect()
     }
 
-    /// Standard deviations of the camera unknowns in units of their priors, marginal over the parameters.
-    /// Each parameter has a prior with the variance of the unit box.
+    /// Marginal standard deviations of the camera unknowns, divided by those of their priors. Each parameter
+    /// has a prior with the variance of a uniform variable in the unit box.
     fn standard_deviations(
         &self,
         jacobian: &DMatrix<f64>,
@@ -242,8 +243,8 @@ fn robust_weight(residual: f64) -> f64 {
 /// A target, its calibration, and the feature of the model.
 type TargetObservation<'a> = (&'a TargetValue, TargetCalibration, Observation);
 
-/// Residual of a feature for the camera numbers `place`, in prior standard deviations, and its derivatives
-/// by these numbers.
+/// Residual of a feature, and its derivatives by the camera numbers `place`, which are in prior standard
+/// deviations.
 fn linearize_residual(
     (target, calibration, observation): &TargetObservation,
     place: [f64; 2],

@@ -232,7 +232,7 @@ struct FeatureRow {
     unit: String,
     target: ExactNumber,
     sd: ExactNumber,
-    /// Scale of differences; absent where ratios are compared.
+    /// Difference that counts as large; absent if values are compared by the logarithm of their ratio.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     large_difference: Option<ExactNumber>,
     /// Whether the feature counts in the last stage only.

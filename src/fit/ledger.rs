@@ -145,7 +145,7 @@ impl<'a> Ledger<'a> {
         text
     }
 
-    /// Writes new evaluations in one call, so that it waits for the disk only once. The evaluations are
+    /// Writes new evaluations in one call, so that the run waits for the disk only once. The evaluations are
     /// counted and reported after they are written.
     fn write_lines(&mut self, stage: EvaluationStage, made: &[(Evaluation, bool)]) -> Result<(), StopReason> {
         if let Some(held) = &mut self.held_lines {

@@ -31,7 +31,7 @@ pub(crate) fn difference_points(unit: &[f64]) -> Vec<Vec<f64>> {
 }
 
 /// `d distance / d u` of every feature as its camera shows it, one row per feature. `None` where the feature
-/// is missing on both sides, or at the point and on one side.
+/// has a value at fewer than two of the three points.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FeatureSlopes(pub Vec<Vec<Option<f64>>>);
 
@@ -228,8 +228,8 @@ pub(crate) const CHI_SQUARED_95: f64 = 3.84;
 pub(crate) const MIN_INFORMATIVE: f64 = 2.0 * Z_95;
 /// Fraction of the largest singular value below which a singular value is a rounding error.
 pub(crate) const ROUNDING_SHARE: f64 = 1e-9;
-/// A parameter is not determined if the uninformative directions contain more than this fraction of
-/// it (squared cosine).
+/// A parameter is not determined if its squared projection onto the uninformative directions reaches this
+/// value.
 pub(crate) const OPEN_SHARE: f64 = 0.01;
 /// Exponents below this fraction of the largest exponent of a combination are left out.
 const MIN_NAMED_EXPONENT: f64 = 0.05;
@@ -295,8 +295,8 @@ impl SingularDirections {
         }
     }
 
-    /// Standard deviation of a coordinate from the informative directions, and the fraction of the coordinate
-    /// in the uninformative ones.
+    /// Standard deviation of a coordinate from the informative directions, and squared projection of the
+    /// coordinate onto the uninformative ones.
     pub(crate) fn coordinate_sd(&self, axis: usize) -> (f64, f64) {
         let component = |direction: &Vec<f64>| math::powi(direction.get(axis).copied().unwrap_or(0.0), 2);
         let (known, open) = self.all.split_at(self.rank);

@@ -11,16 +11,16 @@ use portable_math as math;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 
-/// Relative standard deviation of the measured noise. In clean recordings of another camera model, chi2 per
-/// degree of freedom scatters about 1 by twice this value.
+/// Relative standard deviation of the measured noise. Chi2 per degree of freedom has twice this deviation, as
+/// seen in clean recordings of another camera model.
 const NOISE_SD_RELATIVE: f64 = 0.04;
 /// Allowed relative growth of chi2 per degree of freedom from the shortest to the longest segments, in
 /// addition to its scatter. A wrong damping makes it grow by 0.05 to 0.13, a right model by less than 0.02.
 const MAX_GROWTH: f64 = 0.03;
 /// Half width of a two-sided 95 % interval, in standard deviations of a normal variable.
 const Z_95: f64 = 1.96;
-/// Largest distance of a nuisance parameter from its prior, in standard deviations. With twenty nuisance
-/// parameters, one in a hundred fits of a right model exceeds it.
+/// Largest distance of a nuisance parameter from the mean of its prior, in standard deviations. With twenty
+/// nuisance parameters, one in a hundred fits of a right model exceeds it.
 const MAX_PRIOR_DISTANCE_SD: f64 = 3.5;
 /// Number of digits of a ratio in a sentence.
 const DIGITS: usize = 3;
@@ -166,7 +166,7 @@ fn bad_segments(stages: &[StageMisfit]) -> Option<String> {
     Some(format!("{bad} of {all} segments fit worse than noise ever does"))
 }
 
-/// Evidence: residuals above the noise, whose uncertainty is taken into account.
+/// Evidence: residuals larger than the noise and its uncertainty allow.
 fn misfit_above_noise(stages: &[StageMisfit]) -> Option<String> {
     let last = stages.last()?;
     let most = 1.0 + Z_95 * math::hypot(2.0 * NOISE_SD_RELATIVE, last.chi2_sd());

@@ -77,7 +77,7 @@ pub trait Model: Sync {
 /// A start that differs from that of the scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Restart {
-    /// The run starts earlier by this time, s; the recording starts at the same instant.
+    /// The run starts earlier by this time, s; the recording still starts at its original instant.
     Earlier(f64),
     /// The run starts with angles that are larger by this fraction.
     Moved(f64),

@@ -174,7 +174,8 @@ pub(crate) fn residual(observation: &Observation, target: &TargetValue) -> f64 {
     target.distance(observation.value) / total_sd(observation, target)
 }
 
-/// Standard deviation of the distance, from that of the target and from the spread over starting states.
+/// Standard deviation of [`TargetValue::distance`]: that of the target and the spread over the starting
+/// states, added in quadrature.
 pub(crate) fn total_sd(observation: &Observation, target: &TargetValue) -> f64 {
     math::hypot(target.relative_sd(), observation.spread / target.reference_size())
 }

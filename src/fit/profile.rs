@@ -29,12 +29,12 @@ const FOLLOWED_GAIN: f64 = 0.08;
 /// Maximum number of places of a walker. With a poor linear model a walker needs about eight places, and each
 /// probe behind a crossing is one more.
 const MAX_PLACES: usize = 20;
-/// Distances of the probes behind a crossing, in units of the distance of the crossing from the best point.
+/// Distances of the probes behind a crossing from the best point, divided by the distance of the crossing.
 /// The cost must exceed the threshold there too, so that a ridge as wide as a quarter of the interval does
 /// not end the walk.
 const PROBE_FACTORS: [f64; 2] = [1.25, 1.6];
-/// Largest distance of a known point, along the coordinate in the unit box, from a place at which
-/// it is tried.
+/// Largest difference between the coordinates of a place and of a known point that is tried there, in the
+/// unit box.
 const NEAR_COORDINATE: f64 = 0.01;
 /// Number of times that walkers may continue from a point behind their crossings.
 const MAX_RESUMPTIONS: usize = 3;
@@ -42,10 +42,11 @@ const MAX_RESUMPTIONS: usize = 3;
 const FIRST_STEP_SHARE: f64 = 0.6;
 /// Shortest and longest first step in the unit box.
 const FIRST_STEP_RANGE: (f64, f64) = (0.003, 0.25);
-/// A step aims at this multiple of the root of the threshold, so that the next place brackets the crossing.
+/// A step aims at a place where the square root of the rise in cost is this multiple of that of the
+/// threshold, so that the next place brackets the crossing.
 const OVERSHOOT: f64 = 1.1;
-/// A bracket is narrow enough if the root of the rise at its outer end is at most this multiple of the root
-/// of the threshold.
+/// A bracket is narrow enough if the square root of the rise in cost at its outer end is at most this
+/// multiple of that of the threshold.
 const NARROW_BRACKET: f64 = 1.35;
 /// Distance from a bound, in the unit box, within which a point counts as at the bound: the resolution
 /// of a search.
@@ -187,8 +188,8 @@ struct ProfileWalker {
     outside: Option<(f64, f64)>,
     /// Crossing found, and number of probes already made behind it.
     crossing: Option<(f64, usize)>,
-    /// Whether another parameter is at its bound at the crossing. If so, the bounds end the interval rather
-    /// than the features.
+    /// Whether another parameter is at its bound at the crossing. If so, the interval is limited by the
+    /// bounds, not by the features.
     pinned: bool,
     places: Vec<(f64, f64)>,
     /// Number of places that the walker may still visit.

@@ -262,8 +262,8 @@ pub struct FitResult {
     pub combinations: Vec<ParameterCombination>,
     /// Correlations of the estimates by the linear model, for the parameters that it determines.
     pub correlations: BTreeMap<String, BTreeMap<String, f64>>,
-    /// Cost at the estimates: of the features as defined in `fit::objective`; of the segments and priors in
-    /// a trace fit.
+    /// Cost at the estimates: in a fit of features as defined in `fit::objective`, in a trace fit that of the
+    /// segments and priors.
     pub cost: f64,
     /// Rise in cost at the ends of a 95 % interval.
     pub threshold: f64,

@@ -22,9 +22,9 @@ use super::uncertainty::stored_verdicts;
 use crate::recording::Recording;
 use serde_json::Value;
 
-/// Largest relative difference between a stored and a recomputed number. On a processor without AVX2 and FMA,
-/// the numbers of the committed reports change by up to 4e-11; on the same machine they are equal. Features
-/// are measured to 1e-3 at best.
+/// Relative difference between a stored and a recomputed number up to which they count as equal. On a
+/// processor without AVX2 and FMA, the numbers of the committed reports change by up to 4e-11; on the same
+/// machine they are equal. Features are measured to 1e-3 at best.
 const RELATIVE_TOLERANCE: f64 = 1e-6;
 /// Absolute differences below this value are rounding errors of numbers near zero.
 const ABSOLUTE_TOLERANCE: f64 = 1e-12;
@@ -58,7 +58,7 @@ impl Problem {
         Ok(found)
     }
 
-    /// The result with every value recomputed that follows from its estimates and other numbers.
+    /// The result, in which every value that follows from the estimates or from other numbers is recomputed.
     fn recompute_result(&self, stored: &FitResult) -> Result<FitResult, FitError> {
         let job = self.job();
         let mut again = stored.clone();

@@ -18,8 +18,8 @@ use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
 
-/// Maximum number of evaluations of the right-hand side in a run: a hundred times the cost of a reversal,
-/// a few seconds.
+/// Maximum number of evaluations of the right-hand side in a run: a hundred times as many as a reversal
+/// needs. They take a few seconds.
 const MAX_EVALUATIONS: u64 = 20_000_000;
 
 /// Relative tolerance of the model's runs. Features are measured to 1e-3, and a run has the same transitions
@@ -287,7 +287,7 @@ fn check_tilt(scene: &Scene, tilt: &LargestTilt, largest_rad: f64) -> Result<(),
     let message = format!(
         "a link leans by {found:.1} degrees at {at_s} s, more than the {allowed:.1} that are plausible"
     );
-    // the cost falls as the tilt approaches its limit
+    // the progress is larger, so the cost is lower, the less the tilt exceeds its limit
     let progress = run_progress(scene, scene.run.stop_s) * largest_rad / tilt.largest_rad;
     Err(RunFailure::new(FailureReason::Tilt, message, progress))
 }

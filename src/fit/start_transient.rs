@@ -11,8 +11,8 @@ use super::target_value::TargetValue;
 use crate::feature::Feature;
 use crate::recording::Recording;
 
-/// Shift of a feature between two starts, in standard deviations, above which a note is written: half of the
-/// half width of a 95 % interval.
+/// Shift of a feature between two starts, in standard deviations, above which a note is written: a quarter of
+/// the width of a 95 % interval.
 const MIN_VISIBLE_SHIFT_SD: f64 = 1.0;
 /// Shift of a feature, in standard deviations, up to which the error of the start counts as decayed.
 const MAX_FORGOTTEN_SHIFT_SD: f64 = 0.3;
@@ -138,8 +138,8 @@ mod tests {
 
     const SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
 
-    /// Notes on a job whose only target is the mean deflection over `window`, known to 0.5 %, at the values
-    /// of the scene.
+    /// Notes on a job at the values of the scene. Its only target is the mean deflection over `window`, with
+    /// a standard deviation of 0.5 %.
     fn said(start: &str, window: &str) -> Vec<String> {
         let text = SCENE.replace("time_s = 0.56\nkind = \"steady-slide\"", start);
         assert_ne!(text, SCENE);

@@ -3,8 +3,8 @@
 use crate::feature::{LengthCalibration, ValueComparison};
 use portable_math as math;
 
-/// Ratio of model to target beyond which the residual no longer grows. No physical feature spans two decades,
-/// so any value of it costs less than a missing feature.
+/// Ratio of model to target, or of target to model, above which the residual no longer grows. No physical
+/// feature spans two decades, so any value of a feature costs less than a missing feature.
 pub(crate) const MAX_RATIO: f64 = 100.0;
 
 /// Smallest relative standard deviation in the first stage. Far from the targets all features are many

@@ -296,7 +296,8 @@ impl TraceFindings<'_, '_> {
         let share = if chi2.is_nan() || data == 0 { 1.0 } else { dof as f64 / data as f64 };
         let rows = channels.iter();
         let rows = rows.map(|(channel, parts)| self.channel_misfit(*channel, parts, share)).collect();
-        // this stage of the search is replaced by the run with shorter segments from the best end
+        // the run with shorter segments from the best end replaces the stage of the search with segments of
+        // that length
         let known = self.searched.assessment.as_ref().and_then(|known| known.shorter.as_ref());
         let shorter = |stage: usize| known.filter(|iterate| iterate.stage == stage);
         let stages =

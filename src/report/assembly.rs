@@ -126,9 +126,9 @@ fn condition_figures(case: &ConditionComparison, law: Option<&ConditionCompariso
     parts.into_iter().flatten().collect()
 }
 
-/// The figures of all conditions: histories, spectra, spectrograms and phase portraits. The answer at the top
-/// of the page shows further figures of the condition `telling`; for the other conditions these are included
-/// here.
+/// The figures of all conditions: histories, spectra, spectrograms and phase portraits, and for every
+/// condition except `telling` also its [`condition_figures`]. Those of `telling` are in the answer at the top
+/// of the page.
 fn measured_figures(cases: &[ConditionComparison], telling: usize) -> Vec<FigureBlock> {
     let all = |(i, case): (usize, &ConditionComparison)| {
         let shown = shared_law_case(cases, telling).map(|law| law.condition);

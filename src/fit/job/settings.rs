@@ -23,8 +23,8 @@ const MOST_MEMBERS: usize = 64;
 const SPREAD: f64 = 0.1;
 /// Maximum number of points in a cloud; a thousand fill a box of many parameters.
 const MOST_PARTICLES: usize = 10_000;
-/// Maximum number of entries of one kind. A page and its figures show tens; a larger job is a mistake of the
-/// program that wrote it.
+/// Maximum number of entries of one kind. A page and its figures have room for tens; a job with more entries
+/// than this is a mistake of the program that wrote it.
 const MOST_ENTRIES: usize = 1000;
 /// Default number of fits to twins of the best model: forty give a standard deviation to about a tenth.
 const REPLICATES: usize = 40;

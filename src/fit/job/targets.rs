@@ -185,7 +185,8 @@ fn target_source(
     }
 }
 
-/// Smallest deviation, relative to the target or to the difference that counts as large.
+/// Source of a measured target. `relative` is its smallest deviation, divided by the target or, if
+/// differences are compared, by the difference that counts as large.
 fn measured_source(measure: ValueComparison, relative: f64) -> TargetSource {
     match measure {
         ValueComparison::Log => TargetSource::Measured { least_sd: 0.0, least_sd_relative: relative },
@@ -195,7 +196,8 @@ fn measured_source(measure: ValueComparison, relative: f64) -> TargetSource {
     }
 }
 
-/// Default smallest relative deviation of a feature; 0 if only the noise of the recording counts.
+/// Default lower limit of the relative standard deviation of a feature; 0 if the noise of the recording alone
+/// determines the deviation.
 fn default_min_sd_relative(reading: &Reading) -> f64 {
     match reading {
         Reading::Frequency(_) | Reading::CycleFrequency { .. } => FREQUENCY_SD_FLOOR,
@@ -213,9 +215,9 @@ pub struct FitTarget {
     pub source: TargetSource,
     /// Tolerance of the relative error of a component; `None` for other features.
     pub tolerance_relative: Option<f64>,
-    /// Whether it is only predicted, never fitted.
+    /// Whether the target is only predicted, never fitted.
     pub held_out: bool,
-    /// Stages of the search in which it counts.
+    /// Stages of the search in which the target counts.
     pub stage: TargetStage,
 }
 

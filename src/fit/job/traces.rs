@@ -51,7 +51,7 @@ pub struct TraceTarget {
 pub enum TraceChannel {
     /// Position of the tip along the sweep.
     TipX,
-    /// Drop of the head: how far it is below its height with an upright blade.
+    /// Drop of the head: its distance below the height that it has with an upright blade.
     HeadDrop,
     /// Position of the tip relative to the head, along the sweep.
     Deflection,

@@ -34,8 +34,7 @@ impl Slab {
     }
 }
 
-/// Cost of every point after the ledger has stopped. A solver that receives it is abandoned before
-/// it uses it.
+/// Cost of every point after the ledger has stopped. A solver is abandoned before it uses this cost.
 pub(super) const STOPPED_COST: f64 = 1e100;
 
 /// Costs of points of the unit box for the solvers of a stage.

@@ -217,8 +217,8 @@ impl CmaEs {
         self.decompose_shape();
     }
 
-    /// Rotates coordinates along the axes to the coordinates of the box; the lengths of the axes
-    /// do not count.
+    /// Rotates coordinates along the axes to the coordinates of the box, without scaling by the lengths of
+    /// the axes.
     fn rotate_to_box(&self, along: &DVector<f64>) -> DVector<f64> {
         let mut turned = DVector::zeros(along.len());
         for (column, z) in self.axes.column_iter().zip(along.iter()) {

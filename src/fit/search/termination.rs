@@ -39,8 +39,8 @@ pub(crate) const MIN_START_DISTANCE: f64 = 0.2;
 /// point. The second steps over a kink, or along a valley in which the first collapsed. The third fits into
 /// a narrow valley.
 pub(crate) const SIMPLEX_EDGES: [f64; 3] = [0.05, 0.2, 0.01];
-/// Spread of the costs in a simplex below which it has converged, in squared standard deviations of a
-/// feature: the square of a hundredth.
+/// A simplex has converged if the spread of its costs is below this value: the square of a hundredth of a
+/// standard deviation of a feature.
 pub const SIMPLEX_COST_SPREAD: f64 = 1e-4;
 /// Gain in cost below which another step is not worthwhile: 2 % of the rise of 1 at the ends of a
 /// 68 % interval.

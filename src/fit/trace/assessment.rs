@@ -215,8 +215,8 @@ fn compare_segment_lengths(
     Some((bias, disagreement))
 }
 
-/// Number of starts that end elsewhere and fit nearly as well as the best one: their costs differ by less
-/// than the scatter of the cost of a true model between recordings.
+/// Number of starts that end at another point and cost nearly as little as the best end. The difference is
+/// below the scatter of the cost of a true model between recordings.
 fn count_rivals(end: &Iterate, descents: &[TraceDescent], sd: &[f64]) -> usize {
     /// Largest difference of the costs, in standard deviations of chi2.
     const NEARLY: f64 = 2.0;

@@ -104,8 +104,8 @@ fn build_recording(source: &TraceSource<'_>) -> Result<TraceRecording, HeadMotio
     Ok(TraceRecording { scene, observation: film })
 }
 
-/// Noise of a channel: that of the job, otherwise the measured noise without the part that both points share.
-/// If it cannot be measured, white noise with the size of the differences between frames.
+/// Noise of a channel: that of the job, otherwise the measured noise minus the part that tip and head have in
+/// common. If the noise cannot be measured, it is white, with the scatter between frames.
 fn channel_noise(
     traced: &TraceData,
     recording: &Recording,

@@ -34,8 +34,8 @@ pub struct CameraObservation {
     pub drop_m: Vec<Option<f64>>,
     /// Position of the head in every frame according to the drive, m.
     pub head_m: Vec<f64>,
-    /// Whether the recorded head drives the model, so that `head_m` is in lengths of the picture. Otherwise
-    /// the scene drives it, in true lengths.
+    /// Whether the recorded head drives the model; `head_m` is then in lengths of the picture. If the scene
+    /// drives the model, `head_m` is in true lengths.
     pub own_head: bool,
     /// The smooth curve from which `head_m` is taken; `None` if the scene drives the model.
     pub own_curve: Option<Arc<HeadSpline>>,
@@ -45,8 +45,8 @@ pub struct CameraObservation {
 }
 
 impl CameraObservation {
-    /// Data of a recording. `drive` moves the head of its model. `shared` is the part of the noise of the
-    /// tip's x and of the head's y, m, that the other point shows too; it is subtracted.
+    /// Data of a recording. `drive` moves the head of its model. `shared` is the noise of the tip's x and of
+    /// the head's y, m, that tip and head have in common; it is subtracted.
     pub(crate) fn new(
         recording: &Recording,
         drive: &Drive,
@@ -110,7 +110,7 @@ impl CameraObservation {
 
     /// Whether the head reverses within the fitted frames, so that the blade leans to both sides.
     fn reverses(&self) -> bool {
-        /// Smallest return of the head, as a fraction of its travel, that tilts the blade to the other side.
+        /// Smallest `beyond`, as a fraction of the head's travel, that tilts the blade to the other side.
         const LEAST: f64 = 0.05;
         let [first, last] = self.settings.frames;
         let heads = &self.head_m[first..last];

@@ -10,11 +10,11 @@ use std::borrow::Cow;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum RescuePolicy {
     Never,
-    /// If chi2 exceeds this multiple of the number of data. Restarts from the recorded state, also with
-    /// changed rates, and from the end of the previous segment.
+    /// Restarts a segment whose chi2 exceeds this multiple of its number of data: from the recorded state,
+    /// from this state with changed rates, and from the end of the previous segment.
     Beyond(f64),
-    /// If chi2 exceeds what noise explains. Also restarts from states along the two
-    /// least determined directions.
+    /// Restarts a segment whose chi2 exceeds what noise explains, also from states along the two least
+    /// determined directions.
     Thorough,
 }
 
@@ -22,8 +22,8 @@ pub(super) enum RescuePolicy {
 /// fault lies in the unknowns rather than in the states.
 const MAX_RESCUED_SHARE: f64 = 0.4;
 
-/// Gain of chi2 below which the fit of a state ends, as a fraction of chi2 or, if smaller, of the
-/// number of residuals.
+/// The fit of a state ends when chi2 falls by less than this fraction of chi2 or of the number of residuals,
+/// whichever is smaller.
 const MIN_CHI2_GAIN: f64 = 1e-3;
 
 /// A starting state with its residuals and, where needed, their derivatives.
@@ -98,8 +98,8 @@ fn lower_cost_step(
             let step = c.solve(&slope);
             let state = LinkState::from_fn(|i, _| at.state[i] - step[i]);
             is_small = 2.0 * slope.dot(&step) - step.dot(&(&normal * &step)) < at.least_gain();
-            // derivatives serve the next step, which is unlikely after a step that is the last,
-            // small or repeated
+            // derivatives are needed for a further step, which is unlikely after the last, a small or a
+            // repeated step
             let ends = is_last || is_small || trial > 0;
             let build = if ends { StateTrial::without_jacobian } else { StateTrial::with_jacobian };
             build(point, frames, state)

@@ -17,7 +17,8 @@ fn segment_weight(segment: &SegmentState, plain: bool) -> f64 {
     if plain { 1.0 } else { 1.0 / (1.0 + segment.chi2 / (segment.data.max(1) as f64 * ROBUST_CHI2)) }
 }
 
-/// Cost of all segments: the sum of `n c ln(1 + chi2 / (n c))`, or of chi2 in the plain phase.
+/// Cost of all segments: the sum of `n c ln(1 + chi2 / (n c))` with `n` data and `c` = [`ROBUST_CHI2`], or of
+/// chi2 in the plain phase.
 pub(super) fn segments_cost(segments: &[SegmentState], plain: bool) -> f64 {
     /// Chi2 per datum of a segment whose run fails.
     const FAILED: f64 = 1e6;
@@ -177,8 +178,8 @@ fn head_curve_covariance(model: &TraceModel, at: &Iterate) -> Option<DMatrix<f64
     Some(total)
 }
 
-/// Change of the slope of a segment's cost by each coefficient of the head's curve: the index of the first
-/// coefficient with an effect, and one column per coefficient.
+/// Derivatives of the slope of a segment's cost by the coefficients of the head's curve: the index of the
+/// first coefficient with an effect, and one column per coefficient.
 fn head_curve_slopes(point: &RecordingModel<'_>, segment: &SegmentState) -> Option<(usize, DMatrix<f64>)> {
     let (from, columns) = point.observation.head_curve_derivatives(segment.frames())?;
     let mut linear = point.linearize(segment.frames(), &segment.start_state())?;

@@ -18,8 +18,8 @@ const MIN_STARTS: usize = 2;
 /// may then give the same frames.
 const MIN_STARTS_SLOW: usize = 4;
 
-/// A start is abandoned if the cost of its first stage exceeds the lowest one so far by this factor: it is
-/// in another valley.
+/// A start is abandoned if the cost of its first stage exceeds the lowest one so far by this factor: the
+/// start is then in another valley.
 const GIVE_UP_FACTOR: f64 = 3.0;
 
 /// Outcome of a trace search.
@@ -115,8 +115,8 @@ pub fn undersampled_mode(model: &TraceModel, at: &Iterate) -> Option<[f64; 2]> {
     recording_models(model, &at.point)?.into_iter().find_map(one)
 }
 
-/// Index of the best descent: the one that reached the latest stage, then one with plain cost, then that
-/// of lowest cost.
+/// Index of the best descent: one that reached the latest stage; among these, one with plain cost; among
+/// these, the one of lowest cost.
 fn best_descent(descents: &[TraceDescent]) -> usize {
     let rank = |descent: &TraceDescent| match descent.last_iterate() {
         Some(end) => (Reverse(end.stage), !end.plain, end.cost),

@@ -230,14 +230,14 @@ pub(super) fn follow_runs(
 
 // Profile of the cost: one point on either side of every parameter, with all other unknowns refitted.
 
-/// Standard deviation of the prior that pins a parameter, relative to that of the parameter.
+/// Ratio of the standard deviation of the pinning prior to that of the estimate.
 const PIN_SD: f64 = 1e-3;
 /// Largest factor by which the profile widens an interval.
 const MAX_STRETCH: f64 = 3.0;
 
 /// Distances below and above each estimate, in its coordinate, at which the cost reaches the 95 % threshold.
-/// A distance is never less than that from the standard deviation, and equal to it for an unknown without
-/// side runs. `sides` gives the last iterate of a run.
+/// A distance is at least 1.96 standard deviations, and equal to this for an unknown without side runs.
+/// `sides` gives the last iterate of a run.
 pub(super) fn profile_distances<'s>(
     end: &SearchEnd<'_>,
     sides: impl Fn(UncertaintyRun) -> Option<&'s Iterate>,
@@ -274,7 +274,8 @@ fn pin_unknown(end: &SearchEnd<'_>, i: usize, moved: f64) -> (TraceModel, Vec<f6
     (pinned, point)
 }
 
-/// Rise of the cost to an iterate with unknown `i` pinned, without the cost of the pinning prior.
+/// Cost of an iterate with unknown `i` pinned, without the term of the pinning prior, minus the cost of the
+/// best end.
 fn cost_rise(end: &SearchEnd<'_>, i: usize, moved: f64, at: &Iterate) -> f64 {
     let [pinned_at, sd] = pin_prior(end, i, moved);
     let prior = end.model.unknowns.0[i].prior;

@@ -6,16 +6,17 @@ use nalgebra::{DMatrix, DVector};
 /// Smallest singular value of the scaled state columns that is kept, relative to the largest.
 const MIN_SINGULAR: f64 = 1e-4;
 
-/// Normal equations of one segment for the unknowns, and the change of its starting state with them.
+/// Normal equations of one segment for the unknowns, and the step of its starting state as a function of
+/// them.
 #[derive(Debug, Clone)]
 pub(super) struct ProjectedSegment {
     /// `J^T J` of the Jacobian `J` from which the state has been projected out.
     pub matrix: DMatrix<f64>,
     /// `J^T r` with the residuals `r`.
     pub slope: DVector<f64>,
-    /// Step of the state with the unknowns held fixed, with opposite sign.
+    /// Minus the step of the state with the unknowns held fixed.
     pub move_held: LinkState,
-    /// Derivative of the step of the state by the unknowns, with opposite sign.
+    /// Minus the derivative of the step of the state by the unknowns.
     pub move_by_unknown: DMatrix<f64>,
 }
 

@@ -58,8 +58,8 @@ fn has_point_outside(found: &FitUncertainty, ledger: &Ledger) -> bool {
     })
 }
 
-/// The ranges below and above each identified parameter in which the distance from the best point exceeds
-/// `times` that of the end of the interval.
+/// For each identified parameter, the values below and above the best one that are farther from it than
+/// `times` the distance of the end of the interval on that side.
 fn excluded_slabs(found: &FitUncertainty, ledger: &Ledger, times: f64) -> Vec<Slab> {
     let axes = ledger.objective().axes().iter().zip(&found.best.unit).zip(&found.intervals);
     let sides =

@@ -15,9 +15,9 @@ use crate::fit::target_value::TargetValue;
 use nalgebra::DMatrix;
 use portable_math as math;
 
-/// Smallest correlation with which a parameter at its bound makes another estimate unreliable. If the optimum
-/// lies `k` deviations outside the bound, the other estimate is off by `k` times the correlation, in its own
-/// deviations. With this correlation, ten deviations shift it by a half width of its 95 % interval.
+/// Smallest correlation with which a parameter at its bound makes another estimate unreliable. An optimum `k`
+/// deviations outside the bound shifts the other estimate by `k` times the correlation, in deviations of that
+/// estimate. At this correlation, ten deviations shift it by the half width of its 95 % interval.
 const MIN_CORRELATION: f64 = 0.2;
 
 /// Whether a coordinate of the unit box is at an end of the box.
@@ -37,8 +37,8 @@ pub(super) fn strongest_bound_correlation(
         .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
 }
 
-/// The parameter at its bound whose optimum outside the bound would lower the cost most, and that gain by the
-/// linear model; `None` if no gain is worth a step.
+/// Among the parameters at a bound, the one whose optimum outside the bound would lower the cost most, and
+/// this decrease by the linear model; `None` if no decrease exceeds [`MIN_WORTHWHILE_GAIN`].
 pub(super) fn best_excluded_gain(
     unit: &[f64],
     jacobian: &DMatrix<f64>,
@@ -55,7 +55,7 @@ pub(super) fn best_excluded_gain(
     gains.filter(|(_, gain)| *gain > MIN_WORTHWHILE_GAIN).max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Withdraws all verdicts because a bound excludes a better value; returns a note if there were any.
+/// Withdraws all verdicts because a bound excludes a better value; returns a note if any was withdrawn.
 pub(super) fn withdraw_all(
     intervals: &mut [ParameterResult],
     names: &[String],

@@ -173,7 +173,8 @@ const MOST_OVER_EACH_OTHER: usize = 3;
 /// Heights of a panel with all spectra and of a panel with those of one fit, mm.
 const HEIGHT_MM: f64 = 70.0;
 const EACH_HEIGHT_MM: f64 = 36.0;
-/// Factors by which the axes extend beyond the bands of the components, above the highest peak, and below it.
+/// Factor by which the frequency axis extends outside the bands of the components; then the upper and the
+/// lower end of the amplitude axis, relative to the highest peak.
 const BAND_MARGIN: f64 = 2.0;
 const OVER_PEAK: f64 = 2.0;
 const UNDER_PEAK: f64 = 2e-4;

@@ -115,7 +115,7 @@ pub(in crate::report) fn verdict_cell(good: bool, words: [&str; 2]) -> HtmlCell 
     if good { (escape_text(words[0]), CellStyle::Good) } else { (escape_text(words[1]), CellStyle::Bad) }
 }
 
-/// Heads of columns, in the program's own words: the heads of each style, separated by `|`.
+/// Heads of columns, in the program's own words. Each group is a style and its heads, separated by `|`.
 pub(in crate::report) fn column_heads(groups: &[(CellStyle, &str)]) -> Vec<HtmlCell> {
     groups
         .iter()
