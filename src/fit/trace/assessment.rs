@@ -29,7 +29,7 @@ pub struct UnknownEstimate {
     pub sd: f64,
     /// Ends of the 95 % interval from refitted twins alone, in its SI unit; `None` with too few twins.
     pub twins_95: Option<[f64; 2]>,
-    /// Variance of its coordinate due to errors of the recorded heads.
+    /// Part of the variance of the estimate's coordinate that comes from errors of the recorded heads.
     by_heads: f64,
     /// Whether the estimate lies at an end of its range.
     pub at_bound: bool,

@@ -36,8 +36,8 @@ const ABOVE: f64 = 1.6;
 /// Largest power in these bands, as a fraction of the power of the plateau: -8 dB, which the moving average
 /// over three frames just reaches.
 const FALLEN: f64 = 0.16;
-/// Smallest ratio of the powers at the two ends of the steepest octave, 10 dB: a random walk falls by 6 dB, a
-/// filter of second order by 12 dB.
+/// The power must fall by at least this factor, 10 dB, over the steepest octave. A random walk falls by only
+/// 6 dB per octave, a filter of second order by 12 dB.
 const STEEP: f64 = 10.0;
 /// Ratio of the median to the lower quartile of the power of noise in a bin. Its expected value is ln
 /// 2/ln(4/3) = 2.41; with 32 segments, it lies in this range.
