@@ -33,13 +33,13 @@ fn noise(deviation_m: f64) -> impl FnMut() -> f64 {
 
 #[test]
 fn nothing_sought_is_missed_and_nothing_is_wrongly_clear() {
-    // a camera that shakes moves as slowly as a trend does: three records in a hundred
+    // a camera that shakes moves as slowly as a trend does
     let undecidable = "a camera that shakes";
     for kind in KINDS {
         let (every_change, thorough) = if kind.group == "long" { LONG_SEEDS } else { SEEDS };
         let counts = Counts::of(kind, pick(every_change, thorough));
         assert_eq!(counts.missed, 0, "{}: of {}", kind.name, counts.sought);
-        let wrong = if kind.name == undecidable { 3 } else { 0 };
+        let wrong = if kind.name == undecidable { pick(0, 3) } else { 0 };
         assert!(counts.wrong <= wrong, "{}: {} records with what is none", kind.name, counts.wrong);
         if kind.group == "ring-downs" {
             assert_eq!(counts.cut, 0, "{}: there is nothing to be cut behind", kind.name);
