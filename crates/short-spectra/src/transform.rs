@@ -73,7 +73,7 @@ thread_local! {
 /// the difference between two cosines of a plan.
 const COSINE_TOLERANCE: f64 = 1e-14;
 
-/// A number of a transform.
+/// The real number type that a transform computes with, whose cosines are the same on every system.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PortableReal(pub f64);
 
