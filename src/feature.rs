@@ -3,7 +3,7 @@
 //! `docs/sweeps.md` list the kinds.
 //!
 //! The instants of a window are found in each recording separately, so model and measurement need not share a
-//! clock. Values that only a simulated run can give are computed from its [`RunRecord`].
+//! clock. Values that only a simulated run can give are computed from the [`RunRecord`] of the run.
 
 mod contact;
 mod deflection;
@@ -29,24 +29,24 @@ use serde::Serialize;
 pub use spectral::{ASSIGN_DB, ASSIGN_WIDTH, CycleRangeEnd, FeatureBand};
 pub use value::{FeatureUnit, FeatureValue, LengthCalibration, RunnerUpComponent, ValueComparison};
 
-/// Smallest relative standard deviation of a measured frequency. Without noise, the frequency of a peak at 78
-/// Hz in a window of 0.15 s is accurate to 0.03 Hz (4e-4); the window of the model has the same length but
-/// other instants.
+/// Lower limit of the relative standard deviation of a measured frequency. Even without noise, the frequency
+/// of a peak at 78 Hz in a window of 0.15 s has an error of 0.03 Hz (4e-4). The error depends on the instants
+/// in the window, and those of the model differ from those of the recording.
 pub(crate) const FREQUENCY_SD_FLOOR: f64 = 1e-3;
 
-/// A reading with its name and condition.
+/// A reading with its name in a job, and the condition of the job in whose recording it is evaluated.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Feature {
     /// Name of the feature in the job.
     pub name: String,
     /// Quantity that is evaluated, with its settings.
     pub reading: Reading,
-    /// Index of the condition of the job, counted from 0.
+    /// Index of the job's condition in whose recording the feature is evaluated, counted from 0.
     pub condition: usize,
 }
 
 impl Feature {
-    /// Evaluates the feature in `recording`, in which `instants` were found.
+    /// Evaluates the feature in `recording`; `instants` are the instants that were found in this recording.
     ///
     /// # Errors
     /// [`MissingValue`] with the reason.
@@ -72,7 +72,7 @@ impl Feature {
     }
 }
 
-/// Evaluates every feature in a set of recordings, one for each condition.
+/// Evaluates every feature; `recordings` has one recording for each condition of the job.
 #[must_use]
 pub fn read_features(
     features: &[Feature],
@@ -81,9 +81,9 @@ pub fn read_features(
     read_assigned_features(features, &[], &recordings.iter().collect::<Vec<_>>())
 }
 
-/// Evaluates every feature in the recordings of a model. `targets` has one value per feature, in the unit of
-/// that feature; components are assigned to these values. Features beyond the end of `targets` have no
-/// target.
+/// Evaluates every feature in the recordings of a model, one for each condition. `targets` has one value per
+/// feature, in the unit of that feature; a frequency feature evaluates the component that is assigned to its
+/// target. Features beyond the end of `targets` have no target.
 #[must_use]
 pub fn read_assigned_features(
     features: &[Feature],

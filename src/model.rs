@@ -40,15 +40,17 @@ pub struct Linkage {
     pub l1_m: f64,
     /// Length of the lip `l2`, m.
     pub l2_m: f64,
-    /// `m_a = m1 g1 + m2 l1`, kg m.
+    /// First moment of the mass of neck and lip about the upper hinge of the neck, with the lip's mass at its
+    /// own upper hinge: `m_a = m1 g1 + m2 l1`, kg m.
     pub m_a: f64,
-    /// `m_b = m2 g2`, kg m.
+    /// First moment of the mass of the lip about its upper hinge, `m_b = m2 g2`, kg m.
     pub m_b: f64,
-    /// `m_c = m2 l1 g2`, kg m2.
+    /// Inertial coupling of neck and lip, `m_c = m2 l1 g2`, kg m2.
     pub m_c: f64,
-    /// `m_theta = J1 + m1 g1^2 + m2 l1^2`, kg m2.
+    /// Moment of inertia of the neck about its upper hinge, with the lip's mass at the lower hinge: `m_theta
+    /// = J1 + m1 g1^2 + m2 l1^2`, kg m2.
     pub m_theta: f64,
-    /// `m_phi = J2 + m2 g2^2`, kg m2.
+    /// Moment of inertia of the lip about its upper hinge, `m_phi = J2 + m2 g2^2`, kg m2.
     pub m_phi: f64,
     /// Stiffness and damping of the head's support, `k0`, N/m, and `c0`, N s/m.
     pub head: Spring,
@@ -56,7 +58,8 @@ pub struct Linkage {
     pub neck: Spring,
     /// Stiffness and damping of the lip, `k2`, N m/rad, and `c2`, N m s/rad.
     pub lip: Spring,
-    /// Displacement `h_d` by which the support is pressed down, m.
+    /// Displacement `h_d` by which the head's support is pressed towards the glass when the blade is upright,
+    /// m.
     pub preload_displacement_m: f64,
     /// Friction between lip tip and glass.
     pub friction: FrictionLaw,
@@ -64,36 +67,37 @@ pub struct Linkage {
     pub shoulder: Option<Shoulder>,
 }
 
-/// A linear spring with a parallel damper, in the units of its coordinate.
+/// A linear spring with a parallel damper; the units depend on whether its coordinate is a length or an
+/// angle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Spring {
-    /// Force or moment per displacement.
+    /// Force per displacement, N/m, or moment per angle, N m/rad.
     pub stiffness: f64,
-    /// Force or moment per rate.
+    /// Force per velocity, N s/m, or moment per angular rate, N m s/rad.
     pub damping: f64,
 }
 
 /// Angles and rates of both links, rad and rad/s.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Pose {
-    /// Angle of the neck, `theta`.
+    /// Angle of the neck from the vertical, `theta`, rad.
     pub theta: f64,
-    /// Angle of the lip, `phi`.
+    /// Angle of the lip from the vertical, `phi`, rad.
     pub phi: f64,
-    /// Rate of the neck.
+    /// Angular rate of the neck, rad/s.
     pub theta_rate: f64,
-    /// Rate of the lip.
+    /// Angular rate of the lip, rad/s.
     pub phi_rate: f64,
 }
 
 /// Position, velocity and acceleration of the head along the sweep.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadMotion {
-    /// `v`, m.
+    /// Position `v`, m.
     pub position_m: f64,
-    /// `dv/dt`, m/s.
+    /// Velocity `dv/dt`, m/s.
     pub velocity_m_per_s: f64,
-    /// `d2v/dt2`, m/s2.
+    /// Acceleration `d2v/dt2`, m/s2.
     pub acceleration_m_per_s2: f64,
 }
 
@@ -140,7 +144,8 @@ pub struct FrictionResponse {
 }
 
 impl Linkage {
-    /// Solves equations (1) to (3) as linear functions of the friction force.
+    /// Solves equations (1) to (3) for accelerations and normal force as linear functions of the friction
+    /// force.
     #[inline]
     #[must_use]
     pub fn friction_response(
@@ -208,8 +213,8 @@ impl Linkage {
         }
     }
 
-    /// Total stiffness and damping of the neck while it leans on this side of the shoulder, and its moment at
-    /// zero angle and rate.
+    /// Stiffness of the neck, its damping, and its moment at zero angle and rate; all include the shoulder if
+    /// the neck leans on it.
     fn neck_spring(&self, lean: ShoulderContact) -> [f64; 3] {
         let Spring { stiffness, damping } = self.neck;
         match (lean, &self.shoulder) {

@@ -61,8 +61,8 @@ pub struct Traces {
 #[error("{0}")]
 pub struct RecordingError(String);
 
-/// Largest distance from the origin, m. The positions of a wiper stay below a thousandth of this limit, and
-/// its square is far from overflow.
+/// Largest permitted magnitude of a coordinate, m. The positions of a wiper stay below a thousandth of this
+/// limit, and the square of the limit is far from overflow.
 pub(crate) const LARGEST_M: f64 = 1e6;
 
 /// Traces on their frame grid, with a name for messages. All columns have one entry per frame, and all values
@@ -165,16 +165,17 @@ fn check_column(column: &str, values: &[Option<f64>], expected: usize) -> Result
 }
 
 /// Number of frames through which the interpolating polynomial passes. Half way between two frames at 5,000
-/// frames/s, six frames give a 900 Hz sine 0.8 % too small; a straight line gives it 16 % too small.
+/// frames/s, interpolation through six frames makes a 900 Hz sine 0.8 % too small; linear interpolation makes
+/// it 16 % too small.
 pub(crate) const STENCIL: usize = 6;
-/// A time counts as the time of a frame if it is this close to it, in frames. Times near 1 s at 1e5 frames/s
-/// have far smaller rounding errors.
+/// A time counts as the time of a frame if the two differ by less than this number of frames. The rounding
+/// errors of times near 1 s at 1e5 frames/s are far smaller.
 pub(crate) const ON_FRAME_TOLERANCE: f64 = 1e-6;
 
 impl Recording {
     /// Value of a column of this recording at a time, s. It comes from the polynomial through the three
-    /// frames before and the three after that time; if one of the outer four is missing, from a straight
-    /// line. `None` outside the recording and next to a missing frame.
+    /// frames before and the three after that time; if one of the outer four is missing, from the straight
+    /// line through the two nearest frames. `None` outside the recording and next to a missing frame.
     pub(crate) fn interpolate_column(&self, column: &[Option<f64>], time_s: f64) -> Option<f64> {
         let place = (time_s - self.grid.start_s) * self.grid.frame_rate_hz;
         if let Some(frame) = frame_at(place) {
@@ -188,15 +189,15 @@ impl Recording {
     }
 }
 
-/// Index of the frame at `place`, a time in frames; `None` between frames. The index may lie past the end of
-/// the column.
+/// Index of the frame at `place`, a time in frames after the first frame; `None` between frames. The index
+/// may lie past the end of the column.
 pub(crate) fn frame_at(place: f64) -> Option<usize> {
     let nearest = place.round();
     (nearest >= 0.0 && (place - nearest).abs() < ON_FRAME_TOLERANCE).then_some(nearest as usize)
 }
 
-/// Lagrange polynomial through the six frames from `first` on, evaluated at `place`, a time in frames; `None`
-/// if a frame is missing.
+/// Lagrange polynomial through the six frames from `first` on, evaluated at `place`, a time in frames after
+/// the first frame of the column; `None` if a frame is missing.
 pub(crate) fn lagrange_through_six(column: &[Option<f64>], first: usize, place: f64) -> Option<f64> {
     /// Denominators of the polynomial: for each frame, the product of its signed distances from the other
     /// five.
@@ -277,7 +278,7 @@ mod tests {
             let exact = quintic(place / 5000.0);
             assert!((at(&curve, place) / exact - 1.0).abs() < 1e-13, "{place}");
         }
-        // half way between two frames, which lie at the same distance from the crest on either side
+        // the time is half way between two frames, at the crest of the sine
         let crest = |t: f64| (std::f64::consts::TAU * 900.0 * (t - 4.5 / 5000.0)).cos();
         let sine = recording(0.0, crest);
         assert!((at(&sine, 4.5) - 0.991_64).abs() < 1e-5, "{}", at(&sine, 4.5));

@@ -127,7 +127,7 @@ pub struct Impact {
 pub trait Observer {
     /// Receives a piece of the solution, in order of time.
     fn observe_segment(&mut self, piece: &SolutionSegment<'_>);
-    /// Receives a change of mode, between the pieces that it separates.
+    /// Receives a change of the mode of contact, between the two pieces that it separates.
     fn observe_transition(&mut self, _transition: &Transition) {}
     /// Receives an impact, before the transition that it causes.
     fn observe_impact(&mut self, _impact: &Impact) {}
@@ -163,7 +163,7 @@ pub enum IntegrationMethod {
     RungeKutta,
     /// Runge-Kutta of order 8(5,3); transitions are located by the slack variable method.
     Slack,
-    /// The paper's scheme; the tolerance does not apply.
+    /// The paper's scheme with fixed steps; the tolerance does not apply.
     FixedStep(FixedStepScheme),
 }
 
@@ -178,14 +178,15 @@ impl IntegrationMethod {
         }
     }
 
-    /// Length of a fixed step, s.
+    /// Length of a fixed step, s; `None` for a method with error control.
     pub(crate) fn step_s(&self) -> Option<f64> {
         if let Self::FixedStep(scheme) = self { Some(scheme.step_s) } else { None }
     }
 }
 
 impl SolverOptions {
-    /// Options with this tolerance, the default method and the default work limit ([`MOST_EVALUATIONS`]).
+    /// Options with the given relative tolerance, the default method and the default work limit
+    /// ([`MOST_EVALUATIONS`]).
     #[must_use]
     pub fn new(relative_tolerance: f64) -> Self {
         Self { relative_tolerance, most_evaluations: MOST_EVALUATIONS, method: IntegrationMethod::default() }
@@ -206,7 +207,7 @@ pub struct RunResult {
     pub status: RunStatus,
     /// Time at which the run ended, s.
     pub stopped_at_s: f64,
-    /// Number of changes of mode.
+    /// Number of changes of the mode of contact.
     pub transitions: u64,
     /// Counts of steps and evaluations.
     pub work: WorkCounters,
@@ -232,8 +233,8 @@ pub fn run_scene_with(scene: &Scene, effort: SolverOptions, observer: &mut impl 
     EventLoop::new(&system, scene, effort, &mut watch).run()
 }
 
-/// The driven blade of a scene. Below its scales of angle and rate, the tolerance is absolute instead of
-/// relative.
+/// The driven blade of a scene, with scales of angle and angular rate; for values below these scales, the
+/// tolerance is absolute instead of relative.
 #[must_use]
 pub fn build_system(scene: &Scene) -> DrivenBlade {
     /// The angles of a wiper blade in use are 0.1 to 1 rad.
@@ -267,13 +268,14 @@ pub enum TransitionCause {
     FrictionLimit,
     /// The tip's velocity changes sign, and static friction cannot hold the tip.
     DirectReversal,
-    /// The force that holds the tip jumps at a corner of the shoulder, because of the shoulder's damping.
+    /// The friction force that holds the tip jumps when the neck meets or leaves the shoulder, because of the
+    /// shoulder's damping.
     ShoulderCorner,
     /// The normal force reaches zero.
     LiftOff,
     /// The tip strikes the glass after flight; for a rebound, the modes before and after are both flight.
     Landing,
-    /// The impact without collision that resolves the Painlevé paradox.
+    /// The tip jams (Painlevé paradox), which is resolved as an impact without collision.
     JamImpact,
 }
 

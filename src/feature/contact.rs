@@ -1,4 +1,5 @@
-//! Readings of the contact that only a simulated run can give: stick, changes of contact mode, forces.
+//! Readings of the contact between tip and glass, which only a simulated run can give: stick, changes of
+//! contact mode, forces.
 
 use super::missing::MissingValue;
 use super::reader::{FeatureReader, RunRecord};
@@ -8,10 +9,10 @@ use crate::simulate::outputs::EnergyAudit;
 use crate::simulate::{RunStatus, Transition, TransitionCause};
 use serde::Serialize;
 
-/// A reading of the contact.
+/// A reading of the contact between tip and glass in a simulated run.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub enum ContactReading {
-    /// Fraction of a window for which the tip sticks.
+    /// Fraction of the duration of a window in which the tip sticks, 0 to 1.
     StickFraction(Window),
     /// Longest uninterrupted stick in a window, s.
     LongestStick(Window),
@@ -19,11 +20,11 @@ pub enum ContactReading {
     Transitions(Window),
     /// Time at which the normal force first reaches zero, s.
     ContactLoss,
-    /// Smallest normal force in contact, N.
+    /// Smallest normal force on the tip while it is in contact, N.
     LeastNormalForce,
     /// Time at which the Painlevé condition is first violated, s.
     Jam,
-    /// Smallest Painlevé indicator in slip.
+    /// Smallest Painlevé indicator while the tip slips.
     LeastPainleveIndicator,
 }
 
@@ -49,8 +50,8 @@ impl ContactReading {
         }
     }
 
-    /// Whether the value is known although the run ended early with this status. A count or a fraction would
-    /// need the rest of the run.
+    /// Whether the value is known although the run ended early with the status `end`. A count or a fraction
+    /// is not known, because it needs the rest of the run.
     pub(super) fn is_known_after(self, end: RunStatus) -> bool {
         match self {
             Self::ContactLoss | Self::LeastNormalForce => end == RunStatus::ContactLost,
@@ -59,7 +60,7 @@ impl ContactReading {
         }
     }
 
-    /// Whether the reading needs the extrema over the run, which take time to compute.
+    /// Whether the reading needs the [`EnergyAudit`] of the run, which takes time to compute.
     pub(super) fn needs_audit(self) -> bool {
         matches!(self, Self::LeastNormalForce | Self::LeastPainleveIndicator)
     }
@@ -71,7 +72,7 @@ impl ContactReading {
             Self::StickFraction(window) => {
                 let [from, to] = window_ends_s(&window, reader, run)?;
                 let sticking_s = stick_lengths_s(run, [from, to]).fold(0.0, |sum, length| sum + length);
-                Ok(sticking_s / (to - from)) // (an empty sum() is -0)
+                Ok(sticking_s / (to - from)) // (`sum()` of no numbers is -0)
             }
             Self::LongestStick(window) => {
                 Ok(stick_lengths_s(run, window_ends_s(&window, reader, run)?).fold(0.0, f64::max))
@@ -108,7 +109,7 @@ fn window_ends_s(window: &Window, reader: &FeatureReader, run: &RunRecord) -> Re
     Ok([end(window.from, start_s, frames.start)?, end(window.to, stop_s, frames.end)?])
 }
 
-/// Lengths of the stick intervals within a window, s.
+/// Lengths of the parts of the stick intervals that are in a window, s.
 fn stick_lengths_s(run: &RunRecord, [from, to]: [f64; 2]) -> impl Iterator<Item = f64> {
     run.stick_s.iter().map(move |[start, end]| end.min(to) - start.max(from)).filter(|length| *length > 0.0)
 }

@@ -19,8 +19,8 @@ pub(super) fn read_mean_deflection(
     Ok(FeatureValue::new(sum / count as f64, None))
 }
 
-/// Mean over the frames of a window in which the speed of the head is within a given fraction of a given
-/// speed.
+/// Mean deflection over the frames of a window in which the speed of the head differs from `speed_m_per_s` by
+/// at most the fraction `width_relative` of it.
 pub(super) fn read_deflection_at_speed(
     window: &Window,
     speed_m_per_s: f64,
@@ -60,7 +60,7 @@ pub(super) fn head_speeds_m_per_s(head: &[Option<f64>], frame_rate_hz: f64) -> O
     let half = ((SPEED_BLOCK_S * frame_rate_hz / 2.0).round() as usize).max(FEWEST_IN_BLOCK.div_ceil(2));
     let block = |k: usize| block_slope(head, k * half..((k + 2) * half).min(head.len()), frame_rate_hz);
     let mut blocks: Vec<(f64, f64)> = (0..(head.len() / half).saturating_sub(1)).filter_map(block).collect();
-    // two blocks with the same middle contain the same frames: those between two gaps
+    // two blocks with the same mean index contain the same tracked frames, those between two gaps
     blocks.dedup_by(|later, earlier| later.0 <= earlier.0);
     let mut pairs = blocks.windows(2).peekable();
     let mut pair = pairs.next()?;
@@ -75,7 +75,8 @@ pub(super) fn head_speeds_m_per_s(head: &[Option<f64>], frame_rate_hz: f64) -> O
     Some((0..head.len()).map(speed).collect())
 }
 
-/// Mean index of the tracked frames, and slope of the least-squares line through them, m/s.
+/// Mean index of the tracked frames of a block, and slope, m/s, of the least-squares line through the
+/// positions of the head in these frames.
 fn block_slope(
     head: &[Option<f64>],
     frames: std::ops::Range<usize>,

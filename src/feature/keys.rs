@@ -8,7 +8,7 @@ use short_spectra::Detrend;
 /// Default relative half width of the range of speeds around a given speed. Within this range, several cycles
 /// of chatter occur, and friction hardly changes.
 pub const WIDTH_RELATIVE: f64 = 0.15;
-/// Largest value that the relative half width may have.
+/// Largest permitted relative half width of the range of speeds around a given speed.
 const WIDEST_RELATIVE: f64 = 0.5;
 
 /// The list of keys from which [`Keys`] and the structs of TOML tables are made.
@@ -97,7 +97,7 @@ impl ReadingEntry<'_> {
         refuse_key(self.describe_key(key), problem)
     }
 
-    /// Checks that every key of the entry has a meaning for its kind.
+    /// Checks that the entry has only keys from `known`, those that have a meaning for its kind of reading.
     pub(crate) fn check_keys(&self, known: &[&str]) -> Result<(), KeyRefusal> {
         let Some(key) = self.keys.given_keys().find(|key| !known.contains(key)) else { return Ok(()) };
         let takes = if known.is_empty() { "none of its own".to_owned() } else { known.join(", ") };
@@ -200,7 +200,8 @@ impl ReadingEntry<'_> {
         }
     }
 
-    /// The window in which a speed is sought: the key `part` (of a reversal) or `window`.
+    /// The window whose frames are searched for a speed of the head. It is given by the key `part` (before or
+    /// after the flip of a reversal) or by the key `window`.
     pub(crate) fn stroke_window(&self) -> Result<Window, KeyRefusal> {
         match (self.keys.part.as_deref(), &self.keys.window) {
             (Some(part @ ("before" | "after")), None) => {

@@ -5,8 +5,8 @@ use crate::simulate::RunStatus;
 use serde::{Deserialize, Serialize};
 use short_spectra::SpectrumError;
 
-/// Minimum number of cycles in each half of a window; with fewer, the main lobe of the Hann window overlaps
-/// its mirror image at negative frequencies.
+/// Minimum number of cycles of a decaying component in each half of a window. With fewer cycles, the main
+/// lobe of the Hann window overlaps its mirror image at negative frequencies.
 pub(crate) const LEAST_CYCLES: f64 = 3.0;
 /// Minimum number of tracked frames in which the head has the requested speed.
 pub(crate) const FEWEST_AT_SPEED: usize = 8;
@@ -17,7 +17,7 @@ pub enum MissingValue {
     /// The window is not in the recording.
     #[error("{0}")]
     Window(#[from] WindowError),
-    /// The window has no spectrum.
+    /// No spectrum can be computed from the window.
     #[error("{0}")]
     Spectrum(#[from] SpectrumError),
     /// The band has no component above the noise.
@@ -47,11 +47,11 @@ pub enum MissingValue {
          first half of the window and {second_m:.2e} m in the second"
     )]
     NoDecay {
-        /// Frequency, Hz.
+        /// Frequency of the component, Hz.
         frequency_hz: f64,
-        /// Amplitude in the first half, m.
+        /// Amplitude of the component in the first half of the window, m.
         first_m: f64,
-        /// Amplitude in the second half, m.
+        /// Amplitude of the component in the second half of the window, m.
         second_m: f64,
     },
     /// The component decays to the level of the noise.
@@ -60,9 +60,9 @@ pub enum MissingValue {
          second half of the window; shorten it"
     )]
     Faded {
-        /// Frequency, Hz.
+        /// Frequency of the component, Hz.
         frequency_hz: f64,
-        /// Amplitude in the second half, m.
+        /// Amplitude of the component in the second half of the window, m.
         second_m: f64,
     },
     /// The window contains too few cycles to measure a decay.
@@ -72,9 +72,9 @@ pub enum MissingValue {
         LEAST_CYCLES
     )]
     FewCycles {
-        /// Frequency, Hz.
+        /// Frequency of the component, Hz.
         frequency_hz: f64,
-        /// Number of cycles in half of the window.
+        /// Number of cycles of the component in half of the window.
         cycles: f64,
     },
     /// A segment is longer than the window, or too short.
@@ -215,7 +215,7 @@ impl MissingReason {
         }
     }
 
-    /// Every reason, in the order of legends.
+    /// Every reason, in the order in which legends list the reasons.
     pub(crate) fn all() -> impl Iterator<Item = Self> {
         REASONS.iter().map(|(reason, ..)| *reason)
     }
@@ -226,7 +226,7 @@ impl MissingReason {
         REASONS[self as usize].1
     }
 
-    /// Meaning in a legend.
+    /// Text of the reason in a legend.
     pub(crate) fn meaning(self) -> &'static str {
         REASONS[self as usize].2
     }

@@ -25,7 +25,7 @@ pub struct FeatureReader<'a> {
 }
 
 impl<'a> FeatureReader<'a> {
-    /// Reader of `recording`, in which `instants` were found.
+    /// Reader of `recording`; `instants` are the instants that were found in this recording.
     #[must_use]
     pub fn new(recording: &'a Recording, instants: &'a ReversalInstants) -> Self {
         let (transforms, segments, speeds) = (RefCell::default(), RefCell::default(), RefCell::default());
@@ -54,7 +54,7 @@ impl<'a> FeatureReader<'a> {
         samples.get(frames).unwrap_or_default()
     }
 
-    /// The transform of a band's window.
+    /// Fourier transform of the channel of a band in the window of the band.
     pub(super) fn band_transform(&self, band: &FeatureBand) -> Result<Rc<WindowedTransform>, MissingValue> {
         let key = (band.channel, self.window_frames(&band.window)?, band.detrend);
         compute_once(&self.transforms, key, |(channel, frames, detrend)| {
@@ -64,7 +64,8 @@ impl<'a> FeatureReader<'a> {
         })
     }
 
-    /// The component of a band in each segment; both ends of its frequency range are determined from these.
+    /// The strongest component of a band in each segment of the band's window. The lowest and the highest
+    /// frequency of a drifting component are both taken from these segments.
     pub(super) fn cycle_segments(
         &self,
         band: &FeatureBand,
@@ -113,6 +114,6 @@ pub struct RunRecord {
     pub stick_s: Vec<[f64; 2]>,
     /// Changes of the contact mode, in order of time.
     pub transitions: Vec<Transition>,
-    /// Extrema over the run, if a reading needs them.
+    /// Extrema of the forces and of the Painlevé indicator over the run; `None` if no reading needs them.
     pub audit: Option<EnergyAudit>,
 }

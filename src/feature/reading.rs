@@ -13,8 +13,8 @@ use crate::toml_file::{KeyRefusal, suggest_key};
 use portable_math as math;
 use serde::Serialize;
 
-/// Unit in which two values of a time that may be zero or negative are compared, s: a tenth of a stick that
-/// lasts half a second.
+/// Scale of the difference between two times that may be zero or negative, s: a tenth of the duration of a
+/// long stick, 0.5 s.
 pub(crate) const TIME_SCALE_S: f64 = 0.05;
 /// Default number of bands of a log-spectrum. If the bands span an octave, the width of each is about the
 /// amount by which friction changes a stick-slip frequency.
@@ -30,7 +30,7 @@ pub enum Reading {
     Frequency(FeatureBand),
     /// Amplitude of the strongest component in a band, m.
     Amplitude(FeatureBand),
-    /// Root mean square of a band, m.
+    /// Root mean square of the part of a channel that is in a frequency band, m.
     Rms(FeatureBand),
     /// Level of one band of a log-spectrum, m: the root mean square of the band, to which a floor is added in
     /// quadrature.
@@ -48,7 +48,7 @@ pub enum Reading {
         band: FeatureBand,
         /// Length of the segments in which the component is tracked, s.
         segment_s: f64,
-        /// The end of its frequency range that is evaluated.
+        /// Whether the lowest or the highest frequency is evaluated.
         end: CycleRangeEnd,
     },
     /// Mean of the deflection `tip_x - head_x` over a window, m.
@@ -57,14 +57,14 @@ pub enum Reading {
     DeflectionAtSpeed {
         /// Window from which the frames are selected.
         window: Window,
-        /// The speed, m/s, above 0; in either direction.
+        /// Speed of the head, m/s, above 0; the head may move in either direction.
         speed_m_per_s: f64,
         /// Relative half width of the range of speeds that is used.
         width_relative: f64,
     },
     /// Time between two instants of a reversal, s.
     Interval {
-        /// The two instants, as a kind of interval.
+        /// Kind of interval, which determines the two instants.
         interval: ReversalInterval,
         /// Number of the reversal, counted from 1.
         reversal: usize,
@@ -108,8 +108,8 @@ const NONE: &[&str] = &[];
 
 macro_rules! kinds {
     ($($word:literal $unit:ident $keys:ident $make:ident $of:expr;)*) => {
-        /// Every kind. To add a kind, add a variant of [`Reading`], a row here, its name in [`Reading::kind`]
-        /// and its evaluation in [`Reading::read`].
+        /// Every kind of reading. To add a kind, add a variant of [`Reading`], a row here, its name in
+        /// [`Reading::kind`] and its evaluation in [`Reading::read`].
         const KINDS: &[ReadingKind] = &[$(ReadingKind {
             word: $word, unit: FeatureUnit::$unit, keys: $keys, make: ReadingConstructor::$make($of),
         }),*];
@@ -237,7 +237,8 @@ fn log_spectrum_readings(entry: &ReadingEntry) -> Result<Vec<(String, Reading)>,
     Ok(split_band(band.band_hz, lines).map(level).collect())
 }
 
-/// Bands of equal width or, if together they span more than an octave, with edges of equal ratio.
+/// Splits a band into `count` bands of equal width. If the band spans more than an octave, the parts have an
+/// equal ratio of upper to lower edge instead.
 fn split_band((low, high): (f64, f64), count: usize) -> impl Iterator<Item = (f64, f64)> {
     let share = move |k: usize| k as f64 / count as f64;
     let edge = move |k: usize| {

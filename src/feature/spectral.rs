@@ -1,5 +1,5 @@
-//! Readings from a band in the spectrum of a window: frequency of the component assigned to a target, size of
-//! the strongest component, and power.
+//! Readings from a band in the spectrum of a window: frequency of the component assigned to a target,
+//! amplitude and damping of the strongest component, and root mean square of the band.
 
 use super::missing::{LEAST_CYCLES, MissingValue};
 use super::reader::FeatureReader;
@@ -10,11 +10,12 @@ use serde::Serialize;
 use short_spectra::{Component, Detrend, SpectrumError, SpectrumSettings, WindowedTransform};
 use std::f64::consts::TAU;
 
-/// Distance `ln(f / target)` that has the same weight as a level of [`ASSIGN_DB`]. Near the best point of a
-/// fit, the model's peak is within 10 % of its target.
+/// Distance `ln(f / target)` of a frequency from its target that counts as much as a level of [`ASSIGN_DB`]
+/// below the strongest component, when a component is assigned to the target. Near the best point of a fit,
+/// the model's peak is within 10 % of its target.
 pub const ASSIGN_WIDTH: f64 = 0.1;
-/// Level below the strongest component that has the same weight as a distance of [`ASSIGN_WIDTH`], dB: half
-/// the amplitude.
+/// Level below the strongest component, dB, that counts as much as a distance of [`ASSIGN_WIDTH`] from the
+/// target, when a component is assigned to the target. At 6 dB, the amplitude is half.
 pub const ASSIGN_DB: f64 = 6.0;
 
 /// An end of the frequency range of a drifting component.
@@ -34,7 +35,7 @@ pub(super) fn read_frequency(
 ) -> Result<FeatureValue, MissingValue> {
     let (low, high) = band.band_hz;
     let found = reader.band_transform(band)?.components(band.band_hz)?;
-    // the strongest first, as in the list
+    // as in `found`, the strongest component comes first
     let inside: Vec<&Component> = found.iter().filter(|c| c.is_resolvable()).collect();
     let (chosen, runner_up) = assign_component(&inside, target).ok_or(MissingValue::NoPeak { low, high })?;
     check_amplitude(chosen, band)?;
@@ -147,19 +148,19 @@ pub struct FeatureBand {
 // The frequency in a segment is the mean over the segment. Each end of the measured range therefore lies
 // inside the true range, by the drift within half a segment; this holds for model and measurement alike.
 
-/// Minimum ratio of the amplitude in a segment to the largest amplitude of all segments. At a lower ratio,
-/// the cycle has not started or has decayed.
+/// Minimum ratio of a component's amplitude in a segment to its largest amplitude in all segments. At a lower
+/// ratio, the stick-slip cycle has not started or has decayed.
 pub(crate) const LEAST_SEGMENT_AMPLITUDE: f64 = 0.2;
 
-/// The component in every segment in which its amplitude is sufficient.
+/// The component of a band in every segment in which the amplitude of the component is sufficient.
 pub(super) struct CycleSegments {
     /// Frequencies, each with its standard deviation, Hz.
     pub frequencies: Vec<(f64, f64)>,
 }
 
 impl CycleSegments {
-    /// Measures the component in the samples of a band's window. Segments overlap by at least half; the first
-    /// begins and the last ends with the window.
+    /// Measures the component in the samples of a band's window. Segments overlap by at least half. The first
+    /// segment begins at the start of the window, and the last ends at its end.
     pub(super) fn from_samples(
         band: &FeatureBand,
         segment_s: f64,
@@ -193,8 +194,8 @@ fn strongest_in_segment(
     }
 }
 
-/// First frames of the segments of a window; `None` if a segment has too few frames, or more frames than the
-/// window.
+/// Index of the first frame of each segment of a window, counted from the start of the window; `None` if a
+/// segment has too few frames, or more frames than the window.
 fn segment_starts(window: usize, frames: usize) -> Option<impl Iterator<Item = usize>> {
     if frames < short_spectra::MIN_SAMPLES {
         return None;
@@ -210,8 +211,9 @@ fn segment_starts(window: usize, frames: usize) -> Option<impl Iterator<Item = u
 // near that of the sinusoid: `d = 2 ln(a1 / a2) / T` and `zeta = d / sqrt(d^2 + (2 pi f)^2)`. Errors come
 // from the trend, neighbouring components and noise.
 
-/// Smallest amplitude in the second half, in standard deviations of the noise. At 3, the relative error of
-/// the amplitude is a third, and noise alone seldom reaches that level.
+/// Smallest amplitude of a decaying component in the second half of the window, in standard deviations of the
+/// noise. At 3 standard deviations, the relative error of the amplitude is a third, and noise without a
+/// component seldom reaches that amplitude.
 pub(crate) const LEAST_FINAL_AMPLITUDE: f64 = 3.0;
 
 /// Damping ratio of the strongest component of a band.

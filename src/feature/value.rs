@@ -67,14 +67,14 @@ impl FeatureUnit {
     pub(crate) const DIMENSIONLESS: Self = Self { name: "1", suffix: "", shown: "", factor: 1.0 };
 }
 
-/// Way in which two values are compared.
+/// Way in which two values of a reading are compared.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ValueComparison {
-    /// By the logarithm of their ratio.
+    /// The values are compared by the logarithm of their ratio.
     Log,
-    /// By their difference, since the values may be zero or change sign.
+    /// The values are compared by their difference, because they may be zero or change sign.
     Linear {
-        /// Unit of the difference, in the unit of the reading; a difference of this size counts as large.
+        /// Scale of the difference, in the unit of the reading: a difference of this size counts as large.
         scale: f64,
     },
 }

@@ -15,7 +15,7 @@
 //! ```
 //!
 //! The state has the gap between tip and glass, `l1 (1 - cos theta) + l2 (1 - cos phi) - u`, in place of `u`:
-//! it starts at exactly zero, and its relative accuracy does not depend on the height of the tip.
+//! the gap starts at exactly zero, and its relative accuracy does not depend on the height of the tip.
 
 use super::shoulder::ShoulderContact;
 use super::{HeadMotion, LinkDirections, Linkage, Pose};
@@ -28,7 +28,7 @@ pub struct FlightState {
     pub pose: Pose,
     /// Height of the tip above the glass, m.
     pub gap_m: f64,
-    /// Rate of the gap, m/s.
+    /// Rate of change of the height of the tip above the glass, m/s.
     pub gap_rate_m_per_s: f64,
 }
 
@@ -41,19 +41,19 @@ pub struct FlightAccelerations {
     pub gap_m_per_s2: f64,
 }
 
-/// Changes of the links' rates and of the tip's velocity by a unit impulse on the tip. The changes of
-/// velocity are a column of the inverse contact mass.
+/// Changes of the links' angular rates and of the tip's velocity by a unit impulse on the tip. The changes of
+/// the tip's velocity are one column of the inverse contact mass matrix.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImpulseResponse {
-    /// Rates of neck and lip, rad/s for 1 N s.
+    /// Changes of the angular rates of neck and lip, rad/s for 1 N s.
     pub rates: [f64; 2],
-    /// Velocity of the tip away from the glass, m/s for 1 N s.
+    /// Change of the tip's velocity away from the glass, m/s for 1 N s.
     pub normal_per_kg: f64,
-    /// Velocity of the tip along the sweep, m/s for 1 N s.
+    /// Change of the tip's velocity along the sweep, m/s for 1 N s.
     pub tangential_per_kg: f64,
 }
 
-/// Inverse of the links' mass matrix after elimination of the head's drop, and the coupling of the links to
+/// Inverse of the links' mass matrix after the head's drop is eliminated, and the coupling of the links to
 /// the drop.
 struct ReducedInertia {
     inverse: [[f64; 2]; 2],
@@ -73,7 +73,7 @@ impl Linkage {
         ReducedInertia { inverse: [[scale * a22, -scale * a12], [-scale * a12, scale * a11]], carried }
     }
 
-    /// Accelerations without contact forces.
+    /// Accelerations of the links and of the gap in flight, without contact forces.
     #[inline]
     #[must_use]
     pub fn flight_accelerations(
@@ -118,7 +118,7 @@ impl Linkage {
         )
     }
 
-    /// Responses to a unit impulse away from the glass and to a unit impulse along the sweep, +v.
+    /// Responses to a unit impulse on the tip away from the glass, and to one along the sweep, towards +v.
     #[must_use]
     pub fn impulse_responses(&self, d: &LinkDirections) -> [ImpulseResponse; 2] {
         let ReducedInertia { inverse, carried } = self.reduced_inertia(d);

@@ -9,7 +9,7 @@ use serde::Serialize;
 pub struct FrictionLaw {
     /// Part of the coefficient that falls with speed, `A`.
     pub a: f64,
-    /// Decay of that part with speed, `B`, s/m.
+    /// Decay of the part `A` with speed, `B`, s/m: this part falls to `1/e` at the speed `1/B`.
     pub b_s_per_m: f64,
     /// Part of the coefficient that does not depend on speed, `C`.
     pub c: f64,

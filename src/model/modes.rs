@@ -64,7 +64,7 @@ pub fn natural_modes(blade: &Linkage, tip: TipConstraint, on_shoulder: bool) -> 
     match tip {
         TipConstraint::Free => free_modes(&m, &c, &k),
         TipConstraint::Held => {
-            // q = (1, -l1/l2) times one amplitude
+            // the angles of neck and lip are (1, -l1/l2) times one amplitude
             let shape = nalgebra::Vector2::new(1.0, -blade.l1_m / blade.l2_m);
             let along = |a: &Matrix2<f64>| shape.dot(&(a * shape));
             vec![single_mode(along(&m), along(&c), along(&k), shape[1])]
@@ -86,7 +86,7 @@ pub fn tip_compliance(blade: &Linkage, on_shoulder: bool, frequency_hz: f64) -> 
     (d * (l1 * l1) - b * (2.0 * l1 * l2) + a * (l2 * l2)) / (a * d - b * b)
 }
 
-/// Lowest and highest angular frequency of the links without preload, rad/s.
+/// Lower and higher natural angular frequency of the links, without preload and damping, rad/s.
 #[must_use]
 pub fn time_scales_rad_per_s(blade: &Linkage) -> (f64, f64) {
     let unloaded = Linkage { preload_displacement_m: 0.0, ..*blade };

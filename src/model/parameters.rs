@@ -109,7 +109,7 @@ macro_rules! table {
         $name:literal $symbol:literal $unit:literal $quantity:ident
         $default:expr, $range:expr, $scale:ident, $meaning:literal;
     )*) => {
-        /// Every number of a scene that a file may set and a fit may free.
+        /// Every number of a scene that a file may set and that a fit may vary.
         pub const PARAMETERS: &[ModelParameter] = &[$(ModelParameter {
             name: $name, symbol: $symbol, unit: $unit, quantity: ParameterQuantity::$quantity,
             default: $default, range: $range, scale: ParameterScale::$scale, meaning: $meaning,
@@ -117,7 +117,7 @@ macro_rules! table {
     };
 }
 
-/// Upper limit of the contact angle of a shoulder, rad: there the neck would be level.
+/// Upper limit of the contact angle of a shoulder, rad: at this angle the neck would be horizontal.
 const RIGHT_ANGLE: f64 = std::f64::consts::FRAC_PI_2;
 
 table! {
@@ -174,12 +174,13 @@ pub(crate) fn natural_frequency_hz(stiffness: f64, inertia: f64) -> f64 {
     (stiffness / inertia).sqrt() / TAU
 }
 
-/// Stiffness that gives this natural frequency to an inertia.
+/// Stiffness of a spring with which a mass or a moment of inertia has the natural frequency `frequency_hz`.
 pub(crate) fn stiffness_from_frequency(frequency_hz: f64, inertia: f64) -> f64 {
     inertia * math::powi(TAU * frequency_hz, 2)
 }
 
-/// Damping for a damping ratio: `ratio` times the critical damping `2 sqrt(stiffness inertia)`.
+/// Damping constant that gives a damping ratio: `ratio` times the critical damping `2 sqrt(stiffness
+/// inertia)`.
 pub(crate) fn damping_from_ratio(ratio: f64, stiffness: f64, inertia: f64) -> f64 {
     2.0 * ratio * (stiffness * inertia).sqrt()
 }

@@ -90,8 +90,8 @@ pub(crate) fn find_implausible(
         let doubted = |key: &&str| found.iter().any(|finding| finding.key == *key);
         let (judged, rests_on_doubt) = match row.judged {
             PlausibilitySubject::Derived { keys, of, .. } => (of(value), keys.iter().any(doubted)),
-            // a frequency depends on masses and lengths besides the stiffness, and so does a stiffness
-            // computed from it
+            // a conversion between frequency and stiffness uses masses and lengths, so that a converted value
+            // is not judged if any earlier row has a finding
             PlausibilitySubject::Value => (value(row.key), written(row.key) != row.key && !found.is_empty()),
         };
         let judged = judged.filter(|judged| !rests_on_doubt && !row.admits(*judged));
@@ -147,14 +147,15 @@ fn format_value(value: f64) -> String {
     format_plain(round_to_digits(value, DIGITS))
 }
 
-// Ranges that several rows share. They are wide: every blade in use lies within them.
+// Ranges that several rows of the tables share. They are wide: the values of every blade in use are within
+// them.
 
 /// Height of a link, m: the rubber of a wiper is 5 to 20 mm high, and a part that bends on its own is at
 /// least 0.5 mm high.
 const LINK_M: [f64; 2] = [5e-4, 2e-2];
 /// Thickness of a link, m: from the edge of a lip to the widest body of a profile.
 const THICKNESS_M: [f64; 2] = [1e-4, 1e-2];
-/// Thickness of a hinge, m: a thinner hinge tears, and a thicker part is a body of its own.
+/// Thickness of a hinge, m: a thinner hinge tears, and a thicker part does not act as a hinge.
 const HINGE_THICKNESS_M: [f64; 2] = [1e-4, 3e-3];
 /// Height of a hinge, m.
 const HINGE_M: [f64; 2] = [1e-4, 5e-3];
@@ -174,12 +175,13 @@ const MASS_OVER_HEIGHT_KG_PER_M: [f64; 2] =
 /// its base at the top, 2/3 for one with its base at the bottom; the range leaves room for a bead at either
 /// end.
 const CENTRE_OVER_LENGTH: [f64; 2] = [0.2, 0.8];
-/// Ratio of the inertia of a link to its mass times its length squared: 1/12 for a rod, 1/18 for a triangle,
-/// 1/4 for two masses at the ends. A link may be twice as thick as it is long, which adds 1/3.
+/// Ratio of the moment of inertia of a link, about its centre of mass, to its mass times the square of its
+/// length: 1/12 for a rod, 1/18 for a triangle, 1/4 for two masses at the ends. A link may be twice as thick
+/// as it is long, which adds 1/3.
 const INERTIA_OVER_ROD: [f64; 2] = [0.02, 0.6];
 /// Natural frequency of the head, Hz; published values are 8.88 and 20 Hz.
 const HEAD_HZ: [f64; 2] = [0.5, 200.0];
-/// Damping ratio of a rubber link: half the loss factor.
+/// Damping ratio of a rubber link: half the loss factor of the rubber.
 const RUBBER_RATIO: [f64; 2] = [0.0, 0.5];
 /// Force on the glass per metre of blade, N/m: wiper arms press with 10 to 20 N/m.
 const PRESS_N_PER_M: [f64; 2] = [1.0, 60.0];
@@ -213,8 +215,8 @@ const LENGTHS: &[UnitSlip] = &[MILLIMETRES, CENTIMETRES, METRES_TWICE];
 const MASSES: &[UnitSlip] = &[GRAMS, MILLIGRAMS];
 const INERTIAS: &[UnitSlip] = &[THOUSAND_TOO_LARGE, KG_MM2, G_CM2, G_MM2, THOUSAND_TOO_SMALL];
 
-/// Makes the rows of a table from key, unit, range, reason and slips. The row of a derived number also has
-/// its name, the other keys that it depends on, and its equation.
+/// Makes the rows of a table from key, unit, range, reason and usual mistakes (`UnitSlip`). The row of a
+/// derived number also has its name, the other keys that it depends on, and its equation.
 macro_rules! ranges {
     (@judged) => { PlausibilitySubject::Value };
     (@judged $name:literal, [$($key:literal)*], $of:expr) => {
@@ -231,7 +233,8 @@ macro_rules! ranges {
     };
 }
 
-/// Ratio of the inertia of a link to its mass times its length squared.
+/// Ratio of the moment of inertia of a link, about its centre of mass, to its mass times the square of its
+/// length.
 fn inertia_over_rod(value: &ValueLookup<'_>, link: &str) -> Option<f64> {
     let of = |key: &str| value(&format!("blade.{link}_{key}"));
     let length = of("length_m")?;

@@ -12,8 +12,8 @@
 //! For a rectangle this is `g = h/2` and `J = m (h^2 + t^2)/12`. A blade is long compared with its thickness
 //! and bends as a plate, with `E' = E/(1 - nu^2)` in place of Young's modulus; rubber keeps its volume, so
 //! `nu = 1/2`. A link turns on a hinge of thickness `t` and height `L`. A link without a hinge bends over its
-//! own height; the model's spring is then chosen so that a force at the bottom deflects the bottom as far as
-//! this bending does. With `s` the height above the bottom:
+//! own height; the spring of the model is then chosen so that a force at the bottom of the link displaces the
+//! bottom by the same distance as the bending does. With `s` the height above the bottom:
 //!
 //! ```text
 //! with a hinge     k = E' b t^3/(12 L)
@@ -32,9 +32,9 @@ use portable_math::{gauss_legendre, powi};
 use serde::Serialize;
 use std::fmt::Write;
 
-/// Significant digits of a number in the table, more than its uncertainty warrants.
+/// Significant digits of a number in the `[blade]` table; its uncertainty would justify fewer.
 const DIGITS: usize = 4;
-/// Number of entries in the table.
+/// Number of entries in the `[blade]` table.
 const COUNT: usize = 15;
 /// Smallest value of an input in a finite difference, as a fraction of the input: the limit keeps a dimension
 /// above zero even if the standard deviation exceeds the dimension.
@@ -84,7 +84,7 @@ impl BladeEstimate {
         Self { title: section.title.clone(), length_m: section.number("length_m"), blade }
     }
 
-    /// Value of a key of the table.
+    /// Value of the key `key` in the `[blade]` table; `None` for a key that is not in the table.
     #[must_use]
     pub fn value(&self, key: &str) -> Option<f64> {
         self.blade.iter().find(|quantity| quantity.key == key).map(|quantity| quantity.value)
@@ -107,7 +107,7 @@ impl BladeEstimate {
         for BladeTableEntry { key, value, relative_uncertainty, equation } in &self.blade {
             let value = round_to_digits(*value, DIGITS);
             let percent = round_to_digits(100.0 * relative_uncertainty, 2);
-            let _ = writeln!(text, "{key} = {value:?} # +-{percent} %: {equation}"); // cannot fail
+            let _ = writeln!(text, "{key} = {value:?} # +-{percent} %: {equation}"); // a String never fails
         }
         text
     }
@@ -142,7 +142,8 @@ fn compute_entries(section: &BladeSection) -> [(&'static str, f64, &'static str)
     ]
 }
 
-/// Change of the entry with index `at` by one standard deviation of an input, from a central difference.
+/// Change of the entry with index `at` if an input changes by one standard deviation, from a central
+/// difference.
 fn entry_change(section: &BladeSection, input: &SectionKey, at: usize) -> f64 {
     let value = section.number(input.name);
     let deviation = match input.deviation {
@@ -156,8 +157,9 @@ fn entry_change(section: &BladeSection, input: &SectionKey, at: usize) -> f64 {
 
 /// Poisson's ratio of rubber: its volume hardly changes.
 const POISSON_RATIO: f64 = 0.5;
-/// Number of parts of the bending integral of a link; each is integrated by the five-point rule. The error is
-/// 1e-12 for a link that is 20 times thinner at its edge.
+/// Number of parts of the bending integral of a link; each part is integrated by the five-point
+/// Gauss-Legendre rule. The relative error is 1e-12 for a link that is 20 times thinner at its edge than at
+/// its top.
 const PARTS: u32 = 256;
 
 /// Modulus of a wide plate, `E/(1 - nu^2)`, Pa, from Young's modulus `E`, Pa.
@@ -171,9 +173,9 @@ pub fn plate_modulus_pa(youngs_modulus_pa: f64) -> f64 {
 pub struct LinkSection {
     /// Height `h` of the link, from its hinge to the next hinge or to the edge.
     pub height_m: f64,
-    /// Thickness at the top `t1`.
+    /// Thickness `t1` at the top of the link.
     pub top_thickness_m: f64,
-    /// Thickness at the bottom `t2`.
+    /// Thickness `t2` at the bottom of the link.
     pub bottom_thickness_m: f64,
     /// Hinge at the top of the link, if it has one.
     pub hinge: Option<RubberHinge>,
@@ -182,14 +184,14 @@ pub struct LinkSection {
 /// A thin strip of rubber that bends in place of the link below it; dimensions in m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RubberHinge {
-    /// Thickness `t`.
+    /// Thickness `t` of the hinge.
     pub thickness_m: f64,
-    /// Height `L`.
+    /// Height `L` of the hinge.
     pub height_m: f64,
 }
 
 impl RubberHinge {
-    /// Stiffness per length of blade under a moment, N m/rad/m: `E' t^3/(12 L)`.
+    /// Stiffness of the hinge under a moment, per length of blade, N m/rad/m: `E' t^3/(12 L)`.
     #[must_use]
     pub fn stiffness_n_per_rad(&self, plate_modulus_pa: f64) -> f64 {
         plate_modulus_pa * powi(self.thickness_m, 3) / (12.0 * self.height_m)
@@ -203,7 +205,7 @@ impl LinkSection {
         0.5 * self.height_m * (self.top_thickness_m + self.bottom_thickness_m)
     }
 
-    /// Centre of the area from the top, m: `h (t1 + 2 t2)/(3 (t1 + t2))`.
+    /// Distance of the centroid of the section from the top of the link, m: `h (t1 + 2 t2)/(3 (t1 + t2))`.
     #[must_use]
     pub fn centre_m(&self) -> f64 {
         let (t1, t2) = (self.top_thickness_m, self.bottom_thickness_m);
@@ -218,8 +220,8 @@ impl LinkSection {
             + h * (t1 + t2) * (t1 * t1 + t2 * t2) / 48.0
     }
 
-    /// Stiffness at the top per length of blade, N m/rad/m: that of the hinge, or of the link's own bending
-    /// under a force at its bottom.
+    /// Stiffness of the model's spring at the top of the link, per length of blade, N m/rad/m: the stiffness
+    /// of the hinge, or that of the link's bending under a force at its bottom.
     #[must_use]
     pub fn stiffness_n_per_rad(&self, plate_modulus_pa: f64) -> f64 {
         match self.hinge {
@@ -228,7 +230,8 @@ impl LinkSection {
         }
     }
 
-    /// `int_0^h s^2/t(s)^3 ds` with `s` from the bottom.
+    /// Integral `int_0^h s^2/t(s)^3 ds` of the bending of the link, dimensionless; `s` is the height above
+    /// the bottom and `t(s)` the thickness at that height, m.
     fn bending_integral(&self) -> f64 {
         let part = self.height_m / f64::from(PARTS);
         let (top, bottom) = (self.top_thickness_m, self.bottom_thickness_m);

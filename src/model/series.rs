@@ -24,16 +24,16 @@ pub(super) type LinkPair = [f64; 2];
 /// Contact between tip and glass during the expansion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum ContactMode {
-    /// The tip slides in this direction, +1 or -1.
+    /// The tip slides along the sweep in this direction, +1 or -1.
     Slip(f64),
     /// The tip sticks.
     Stick,
-    /// The tip is off the glass; drop of the head, m, and its rate, m/s.
+    /// The tip is off the glass. The two numbers are the drop of the head, m, and its rate, m/s.
     Flight(f64, f64),
 }
 
 impl ContactMode {
-    /// Direction of slip, 0 in stick and flight.
+    /// Direction of slip, +1 or -1; 0 in stick and flight.
     #[inline]
     pub(super) fn slip_direction(self) -> f64 {
         match self {
@@ -43,29 +43,32 @@ impl ContactMode {
     }
 }
 
-/// Left factors, of index `j`, of the products in the recurrence.
+/// Taylor coefficients of index `j`, the left factors of the products in the recurrence.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct LeftFactors {
     pub cos: LinkPair,
     pub sin: LinkPair,
-    /// Coefficients `mu_j` and `j v3'_j`.
+    /// Coefficient `mu_j` of the friction coefficient, and `j` times the coefficient `v3'_j` of the tip
+    /// velocity.
     pub slip: LinkPair,
 }
 
-/// Right factors, of index `m`, of the products in the recurrence; some have the index `m + 1` instead.
+/// Taylor coefficients of index `m`, the right factors of the products in the recurrence; some have the index
+/// `m + 1` instead.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct RightFactors {
     /// Angular rates of index `m + 1`.
     next_rate: LinkPair,
     pub x: LinkPair,
     pub y: LinkPair,
-    /// `N_m`, and the falling part of `mu` of index `m + 1`.
+    /// Coefficient `N_m` of the normal force, and coefficient `m + 1` of the part of `mu` that falls with
+    /// speed.
     slip: LinkPair,
 }
 
 /// Taylor coefficients of the motion; `K` is the number of coefficients, including that of `x^0`.
 ///
-/// After `expand` to the order `n` the motion is known up to `x^n`, forces up to `x^(n-1)`.
+/// After `expand` to the order `n` the motion is known up to `x^n`, and forces are known up to `x^(n-1)`.
 #[derive(Debug, Clone)]
 pub struct MotionSeries<const K: usize> {
     /// Velocity of the head along the sweep, m/s; the caller sets it.
@@ -89,7 +92,7 @@ pub struct MotionSeries<const K: usize> {
     pub(super) drop_rate: [f64; K],
     pub(super) left: [LeftFactors; K],
     pub(super) right: [RightFactors; K],
-    /// `p` and `q` of the highest order so far.
+    /// Coefficients of `p = cos(angle) rate` and `q = sin(angle) rate` of the highest order computed so far.
     pub(super) p: LinkPair,
     pub(super) q: LinkPair,
 }
@@ -115,7 +118,7 @@ impl<const K: usize> Default for MotionSeries<K> {
     }
 }
 
-/// Sums of the products of coefficients of lower orders.
+/// Sums of the products of coefficients of lower orders in the recurrence.
 #[derive(Clone, Copy, Default)]
 struct ProductSums {
     p: LinkPair,
@@ -130,20 +133,23 @@ struct ProductSums {
 pub(super) struct RecurrenceConstants {
     pub l: LinkPair,
     pub m: LinkPair,
-    /// `m_a - M l1`, `m_b - M l2`: coefficients of `q'` in the normal force.
+    /// `m_a - M l1` and `m_b - M l2`, kg m: coefficients of `q' = (sin(angle) rate)'` of neck and lip in the
+    /// normal force.
     pub arm: LinkPair,
-    /// Inverse of the coefficient matrix of the accelerations, with friction.
+    /// Inverse of the coefficient matrix of the angular accelerations, including friction in slip.
     pub inverse: [LinkPair; 2],
     /// `w = (l1 cos theta, l2 cos phi)`, `A^-1 w` and `1 / (w.A^-1 w)`, for stick.
     pub w: LinkPair,
     pub per_force: LinkPair,
     pub mobility: f64,
-    /// Coefficients in the equation for `u''`, of the accelerations and of the remaining part of `q'`; then
-    /// the coefficients of the accelerations in the equation for `N`.
+    /// `drop` and `drop_rest` are coefficients in the equation for the drop's acceleration `u''`: those of
+    /// the angular accelerations, and those of the part of `q'` without them. `normal` has the coefficients
+    /// of the angular accelerations in the equation for the normal force `N`.
     pub drop: LinkPair,
     pub drop_rest: LinkPair,
     pub normal: LinkPair,
-    /// Moments on neck and lip per newton of normal force, and per newton of friction from lower orders.
+    /// Moments on neck and lip: `per_normal` per newton of normal force, `per_slip` per newton of friction
+    /// from coefficients of lower orders.
     pub per_normal: LinkPair,
     pub per_slip: LinkPair,
     /// Cosines and sines at the instant, times `m_c` and times `m`.
@@ -153,8 +159,8 @@ pub(super) struct RecurrenceConstants {
     pub sin_m: LinkPair,
     /// Friction coefficient with the sign of the friction force.
     pub mu: f64,
-    /// Total stiffness and damping of the neck, with those of a shoulder on which it leans, and its moment at
-    /// zero angle.
+    /// Stiffness of the neck, its damping, and its moment at zero angle and rate; all include the shoulder if
+    /// the neck leans on it.
     pub neck: [f64; 3],
     /// Painlevé indicator of slip; 1 in stick and in flight.
     pub indicator: f64,
@@ -358,7 +364,7 @@ impl<const K: usize> MotionSeries<K> {
         self.tip_velocity[k + 1] = tip;
         let mut falling = 0.0;
         if FALLING {
-            // E' = -b sigma v3'' E for the falling part of mu = E + c
+            // the part E of mu = E + c that falls with speed satisfies E' = -b sigma v3'' E
             let sum = sums.slip[1] + next * tip * (mu - linkage.friction.c);
             falling = -linkage.friction.b_s_per_m * direction * sum * share;
         }
@@ -366,8 +372,8 @@ impl<const K: usize> MotionSeries<K> {
         self.right[k] = RightFactors { next_rate: rate, x, y, slip: [normal, falling] };
     }
 
-    /// Sums the products of known coefficients. The newest factors are added last, because the processor may
-    /// still be computing them when the sum starts.
+    /// Sums the products of the known coefficients in the recurrence. The newest factors are added last,
+    /// because the processor may still be computing them when the sum starts.
     #[inline(always)]
     fn sum_products<const FALLING: bool>(&self, k: usize) -> ProductSums {
         let mut sums = ProductSums::default();
@@ -402,7 +408,7 @@ impl<const K: usize> MotionSeries<K> {
     }
 }
 
-/// Applies `f` to the index of each link.
+/// Applies `f` to the index of each link, 0 for the neck and 1 for the lip.
 #[inline(always)]
 pub(super) fn per_link(f: impl Fn(usize) -> f64) -> LinkPair {
     [f(0), f(1)]

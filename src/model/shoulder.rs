@@ -11,14 +11,14 @@ use serde::Serialize;
 pub struct Shoulder {
     /// Angle at which the neck meets the shoulder, `theta_s`, rad.
     pub contact_angle_rad: f64,
-    /// Additional stiffness, `k_s`, N m/rad.
+    /// Stiffness that the shoulder adds to the neck, `k_s`, N m/rad.
     pub stiffness_n_m_per_rad: f64,
-    /// Additional damping, `c_s`, N m s/rad.
+    /// Damping that the shoulder adds to the neck, `c_s`, N m s/rad.
     pub damping_n_m_s_per_rad: f64,
 }
 
 impl Shoulder {
-    /// Moment on the neck while it leans on side `side` (+1 or -1) of the shoulder, N m.
+    /// Moment of the shoulder on the neck, N m, while the neck leans on the side `side` (+1 or -1).
     #[inline]
     #[must_use]
     pub fn moment(&self, theta: f64, theta_rate: f64, side: f64) -> f64 {

@@ -1,5 +1,5 @@
-//! The first variation of the motion: linear equations for the derivatives of the blade's angles along a
-//! motion with known Taylor series.
+//! The first variation of the motion: linear equations for the derivatives of the blade's angles with respect
+//! to parameters (directions), along a motion with known Taylor series.
 //!
 //! The unknowns are the derivatives `y_i = cos(angle_i) d angle_i` of the sines of both angles, so that the
 //! derivative of the tip's position is `l1 y1 + l2 y2` at all angles. Let `t` be the tangent of an angle and
@@ -49,7 +49,7 @@ pub(crate) struct StateTangent {
 /// One vector for the neck and one for the lip.
 pub(super) type LaneVectorPair = [LaneVector; 2];
 
-/// The motion about which the variation is computed; `K` is the size of its series.
+/// The motion about which the variation is computed; `K` is the number of Taylor coefficients of its series.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ReferenceMotion<'a, const K: usize> {
     pub linkage: &'a Linkage,
@@ -73,20 +73,21 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         [self.linkage.m_a, self.linkage.m_b]
     }
 
-    /// `m_a - M l1`, `m_b - M l2`: coefficients of `q'` in the normal force.
+    /// `m_a - M l1` and `m_b - M l2`, kg m: coefficients of `q' = (sin(angle) rate)'` of neck and lip in the
+    /// normal force.
     pub(super) fn arms(&self) -> [f64; 2] {
         let (l, m) = (self.lengths(), self.moments());
         [m[0] - self.linkage.mass_kg * l[0], m[1] - self.linkage.mass_kg * l[1]]
     }
 }
 
-/// Applies `f` to the index of each link.
+/// Applies `f` to the index of each link, 0 for the neck and 1 for the lip.
 #[inline(always)]
 pub(super) fn lanes_per_link(f: impl Fn(usize) -> LaneVector) -> LaneVectorPair {
     [f(0), f(1)]
 }
 
-/// The sum over both links.
+/// Sum over both links of the weight times the vector of the link.
 #[inline(always)]
 pub(super) fn sum_over_links(weights: [f64; 2], rows: &LaneVectorPair) -> LaneVector {
     weights[0] * rows[0] + weights[1] * rows[1]
@@ -101,7 +102,8 @@ pub(crate) struct TangentMatrices {
     pub stiffness: [[LaneVector; 3]; 3],
 }
 
-/// The equation for `y1` in stick, with the friction force eliminated; `y2` follows from `y1`.
+/// Equation in stick for `y1`, the derivative of the sine of the neck's angle. The friction force is
+/// eliminated; `y2`, that of the lip, follows from `y1`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StickEquation {
     /// Coefficients of `y1''`, `y1'` and `y1`, with `y2` eliminated.
@@ -128,7 +130,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         self.linkage.friction.b_s_per_m * at.falling
     }
 
-    /// The matrices at these instants; in stick, they leave out the friction force.
+    /// Matrices of the variation at the sampled instants; in stick, they do not include the friction force.
     pub(crate) fn tangent_matrices(&self, at: &MotionSamples) -> TangentMatrices {
         let linkage = self.linkage;
         let (l, m, arms, m_c) = (self.lengths(), self.moments(), self.arms(), linkage.m_c);
@@ -169,8 +171,9 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         out
     }
 
-    /// Adds the terms of `S_j = t_j y_j` to equation `i`: `pushed` times the second derivative of `S_j`, and
-    /// `held` times the change of the support's force, which depends on `S_j` and its first derivative.
+    /// Adds the terms of `S_j = t_j y_j`, the derivative of minus the cosine of angle `j`, to equation `i`:
+    /// `pushed` times the second derivative of `S_j`, and `held` times the change of the support's force,
+    /// which depends on `S_j` and its first derivative.
     #[inline(always)]
     fn add_support(
         &self,
@@ -187,7 +190,8 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         out.stiffness[i][j] += pushed * t_2 + by_rate * t_1 + by_value * t;
     }
 
-    /// Adds the springs of both links, which act on the angles `y / cos`.
+    /// Adds the terms of the springs and dampers of both links, which act on the derivatives of the angles,
+    /// `y / cos`.
     #[inline(always)]
     fn add_springs(&self, out: &mut TangentMatrices, secant: &[LaneVector; 2], secant_1: &[LaneVector; 2]) {
         let lip = self.linkage.lip;
@@ -202,7 +206,8 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         }
     }
 
-    /// Adds the terms of the gap in flight. The gap lifts the head, whose equation is the third.
+    /// Adds the terms of flight: the third column belongs to the gap between tip and glass, and the third row
+    /// is the equation of the head's drop.
     #[inline(always)]
     fn add_gap(&self, out: &mut TangentMatrices, at: &MotionSamples) {
         const GAP: usize = 2;

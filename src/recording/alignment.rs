@@ -19,8 +19,8 @@ pub struct Alignment {
     /// Standard deviation of the time shift, s; infinite if the path does not determine the shift, `None` if
     /// no path is fitted.
     pub shift_sd_s: Option<f64>,
-    /// Whether the recorded head turns in the opposite direction; then the paths are aligned only at the
-    /// turn.
+    /// Whether the recorded head turns in the opposite direction to the model's head; the paths are then
+    /// aligned only at the turn.
     pub opposite_turn: bool,
 }
 
@@ -57,12 +57,13 @@ pub(crate) fn is_tracked(column: &[Option<f64>]) -> bool {
     column.iter().any(Option::is_some)
 }
 
-/// Maximum number of least-squares steps. The head's path is smooth, and three steps reach a nanosecond.
+/// Maximum number of least-squares steps. The head's path is smooth, and three steps find the time shift to a
+/// nanosecond.
 const MAX_STEPS: usize = 8;
-/// Step below which the iteration ends, s.
+/// Step of the time shift below which the iteration ends, s.
 const MIN_STEP_S: f64 = 1e-9;
-/// Maximum number of frames that are used; more frames would change the time shift by less than a
-/// microsecond.
+/// Maximum number of frames from which an alignment is estimated; more frames would change the time shift by
+/// less than a microsecond.
 const MAX_FRAMES: usize = 20_000;
 
 impl Alignment {
@@ -148,7 +149,8 @@ fn used_frames(recording: &Recording) -> impl Iterator<Item = usize> {
     (0..frames).step_by(frames.div_ceil(MAX_FRAMES).max(1))
 }
 
-/// One Gauss-Newton step of the time shift, with the mean distance of the paths.
+/// One Gauss-Newton step of the time shift, and the mean offset of the recorded path from the model's path,
+/// m.
 struct AlignmentStep {
     time_s: f64,
     /// Standard deviation of the time shift from the residuals, s.

@@ -123,9 +123,10 @@ pub(super) fn central_moments(points: &[(f64, f64)]) -> ([f64; 2], [f64; 2]) {
     ([x, y], sums)
 }
 
-/// The tracked frames of a channel, their noise, m, and the step of the positions, m (0 without a step).
+/// The tracked frames of a channel, the standard deviation of their noise, m, and the smallest change of
+/// position between two tracked frames that is not zero, m (0 if the position never changes).
 pub(super) struct TrackPoints {
-    /// Frame and position, m.
+    /// Frame number and position, m, of every tracked frame.
     pub points: Vec<(usize, f64)>,
     pub noise_m: f64,
     pub step_m: f64,
@@ -155,7 +156,7 @@ pub(super) fn present_points(samples: &[Option<f64>]) -> Vec<(usize, f64)> {
 }
 
 /// Standard deviation of white noise on a smooth path, m, from the fourth differences of consecutive frames,
-/// which are zero for a motion up to the third degree.
+/// which are zero for a path that is a polynomial of degree 3 in time.
 pub(super) fn noise_sd_m(points: &[(usize, f64)]) -> f64 {
     /// Fourth differences of white noise have 1 + 16 + 36 + 16 + 1 times the variance of the noise.
     const GAIN: f64 = 70.0;
@@ -195,7 +196,8 @@ pub(super) fn value_range(values: &[f64]) -> (f64, f64) {
     values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)))
 }
 
-/// Median of three at every point: the filter removes outliers of a single frame; a turn takes far longer.
+/// Median of every point and its two neighbours. The filter removes outliers of a single frame and hardly
+/// changes a turn of the head, which takes many frames.
 pub(super) fn median_filter(points: &[(usize, f64)]) -> Vec<f64> {
     (0..points.len()).map(|index| median_of_three(points, index)).collect()
 }

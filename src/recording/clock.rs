@@ -1,18 +1,20 @@
 //! Frame numbers from a column of times; the times may be rounded, and rows may be missing.
 
-/// Largest distance of a time from its frame, frames. Rounding to half a frame moves a time by up to a
-/// quarter of a frame; at more than a third, the nearest frame is uncertain.
+/// Largest distance of a time from the time of its frame, in frames. Rounding to half a frame moves a time by
+/// up to a quarter of a frame; at more than a third, the nearest frame is uncertain.
 pub(crate) const OFF_GRID_LIMIT_FRAMES: f64 = 0.3;
 
-/// Longest grid, frames: 17 minutes at 10,000 frames/s. A larger jump in the times is damage.
+/// Largest number of frames of a grid: 17 minutes at 10,000 frames/s. Times that span more frames come from a
+/// damaged file.
 pub(crate) const MAX_FRAMES: f64 = 10_000_000.0;
 
-/// Fraction of a row's distance from the grid by which the phase of the grid is corrected. If the time per
-/// frame of the seed is 1 % off, the phase lags by a tenth of a frame.
+/// After each row, the phase of the grid is corrected by this fraction of the row's distance from the grid.
+/// If the first guess of the time per frame is wrong by 1 %, the phase lags by a tenth of a frame.
 const PHASE_GAIN: f64 = 0.1;
 /// Maximum number of digits to which a fitted frame rate is rounded.
 const RATE_DIGITS: usize = 16;
-/// Maximum number of rounds of renumbering; one suffices unless the first slope is far off.
+/// Maximum number of times that the rows are numbered again after a line was fitted; once suffices unless the
+/// slope of the first line is far off.
 const ROUNDS: usize = 4;
 
 /// Frame numbers of the rows, and the line that fits their times.
@@ -22,9 +24,9 @@ pub(crate) struct FrameFit {
     pub frames: Vec<usize>,
     /// Time from frame to frame, from the least-squares line, s.
     pub frame_s: f64,
-    /// Row that is furthest off the grid.
+    /// Index of the row that is furthest from its frame.
     pub worst_row: usize,
-    /// Distance of that row from its frame, frames.
+    /// Distance of the row `worst_row` from its frame, in frames.
     pub worst_frames: f64,
 }
 
@@ -72,8 +74,8 @@ fn follow_grid(times_s: &[f64], first: f64, seed_s: f64) -> Vec<usize> {
     times_s.iter().map(&mut number).collect()
 }
 
-/// Median time from row to row, s: the time per frame if most rows are neighbours. The shorter of two middle
-/// values is taken, because gaps only lengthen these times.
+/// Median time from row to row, s: the time per frame if most rows belong to consecutive frames. The shorter
+/// of two middle values is taken, because gaps only lengthen these times.
 pub(crate) fn median_step_s(times_s: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> = times_s.windows(2).map(|w| w[1] - w[0]).collect();
     steps.sort_by(f64::total_cmp);

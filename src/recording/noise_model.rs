@@ -14,23 +14,24 @@ pub(crate) use common_noise::{SharedNoise, measure_common_noise};
 // The position of the head along the sweep is compared with its smooth motion. The height of the tip is
 // compared with the glass, which is a straight line in the picture. In the other two channels the blade
 // itself moves from frame to frame, so their noise cannot be separated. The tracker is assumed to treat both
-// points alike: the noise of the head along the sweep also stands for the tip, and the noise of the tip's
-// height also stands for the head.
+// points alike: the noise of the head along the sweep is used for the tip too, and the noise of the tip's
+// height is used for the head too.
 
-/// Length of a block, s, in which a cubic is fitted to the motion. Its residual is a hundredth of the
-/// amplitude for a motion at 50 Hz.
+/// Length of a block, s, in which a cubic is fitted to the motion. For a motion at 50 Hz, the residual of the
+/// cubic is a hundredth of the amplitude.
 const BLOCK_S: f64 = 8e-3;
 /// Minimum number of frames of a block: in a shorter block, a cubic removes most of the correlation between
 /// neighbouring frames.
 const LEAST_BLOCK: usize = 24;
-/// Maximum number of frames that are used, spread over the recording: they determine a correlation to 0.01.
+/// Maximum number of frames that are used for an estimate of the noise, spread over the recording: they
+/// determine a correlation with an error of 0.01.
 const MOST_FRAMES: usize = 6_000;
-/// Minimum number of degrees of freedom of an estimate.
+/// Minimum number of degrees of freedom of an estimate of the noise.
 const FEWEST_FRAMES: usize = 100;
 /// Smallest standard deviation that counts as noise, m; a smaller one is rounding.
 const LEAST_SD_M: f64 = 1e-9;
 
-/// Noise of a channel.
+/// Estimated noise of a channel, with its uncertainty.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ChannelNoise {
     pub noise: AutoregressiveNoise,
@@ -52,7 +53,7 @@ pub(crate) enum NoiseSource {
     Glass,
 }
 
-/// Noise of a recording.
+/// Estimated noise of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct RecordingNoise {
     /// Noise of tip and head along the sweep.
@@ -67,7 +68,7 @@ pub(super) fn block_length(frame_rate_hz: f64) -> usize {
 }
 
 /// Measures the noise of a recording along the sweep and in height. Each of the two is measured on its own
-/// channel. If one measurement fails, the result of the other stands for both.
+/// channel. If one measurement fails, the result of the other is used for both.
 pub(crate) fn measure_noise(recording: &Recording) -> RecordingNoise {
     let (traces, length) = (recording.traces(), block_length(recording.grid().frame_rate_hz));
     let head = BlockCut { length, degree: 3, covariate: None };

@@ -1,8 +1,9 @@
-//! Quality of a recording: its rate, gaps and noise, measured on the traces, and the findings on them.
+//! Quality of a recording: its rate, gaps and noise, measured on the traces, and findings on these
+//! measurements.
 //!
 //! [`measure_quality`] measures; [`collect_findings`] judges and gives each finding a severity, a number and
 //! advice; `verdict_lines` writes measurements and findings as text; [`Quality::component_visibility`] judges
-//! a single frequency.
+//! whether an oscillation of a single frequency is visible.
 
 mod checks;
 mod finding;
@@ -30,7 +31,7 @@ pub use tilt::{CameraTilt, Curvature, TiltNotFound, measure_tilt};
 
 /// All findings on a recording, the gravest first, with the findings of its import.
 ///
-/// `measured` is the result of [`measure_quality`] for the same recording, `instants` that of
+/// `measured` is the result of [`measure_quality`] for the same recording, and `instants` is the result of
 /// [`ReversalInstants::find_instants`].
 #[must_use]
 pub fn collect_findings(

@@ -1,5 +1,5 @@
-//! Pictures of the video from which a recording was tracked, and the pixel at which a tracked point lies in
-//! them.
+//! Pictures of the video from which a recording was tracked, and the pixel of a tracked point in these
+//! pictures.
 
 use super::files::{CameraEntry, FilesError, LevelEntry};
 use crate::toml_file::NumberPair;
@@ -14,7 +14,7 @@ const MOST_BYTES: usize = 256 << 20;
 /// Number of grey levels of a picture in a figure: a pixel then needs half a byte, and four pictures fit on a
 /// page.
 const GREYS: u16 = 16;
-/// Maximum number of samples of the picture along either side of a pixel of a figure.
+/// Maximum number of samples of the original picture along either side of a pixel of a figure.
 const MOST_SAMPLES: f64 = 8.0;
 
 /// Why a picture cannot be read.
@@ -153,7 +153,8 @@ impl std::fmt::Debug for RecordingVideo<'_> {
 /// Largest distance of the origin from the corner of the picture, pixels; a larger distance, a thousand
 /// pictures or more, is a mistake.
 const MOST_PIXELS: f64 = 1e7;
-/// Admissible length of a pixel, m: from that of a microscope to far more than that of a camera on a wiper.
+/// Admissible length that a pixel shows, m: from the pixel of a microscope to 1 m, far more than in a view of
+/// a wiper.
 const LENGTHS_M: std::ops::RangeInclusive<f64> = 1e-9..=1.0;
 
 /// `[video]`: pictures of frames, for figures.

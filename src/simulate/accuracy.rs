@@ -22,7 +22,7 @@ pub(crate) const FIXED_STEPS_S: [f64; 5] = [1e-4, 3e-5, 1e-5, 3e-6, 1e-6];
 /// Relative tolerance of the reference run.
 pub(crate) const REFERENCE_TOLERANCE: f64 = 1e-13;
 
-/// A method with its tolerance or step size.
+/// A solver setting: a method with its tolerance or step size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SolverSetting {
     pub method: IntegrationMethod,
@@ -48,8 +48,8 @@ impl SolverSetting {
     }
 }
 
-/// All settings for a scene: each adaptive method with each tolerance, then the fixed steps. The fixed steps
-/// are left out if the scene has flight or impacts.
+/// All solver settings for a scene: each adaptive method with each tolerance, then the schemes with fixed
+/// steps. The fixed steps are left out if the scene allows flight or impacts.
 pub(crate) fn list_settings(scene: &Scene) -> Vec<SolverSetting> {
     let adaptive = [IntegrationMethod::Taylor, IntegrationMethod::RungeKutta, IntegrationMethod::Slack];
     let tolerances =
@@ -72,7 +72,7 @@ fn format_optional(value: Option<f64>) -> String {
     value.map_or_else(String::new, |v| format!("{v:e}"))
 }
 
-/// Table cells with the tolerance, the step, and the largest error of a transition time.
+/// Table cells of a solver setting: tolerance, step, and largest error of a transition time, s.
 fn setting_cells(row: &AccuracyRow) -> [String; 3] {
     let AccuracyRow { setting, lists, .. } = row;
     [setting.relative_tolerance, setting.method.step_s(), lists.worst_s].map(format_optional)

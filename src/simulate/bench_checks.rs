@@ -23,16 +23,16 @@ pub struct BenchChecks {
     pub per_metre: Option<ChecksPerMetre>,
     /// Force on the tip at which the displacements are given, N.
     pub tip_force_n: f64,
-    /// Displacement of the tip along the glass under this force, in free air with the head held, m:
-    /// `F ((l1 + l2)^2/k1 + l2^2/k2)`.
+    /// Displacement of the tip along the glass under the force `F` on the tip, in free air with the head
+    /// held, m: `F ((l1 + l2)^2/k1 + l2^2/k2)`.
     pub tip_displacement_m: f64,
-    /// Displacement of the tip if the neck is held too, m: `F l2^2/k2`.
+    /// Displacement of the tip under the force `F` if head and neck are held, m: `F l2^2/k2`.
     pub lip_displacement_m: f64,
     /// Displacement of the support under the preload, m: `N0/k0`.
     pub preload_displacement_m: f64,
     /// Preload `N0`, N.
     pub preload_force_n: f64,
-    /// Natural frequencies of the single parts.
+    /// Natural frequencies of head, neck and lip as single bodies.
     pub parts: PartFrequencies,
     /// Natural frequencies of the coupled modes in free air with the head held, Hz.
     pub free_air_hz: Vec<Option<f64>>,
@@ -56,7 +56,7 @@ pub struct ChecksPerMetre {
     pub press_force_n_per_m: f64,
 }
 
-/// Natural frequencies of head, neck and lip, Hz.
+/// Natural frequencies of head, neck and lip as single bodies, Hz.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[allow(missing_docs)] // the names include the unit
 pub struct PartFrequencies {

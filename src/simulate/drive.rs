@@ -25,12 +25,12 @@ pub enum Drive {
         #[serde(skip_serializing_if = "is_zero")]
         delay_s: f64,
     },
-    /// Uniform motion `v = speed t`, for tests with exact solutions; scene files cannot ask for it.
+    /// Uniform motion `v = speed t`, for tests with exact solutions; a scene file cannot select it.
     Uniform {
         /// Speed of the head, m/s.
         speed_m_per_s: f64,
     },
-    /// Motion of the head of a recording; copies of a scene share it.
+    /// Motion of the head of a recording; copies of a scene share the same spline.
     Recorded(Arc<HeadSpline>),
 }
 
@@ -59,7 +59,7 @@ impl Drive {
     }
 
     /// Fills `out` with the Taylor coefficients of the head's velocity about `t`, m/s^(k+1), in rising order.
-    /// The series holds from `t` to the [next break](Self::next_break).
+    /// The series is exact from `t` to the [next break](Self::next_break).
     #[inline]
     pub(crate) fn velocity_series(&self, t: f64, out: &mut [f64]) {
         match *self {
@@ -96,7 +96,7 @@ impl Drive {
         }
     }
 
-    /// Start of the cosine, s; 0 for other motions.
+    /// Time at which the cosine starts, `t0`, s; 0 for other motions.
     pub(crate) fn delay_s(&self) -> f64 {
         if let Self::Cosine { delay_s, .. } = *self { delay_s } else { 0.0 }
     }
@@ -177,8 +177,8 @@ pub fn smooth_head_motion(recording: &Recording) -> Result<HeadSpline, HeadMotio
     Ok(HeadSpline::from_points(&grid, &points, block, &knots))
 }
 
-/// First time at which the head is fast enough for a start in steady slip, s; it lies after the uncertain
-/// start of the recording.
+/// First time at which the head is fast enough for a start in steady slip, s; it is after the uncertain start
+/// of the recording.
 pub(crate) fn even_motion_start_s(motion: &HeadSpline) -> f64 {
     const STEP_S: f64 = 1e-3;
     let [first_s, last_s] = motion.span_s();

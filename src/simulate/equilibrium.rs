@@ -11,12 +11,13 @@ type Pair = Vector2<f64>;
 /// its solution.
 const LOAD_STEPS: u32 = 64;
 const MOST_ITERATIONS: u32 = 50;
-/// The iteration has converged if the residual moment is below this multiple of the stiffness of neck and lip
-/// times one radian.
+/// The iteration has converged if the residual moment is below this multiple of the sum of the stiffnesses of
+/// neck and lip, times one radian.
 const RESIDUAL: f64 = 1e-14;
 
-/// Pose with `A qdd = 0` under the friction at the head's speed, m/s. `None` if the head is at rest, if no
-/// such pose with both links above level exists, or if the glass would have to pull the tip.
+/// Pose of static equilibrium (all accelerations zero) while the tip slides at the head's speed, m/s, with
+/// the friction at this speed. `None` if the head is at rest, if no such pose with both links above level
+/// exists, or if the glass would have to pull the tip.
 #[must_use]
 pub fn steady_slip_pose(linkage: &Linkage, speed_m_per_s: f64) -> Option<Pose> {
     if speed_m_per_s == 0.0 {
@@ -35,7 +36,7 @@ pub fn steady_slip_pose(linkage: &Linkage, speed_m_per_s: f64) -> Option<Pose> {
     (is_pressed && is_upright).then_some(pose)
 }
 
-/// Largest trial coefficient of friction, and number of steps up to this coefficient.
+/// Largest trial coefficient of friction; it is reached from 0 in [`FRICTIONS`] equal steps.
 const MOST_FRICTION: f64 = 1.5;
 const FRICTIONS: u32 = 300;
 
@@ -77,7 +78,7 @@ pub(super) fn shoulder_contact(linkage: &Linkage, theta: f64) -> ShoulderContact
 }
 
 /// The equilibrium for one coefficient of friction. Each iteration keeps the side of the shoulder fixed,
-/// because Newton's steps could otherwise cycle across the kink at its corner.
+/// because Newton's steps could otherwise cycle across the kink at the corner of the shoulder.
 fn solve_for_load(linkage: &Linkage, mu: f64, angles: Pair) -> Option<Pair> {
     let here = shoulder_contact(linkage, angles[0]);
     let sides = [here, ShoulderContact::Off, ShoulderContact::Forward, ShoulderContact::Backward];

@@ -43,7 +43,7 @@ pub(super) struct EventLoop<'a> {
     recent: ChatterDetector,
     /// Shortest period of the links, s.
     shortest_period_s: f64,
-    /// Number of consecutive short rebounds.
+    /// Number of consecutive short rebounds up to now.
     short_rebounds: u32,
     /// Workspaces for the series of stick, slip and flight.
     rooms: (
@@ -55,9 +55,11 @@ pub(super) struct EventLoop<'a> {
 
 /// The next phase, or the end of the run.
 enum NextPhase {
-    /// A phase of contact, with the order of the zero of each guard at its start (0 for none).
+    /// A phase of contact: its mode, its first pose, and the order of the zero that each guard has at the
+    /// start of the phase (0 for a guard that is not zero).
     Phase(TipMode, Pose, [u8; GUARDS]),
-    /// Flight, with the order of the zero of each guard at its start.
+    /// Flight: its first state, and the order of the zero that each guard has at the start of flight (0 for a
+    /// guard that is not zero).
     Flight(FlightState, [u8; GUARDS]),
     /// The end of the run.
     End(RunStatus),
@@ -178,9 +180,9 @@ impl<'a> EventLoop<'a> {
         }
     }
 
-    /// Removes the small tip velocity that event location leaves, by an impulse on the tip, so that the next
-    /// mode is decided for a tip exactly at rest. This velocity is a rounding error, or up to the tolerance
-    /// if the tip nearly stops.
+    /// Applies an impulse to the tip that makes its velocity zero, so that the next mode is decided for a tip
+    /// exactly at rest. After event location, the velocity is a rounding error, or is within the tolerance if
+    /// the tip nearly stops.
     fn remove_tip_velocity(&self, mut pose: Pose) -> Pose {
         if matches!(self.effort.method, IntegrationMethod::FixedStep(scheme) if scheme.gain_per_s > 0.0) {
             return pose; // the stabilisation removes the velocity
@@ -262,7 +264,8 @@ impl<'a> EventLoop<'a> {
         }
     }
 
-    /// Leaves stick at the static limit. The tip's velocity then has a double zero at the start of slip.
+    /// Decides the next phase when the holding force reaches the static friction limit in stick. If slip
+    /// follows, the tip's velocity has a double zero at the start of slip.
     fn release_tip(&mut self, mode: TipMode, pose: Pose) -> NextPhase {
         let at = self.system.contact_instant(self.t, &pose, self.lean);
         let (_, forces) = SlipPhase { system: self.system, direction: mode.direction(), lean: self.lean }
@@ -277,7 +280,8 @@ impl<'a> EventLoop<'a> {
         NextPhase::Phase(mode, pose, zero_order)
     }
 
-    /// Decides the next mode at a corner of the shoulder, where its damping makes the holding force jump.
+    /// Decides the next mode when the neck meets or leaves the shoulder: the damping of the shoulder makes
+    /// the holding force jump.
     fn decide_at_corner(&mut self, guard: usize, pose: &Pose) -> NextPhase {
         let corner = self.cross_corner(guard);
         let mut next = self.decide_at_rest(pose, Some((TipMode::Stick, None)));
@@ -320,9 +324,9 @@ impl<'a> EventLoop<'a> {
             }
             Ended::StepTooSmall => NextPhase::End(RunStatus::Diverged),
             Ended::Guard(JAMS) if self.is_at_pole(&phase, &pose) => self.resolve_jam(&pose, mode),
-            // the indicator has not fallen in this state, so the phase continues from it; a step past the
-            // tip's rest evaluates friction at negative speed, where a steeply falling law grows without
-            // bound and may put the indicator below zero.
+            // the Painlevé indicator is not near zero in this pose, so slip continues from it; a step past
+            // the instant at which the tip stops evaluates friction at negative speed, where a steeply
+            // falling law grows without bound and may make the indicator negative
             Ended::Guard(JAMS) => {
                 self.recent.note_event(self.t);
                 self.shorten_slip_step();
@@ -359,14 +363,16 @@ impl<'a> EventLoop<'a> {
     /// of the remaining time, and the normal force grows without bound. No step resolves the last instant; a
     /// step that passes this instant because of rounding yields a negative normal force.
     fn is_at_pole(&self, phase: &SlipPhase<'_>, pose: &Pose) -> bool {
-        /// Empirical limit on the indicator. In runs of 300 random blades with heavy heads, its size was at
-        /// most 5e-6 in those that ended at the paradox, and at least 0.5 in all others.
+        /// Empirical limit of the Painlevé indicator, below which the tip is about to jam. In runs of 300
+        /// random blades with heavy heads, the indicator was at most 5e-6 in size in the runs that ended at
+        /// the paradox, and at least 0.5 in all others.
         const VANISHED: f64 = 1e-4;
         let (_, forces) = phase.slip_forces(pose, &self.system.contact_instant(self.t, pose, self.lean));
         forces.indicator < VANISHED
     }
 
-    /// Moves the neck onto or off the shoulder; returns the guard of the corner that it passed.
+    /// Records that the neck has met or left the shoulder; returns the index of the guard of the corner that
+    /// the neck passed.
     fn cross_corner(&mut self, guard: usize) -> usize {
         self.recent.note_event(self.t);
         let [forward, backward] = SHOULDER_GUARDS;
@@ -390,8 +396,8 @@ fn release_order(contact: &FrictionResponse, mu: f64) -> u8 {
     if force.abs() > limit * (1.0 + EQUAL) { 1 } else { 2 }
 }
 
-/// Cause of the transition of a tip at rest. A transition out of stick comes here only at a corner of the
-/// shoulder.
+/// Cause of the transition of a tip at rest. This function sees a transition out of stick only if the neck
+/// meets or leaves the shoulder.
 fn cause_of_change(from: TipMode, to: TipMode) -> TransitionCause {
     match (from, to) {
         (_, TipMode::Stick) => TransitionCause::TipStops,
@@ -404,7 +410,7 @@ fn cause_of_change(from: TipMode, to: TipMode) -> TransitionCause {
 /// these methods again for every observer.
 type StepObserver<'a, const N: usize> = &'a mut dyn FnMut(&AcceptedStep<'_, N>) -> ControlFlow<()>;
 
-/// Integrates a phase by the method of the run, from one horizon to the next.
+/// Integrates a phase by the method of the run, with a restart at every horizon.
 ///
 /// `horizon(t)` is the latest time up to which the integration from `t` may run; the phase stops where
 /// `horizon(t)` is not later than `t`.
@@ -457,8 +463,8 @@ pub(super) struct ChatterDetector {
 impl ChatterDetector {
     /// Number of the latest events that are considered.
     const WINDOW: usize = 64;
-    /// These events count as chattering if all of them occur within this fraction of the blade's shortest
-    /// period; a real stick-slip cycle alone lasts about a period.
+    /// The latest [`Self::WINDOW`] events count as chattering if all of them occur within this fraction of
+    /// the blade's shortest period. One real stick-slip cycle lasts about a period.
     const SHARE: f64 = 1e-6;
 
     pub(super) fn new(period_s: f64) -> Self {
@@ -483,7 +489,7 @@ pub(in crate::simulate) trait RunWatcher {
     fn watch_guard(&mut self, _guard: usize, _motion: &TaylorMotion) {}
     /// Receives a strike of the tip on the glass at the end of the last piece.
     fn watch_strike(&mut self, _strike: &TipStrike) {}
-    /// Receives a change of mode, between the pieces that it separates.
+    /// Receives a change of the mode of contact, between the two pieces that it separates.
     fn watch_transition(&mut self, transition: &Transition);
     /// Receives an impact, before the transition that it causes.
     fn watch_impact(&mut self, impact: &Impact);

@@ -23,15 +23,15 @@ pub(crate) const DEFAULT_GAIN_PER_S: f64 = 1e4;
 /// Differential Equations II", section IV.2).
 pub(crate) const LARGEST_GAIN_TIMES_STEP: f64 = 2.785;
 
-/// Settings of the scheme.
+/// Settings of the paper's fixed-step scheme.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FixedStepScheme {
     /// Length of a step, s.
     pub step_s: f64,
     /// Method of locating transitions.
     pub locate: FixedStepLocator,
-    /// Gains `a = b` of the stabilisation, 1/s. If the gain is zero, the tip's velocity is removed at the
-    /// transition, because it would not decay.
+    /// Gains `a = b` of the stabilisation of stick, 1/s. If the gain is zero, the tip's remaining velocity is
+    /// set to zero at the transition, because it would not decay in stick.
     pub gain_per_s: f64,
 }
 
@@ -42,8 +42,8 @@ impl FixedStepScheme {
     }
 }
 
-/// Stick in which the stabilisation draws the tip to `place_m`; the states are
-/// `(theta, phi, theta_rate, phi_rate)`, the guards those of [`super::phases::StickPhase`].
+/// Stick in which the stabilisation returns the tip to `place_m`; the states are `(theta, phi, theta_rate,
+/// phi_rate)`, and the guards are those of [`super::phases::StickPhase`].
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StabilisedStickPhase<'a> {
     /// The blade on its drive.
@@ -70,7 +70,8 @@ impl<'a> StabilisedStickPhase<'a> {
         Self { system, place_m, lean, gain_per_s }
     }
 
-    /// The forces that draw the tip to its target: `v3dd = a_free + kappa f = -2 a Phi' - a^2 Phi`.
+    /// Forces on the tip with which it returns to its target position: `v3dd = a_free + kappa f = -2 a Phi' -
+    /// a^2 Phi`.
     #[inline]
     pub(super) fn stabilised_forces(&self, pose: &Pose, at: &ContactInstant) -> TipForces {
         let ContactInstant { head, directions, contact } = at;

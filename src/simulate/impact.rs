@@ -51,9 +51,9 @@ pub struct ContactSurface {
 /// Velocity of the tip, m/s.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TipVelocity {
-    /// Component away from the glass.
+    /// Component of the velocity away from the glass, m/s.
     pub normal: f64,
-    /// Component along the sweep.
+    /// Component of the velocity along the sweep, m/s.
     pub tangential: f64,
 }
 
@@ -71,7 +71,7 @@ pub struct ImpactOutcome {
 /// Cause of an impact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ImpactOrigin {
-    /// The tip meets the glass at `v_n <= 0`.
+    /// The tip strikes the glass with the normal velocity `v_n <= 0`.
     Collision,
     /// The tip slides on the glass, `v_n = 0`, and no finite force is admissible.
     Jam,
@@ -79,7 +79,7 @@ pub enum ImpactOrigin {
 
 /// Solves an impact from the velocity `before`; `None` if the integration yields numbers that are not finite.
 ///
-/// `relative` is the tolerance of the integration.
+/// `relative` is the relative tolerance of the integration.
 #[must_use]
 pub fn solve_impact(
     mass: &InverseMass,
@@ -90,7 +90,7 @@ pub fn solve_impact(
     work: &mut WorkCounters,
 ) -> Option<ImpactOutcome> {
     /// If the ratio of tangential to normal velocity exceeds this value, the tangential velocity sets the
-    /// unit of velocity, so that the quotient stays finite.
+    /// unit of velocity, so that the ratio stays finite.
     const FLATTEST: f64 = 1e12;
     let unit = before.normal.abs().max(before.tangential.abs() / FLATTEST);
     let unit = if origin == ImpactOrigin::Jam { before.tangential.abs() } else { unit };
@@ -156,8 +156,8 @@ struct ScaledImpact {
 impl ScaledImpact {
     /// Integrates an impact to its end.
     fn integrate_impact(&self, mut state: ImpactState, work: &mut WorkCounters) -> Option<ImpactState> {
-        /// Maximum number of parts of an impact: the tip slips at most twice, before and after rest, and each
-        /// slip has a few stages.
+        /// Maximum number of parts of an impact: the tip slips at most twice, before and after it is at rest,
+        /// and each slip has a few stages.
         const MOST_PARTS: usize = 32;
         for _ in 0..MOST_PARTS {
             if state.stage == ImpactStage::Ended {
@@ -222,8 +222,9 @@ impl ScaledImpact {
         Some(next)
     }
 
-    /// Integrates the slip of a jam until the tip is at rest. A stage cannot end it: the normal velocity
-    /// starts at a zero whose order is unknown, because it depends on how the indicator vanished.
+    /// Integrates the slip of a jam until the tip is at rest. The end of a stage does not end this
+    /// integration, because the normal velocity starts at a zero of unknown order: the order depends on how
+    /// the Painlevé indicator vanished.
     fn integrate_jam(&self, state: ImpactState, work: &mut WorkCounters) -> Option<ImpactState> {
         let slide = ImpactSlip { blow: self, direction: state.tangential.signum(), from: state, open: true };
         let (next, cause) = slide.integrate([0; 3], work);
@@ -233,16 +234,16 @@ impl ScaledImpact {
     }
 }
 
-/// Guards of slip: the tip comes to rest, the stage ends, or the tip approaches the glass again in
-/// restitution.
+/// Indices of the guards of slip during an impact: the tip comes to rest (`RESTS`), the stage ends
+/// (`CLOSES`), or the tip approaches the glass again during restitution (`REOPENS`).
 const RESTS: usize = 0;
 const CLOSES: usize = 1;
 const REOPENS: usize = 2;
 
 /// Slip in one direction as a function of the normal impulse.
 ///
-/// The states are the change of the tangential speed in that direction, which is far smaller than the speed
-/// in a glancing impact, and the work of the normal force.
+/// The two states are the change of the tangential speed in the direction of slip, and the work of the normal
+/// force. In a glancing impact, the change of speed is far smaller than the speed.
 struct ImpactSlip<'a> {
     blow: &'a ScaledImpact,
     direction: f64,
@@ -256,7 +257,8 @@ impl ImpactSlip<'_> {
         self.direction * self.from.tangential + growth
     }
 
-    /// Normal velocity from both impulses; if it were integrated as a state, it would drift from them.
+    /// Normal velocity that follows from both impulses; if it were integrated as a state, it would drift from
+    /// this value.
     fn normal_velocity(&self, impulse: f64, growth: f64) -> f64 {
         let ScaledImpact { cross, along, .. } = *self.blow;
         let grown = impulse - self.from.impulse;
@@ -268,7 +270,8 @@ impl ImpactSlip<'_> {
         /// Impulse at which slip counts as endless, in units of the impulse that stops the tip without
         /// friction.
         const MOST: f64 = 1e15;
-        /// First trial step in the same unit; slip usually ends within this step.
+        /// First trial step of the impulse, in units of the impulse that stops the tip without friction; slip
+        /// usually ends within this step.
         const FIRST: f64 = 1.0;
         let start = PhaseStart { t: self.from.impulse, y: [0.0; 2], zero_order, step: Some(FIRST) };
         let end = ode::integrate(self, start, MOST, self.blow.relative, work, |_| ());

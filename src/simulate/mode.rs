@@ -69,7 +69,8 @@ pub fn holding_force(contact: &FrictionResponse) -> f64 {
 ///
 /// If `1 + sigma mu nu` is positive in both directions, exactly one mode is consistent: stick if the holding
 /// force is within the static limit and the glass presses on the tip, lift-off if the glass would have to
-/// pull, otherwise slip against the holding force. If it is not (the Painlevé region), every mode is tried.
+/// pull, otherwise slip against the holding force. Otherwise (the Painlevé region), the consistency of every
+/// mode is tested.
 pub(crate) fn decide_mode_at_rest(contact: &FrictionResponse, mu: f64) -> RestDecision {
     let force = holding_force(contact);
     let normal = contact.n_free + contact.nu * force;

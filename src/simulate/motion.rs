@@ -6,15 +6,16 @@ use crate::simulate::scene::Scene;
 use crate::simulate::{Impact, ModelSample, Observer, RunResult, SolutionSegment, Transition, run_scene};
 use std::ops::ControlFlow;
 
-/// Number of samples of a run: 24 per cycle of 1 kHz over the 0.25 s of a reversal.
+/// Number of samples of a run: 24 per cycle of a 1 kHz oscillation in a run of 0.25 s, the duration of a
+/// reversal.
 pub(crate) const MOTION_SAMPLES: usize = 6000;
-/// Time between fine samples, s: fifty samples per cycle of 1 kHz.
+/// Time between fine samples, s: fifty samples per cycle of a 1 kHz oscillation.
 const FINE_STEP_S: f64 = 2e-5;
 /// Maximum number of fine samples of a run (14 MB); in a longer run, the time between them is longer.
 const MAX_FINE_SAMPLES: usize = 100_000;
 
-/// Fraction of its travel by which the head must move to an extremum and back for it to count as a turn;
-/// vibration of the drive is smaller.
+/// Fraction of the head's travel that the head must move towards an extremum and away from it for the
+/// extremum to count as a turn; vibration of the drive is smaller.
 const RETURN: f64 = 0.005;
 
 /// Samples and events of a run.
@@ -26,9 +27,9 @@ pub struct RunMotion {
     pub samples: Vec<ModelSample>,
     /// States at finer time steps, for figures of a part of the run.
     pub fine: Vec<ModelSample>,
-    /// Every change of mode.
+    /// Every change of the mode of contact.
     pub transitions: Vec<Transition>,
-    /// Intervals of stick, s.
+    /// Start and end of each interval of stick, s.
     pub stick_s: Vec<[f64; 2]>,
     /// Every impact of the tip on the glass.
     pub impacts: Vec<Impact>,
@@ -54,8 +55,8 @@ impl RunMotion {
         self.fine.get(first..end).unwrap_or_default()
     }
 
-    /// Index of the sample at the first turn of the head, an extremum that the head reaches and leaves by
-    /// more than [`RETURN`] of its travel.
+    /// Index of the sample at the first turn of the head, an extremum from which the head is farther away
+    /// than [`RETURN`] times its travel both before and after.
     pub(crate) fn turn(&self) -> Option<usize> {
         let x = |at: usize| self.samples[at].head_x_m;
         let (least, most) = self

@@ -16,14 +16,14 @@ use std::fmt::Write;
 use std::iter::Peekable;
 use std::ops::ControlFlow;
 
-/// Passes samples at given times to `sink`.
+/// Observer that passes the state of the model at given times to `sink`.
 pub struct SampleObserver<I: Iterator<Item = f64>, F: FnMut(&ModelSample)> {
     times: Peekable<I>,
     sink: F,
 }
 
 impl<I: Iterator<Item = f64>, F: FnMut(&ModelSample)> SampleObserver<I, F> {
-    /// Samples at these times, s, which must rise.
+    /// Observer for `times`, s, in rising order.
     pub fn new(times: I, sink: F) -> Self {
         Self { times: times.peekable(), sink }
     }
@@ -59,7 +59,7 @@ impl Observer for Impacts {
     }
 }
 
-/// Collects the intervals of stick of a run, s.
+/// Collects start and end of each interval of stick of a run, s.
 #[derive(Debug, Clone, Default)]
 pub struct StickIntervals(pub Vec<[f64; 2]>);
 
@@ -78,7 +78,7 @@ impl Observer for StickIntervals {
 /// Largest angle of a link from the vertical.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct LargestTilt {
-    /// The largest angle, rad, found at the ends of pieces only; a swing has many pieces.
+    /// The largest angle, rad, taken only at the ends of the pieces of the solution; a swing has many pieces.
     pub largest_rad: f64,
     /// Time of the largest angle, s.
     pub at_s: f64,
@@ -137,17 +137,17 @@ pub struct EnergyAudit {
     exchanged_j: f64,
     largest_energy_j: f64,
     largest_residual_j: f64,
-    /// Largest drift of the tip in stick, m.
+    /// Largest drift of the tip from its position in stick, m.
     pub max_constraint_drift_m: f64,
-    /// Smallest normal force in contact, N.
+    /// Smallest normal force on the tip while it is in contact, N.
     pub min_normal_force_n: Option<f64>,
-    /// Smallest Painlevé indicator in slip.
+    /// Smallest Painlevé indicator while the tip slips.
     pub min_painleve_indicator: Option<f64>,
 }
 
 impl EnergyAudit {
-    /// Largest error of the energy balance relative to the stored or exchanged energy; 0 if there is no
-    /// energy.
+    /// Largest error of the energy balance, relative to the larger of the stored and the exchanged energy; 0
+    /// if there is no energy.
     #[must_use]
     pub fn energy_residual_relative(&self) -> f64 {
         let scale = self.largest_energy_j.max(self.exchanged_j);
@@ -189,7 +189,7 @@ impl Observer for EnergyAudit {
 
     fn observe_impact(&mut self, impact: &Impact) {
         if self.start_energy_j.is_none() {
-            return; // the balance begins with the first piece, after an impact at the start
+            return; // the balance begins with the first piece, after any impact at the start
         }
         self.supplied_j += impact.driven_j - impact.lost_j;
         self.exchanged_j += impact.driven_j.abs() + impact.lost_j.abs();
@@ -292,7 +292,7 @@ pub fn sample_times(scene: &Scene) -> impl Iterator<Item = f64> + use<> {
 
 /// Coordinates of a sample as in a recording, m: tip x, tip y, head x, head y.
 ///
-/// The origin is the head of the upright blade; the glass lies at `y = -(l1 + l2)`.
+/// The origin is the position of the head of the upright blade; the glass is at `y = -(l1 + l2)`.
 #[must_use]
 pub fn recorded_points_m(linkage: &Linkage, sample: &ModelSample) -> [f64; 4] {
     let glass_y_m = -(linkage.l1_m + linkage.l2_m);
@@ -333,7 +333,7 @@ impl<I: Iterator<Item = [f64; 2]>, F: FnMut(&BladePoints)> ShutterObserver<I, F>
         Self { intervals: intervals.peekable(), sink, sum: [0.0; 4], open_s: 0.0 }
     }
 
-    /// Adds the integral of the positions between two times of a piece.
+    /// Adds the integral of the positions between two times within a piece of the solution.
     fn add_exposure(&mut self, path: &SegmentPath<'_>, from_s: f64, to_s: f64) {
         if to_s > from_s {
             let integral = path.integrate_points(from_s, to_s).to_array();

@@ -10,28 +10,33 @@ use hybrid_ode::polynomial::TERMS;
 use hybrid_ode::taylor::{TaylorExpansion, TaylorPhase};
 use portable_math as math;
 
-/// Number of guards of a phase.
+/// Number of guards of a phase. A guard is a function of time and state; the phase ends when one falls to
+/// zero.
 pub const GUARDS: usize = 7;
-/// Guards of the neck's angle in all phases: the forward and the backward corner of the shoulder.
+/// Indices of the two guards of the neck's angle in all phases: the neck meets or leaves the forward or the
+/// backward side of the shoulder.
 pub(crate) const SHOULDER_GUARDS: [usize; 2] = [3, 4];
-/// Guards of neck and lip in all phases; a guard falls to zero when its link is level. Past level, the hinge
-/// would lie below the glass.
+/// Indices of the guards of neck and lip in all phases; a guard falls to zero when its link is level. Past
+/// level, the hinge would be below the glass.
 pub(crate) const LEVEL_GUARDS: [usize; 2] = [5, 6];
 
-/// Slip: the tip's speed in the direction of slip reaches zero.
+/// Index of a guard of slip: the tip's speed in the direction of slip reaches zero.
 pub(crate) const TIP_STOPS: usize = 0;
-/// Slip: the normal force reaches zero.
+/// Index of a guard of slip: the normal force reaches zero.
 pub const SLIP_CONTACT_LOST: usize = 1;
-/// Slip: the Painlevé indicator reaches zero.
+/// Index of a guard of slip: the Painlevé indicator reaches zero.
 pub const JAMS: usize = 2;
-/// Stick: the holding force reaches the static limit towards +v.
+/// Index of a guard of stick: the holding force reaches the static friction limit, and the tip starts to slip
+/// towards +v.
 pub(crate) const FORWARD_LIMIT: usize = 0;
-/// Stick: the holding force reaches the static limit towards -v.
+/// Index of a guard of stick: the holding force reaches the static friction limit, and the tip starts to slip
+/// towards -v.
 pub(crate) const BACKWARD_LIMIT: usize = 1;
-/// Stick: the normal force reaches zero.
+/// Index of a guard of stick: the normal force reaches zero.
 pub(crate) const STICK_CONTACT_LOST: usize = 2;
 
-/// A blade and its drive. Below the scales, the tolerance is absolute instead of relative.
+/// A blade and its drive, with scales of angle and angular rate; for values below these scales, the tolerance
+/// is absolute instead of relative.
 #[derive(Debug, Clone)]
 pub struct DrivenBlade {
     /// The blade.
@@ -44,7 +49,7 @@ pub struct DrivenBlade {
     pub rate_scale: f64,
 }
 
-/// Head, link directions and response to friction at one instant.
+/// Motion of the head, directions of the links, and response of the blade to friction at one instant.
 pub(super) struct ContactInstant {
     pub head: HeadMotion,
     pub directions: LinkDirections,
@@ -59,7 +64,8 @@ impl DrivenBlade {
         ContactInstant { head, directions, contact }
     }
 
-    /// Guards of the shoulder's corners, rad; positive while the neck stays on its side of the corner.
+    /// Guards of the two corners of the shoulder (the neck angles at which contact with the shoulder starts
+    /// or ends), rad; a guard is positive while the neck stays on its side of the corner.
     #[inline]
     pub(super) fn corner_distances(&self, theta: f64, lean: ShoulderContact) -> [f64; 2] {
         match (&self.linkage.shoulder, lean) {
@@ -355,7 +361,7 @@ impl TaylorPhase<2, GUARDS> for StickPhase<'_> {
     }
 }
 
-/// Mode that follows when a guard of stick falls; `None` unless the guard is a friction limit.
+/// Mode that follows when a guard of stick falls to zero; `None` unless the guard is a friction limit.
 pub(crate) fn mode_after_release(guard: usize) -> Option<TipMode> {
     match guard {
         FORWARD_LIMIT => Some(TipMode::SlipForward),

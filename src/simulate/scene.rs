@@ -25,7 +25,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// A validated scene. Its serialised form contains exactly what determines a run.
+/// A validated scene. Its serialised form contains exactly the data that determine a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Scene {
     #[serde(skip)]
@@ -34,9 +34,9 @@ pub struct Scene {
     title: String,
     values: BTreeMap<&'static str, f64>,
     has_shoulder: bool,
-    /// What happens at a loss of contact.
+    /// What the run does when contact is lost.
     pub loss: ContactLossRule,
-    /// What happens at the Painlevé paradox.
+    /// What the run does at the Painlevé paradox.
     pub jam: JamRule,
     /// Motion of the head.
     pub drive: Drive,
@@ -202,7 +202,7 @@ impl Scene {
         Err(key_error(&self.file, name, found, expected, advice))
     }
 
-    /// Names and values of all numbers as written.
+    /// Names and values of all parameters that the scene gives, under the names as written.
     pub fn written_values(&self) -> impl Iterator<Item = (&'static str, f64)> {
         self.values.iter().map(|(name, value)| (*name, *value))
     }

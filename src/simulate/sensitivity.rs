@@ -35,8 +35,9 @@ pub use tangent_segment::{Channel, ChannelWeights, TangentSegment};
 pub trait TangentObserver {
     /// Receives a piece of the solution, in order of time.
     fn observe_segment(&mut self, piece: &TangentSegment<'_>);
-    /// Receives a change of mode, between the pieces that it separates. `d_time_s` contains the derivatives
-    /// of its time, s per unit of each direction; `None` if they do not exist.
+    /// Receives a change of the mode of contact, between the two pieces that it separates. `d_time_s`
+    /// contains the derivatives of the time of this change, s per unit of each direction; `None` if they do
+    /// not exist.
     fn observe_transition(&mut self, _transition: &Transition, _d_time_s: Option<&[f64]>) {}
     /// Called after every piece; `Break` ends the run as `RunStatus::Interrupted`.
     fn control_flow(&self) -> ControlFlow<()> {
@@ -53,8 +54,8 @@ pub struct TangentRunner {
 
 impl TangentRunner {
     /// A runner whose derivatives have the relative accuracy `relative` within a step and are far more
-    /// accurate at its ends; for searches that need no more. The default accuracy is the tolerance of the
-    /// run, which `relative` does not change.
+    /// accurate at its ends; for searches that need no higher accuracy. The default accuracy is the tolerance
+    /// of the run, which `relative` does not change.
     #[must_use]
     pub fn with_accuracy(relative: f64) -> Self {
         Self { room: TangentWorkspace::default(), accuracy: Some(relative) }

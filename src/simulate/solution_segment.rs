@@ -47,19 +47,19 @@ pub struct ModelSample {
     pub tip_height_m: f64,
     /// Position of the tip along the sweep, `v3`, m.
     pub tip_x_m: f64,
-    /// Velocity of the tip, m/s; exactly zero in stick, except with the fixed-step scheme.
+    /// Velocity of the tip along the sweep, m/s; exactly zero in stick, except with the fixed-step scheme.
     pub tip_velocity_m_per_s: f64,
-    /// Normal force, N.
+    /// Normal force on the tip, N.
     pub normal_n: f64,
-    /// Friction force, N.
+    /// Friction force on the tip, N.
     pub friction_n: f64,
     /// Painlevé indicator of slip, 1 in stick and in flight.
     pub indicator: f64,
-    /// Drift of the tip from its position in stick, m; zero in slip and in flight.
+    /// Drift of the tip from the position at which it sticks, m; zero in slip and in flight.
     pub constraint_drift_m: f64,
-    /// Energy of the blade, J.
+    /// Kinetic energy of the blade plus the energy of its springs, J.
     pub energy_j: f64,
-    /// Power supplied to the blade minus losses, W.
+    /// Power supplied to the blade by the drive, minus the losses in friction and dampers, W.
     pub power_w: f64,
 }
 
@@ -272,7 +272,7 @@ const RECIPROCALS: [f64; TERMS + 4] = {
     share
 };
 
-/// Positions of head and tip over a piece; one path serves all queries on the piece.
+/// Positions of head and tip over a piece of the solution; one path is used for all times within the piece.
 pub struct SegmentPath<'a> {
     piece: &'a SolutionSegment<'a>,
     polynomials: Option<PathPolynomials<'a>>,
@@ -358,8 +358,8 @@ impl<'a> PathPolynomials<'a> {
         self.add_start(to - from, four_values(|i| high[i] * to * to - low[i] * from * from))
     }
 
-    /// Adds the change since the start to `weight` times the positions at the start; a tip in stick does not
-    /// move.
+    /// Adds `change`, the change of the positions since the start of the piece, to `weight` times the
+    /// positions at the start; a tip in stick does not move.
     #[inline]
     fn add_start(&self, weight: f64, mut change: [f64; 4]) -> [f64; 4] {
         const TIP: usize = 2;

@@ -57,7 +57,7 @@ pub enum TwinViewError {
 
 /// Runs a scene and records it without noise from `start_s` to `stop_s`, in the scene's time.
 ///
-/// The origin is the position of the head of the upright blade; the glass lies at `y = -(l1 + l2)`. A frame
+/// The origin is the position of the head of the upright blade; the glass is at `y = -(l1 + l2)`. A frame
 /// averages over the part of its exposure between `start_s` and `stop_s`.
 ///
 /// # Errors
@@ -72,7 +72,7 @@ pub fn film_scene(
     film_scene_with_observer(scene, camera, [start_s, stop_s], effort, &mut ())
 }
 
-/// As [`film_scene`], with a further observer of the run.
+/// Does the same as [`film_scene`], and passes the run to a further observer.
 ///
 /// # Errors
 /// The errors of [`film_scene`].
@@ -158,7 +158,7 @@ pub(crate) fn write_tracker_table(recording: &Recording, metres_per_pixel: f64) 
     let traces = recording.traces();
     let columns = [&traces.tip_x_m, &traces.tip_y_m, &traces.head_x_m, &traces.head_y_m];
     for i in 0..recording.grid().frames {
-        let _ = write!(text, "{:.6E}", i as f64 / recording.grid().frame_rate_hz); // cannot fail
+        let _ = write!(text, "{:.6E}", i as f64 / recording.grid().frame_rate_hz); // a String never fails
         for column in columns {
             let cell = column[i].map(|value| format!("{:.6E}", value / metres_per_pixel));
             text.push('\t');

@@ -86,7 +86,7 @@ impl BladeSection {
             numbers.into_iter().map(move |(key, value)| (format!("{table}.{key}"), value))
         });
         let numbers = numbers.chain([("length_m".to_owned(), written.length_m)]);
-        // (the schema allows exactly these keys, so that none is lost)
+        // (the schema allows exactly the keys in `KEYS`, so that no number is dropped)
         let known =
             |(name, value): (String, f64)| Some((KEYS.iter().find(|key| key.name == name)?.name, value));
         let values = numbers.filter_map(known).collect();
@@ -148,7 +148,7 @@ fn check_hinges(file: &str, values: &BTreeMap<&'static str, f64>) -> Result<(), 
     Err(SectionError::HalfAHinge { file: file.to_owned(), key, expected })
 }
 
-/// Standard deviation of a number that is measured with simple means.
+/// Standard deviation of an input number that is measured with simple means.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum InputDeviation {
     /// In the unit of the key.
@@ -157,22 +157,25 @@ pub(super) enum InputDeviation {
     Relative(f64),
 }
 
-/// Dimension measured with a calliper on soft rubber, or in a picture of the section, m.
+/// Standard deviation of a dimension measured with a calliper on soft rubber, or in a picture of the section,
+/// m.
 const CALLIPER: InputDeviation = InputDeviation::Absolute(5e-5);
-/// Length measured with a ruler along the blade, m.
+/// Standard deviation of a length measured with a ruler along the blade, m.
 const RULER: InputDeviation = InputDeviation::Absolute(5e-4);
-/// Density from weight and volume of a piece.
+/// Standard deviation of a density from the weight and the volume of a piece.
 const DENSITY: InputDeviation = InputDeviation::Relative(0.03);
-/// Young's modulus from hardness, or from the bending of a strip.
+/// Standard deviation of Young's modulus from the hardness, or from the bending of a strip.
 const MODULUS: InputDeviation = InputDeviation::Relative(0.3);
-/// Loss factor from a table, or from the ring-down of a strip.
+/// Standard deviation of a loss factor from a table, or from the ring-down of a strip.
 const LOSS: InputDeviation = InputDeviation::Relative(0.3);
-/// Mass measured with a kitchen scale; it is uncertain which parts move with the head.
+/// Standard deviation of the head's mass, measured with a kitchen scale; it is uncertain which parts move
+/// with the head.
 const HEAD: InputDeviation = InputDeviation::Relative(0.05);
-/// Force or stiffness measured with a force gauge over its travel, or with a scale below the blade.
+/// Standard deviation of a force or a stiffness measured with a force gauge, or with a scale below the blade.
 const FORCE: InputDeviation = InputDeviation::Relative(0.1);
 
-/// Limits of every number: every blade lies within them, and no product of such numbers overflows.
+/// Lower limit of every number of a section, in the unit of its key; `GREATEST_VALUE` is the upper limit. The
+/// numbers of every real blade are within these limits, and no product of such numbers overflows.
 const LEAST_VALUE: f64 = 1e-9;
 const GREATEST_VALUE: f64 = 1e12;
 

@@ -18,13 +18,13 @@ pub struct ForcingTerms {
     pub head: LaneVector,
     /// Displacement of the tip along the sweep at constant angles, m, and its first two derivatives in time.
     pub tip: [LaneVector; 3],
-    /// Drop of the head at constant angles, m.
+    /// Change of the head's drop at constant angles, m.
     pub drop: LaneVector,
-    /// Normal force at constant angles, N.
+    /// Change of the normal force at constant angles, N.
     pub normal: LaneVector,
-    /// Friction force in slip at constant angles and normal force, N.
+    /// Change of the friction force in slip at constant angles and constant normal force, N.
     pub force: LaneVector,
-    /// Forcing term of each equation.
+    /// Forcing term of each equation of the variation.
     pub equations: [LaneVector; 3],
 }
 
@@ -53,7 +53,7 @@ impl ForcingTerms {
 }
 
 impl<const K: usize> ReferenceMotion<'_, K> {
-    /// Whether the motion depends on a constant in this mode of contact.
+    /// Whether the motion depends on a constant of the linkage in the present mode of contact.
     pub(crate) fn depends_on(&self, constant: LinkageConstant) -> bool {
         match constant {
             LinkageConstant::FrictionA | LinkageConstant::FrictionB | LinkageConstant::FrictionC => {
@@ -66,13 +66,13 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         }
     }
 
-    /// Forcing terms of a unit change of a constant.
+    /// Forcing terms of a unit change of a constant of the linkage.
     #[inline(always)]
     pub(crate) fn constant_forcing(&self, at: &MotionSamples, constant: LinkageConstant) -> ForcingTerms {
         let mut direct = DirectForcing::default();
         if let LinkageConstant::FrictionA | LinkageConstant::FrictionB | LinkageConstant::FrictionC = constant
         {
-            // (a shortcut: these constants change only the friction force, and fits often free all three)
+            // (a shortcut: these constants change only the friction force, and fits often vary all three)
             direct.effect.force = self.friction_law_forcing(at, constant);
             let l = self.lengths();
             direct.effect.equations[0] = -l[0] * direct.effect.force;
@@ -89,7 +89,8 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         matches!(constant, LinkageConstant::Length(_))
     }
 
-    /// Displacements of tip and head by a unit change of a constant, without forces.
+    /// Displacements of tip and head by a unit change of a constant at constant angles; the terms of forces
+    /// are zero.
     pub(crate) fn displacement_terms(&self, at: &LinkAttitudes, constant: LinkageConstant) -> ForcingTerms {
         let mut effect = ForcingTerms::default();
         if let LinkageConstant::Length(j) = constant {

@@ -1,4 +1,5 @@
-//! A short vector of numbers for parallel arithmetic: one lane per direction, or per instant.
+//! A short vector of numbers for parallel arithmetic, with one number (lane) per direction of a derivative,
+//! or per instant.
 
 use std::array::from_fn;
 use std::ops::{Add, AddAssign, Index, IndexMut, Mul, Neg, Sub, SubAssign};
@@ -6,7 +7,7 @@ use std::ops::{Add, AddAssign, Index, IndexMut, Mul, Neg, Sub, SubAssign};
 /// Number of lanes, the width of a vector register of most processors.
 pub(crate) const LANES: usize = 4;
 
-/// One number per direction, or per instant.
+/// One number per direction of a derivative, or per instant.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct LaneVector(pub [f64; LANES]);
 

@@ -26,29 +26,32 @@ pub enum ModelChannel {
     LipRate,
     /// Velocity of the tip along the sweep, m/s.
     TipVelocity,
-    /// Normal force, N.
+    /// Normal force on the tip, N.
     NormalForce,
-    /// Friction force, N.
+    /// Friction force on the tip, N.
     FrictionForce,
 }
 
 /// Derivative of a quantity as a linear form: its coefficients at a few instants.
 #[derive(Debug, Clone, Default)]
 pub struct LinearForm {
-    /// Coefficients of `y1`, `y2` and the gap.
+    /// Coefficients of `y1` and `y2`, the derivatives of the sines of both angles, and of the gap's
+    /// derivative.
     pub value: [LaneVector; 3],
-    /// Coefficients of the rates of `y1`, `y2` and the gap.
+    /// Coefficients of the rates of `y1` and `y2`, the derivatives of the sines of both angles, and of the
+    /// gap's derivative.
     pub rate: [LaneVector; 3],
-    /// Coefficients of the second derivatives of `y1`, `y2` and the gap; zero after their elimination.
+    /// Coefficients of the second time derivatives of `y1` and `y2`, the derivatives of the sines of both
+    /// angles, and of the gap's derivative; zero after these are eliminated.
     second: [LaneVector; 3],
-    /// Coefficient of the position at which the tip sticks.
+    /// Coefficient of the derivative of the position at which the tip sticks.
     pub place: LaneVector,
     /// Coefficients of the forcing terms.
     pub forcing: ForcingTerms,
 }
 
 impl<const K: usize> ReferenceMotion<'_, K> {
-    /// Linear form of the tip's position along the sweep; it is the same at all instants.
+    /// Linear form of the tip's position along the sweep; its coefficients are the same at all instants.
     pub(crate) fn tip_position_form(&self) -> LinearForm {
         let (mut form, l, one) = (LinearForm::default(), self.lengths(), LaneVector::splat(1.0));
         if self.touch == ContactMode::Stick {
@@ -60,15 +63,15 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         form
     }
 
-    /// Linear form of the head's position along the sweep; it is the same at all instants.
+    /// Linear form of the head's position along the sweep; its coefficients are the same at all instants.
     pub(crate) fn head_position_form(&self) -> LinearForm {
         let mut form = LinearForm::default();
         form.forcing.head = LaneVector::splat(1.0);
         form
     }
 
-    /// Linear form of a quantity at these instants; `y2` is eliminated in stick. For a force, it is zero;
-    /// [`Self::force_form`] computes the form of a force.
+    /// Linear form of a quantity at the sampled instants; in stick, `y2` (of the lip) is eliminated. The
+    /// result for a force is zero: [`Self::force_form`] computes the form of a force.
     pub(crate) fn channel_form(&self, at: &LinkAttitudes, quantity: ModelChannel) -> LinearForm {
         let (mut form, l, one) = (LinearForm::default(), self.lengths(), LaneVector::splat(1.0));
         let gap = if self.is_in_flight() { one } else { LaneVector::ZERO };
@@ -101,7 +104,8 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         form
     }
 
-    /// Linear form of a force at these instants, with the second derivatives eliminated; zero in flight.
+    /// Linear form of a force at the sampled instants, with the second time derivatives eliminated; zero in
+    /// flight.
     pub(crate) fn force_form(&self, at: &MotionSamples, quantity: ModelChannel) -> LinearForm {
         let mut form = match (quantity, self.touch) {
             (_, ContactMode::Flight(..)) => return LinearForm::default(),
@@ -154,7 +158,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         form
     }
 
-    /// Eliminates the second derivatives with the equations of the variation.
+    /// Eliminates the second time derivatives from a linear form, by the equations of the variation.
     fn eliminate_accelerations(&self, form: &mut LinearForm, matrices: &TangentMatrices) {
         if self.touch == ContactMode::Stick {
             self.eliminate_lip(form);
@@ -174,7 +178,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         form.second = [LaneVector::ZERO; 3];
     }
 
-    /// Eliminates `y1''` with the equation in stick.
+    /// Eliminates `y1''` (of the neck) from a linear form, by the equation of the variation in stick.
     fn eliminate_in_stick(&self, form: &mut LinearForm, matrices: &TangentMatrices) {
         let (single, l) = (self.stick_equation(matrices), self.lengths());
         let factor = form.second[0] * single.first[0].inverse();
@@ -191,7 +195,8 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         form.second = [LaneVector::ZERO; 3];
     }
 
-    /// Eliminates `y2` in stick with `y2 = (place - tip - l1 y1) / l2` and its derivatives.
+    /// Eliminates `y2` (of the lip) and its time derivatives from a linear form in stick, by `y2 = (place -
+    /// tip - l1 y1) / l2`.
     fn eliminate_lip(&self, form: &mut LinearForm) {
         let l = self.lengths();
         let (ratio, share) = (l[0] / l[1], 1.0 / l[1]);

@@ -32,7 +32,7 @@ pub struct SpringTangent {
     pub damping: LaneVector,
 }
 
-/// A constant of a linkage; index 0 stands for the neck, 1 for the lip.
+/// A constant of a linkage; the index is 0 for the neck and 1 for the lip.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs)] // the names are those of the linkage's fields
 pub enum LinkageConstant {
@@ -101,8 +101,8 @@ const CONSTANTS: &[ConstantRow] = constants! {
 };
 
 impl LinkageTangent {
-    /// Sets the derivatives in the direction `lane` to the difference quotient `sum weight * linkage`; the
-    /// weights add up to zero.
+    /// Sets the derivatives in the direction `lane` to a finite difference: the sum of weight times constant
+    /// over the linkages in `terms`. The weights add up to zero.
     pub(crate) fn set_direction(&mut self, lane: usize, terms: &[(f64, Linkage)]) {
         let mut first = terms.first().map(|(_, linkage)| *linkage);
         for (_, row, place) in CONSTANTS {

@@ -7,7 +7,7 @@ use portable_math as math;
 use std::cell::OnceCell;
 use std::ops::Deref;
 
-/// Attitude of the links at a few instants, one per lane.
+/// Angles and angular rates of the links at a few instants, one per lane.
 #[derive(Debug, Clone)]
 pub(crate) struct LinkAttitudes {
     /// Times since the start of the series, s.
@@ -34,15 +34,16 @@ pub(crate) struct MotionSamples {
     pub(super) drop_acceleration: LaneVector,
     pub(super) normal: LaneVector,
     pub(super) friction: LaneVector,
-    /// `sigma mu` in slip, 0 otherwise.
+    /// Friction coefficient times the direction of slip, `sigma mu`; 0 unless the tip slips.
     pub(super) mu: LaneVector,
-    /// `N E` in slip, 0 otherwise: the normal force times the falling part of the friction coefficient.
+    /// Normal force times the part of the friction coefficient that falls with speed, `N E`, N; 0 unless the
+    /// tip slips.
     pub(super) falling: LaneVector,
     /// Both angles, rad, computed on demand.
     angles: OnceCell<LaneVectorPair>,
 }
 
-/// Sums of `Q` series by Horner's rule, up to `order`.
+/// Sums of `Q` Taylor series at the times `x`, by Horner's rule, with powers of `x` up to `order`.
 #[inline(always)]
 pub(super) fn sum_horner<const Q: usize>(
     x: LaneVector,
@@ -67,7 +68,7 @@ impl Deref for MotionSamples {
 }
 
 impl<const K: usize> ReferenceMotion<'_, K> {
-    /// Attitude of the links at these times after the start of the series, s.
+    /// Angles and angular rates of the links at the times `x` after the start of the series, s.
     #[inline]
     pub(crate) fn sample_attitudes(&self, x: LaneVector) -> LinkAttitudes {
         let motion = self.motion;
@@ -79,7 +80,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         LinkAttitudes { x, cos: [cos_0, cos_1], sin: [sin_0, sin_1], rate }
     }
 
-    /// The motion at these times after the start of its series, s.
+    /// Motion and forces at the times `x` after the start of the series, s.
     #[inline]
     pub(crate) fn sample_motion(&self, x: LaneVector) -> MotionSamples {
         let (motion, order) = (self.motion, self.motion.order);
@@ -156,7 +157,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         *at.angles.get_or_init(|| sum_horner(at.x, self.motion.order, |k| self.motion.angle[k]))
     }
 
-    /// Velocity of the tip at the times `x`, m/s.
+    /// Velocity of the tip along the sweep at the times `x` after the start of the series, m/s.
     pub(super) fn sample_tip_velocity(&self, x: LaneVector) -> LaneVector {
         let [velocity] = sum_horner(x, self.motion.order, |k| [self.motion.tip_velocity[k]]);
         velocity
@@ -175,7 +176,8 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         ]
     }
 
-    /// Factor `e = exp(-b |v3'|)` of friction: the falling part of the friction coefficient is `a e`.
+    /// Factor `e = exp(-b |v3'|)` of the friction law: the part of the friction coefficient that falls with
+    /// speed is `a e`.
     pub(super) fn friction_decay(&self, at: &MotionSamples, direction: f64) -> LaneVector {
         let law = &self.linkage.friction;
         if law.a == 0.0 {
@@ -186,7 +188,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
     }
 }
 
-/// Times as a vector; the last time also fills the remaining lanes.
+/// Vector of the given times; the last time also fills the remaining lanes.
 pub(crate) fn fill_lanes(times: impl IntoIterator<Item = f64>) -> LaneVector {
     let mut row = LaneVector::ZERO;
     for (lane, time) in times.into_iter().take(LANES).enumerate() {

@@ -3,24 +3,27 @@
 use super::{index_at_frame, median_of_three, median_position};
 use std::ops::Range;
 
-/// Fraction of the change at which the flip starts; 5 % is usual for rise times and far above tracking noise.
+/// Fraction of the change of the deflection at which the flip starts; 5 % is usual for rise times and far
+/// above tracking noise.
 const START_SHARE: f64 = 0.05;
-/// Fraction of the change at which the flip ends.
+/// Fraction of the change of the deflection at which the flip ends.
 const END_SHARE: f64 = 0.95;
-/// Number of tracked frames on either side of the turn that the median for the level before the turn always
-/// includes.
+/// Number of tracked frames on either side of the head's turn that always enter the median which gives the
+/// level of the deflection before the turn.
 const NEAR_TURN: usize = 5;
-/// Minimum number of tracked frames for the level after the turn: noise dominates a median of fewer frames.
+/// Minimum number of tracked frames for the level of the deflection after the turn: the median of fewer
+/// frames is dominated by noise.
 const FEWEST_POINTS: usize = 8;
-/// Smallest change that counts as a flip, in units of the deflection's noise. The extremes of white noise in
-/// 1e5 frames are about 9 units apart.
+/// Smallest change of the deflection that counts as a flip, in standard deviations of its noise. The largest
+/// and the smallest of 1e5 values of white noise differ by about 9 standard deviations.
 const CHANGE_NOISES: f64 = 12.0;
 
-/// Passage of the deflection from its level before a turn to its level after, in s of the recording.
+/// Passage of the deflection from its level before a turn of the head to its level after the turn, as two
+/// times of the recording.
 ///
 /// The level before is the median deflection from the stop of the tip to the turn of the head. The level
-/// after is the median over a time that begins at the release and is as long as the tip's rest, so that the
-/// oscillation about this level averages out. The flip starts when the deflection last leaves the first 5 %
+/// after is the median over a time that begins at the release and is as long as the tip's rest, so that
+/// oscillations about this level average out. The flip starts when the deflection last leaves the first 5 %
 /// of the change, and ends when it first reaches 95 %. A zero crossing would not serve as a criterion,
 /// because zero depends on the choice of the tracked points.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,8 +65,8 @@ pub(super) fn find_flip(
     Some((start, interpolate_crossing(points, &share, end.checked_sub(1)?, END_SHARE)))
 }
 
-/// Points between the stop of the tip and the turn, whichever is earlier, and at least [`NEAR_TURN`] points
-/// on either side of the turn.
+/// Indices of the points between the stop of the tip and the turn of the head, in either order, and of at
+/// least [`NEAR_TURN`] points on either side of the turn.
 fn level_before(points: &[(usize, f64)], around: &TurnNeighbourhood) -> Range<usize> {
     let frames = [around.turn, around.hold.unwrap_or(around.turn)];
     let [turn, hold] = frames.map(|frame| index_at_frame(points, frame));
@@ -71,14 +74,16 @@ fn level_before(points: &[(usize, f64)], around: &TurnNeighbourhood) -> Range<us
         ..turn.max(hold).max((turn + NEAR_TURN).min(points.len()))
 }
 
-/// Points after the release, for as long as the tip rested but not past the next turn.
+/// Indices of the points after the release of the tip, for as long as the tip rested, but not past the next
+/// turn.
 fn level_after(points: &[(usize, f64)], around: &TurnNeighbourhood) -> Range<usize> {
     let rested = around.release - around.hold.unwrap_or(around.turn).min(around.turn);
     let from = index_at_frame(points, around.release);
     from..index_at_frame(points, (around.release + rested).min(around.next_turn)).max(from)
 }
 
-/// Frame at which the fraction `share` of the change passes `level` between a point and the next.
+/// Frame number (a real number) at which the fraction `share` of the change passes `level` between a point
+/// and the next point, by linear interpolation.
 fn interpolate_crossing(
     points: &[(usize, f64)],
     share: &impl Fn(usize) -> f64,
@@ -104,7 +109,7 @@ mod tests {
 
     const RATE_HZ: f64 = 10_000.0;
     const AMPLITUDE_M: f64 = 0.018;
-    /// Deflection of the trailing blade, m.
+    /// Size of the deflection while the tip trails the head, m.
     const TRAILS_M: f64 = 1.1e-3;
     const HOLD_BEFORE_S: f64 = 0.02;
 
@@ -113,8 +118,8 @@ mod tests {
         AMPLITUDE_M * (1.0 - (PI * t).cos())
     }
 
-    /// Time after a turn, s, at which the head has moved back past its position at the tip's stop by
-    /// `back_m`.
+    /// Time after a turn, s, at which the head, on its way back, is `back_m` beyond the position that it had
+    /// when the tip stopped.
     fn back_s(back_m: f64) -> f64 {
         ((PI * HOLD_BEFORE_S).cos() - back_m / AMPLITUDE_M).acos() / PI
     }
@@ -163,8 +168,8 @@ mod tests {
         ReversalInstants::find_instants(recording).reversals
     }
 
-    /// Times at 5 % and 95 % of the change to the new side; the change starts at the median of the deflection
-    /// at rest, which the head passes half-way in time.
+    /// Times, s, at 5 % and 95 % of the change of the deflection to the new side. The change starts at the
+    /// median of the deflection from the stop of the tip to the turn, which is its value half-way in time.
     fn expected_s(turn_s: f64) -> [f64; 2] {
         let excursion_m = head(1.0 - HOLD_BEFORE_S / 2.0) - head(1.0 - HOLD_BEFORE_S);
         let change_m = 2.0 * TRAILS_M + excursion_m;
@@ -193,9 +198,9 @@ mod tests {
     #[test]
     fn noise_and_gaps_move_it_by_a_few_frames() {
         let gappy = |i: usize| i % 7 == 3 || (1900..2100).contains(&i) || (2355..2380).contains(&i);
-        // noise of 3 um is as much as the head moves in 4 frames where the flip starts; a gap at the turn
-        // hides the half of the rest in which the blade is deflected most, by 10 um or 16 frames of the
-        // head's motion
+        // the noise of the deflection, 3 um, is the distance that the head moves in 4 frames where the flip
+        // starts; a gap at the turn hides the larger deflections before the turn, which moves their median by
+        // 10 um, or 16 frames of the head's motion
         for (missing, frames) in [(&(|_| false) as &dyn Fn(usize) -> bool, 12.0), (&gappy, 30.0)] {
             let found = find(&stroke(0.8, 1.4, [2e-6, 0.0], missing));
             assert_eq!(found.len(), 1);

@@ -68,7 +68,7 @@ pub enum InstantNotFound {
     /// The head does not turn.
     #[error("the head does not turn in it")]
     NoTurn,
-    /// The head turns at least once, but fewer times than asked for.
+    /// The head turns at least once, but fewer times than the requested number of the turn.
     #[error("{turns} reversal{} found", if *turns == 1 { " was" } else { "s were" })]
     FewerTurns {
         /// Number of turns that were found.
@@ -172,7 +172,7 @@ mod tests {
     const HOLD_BEFORE_S: f64 = 0.02;
     const RELEASE_AFTER_S: f64 = 0.05;
 
-    /// A head on a cosine of 0.5 Hz (with turns at 1, 2, 3 s ...) and a tip that trails by 2 mm, holds around
+    /// A head on a cosine of 0.5 Hz (with turns at 1, 2, 3 s ...) and a tip that trails by 2 mm, rests around
     /// each turn, and is then dragged along again.
     fn stroke(start_s: f64, stop_s: f64, noise_m: f64, missing: impl Fn(usize) -> bool) -> Recording {
         let frames = ((stop_s - start_s) * RATE_HZ).round() as usize;

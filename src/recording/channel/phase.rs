@@ -18,7 +18,7 @@ use std::ops::Range;
 ///
 /// The tip still sticks during most of `flip`, while the head passes over it. During `stick` the blade rests,
 /// so a ring-down in this phase does not overlap with the flip. The phase `before` of a later reversal is the
-/// phase `after` of the previous one. `Flip` describes how the flip is found.
+/// phase `after` of the previous one. The type `Flip` describes how the flip is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum ReversalPhase {
     /// The blade trails on its old side.
@@ -46,7 +46,7 @@ impl ReversalPhase {
     }
 
     /// Time of the end (if `at_end`) or the start of the phase at the `reversal`-th turn (counted from 1), s;
-    /// `None` stands for the end or the start of the recording.
+    /// `None` means the end or the start of the recording.
     pub(super) fn boundary_s(
         self,
         at_end: bool,
@@ -80,9 +80,9 @@ pub struct PhaseWindow {
     pub reversal: usize,
     /// Frames of the phase, those with `from_s <= time < to_s`; at least one.
     pub frames: Range<usize>,
-    /// Start, s.
+    /// Start of the phase, s.
     pub from_s: f64,
-    /// End, s.
+    /// End of the phase, s.
     pub to_s: f64,
 }
 

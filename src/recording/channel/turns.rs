@@ -3,20 +3,22 @@
 use super::{TrackPoints, median_filter, median_position, noise_sd_m, value_range};
 use portable_math as math;
 
-/// Smallest distance by which the head must move to an extremum and back for it to count as a turn, m: one
-/// pixel of the usual 20 um. Jitter of a resting head is smaller.
+/// Smallest distance that the head must move towards an extremum and away from it for the extremum to count
+/// as a turn, m: one pixel of the usual size, 20 um. Jitter of a resting head is smaller.
 pub(super) const LEAST_RETURN_M: f64 = 20e-6;
-/// Smallest distance to an extremum and back in units of the tracking noise; two extremes of white noise in
-/// 1e5 frames are about 9 apart.
+/// Smallest distance that the head must move towards a turn and away from it, in standard deviations of the
+/// tracking noise. The largest and the smallest of 1e5 values of white noise differ by about 9 standard
+/// deviations.
 const RETURN_NOISES: f64 = 12.0;
-/// Smallest distance to an extremum and back as a fraction of the head's whole travel; vibration of the drive
-/// is smaller.
+/// Smallest distance that the head must move towards a turn and away from it, as a fraction of the head's
+/// whole travel; vibration of the drive is smaller.
 const RETURN_TRAVEL: f64 = 0.005;
-/// A turn is timed by a parabola through the frames that are nearer to the extremum than this multiple of the
-/// smallest distance.
+/// The time of a turn comes from a parabola through the frames in which the distance of the head from the
+/// extremum is at most this multiple of the smallest distance of a turn.
 const FIT_RETURNS: f64 = 4.0;
 
-/// A turn of the head: its time in frames, and the first and last frame of the parabola that timed it.
+/// A turn of the head: its time in frames, and the first and last frame to which the parabola was fitted that
+/// gives this time.
 pub(super) struct HeadTurn {
     pub frame: f64,
     pub first: usize,
@@ -61,7 +63,8 @@ fn alternating_extrema(values: &[f64], least: f64) -> Vec<usize> {
     found
 }
 
-/// Times an extremum by the vertex of a parabola through the frames whose position is within `reach_m` of it.
+/// Finds the time of an extremum: the vertex of a least-squares parabola through the adjacent frames whose
+/// positions are within `reach_m` of the extremum.
 fn time_extremum(head: &TrackPoints, smooth: &[f64], index: usize, reach_m: f64) -> HeadTurn {
     let near = |i: &usize| (smooth[*i] - smooth[index]).abs() <= reach_m;
     let first = (0..=index).rev().take_while(near).last().unwrap_or(index);
@@ -75,7 +78,7 @@ fn time_extremum(head: &TrackPoints, smooth: &[f64], index: usize, reach_m: f64)
     }
 }
 
-/// Frame of the vertex of the least-squares parabola through the points.
+/// Frame number (a real number) of the vertex of the least-squares parabola through the points.
 fn parabola_vertex(points: &[(usize, f64)]) -> Option<f64> {
     let (first, last) = (points.first()?.0 as f64, points.last()?.0 as f64);
     let (centre, half) = ((first + last) / 2.0, (last - first) / 2.0);
@@ -95,30 +98,34 @@ fn parabola_vertex(points: &[(usize, f64)]) -> Option<f64> {
     s.is_finite().then_some(centre + half * s)
 }
 
-/// Tolerance of a hold, in standard deviations of the noise. White noise exceeds it in one frame of 2
-/// million.
+/// Tolerance of the tip's position during a hold (a rest of the tip), in standard deviations of the noise.
+/// White noise exceeds this tolerance in one frame of 2 million.
 const HOLD_NOISES: f64 = 5.0;
-/// Smallest tolerance of a hold, m: a hundredth of a pixel of 20 um, finer than any tracker.
+/// Smallest tolerance of the tip's position during a hold, m: a hundredth of a pixel of 20 um. No tracker is
+/// that accurate.
 const LEAST_TOLERANCE_M: f64 = 0.2e-6;
-/// Tolerance of a hold, in steps of the tracker: whole-pixel tracking flickers between two adjacent values.
+/// Tolerance of the tip's position during a hold, in steps of the tracker, if the noise is zero: whole-pixel
+/// tracking flickers between two adjacent values.
 const HOLD_STEPS: f64 = 1.1;
-/// Number of consecutive frames outside the tolerance, on one side, that end a hold; fewer frames are
-/// outliers of the tracker.
+/// Number of consecutive frames outside the tolerance, all on the same side, that end a hold; fewer frames
+/// are outliers of the tracker.
 const LEFT_FRAMES: usize = 3;
-/// Number of seeds of the search for a hold on either side of a turn, spread over the frames of the parabola.
+/// Number of frames on either side of a turn at which a search for a hold starts. They are spread evenly over
+/// the frames of the parabola that gives the time of the turn.
 const SEEDS: isize = 4;
 /// Half the number of frames whose median is the first estimate of the position of a hold.
 const SEED_HALF: usize = 5;
-/// Smallest travel of the head during a hold, in tolerances. If the tip only follows a slow head, it leaves
-/// the tolerance before the head has travelled two tolerances; noise adds less than two to this travel.
+/// Smallest travel of the head during a hold, in tolerances of the tip's position. If the tip only follows a
+/// slow head, it leaves the tolerance before the head has travelled two tolerances; noise adds less than two
+/// to this travel.
 const HEAD_TOLERANCES: f64 = 6.0;
 /// Maximum number of frames from the first point outside a hold back to the extrapolated start or end of the
 /// hold.
 const MOST_EXTRAPOLATED: f64 = 5.0;
-/// Exponent of the tip's path after release: its acceleration starts at zero, so the path grows as the cube
-/// of time.
+/// Exponent of the tip's path after release: the tip's acceleration starts at zero, so the path grows as the
+/// cube of time.
 const RELEASE_POWER: f64 = 3.0;
-/// Exponent of the tip's path before a hold: it decelerates to rest along a parabola.
+/// Exponent of the tip's path before a hold: the tip decelerates to rest along a parabola.
 const HOLD_POWER: f64 = 2.0;
 
 /// An interval in which the tip rests, in frames (real numbers); an end that lies outside the recording is
@@ -137,8 +144,8 @@ pub(super) fn longest_hold(head: &TrackPoints, tip: &TrackPoints, turn: &HeadTur
     holds.reduce(|best, hold| if hold.points > best.points { hold } else { best })
 }
 
-/// Tolerance of a hold, m, from the noise in the middle third of the frames of the parabola, where the drive
-/// is slow.
+/// Tolerance of the tip's position during a hold, m, from the noise in the middle third of the frames of the
+/// turn's parabola, where the head is slow.
 fn hold_tolerance_m(tip: &TrackPoints, turn: &HeadTurn) -> f64 {
     let sixth = (turn.last - turn.first) as f64 / 6.0;
     let near = &tip.points[tip.index_at_frame(turn.frame - sixth)..tip.index_at_frame(turn.frame + sixth)];
@@ -165,7 +172,7 @@ fn hold_around(head: &TrackPoints, tip: &TrackPoints, seed: usize, tolerance_m: 
     head_moves.then_some(TipHold { start, end, points: last - first + 1 })
 }
 
-/// First and last point of the interval around `seed` in which the tip stays near `place`.
+/// First and last point of the interval around `seed` in which the tip stays within `tolerance_m` of `place`.
 fn hold_extent(tip: &TrackPoints, seed: usize, place: f64, tolerance_m: f64) -> (usize, usize) {
     let outside = |i: usize| {
         let off = tip.points[i].1 - place;
@@ -182,7 +189,8 @@ fn hold_extent(tip: &TrackPoints, seed: usize, place: f64, tolerance_m: f64) -> 
     (first, last)
 }
 
-/// Start `t0`, in frames, of the path `distance = c |t - t0|^power` through two points outside the hold.
+/// Start or end of a hold, in frames: the time `t0` of the path `distance = c |t - t0|^power` through two
+/// points outside the hold, where `distance` is measured from the position of the hold.
 fn departure_frame(tip: &TrackPoints, outside: usize, next: Option<usize>, place: f64, power: f64) -> f64 {
     let (frame, x) = tip.points[outside];
     let frame = frame as f64;

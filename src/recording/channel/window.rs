@@ -27,7 +27,8 @@ pub enum WindowEnd {
         /// Time from the instant, s.
         offset_s: f64,
     },
-    /// A phase of a reversal: its start if this is the start of a window, its end if this is the end.
+    /// A phase of a reversal: the start of the phase if this is the start of a window, and the end of the
+    /// phase if this is the end of a window.
     Phase {
         /// The phase.
         phase: ReversalPhase,
@@ -36,7 +37,7 @@ pub enum WindowEnd {
     },
 }
 
-/// Frames from `from` (included) to `to` (not included).
+/// A part of a recording: the frames from `from` (included) to `to` (not included).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Window {
     /// Start of the window.
@@ -118,8 +119,8 @@ impl Window {
 }
 
 impl WindowEnd {
-    /// Time of this end, s, as the end of a window (if `at_end`) or as its start; `None` stands for the end
-    /// or the start of the recording.
+    /// Time of this end, s, as the end of a window (if `at_end`) or as its start; `None` means the end or the
+    /// start of the recording.
     fn time_s(self, at_end: bool, instants: &ReversalInstants) -> Result<Option<f64>, AbsentInstant> {
         match self {
             Self::Open => Ok(None),
@@ -145,8 +146,8 @@ const EXPECTED_PHASE: &str = "two ends with `..` between them, or one of `before
 impl Window {
     /// Parses `A..B`. Each end is empty, or a number of seconds, or `hold|reversal|flip|release` followed by
     /// an optional `[k]` (the k-th reversal, default 1) and an optional `+seconds` or `-seconds`. A whole
-    /// phase of a reversal, `before|stick|flip|after` with an optional `[k]`, may stand for the window: see
-    /// [`ReversalPhase`].
+    /// phase of a reversal, `before|stick|flip|after` with an optional `[k]`, may be given in place of
+    /// `A..B`: see [`ReversalPhase`].
     ///
     /// # Errors
     /// [`WindowError`] with the part at fault.

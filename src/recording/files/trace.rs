@@ -13,12 +13,13 @@ const NO_ROWS: &str = ": found no rows of numbers, expected the header \
 pub const HEADER: &str = "time_s,tip_x_m,tip_y_m,head_x_m,head_y_m";
 const CONFIDENCES: [&str; 2] = ["tip_confidence", "head_confidence"];
 const POSITIONS: usize = 4;
-/// Number of rows in a block of text, about half a megabyte, and number of blocks that are made in parallel.
+/// Number of rows in a block of text, which has about half a megabyte; [`BLOCKS`] blocks are made in
+/// parallel.
 const BLOCK_ROWS: usize = 4096;
 const BLOCKS: usize = 8;
 
-/// Largest distance of a time from the grid of a rounded rate, frames. Times printed with 16 digits lie far
-/// closer.
+/// Largest distance of a time from its frame, in frames, that is always accepted for a rounded frame rate.
+/// Times printed with 16 digits are far closer to their frames.
 const SNAP_FRAMES: f64 = 1e-6;
 
 /// The recording as `trace.csv`: times from the grid, each number with the fewest digits that preserve its
@@ -28,7 +29,8 @@ pub fn trace_csv(recording: &Recording) -> String {
     trace_blocks(recording).collect()
 }
 
-/// The text of [`trace_csv`] in pieces, so that the text of a long recording never lies in memory as a whole.
+/// The text of [`trace_csv`] in pieces, so that the whole text of a long recording is never in memory at
+/// once.
 pub fn trace_blocks(recording: &Recording) -> impl Iterator<Item = String> {
     let columns: Vec<_> = recording.traces().columns().collect();
     let optional = columns.iter().skip(POSITIONS).map(|(name, _)| format!(",{name}"));
@@ -72,8 +74,8 @@ fn push_number(text: &mut String, value: f64) {
     };
 }
 
-/// Reads `trace.csv` without its description. The frame rate is estimated from the times: it has the fewest
-/// digits that explain them. Missing rows become missing frames.
+/// Reads `trace.csv` without its description. The frame rate is estimated from the times: it is the rate with
+/// the fewest digits that fits the times. Missing rows become missing frames.
 ///
 /// # Errors
 /// [`FilesError`] with file, line and column.
@@ -85,7 +87,7 @@ pub fn parse_trace_csv(file: &str, text: &str) -> Result<(FrameGrid, Traces), Fi
     Ok(table.place_on_grid(&fit, frame_rate_hz))
 }
 
-/// Reads `trace.csv` on a grid of known rate, 1/s. Missing rows become missing frames.
+/// Reads `trace.csv` on a frame grid of known rate, 1/s. Missing rows become missing frames.
 ///
 /// # Errors
 /// [`FilesError`] with file, line and column; also if the times do not lie on that grid.
@@ -107,7 +109,7 @@ pub fn parse_trace_csv_at(
 /// with a jump in its times from filling the memory.
 const FRAMES_WITHOUT_ROWS: (usize, usize) = (250_000, 4);
 
-/// The rows as written, before frame numbers are assigned.
+/// The rows of `trace.csv` as written, before frame numbers are assigned.
 struct TraceTable<'a> {
     text: &'a str,
     confidences: [bool; 2],
@@ -259,7 +261,7 @@ fn farthest_off_grid(times_s: &[f64], frames: &[usize], frame_rate_hz: f64) -> (
     off.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, 0.0))
 }
 
-/// The rate with the fewest digits that explains the times as well as the fitted rate does.
+/// The frame rate with the fewest digits that fits the times about as well as the fitted rate.
 fn simplest_frame_rate_hz(times_s: &[f64], fit: &FrameFit) -> f64 {
     let fitted = 1.0 / fit.frame_s;
     let allowed = SNAP_FRAMES.max(1.5 * farthest_off_grid(times_s, &fit.frames, fitted).1);

@@ -64,7 +64,7 @@ impl AutoregressiveNoise {
         self.sd * unexplained.sqrt()
     }
 
-    /// Correlations of frames that are 0, 1, ... `count - 1` frames apart.
+    /// Correlations of the noise in two frames that are 0, 1, ... `count - 1` frames apart.
     pub(crate) fn correlations(&self, count: usize) -> Vec<f64> {
         let mut correlations = vec![1.0];
         let (mut known, mut unexplained) = (Vec::new(), 1.0);
@@ -114,7 +114,7 @@ fn reflection_coefficients(coefficients: &[f64]) -> Vec<f64> {
 // 1980, *Technometrics* 22). The gains of the filter do not depend on the data, so they are computed once.
 // Across a gap, the filter predicts over several frames.
 
-/// Noise of the last frames, beginning with the latest.
+/// One number for each of the last frames, beginning with the latest frame.
 type NoiseMemory = [f64; MOST_COEFFICIENTS];
 
 /// Linear map that makes the noise white for a given pattern of present frames.
@@ -126,7 +126,7 @@ pub(crate) struct Whitener {
     steps: Vec<WhiteningStep>,
 }
 
-/// Step from one present frame to the next.
+/// Step of the filter from one present frame to the next.
 #[derive(Debug, Clone, PartialEq)]
 struct WhiteningStep {
     /// Number of frames since the previous present frame.
@@ -340,8 +340,8 @@ mod tests {
         assert_eq!(column, expected);
     }
 
-    /// Noise of every model, with a fifth of the frames lost, gets unit variance and no correlation of
-    /// neighbouring frames.
+    /// After whitening, the noise of every model, with a fifth of the frames lost, has unit variance and no
+    /// correlation between neighbouring frames.
     #[test]
     fn whitened_noise_is_white() {
         const FRAMES: usize = 20_000;

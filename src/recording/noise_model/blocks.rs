@@ -8,8 +8,8 @@ use portable_math as math;
 const LEAST_SHARE: f64 = 0.5;
 /// Minimum number of degrees of freedom of a block.
 const LEAST_LEFT: usize = 4;
-/// Largest scatter of a block, in units of the median scatter. A block with a larger scatter has an outlier,
-/// or the tip is off the glass.
+/// Largest scatter of the residuals in a block that is used, in units of the median scatter of all blocks. A
+/// block with a larger scatter has an outlier, or the tip is off the glass.
 const OUTLYING_SCATTER: f64 = 3.0;
 
 /// Length of the blocks of a channel, and the terms that are fitted in them.
@@ -23,7 +23,7 @@ pub(super) struct BlockCut<'a> {
     pub covariate: Option<&'a [Option<f64>]>,
 }
 
-/// Frames in which the motion is a linear combination of a few columns.
+/// A block of frames in which the motion is a linear combination of a few columns.
 #[derive(Debug, Clone)]
 pub(super) struct NoiseBlock {
     /// Indices of the frames that are present.
@@ -67,7 +67,7 @@ pub(super) fn dot_product(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// The blocks of a channel that hold enough frames.
+/// The blocks of a channel in which enough frames are present.
 pub(super) fn cut_blocks(channel: &[Option<f64>], cut: &BlockCut<'_>) -> Vec<NoiseBlock> {
     let starts = (0..channel.len()).step_by(cut.length);
     starts.filter_map(|first| cut_block(channel, cut, first)).collect()
@@ -92,7 +92,7 @@ fn cut_block(channel: &[Option<f64>], cut: &BlockCut<'_>, first: usize) -> Optio
     let mut columns: Vec<Vec<f64>> = powers.collect();
     if cut.covariate.is_some() {
         let moved = centred(&beside)?;
-        // (a channel that does not move is not an independent column)
+        // (a constant channel is not independent of the polynomial)
         if dot_product(&moved, &moved) > 0.0 {
             columns.push(moved);
         }

@@ -2,19 +2,21 @@
 //!
 //! The noise of one point is regressed on the noise of the other within short blocks, in which a parabola
 //! describes the motion. The weight of a block is the inverse of its residual variance: a block in which the
-//! blade rings counts little, one in which it sticks counts much.
+//! blade oscillates has little weight, and a block in which it sticks has much weight.
 
 use super::block_length;
 use super::blocks::{BlockCut, NoiseBlock, cut_blocks, dot_product, keep_quiet_blocks};
 use crate::recording::Recording;
 use portable_math as math;
 
-/// Number of frames of a short block: a parabola leaves three quarters of the degrees of freedom.
+/// Number of frames of a short block: after a parabola is fitted, three quarters of the degrees of freedom
+/// remain.
 const SHORT_BLOCK: usize = 12;
-/// A share is significant if it exceeds this number of its standard deviations; by chance, a share does so in
-/// one recording of 370.
+/// The share of common noise is significant if it exceeds this number of its standard deviations. By chance,
+/// that happens in one recording of 370.
 const CLEAR_DEVIATIONS: f64 = 3.0;
-/// Minimum number of blocks: the scatter over fewer blocks is too uncertain.
+/// Minimum number of blocks for a share of common noise: its standard deviation, from the scatter over the
+/// blocks, is too uncertain with fewer blocks.
 const FEWEST_BLOCKS: usize = 30;
 
 /// The part of a channel's noise that it shares with the other point.
@@ -62,8 +64,8 @@ fn channel_residuals(channel: &[Option<f64>], cut: &BlockCut<'_>) -> Vec<Option<
     left
 }
 
-/// Regression of the noise of a channel on the noise of the other point, in the frames in which the latter
-/// (`residuals`) is known.
+/// Regression of the noise of a channel on `residuals`, the noise of the other point, in the frames in which
+/// `residuals` has a value.
 fn regress_on_other_point(
     channel: &[Option<f64>],
     other: &[Option<f64>],
@@ -90,8 +92,9 @@ fn residual_pair(block: &NoiseBlock, other: &[Option<f64>]) -> Option<[Vec<f64>;
     Some([block.residuals(), NoiseBlock { values, ..block.clone() }.residuals()])
 }
 
-/// Share and its standard deviation by iteratively reweighted least squares; the standard deviation follows
-/// from the scatter over the blocks. The weight of a block is the inverse of its residual variance.
+/// Share of common noise, and its standard deviation, by iteratively reweighted least squares; the standard
+/// deviation follows from the scatter over the blocks. The weight of a block is the inverse of its residual
+/// variance.
 fn regress_pairs(pairs: &[[Vec<f64>; 2]]) -> Option<(f64, f64)> {
     const ROUNDS: usize = 4;
     let mut share = 0.0;

@@ -8,9 +8,11 @@ use super::{ChannelNoise, NoiseSource};
 use nalgebra::{DMatrix, DVector};
 use portable_math as math;
 
-/// Highest order: the noise of trackers consists of vibration and sub-pixel bias, which last a few frames.
+/// Highest order of the autoregressive process: the noise of trackers consists of vibration and sub-pixel
+/// bias, which last a few frames.
 const MOST_ORDER: usize = 6;
-/// The search ends after this number of consecutive orders without a lower criterion.
+/// The search for the order ends after this number of consecutive orders that do not lower Schwarz's
+/// criterion.
 const ORDERS_WITHOUT_GAIN: usize = 2;
 
 /// Estimates the noise of blocks; `None` if the blocks have too few frames or no noise.
@@ -33,7 +35,7 @@ pub(super) fn estimate_noise(blocks: &[NoiseBlock], source: NoiseSource) -> Opti
     estimate_at_optimum(blocks, &best.1, freedoms, source)
 }
 
-/// The noise at the optimum, with standard deviations from the curvature of the deviance.
+/// The noise at the minimum of the deviance, with standard deviations from the curvature of the deviance.
 fn estimate_at_optimum(
     blocks: &[NoiseBlock],
     turns: &[f64],
@@ -82,8 +84,8 @@ fn restricted_deviance(blocks: &[NoiseBlock], turns: &[f64]) -> Option<f64> {
     deviance.is_finite().then_some(deviance)
 }
 
-/// Deviance and variance of the noise; neighbouring blocks with the same pattern of frames use the same
-/// whitener.
+/// Deviance of the blocks and variance of their noise; neighbouring blocks with the same pattern of frames
+/// use the same whitener.
 fn deviance_and_variance(blocks: &[NoiseBlock], noise: &AutoregressiveNoise) -> Option<(f64, f64)> {
     let (mut left, mut logs, mut freedoms) = (0.0, 0.0, 0);
     let mut last: Option<(Vec<usize>, Whitener)> = None;
@@ -107,7 +109,7 @@ fn deviance_and_variance(blocks: &[NoiseBlock], noise: &AutoregressiveNoise) -> 
     (variance > 0.0).then(|| (freedoms as f64 * math::ln(variance) + logs, variance))
 }
 
-/// Minimises the deviance by Newton's method and returns it.
+/// Minimises the deviance over `turns` by Newton's method, and returns the smallest value found.
 fn minimise_deviance(blocks: &[NoiseBlock], turns: &mut Vec<f64>) -> Option<f64> {
     const ROUNDS: usize = 12;
     const LONGEST: f64 = 0.7;
@@ -137,7 +139,7 @@ fn minimise_deviance(blocks: &[NoiseBlock], turns: &mut Vec<f64>) -> Option<f64>
     Some(here)
 }
 
-/// Gradient and Hessian of the deviance from finite differences.
+/// Gradient and Hessian of the deviance with respect to `turns`, from finite differences.
 fn deviance_derivatives(
     blocks: &[NoiseBlock],
     turns: &[f64],

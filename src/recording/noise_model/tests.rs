@@ -26,7 +26,7 @@ fn series(noise: &AutoregressiveNoise, frames: usize, generator: &mut Xoshiro256
 struct Sweep {
     rate_hz: f64,
     noise: AutoregressiveNoise,
-    /// Fraction of the variance that both points have in common.
+    /// Fraction of the noise variance that both points have in common.
     shared: f64,
     lost: f64,
     seed: u64,
@@ -96,7 +96,8 @@ fn white_noise_is_found_to_be_white_and_of_its_size() {
     assert!(coloured <= 2, "{coloured} of 30");
 }
 
-/// The errors are normal in units of their estimated standard deviations.
+/// The errors of the estimates, divided by their estimated standard deviations, have a standard normal
+/// distribution.
 #[test]
 fn noise_that_resembles_its_neighbours_is_found() {
     let mut scores = Vec::new();
@@ -132,9 +133,9 @@ fn a_bias_within_the_pixel_counts_as_noise() {
     }
 }
 
-/// If both points share a fraction `s` of the variance, the best multiple to subtract is `s`. This leaves
-/// `1 - s^2` of white noise, plus the noise of the head that the smooth motion absorbs: 4 degrees of freedom
-/// in a block of 40 frames.
+/// If both points share a fraction `s` of the variance, the best multiple of the head's noise to subtract
+/// from the tip is `s`. The fraction `1 - s^2` of the variance of white noise remains, plus the noise of the
+/// head that the smooth motion absorbs: 4 degrees of freedom in a block of 40 frames.
 #[test]
 fn what_both_points_share_is_found_and_taken_out() {
     for (rate_hz, rho, share) in [(5000.0, 0.0, 0.6), (10_000.0, 0.6, 0.5), (10_000.0, 0.9, 0.8)] {

@@ -6,23 +6,23 @@ use super::noise::FrameGaps;
 use crate::recording::{FrameGrid, Traces};
 use short_spectra::sampling::exposure_gain;
 
-/// Fraction of missing frames that calls for a caution. Least-squares spectra with the true frame times stay
-/// accurate up to 40 %, but weak components are lost much earlier.
+/// Fraction of missing frames above which the finding is a caution. Least-squares spectra with the true frame
+/// times stay accurate up to 40 % of missing frames, but weak components are lost much earlier.
 const MANY_MISSING: f64 = 0.2;
-/// Largest fraction of the recording that a single gap may cover: a longer gap may hide the whole stick phase
-/// of a stroke.
+/// Largest fraction of the recording that a single gap may cover without a caution: a longer gap may hide the
+/// whole stick phase of a stroke.
 const LONG_GAP: f64 = 0.05;
-/// Smallest fraction of an amplitude that the exposure should pass at the highest usable frequency. A loss of
-/// a tenth exceeds the uncertainty of the scale.
+/// Smallest fraction of an amplitude that the exposure passes at the highest usable frequency without a
+/// caution. A loss of a tenth exceeds the uncertainty of the scale.
 const EXPOSURE_PASSES: f64 = 0.9;
 /// Largest relative difference between a step and a pixel at which the step counts as a whole pixel: scales
 /// are given to three digits.
 const PIXEL_NEARNESS: f64 = 0.01;
 /// Confidence below which a position is doubtful: the default cut-off of DeepLabCut (`pcutoff`).
 const LOW_CONFIDENCE: f64 = 0.6;
-/// Fraction of doubtful positions that calls for a caution: more than stray outliers.
+/// Fraction of doubtful positions above which the finding is a caution: more than stray outliers.
 const MANY_DOUBTFUL: f64 = 0.01;
-/// Fraction of doubtful positions that is serious: most of the track is guessed.
+/// Fraction of doubtful positions above which the finding is serious: most of the track is guessed.
 const MOST_DOUBTFUL: f64 = 0.5;
 
 /// Rates at which video is played back, 1/s (film, PAL, NTSC and their doubles).
@@ -126,7 +126,8 @@ pub(crate) fn check_position_steps(measured: &Quality, optics: &Optics) -> Vec<Q
     measured.channels().into_iter().filter_map(check).collect()
 }
 
-/// Finding on a step that is coarser than the noise; the step, not the tracking, then limits the measurement.
+/// Finding on positions that are written in steps larger than their noise: the step, not the tracking, then
+/// limits the accuracy.
 fn check_position_step(channel: &ChannelQuality, optics: &Optics) -> Option<QualityFinding> {
     let step_m = channel.step_m.filter(|&step| channel.noise_m.is_some_and(|noise| noise < step))?;
     let whole = optics.metres_per_pixel.filter(|pixel| (step_m / pixel - 1.0).abs() < PIXEL_NEARNESS);

@@ -174,13 +174,13 @@ impl QualityFinding {
         Self { check, severity, channel: None, value, unit, found, advice }
     }
 
-    /// This finding on one channel.
+    /// Returns this finding with the name of the channel that it concerns.
     #[must_use]
     pub fn on_channel(self, channel: &str) -> Self {
         Self { channel: Some(channel.to_owned()), ..self }
     }
 
-    /// This finding with advice.
+    /// Returns this finding with the given advice.
     #[must_use]
     pub fn with_advice(self, advice: &str) -> Self {
         Self { advice: advice.to_owned(), ..self }

@@ -121,8 +121,8 @@ impl Quality {
         [("tip-x", &self.tip_x), ("tip-y", &self.tip_y), ("head-x", &self.head_x), ("head-y", &self.head_y)]
     }
 
-    /// Standard deviation of the noise of the deflection, m, from the noise of tip and head; the noise of
-    /// each is taken as at least the rounding error of its step.
+    /// Standard deviation of the noise of the deflection, m, from the noise of tip and head. The noise of
+    /// each point counts as at least the rounding error of its positions, `step / sqrt(12)`.
     pub(super) fn deflection_floor_m(&self) -> Option<f64> {
         let variance = |c: &ChannelQuality| {
             Some(math::powi(c.noise_m?, 2).max(math::powi(c.step_m.unwrap_or(0.0), 2) / 12.0))
@@ -149,11 +149,11 @@ pub(super) fn measured_columns<'a>(traces: &'a Traces, measured: &'a Quality) ->
 
 /// Title of the paper whose experiment showed the [`PUBLISHED_COMPONENTS_HZ`].
 pub const PUBLISHED_TITLE: &str = "Investigation of the dynamics of the wiper blade around the reversal";
-/// The two components of the published experiment, with their names, Hz.
+/// Names and frequencies, Hz, of the two spectral components in the published experiment.
 pub const PUBLISHED_COMPONENTS_HZ: [(&str, f64); 2] =
     [("low", 78.4), ("high (printed as about 900 Hz)", 900.0)];
-/// Smallest fraction of an amplitude that counts as shown in full: a scale is rarely known to better than a
-/// tenth.
+/// Smallest fraction of an amplitude passed by the exposure at which the amplitude counts as shown in full: a
+/// scale is rarely known to better than a tenth.
 const NEARLY_ALL: f64 = 0.9;
 
 /// Visibility of a component in a recording.
@@ -168,11 +168,11 @@ pub enum Visibility {
     NearNyquist,
     /// The frequency is above the Nyquist frequency: the component appears at a wrong, lower frequency.
     Aliased,
-    /// Fewer than three cycles lie in the recording.
+    /// The recording contains fewer than three cycles.
     TooFewCycles,
 }
 
-/// A component as a recording shows it.
+/// How a recording shows a spectral component.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ComponentVisibility {
     /// Frequency of the component, Hz.
@@ -181,9 +181,9 @@ pub struct ComponentVisibility {
     pub verdict: Visibility,
     /// Frequency at which the component appears, Hz; equal to its own frequency unless it is aliased.
     pub appears_at_hz: f64,
-    /// Number of its cycles in the whole recording.
+    /// Number of cycles of the component in the whole recording.
     pub cycles: f64,
-    /// Fraction of its amplitude that the exposure passes; `None` if the exposure is unknown.
+    /// Fraction of the component's amplitude that the exposure passes; `None` if the exposure is unknown.
     pub exposure_passes: Option<f64>,
 }
 

@@ -1,5 +1,5 @@
-//! Checks on both points together: repeated frames, common frames, scale, direction of y, and the turns of
-//! the head.
+//! Checks on both points together: repeated frames, frames that both tracks cover, scale, direction of y, and
+//! the turns of the head.
 
 use super::finding::{Check, QualityFinding, Severity};
 use super::measurement::{ChannelQuality, Quality};
@@ -7,38 +7,41 @@ use crate::recording::channel::{ReversalInstants, median_in_place};
 use crate::recording::{FrameGrid, Recording, Traces};
 use std::f64::consts::PI;
 
-/// Fraction of repeated frames that is serious: frequencies are then wrong, not only a few samples.
+/// Fraction of repeated frames above which the finding is serious: not only a few samples but also
+/// frequencies are then wrong.
 const MANY_REPEATED: f64 = 0.01;
-/// Ratio of the tolerated number of repeats to `1 + expected`, where `expected` is the number of repeats that
-/// rounding is expected to cause.
+/// Ratio of the tolerated number of repeated frames to `1 + expected`, where `expected` is the number of
+/// repeated frames that rounding is expected to cause.
 const BY_ROUNDING: f64 = 3.0;
-/// No repeat is tolerated if rounding is expected to cause fewer repeats than this.
+/// No repeated frame is tolerated if rounding is expected to cause fewer repeated frames than this number.
 const NO_REPEATS: f64 = 0.01;
-/// Probability of a repeat by rounding above which repeats are not judged: with noise below the step,
-/// positions repeat for many frames.
+/// Probability that rounding makes a frame repeat the previous one, above which repeated frames are not
+/// judged. If the noise is smaller than the step, positions stay equal for many frames.
 const LIKELY_REPEAT: f64 = 1e-3;
 /// Smallest noise of a column that moves, m; below a picometre, the noise is rounding of a point at rest.
 const LEAST_NOISE_M: f64 = 1e-12;
-/// Fraction of frames at the ends with only one tracked point that calls for a caution: more than a late
-/// start of a track.
+/// Fraction of frames, at the start and the end of the recording, in which only one point is tracked, above
+/// which the finding is a caution. A late start of a track affects fewer frames.
 const MANY_ALONE: f64 = 0.1;
-/// Largest travel in a view that still resolves the lip, m: with 1,000 pixels across, a lip of 5 mm is 10
-/// pixels high.
+/// Largest travel of a point in a camera's view that still resolves the lip, m: with 1,000 pixels across, a
+/// lip of 5 mm is 10 pixels high.
 const LARGEST_VIEW_M: f64 = 0.5;
-/// Travel beyond any wiper's sweep, m: the longest blades travel about 1.5 m along their arc.
+/// Travel of a point that is longer than any wiper's sweep, m: the longest blades travel about 1.5 m along
+/// their arc.
 const LARGEST_SWEEP_M: f64 = 2.0;
-/// Travel below which nothing has moved, m: five pixels of the usual 20 um.
+/// Travel below which a point counts as at rest, m: five pixels of the usual size, 20 um.
 const LEAST_TRAVEL_M: f64 = 1e-4;
-/// Maximum number of positions from which a travel is measured; a stroke is smooth over a thousandth of its
-/// length.
+/// Maximum number of positions of a column that are used, evenly spaced in time; a stroke is smooth over a
+/// thousandth of its duration.
 const MOST_POSITIONS: usize = 20_000;
-/// Fraction of the positions at either end that a travel leaves out, because they may be outliers.
+/// Fraction of the positions at either end of their range that are left out when a travel is measured,
+/// because they may be outliers.
 const TRIMMED: f64 = 0.01;
 /// Smallest height of the tip above the head that calls for a caution, m: neck and lip are 5 to 10 mm high,
 /// and smaller heights may come from different origins of the two tracks.
 const LEAST_HEIGHT_M: f64 = 1e-3;
 
-/// Checks on both points together.
+/// Findings from the checks on both points together.
 pub(super) fn check_motion(recording: &Recording, measured: &Quality) -> Vec<QualityFinding> {
     let (traces, grid) = (recording.traces(), recording.grid());
     let found = [
@@ -78,9 +81,10 @@ fn check_repeated_frames(traces: &Traces, measured: &Quality) -> Option<QualityF
     Some(QualityFinding::advise((Check::FrozenFrames, severity), value, words, advice))
 }
 
-/// Probability that all columns repeat by chance. For a column with step `q` and noise `s` it is
-/// `q/(2 sqrt(pi) s)`: the step times the probability density of the difference of two values, taken at zero.
-/// `None` if noise does not move both points, or if repeats by chance are too likely to be judged.
+/// Probability that all columns by chance have the same values in two consecutive frames, the product over
+/// the columns. For a column with step `q` and noise `s` it is `q/(2 sqrt(pi) s)`: the step times the
+/// probability density of the difference of two values, taken at zero. `None` if noise does not move both
+/// points, or if repeats by chance are too likely to be judged.
 fn repeat_probability(measured: &Quality) -> Option<f64> {
     let moved = |channel: &ChannelQuality| channel.noise_m.is_some_and(|noise| noise > LEAST_NOISE_M);
     let unchanged = |channel: &ChannelQuality| {
@@ -123,7 +127,7 @@ fn check_overlap(traces: &Traces, grid: FrameGrid) -> Option<QualityFinding> {
     Some(QualityFinding::advise((Check::Overlap, severity), (both as f64, "frames"), words, advice))
 }
 
-/// Travel of the point that travels farther, m.
+/// Travel of the tip or of the head along the sweep, whichever is longer, m.
 fn largest_travel_m(traces: &Traces) -> Option<f64> {
     let travel = |samples: &[Option<f64>]| {
         let some = samples.iter().step_by(samples.len() / MOST_POSITIONS + 1);

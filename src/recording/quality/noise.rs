@@ -7,18 +7,20 @@ const MAD_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
 /// Variance of a third difference of white noise of unit variance: the sum of the squared binomial weights, 1
 /// + 9 + 9 + 1.
 const THIRD_DIFFERENCE_VARIANCE: f64 = 20.0;
-/// Minimum number of differences for an estimate: the median of fewer is uncertain.
+/// Minimum number of differences between frames for an estimate of noise or step: the median of fewer is
+/// uncertain.
 const FEWEST_DIFFERENCES: usize = 8;
-/// Remainder that counts as zero, relative to the largest position: the rounding of decimal numbers.
+/// Remainder of a division that counts as zero, relative to the largest position. It allows for the rounding
+/// of decimal numbers.
 const ROUNDING: f64 = 1e-10;
-/// Maximum number of steps that a difference may span: a larger number means that the common divisor is a
-/// coincidence of many digits.
+/// Maximum ratio of the largest difference between neighbouring frames to the quantisation step. A larger
+/// ratio means that the common divisor is a coincidence of many digits.
 const MOST_STEPS: f64 = 20_000.0;
 
 /// Standard deviation of white noise on the samples, in their unit: the median absolute third difference of
 /// four consecutive present frames, divided by `0.6745 sqrt(20)`. A third difference removes motion up to a
 /// parabola. An oscillation within a few frames remains and makes the estimate too high; errors that change
-/// slowly do not contribute.
+/// slowly from frame to frame do not contribute.
 #[must_use]
 pub fn noise_floor(samples: &[Option<f64>]) -> Option<f64> {
     let third = |w: &[Option<f64>]| match *w {
@@ -62,7 +64,7 @@ fn approximate_common_divisor(mut larger: f64, mut smaller: f64, rounding: f64) 
     larger
 }
 
-/// Runs of missing frames.
+/// Numbers and lengths of the runs of consecutive missing frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct FrameGaps {
     pub missing: usize,
@@ -102,8 +104,7 @@ fn greatest_common_divisor(a: usize, b: usize) -> usize {
 mod tests {
     use super::*;
 
-    /// Third differences of (0, 1, 1, 0) repeated have the size 0, 2 or 4 in turn, so that their median is
-    /// known.
+    /// All third differences of the samples 0, 1, 0, 1, ... have the size 4, so that their median is known.
     #[test]
     fn the_noise_floor_is_the_median_third_difference_over_its_factor() {
         let samples: Vec<Option<f64>> = (0..40).map(|i| Some(f64::from(i % 2))).collect();

@@ -17,33 +17,37 @@ use crate::recording::FrameGrid;
 /// Weight of the two nearer neighbours in the cubic through four points; the two further ones have the weight
 /// -1.
 const NEARER: f64 = 4.0;
-/// Sum of the four weights.
+/// Sum of the four weights of the neighbours in the cubic.
 const WEIGHTS: f64 = 6.0;
 /// Standard deviation of the miss (the distance from the cubic) in white noise of standard deviation 1:
 /// `sqrt(1 + (16 + 16 + 1 + 1)/36)`.
 const MISS_SD: f64 = 1.394_433_377_556_792_8;
-/// Smallest miss of an outlier, in standard deviations of a miss; white noise exceeds it at 2 of 1e9 points.
+/// Smallest distance of an outlier from the cubic through its neighbours, in standard deviations of this
+/// distance in white noise. White noise exceeds it at 2 of 1e9 points.
 const BEYOND_NOISE: f64 = 6.0;
-/// Smallest miss of an outlier, in steps: flicker between adjacent values is not an outlier.
+/// Smallest distance of an outlier from the cubic through its neighbours, in steps of the positions: flicker
+/// between adjacent values is not an outlier.
 const BEYOND_STEPS: f64 = 2.0;
-/// Smallest miss of an outlier, m: a tenth of a pixel of the usual 20 um. No tracker is that accurate in
-/// every frame.
+/// Smallest distance of an outlier from the cubic through its neighbours, m: a tenth of a pixel of the usual
+/// size, 20 um. No tracker is that accurate in every frame.
 const LEAST_MISS_M: f64 = 2e-6;
-/// Smallest miss of an outlier, in pixels, if the scale is known.
+/// Smallest distance of an outlier from the cubic through its neighbours, in pixels, if the scale is known.
 const LEAST_MISS_PX: f64 = 0.1;
-/// An outlier is at least this fraction of its miss away from both lines, and the lines differ by at most
-/// this fraction plus noise.
+/// The distance of an outlier from each of the two straight lines through its neighbours is at least this
+/// fraction of its distance from the cubic. The values of the two lines differ by at most this fraction, plus
+/// noise.
 const BOTH_SIDES: f64 = 0.5;
-/// Three standard deviations of the difference of the two lines in white noise: `3 sqrt(2 (4 + 1))`.
+/// Three standard deviations of the difference between the values of the two lines in white noise of standard
+/// deviation 1: `3 sqrt(2 (4 + 1))`.
 const LINES_SD: f64 = 9.5;
-/// Smallest ratio of an outlier's miss to the largest miss around it. The largest of six misses of white
-/// noise reaches 3 standard deviations once in 60 cases.
+/// Smallest ratio of an outlier's distance from its cubic to the largest such distance of the points around
+/// it. In white noise, the largest of six such distances reaches 3 standard deviations once in 60 cases.
 const MORE_THAN_AROUND: f64 = 4.0;
 /// Distances, in frames, from an outlier to the points around it: the nearest points whose own cubic does not
 /// use the outlier.
 const AROUND: std::ops::RangeInclusive<usize> = 3..=5;
-/// Fraction of outliers that calls for a caution: each outlier is an impulse that raises the noise of a
-/// spectrum.
+/// Fraction of outliers above which the finding is a caution: each outlier is an impulse that raises the
+/// noise of a spectrum.
 const MANY_OUTLIERS: f64 = 1e-3;
 
 /// Frames of the outliers in a column, in order; `metres_per_pixel` is given if known.
@@ -84,7 +88,8 @@ fn lies_off_both_lines(samples: &[Option<f64>], frame: usize, miss_m: f64, noise
     Some(off(before) && off(after) && agree)
 }
 
-/// Whether the cubics predict all points around a frame well; false if no point around it has a cubic.
+/// Whether all points around a frame are much closer to their own cubics than the distance `miss_m` of the
+/// frame's point from its cubic; false if no point around it has a cubic.
 fn is_calm_around(samples: &[Option<f64>], frame: usize, miss_m: f64) -> bool {
     let miss = |at: Option<usize>| distance_from_cubic(samples.get(at?.checked_sub(2)?..at? + 3)?);
     let around = AROUND.flat_map(|apart| [frame.checked_sub(apart), frame.checked_add(apart)]);

@@ -23,24 +23,24 @@ const MOST_BRIDGED: usize = 6;
 const FEWEST_SEGMENTS: usize = 32;
 /// Maximum number of segments, spread over the recording: they determine the median power to 7 %.
 const MOST_SEGMENTS: usize = 256;
-/// Edges of the bands, bins: a band is about a third of an octave and at least two bins wide. Motion and
-/// trend lie below the first edge.
+/// Edges of the frequency bands, in bins of the transform: a band is about a third of an octave and at least
+/// two bins wide. The frequencies of motion and trend are below the first edge.
 const EDGES: [usize; 12] = [3, 5, 7, 10, 13, 16, 20, 25, 32, 40, 50, 64];
-/// Number of bands of a plateau.
+/// Number of frequency bands of a plateau.
 const PLATEAU: usize = 3;
 /// Largest power ratio within a plateau, 3 dB. Across three bands, the power of a random walk, 1/f^2, falls
 /// by 4 dB or more.
 const FLAT: f64 = 2.0;
-/// The power must be low in all bands from this multiple of the cut-off frequency on.
+/// In a filtered trace, the power is low in all bands above this multiple of the cut-off frequency.
 const ABOVE: f64 = 1.6;
-/// Largest power in these bands, as a fraction of the power of the plateau: -8 dB, which the moving average
-/// over three frames just reaches.
+/// Largest power of a filtered trace in the bands above [`ABOVE`] times the cut-off frequency, as a fraction
+/// of the power of the plateau: -8 dB. A moving average over three frames just satisfies this limit.
 const FALLEN: f64 = 0.16;
-/// The power must fall by at least this factor, 10 dB, over the steepest octave. A random walk falls by only
-/// 6 dB per octave, a filter of second order by 12 dB.
+/// The power of a filtered trace falls by at least this factor, 10 dB, over the steepest octave. A random
+/// walk falls by only 6 dB per octave, a filter of second order by 12 dB.
 const STEEP: f64 = 10.0;
-/// Ratio of the median to the lower quartile of the power of noise in a bin. Its expected value is ln
-/// 2/ln(4/3) = 2.41; with 32 segments, it lies in this range.
+/// Range of the ratio of the median to the lower quartile of the power in a bin, over the segments of noise.
+/// The expected ratio is ln 2/ln(4/3) = 2.41; with 32 segments, the ratio is within this range.
 const NOISE_SCATTER: std::ops::RangeInclusive<f64> = 1.6..=3.8;
 /// Smallest power of a plateau, as a fraction of the square of the largest position; a lower power is
 /// rounding error.
@@ -83,12 +83,12 @@ fn is_plateau(bands: &[PrefilterBand]) -> bool {
     low > 0.0 && high <= FLAT * low && bands.iter().all(|band| NOISE_SCATTER.contains(&band.scatter))
 }
 
-/// Power between two bins, from all segments.
+/// Power of a frequency band between two bins, from all segments.
 struct PrefilterBand {
     /// Median power per bin over the segments; kinks, outliers and chatter in fewer than half of the segments
     /// do not change it.
     power: f64,
-    /// Ratio of the median to the lower quartile of the power.
+    /// Ratio of the median to the lower quartile of the power over the segments.
     scatter: f64,
 }
 
@@ -158,7 +158,7 @@ fn goertzel_power(values: &[f64], bin: usize) -> f64 {
     last * last + before * before - twice_cosine * last * before
 }
 
-/// Finding on a low-pass filter.
+/// Finding that a column was low-pass filtered before its export.
 pub(super) fn check_prefilter(column: &MeasuredColumn, frame_rate_hz: f64) -> Option<QualityFinding> {
     let ChannelQuality { step_m, noise_m, .. } = column.quality;
     if step_m.is_some_and(|step| noise_m.is_none_or(|noise| noise < step)) {

@@ -17,7 +17,8 @@ use glass_line::{GlassLine, TipPath};
 use portable_math as math;
 use serde::Serialize;
 
-/// Minimum number of frames with a height: fewer do not determine the correlation of the errors.
+/// Minimum number of frames in which the tip has a height: fewer frames do not determine the correlation of
+/// the errors.
 const FEWEST_FRAMES: usize = 50;
 /// Smallest travel of the tip within a stroke, m: about the height of a blade. As the lip bends, its tracked
 /// point moves up and down by some 10 um, which is 0.1 degrees over this travel.
@@ -28,7 +29,7 @@ const LEAST_ON_GLASS: f64 = 0.5;
 /// A slope or curvature is significant if it exceeds this number of its standard deviations; by chance, it
 /// does so in one level recording of 370.
 const CLEAR_DEVIATIONS: f64 = 3.0;
-/// Smallest sag of a curved path, m; a smaller one is rounding of a path without noise.
+/// Smallest sag of a path that counts as curved, m; a smaller sag is rounding error of a path without noise.
 const LEAST_SAG_M: f64 = 1e-9;
 /// Smallest tilt that matters, rad: 0.01 degrees shift the deflection of a blade 6 mm high by 1 um, a
 /// twentieth of the usual pixel.
@@ -222,7 +223,7 @@ impl TiltEffect {
         Some(QualityFinding::advise(kind, (per_m, "1/m"), words, advice))
     }
 
-    /// Shift of the deflection, m.
+    /// Shift of the deflection by a tilt of `angle_rad`, m.
     fn shift_m(&self, angle_rad: f64) -> Option<f64> {
         Some(self.height_m? * math::sin(angle_rad))
     }

@@ -11,7 +11,7 @@ use crate::simulate::{IntegrationMethod, RunResult, SolverOptions, run_scene_wit
 use short_spectra::{SpectrumSettings, analyse_spectrum};
 use std::ops::Range;
 
-/// Reference run of a scene.
+/// Reference run of a scene, with which runs of other solver settings are compared.
 pub(crate) struct ReferenceRun<'a> {
     scene: &'a Scene,
     motion: SampledRun,
@@ -28,7 +28,7 @@ pub(crate) struct ReferenceRun<'a> {
     pub state_apart: f64,
 }
 
-/// Errors and cost of a setting.
+/// Errors, relative to the reference run, and cost of a run with one solver setting.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct AccuracyRow {
     pub setting: SolverSetting,
@@ -40,9 +40,10 @@ pub(crate) struct AccuracyRow {
     pub lists: TransitionDifference,
     /// Error of the time at which the run ends, s.
     pub stop_error_s: f64,
-    /// Root-mean-square error of the deflection, relative to its range.
+    /// Root-mean-square error of the deflection, relative to the range of the deflection in the reference
+    /// run.
     pub state_rms: f64,
-    /// Largest error of the deflection, relative to its range.
+    /// Largest error of the deflection, relative to the range of the deflection in the reference run.
     pub state_worst: f64,
     /// Errors of the frequencies of the low and the high component, Hz; `None` unless the component is found
     /// in both the run and the reference.
@@ -83,12 +84,12 @@ impl<'a> ReferenceRun<'a> {
         self.lists_agree && self.apart_s.is_none_or(|apart| error_s > apart)
     }
 
-    /// Runs a setting without observers, for timing.
+    /// Runs the scene with a solver setting and without observers, for timing.
     pub(crate) fn run_untracked(&self, setting: &SolverSetting) -> RunResult {
         run_scene_with(self.scene, setting.solver_options(), &mut ())
     }
 
-    /// Runs a setting and compares it with the reference.
+    /// Runs the scene with a solver setting, and compares the run with the reference run.
     pub(crate) fn measure_setting(&self, setting: SolverSetting) -> AccuracyRow {
         let motion = SampledRun::run_scene(self.scene, setting.solver_options());
         let (state_rms, state_worst) = SampledRun::deflection_differences(&self.motion, &motion);
@@ -109,15 +110,17 @@ impl<'a> ReferenceRun<'a> {
 
 // Low and high spectral component of a run, found as in fits.
 
-/// Index of the low component: the head on its spring, found in the head's drop.
+/// Index of the low spectral component: the vibration of the head on its support, measured in the head's
+/// drop.
 pub(crate) const LOW_COMPONENT: usize = 0;
-/// Index of the high component: the stick-slip cycle, found in the deflection.
+/// Index of the high spectral component: the stick-slip cycle, measured in the deflection.
 pub(crate) const HIGH_COMPONENT: usize = 1;
 
-/// Search bands of both components, relative to the head's natural frequency. Published values are 1.5 and
-/// 3.9 times that frequency for the low component, and 40 to 80 times for the high one.
+/// Search bands of the low and the high component, relative to the head's natural frequency. Published values
+/// are 1.5 and 3.9 times that frequency for the low component, and 40 to 80 times for the high one.
 const BANDS_OVER_HEAD: [(f64, f64); 2] = [(1.0, 6.0), (6.0, 600.0)];
-/// Time from the release to the start of the window, s, in which the vibration of the flip decays.
+/// Time from the release of the tip to the start of the analysed frames, s; in this time, the vibration from
+/// the flip decays.
 const AFTER_RELEASE_S: f64 = 0.01;
 
 /// The spectral components of a run.
@@ -136,7 +139,8 @@ pub(crate) struct ComponentReader {
 }
 
 impl ComponentReader {
-    /// Uses the frames from the reference's release to its end, or all frames if there is no release.
+    /// Uses the frames from [`AFTER_RELEASE_S`] after the release of the tip in the reference run to the end
+    /// of that run, or all frames if there is no release.
     pub(crate) fn from_reference(scene: &Scene, reference: Option<&Recording>) -> Self {
         let from = WindowEnd::Found { anchor: InstantKind::Release, reversal: 1, offset_s: AFTER_RELEASE_S };
         let window = Window { from, to: WindowEnd::Open };

@@ -15,8 +15,9 @@ pub(crate) struct TransitionDifference {
 
 impl TransitionDifference {
     /// Compares two lists. The lists agree if they have the same changes of mode in the same order.
-    /// Otherwise, two transitions between the same modes form a pair if they are closer than half of the
-    /// reference's median gap; the other transitions are missed or invented.
+    /// Otherwise, two transitions between the same modes form a pair if their times differ by less than half
+    /// of the median time between successive transitions of the reference; the other transitions are missed
+    /// or invented.
     pub(crate) fn from_lists(reference: &[Transition], found: &[Transition]) -> Self {
         let same =
             reference.len() == found.len() && reference.iter().zip(found).all(|(a, b)| is_of_one_kind(a, b));
@@ -27,7 +28,7 @@ impl TransitionDifference {
         }
         let pairs = count_pairs(reference, found, 0.5 * median_gap(reference));
         let (missed, invented) = match (reference.len() - pairs, found.len() - pairs) {
-            (0, 0) => (1, 1), // the lists differ only in order, which counts as one of each
+            (0, 0) => (1, 1), // the lists differ only in order: one missed, one invented
             unpaired => unpaired,
         };
         Self { missed, invented, worst_s: None }

@@ -77,13 +77,14 @@ impl HeadSpline {
         self.curve.as_ref().map_or(0, |curve| curve.coefficients.len())
     }
 
-    /// Derivatives of the position at a frame with respect to the coefficients: index of the first nonzero
-    /// derivative, and the values from this index on.
+    /// Derivatives of the position at a frame with respect to the coefficients of the smooth curve: index of
+    /// the first nonzero derivative, and the values from this index on.
     pub(crate) fn position_weights(&self, frame: usize) -> (usize, [f64; 6]) {
         self.curve.as_ref().map_or((0, [0.0; 6]), |curve| curve.position_weights(frame as f64))
     }
 
-    /// Multiplies a row vector of coefficients by their covariance, m^2, in place.
+    /// Multiplies a row vector, with one number per coefficient of the smooth curve, by the covariance matrix
+    /// of the coefficients, m^2, in place.
     pub(crate) fn multiply_covariance(&self, row: &mut [f64]) {
         if let Some(curve) = &self.curve {
             curve.multiply_covariance(row);
@@ -143,7 +144,8 @@ impl HeadSpline {
     }
 }
 
-/// Second derivatives at the knots of the cubic spline through positions, from those at the two ends.
+/// Second derivatives, m/frame^2, at the knots of the cubic spline through `positions`; `first` and `last`
+/// are the second derivatives at the two ends.
 fn solve_curvatures(frames: &[usize], positions: &[f64], [first, last]: [f64; 2]) -> Vec<f64> {
     let h = |i: usize| (frames[i + 1] - frames[i]) as f64;
     let slope = |i: usize| (positions[i + 1] - positions[i]) / h(i);
@@ -201,7 +203,7 @@ mod tests {
             let found = [found.position_m, found.velocity_m_per_s, found.acceleration_m_per_s2];
             worst = std::array::from_fn(|k| worst[k].max((found[k] - exact[k]).abs()));
         }
-        let bounds = [1e-13, 1e-10, 1e-7]; // rounding of 0.5 m, over a frame and over its square
+        let bounds = [1e-13, 1e-10, 1e-7]; // rounding of 0.5 m, divided by a frame's time, and by its square
         assert!(worst.iter().zip(bounds).all(|(worst, bound)| *worst < bound), "{worst:?}");
     }
 

@@ -1,10 +1,10 @@
 //! A smooth curve through noisy points on a frame grid: a least-squares spline of degree 5.
 //!
 //! Generalised cross-validation chooses the number of pieces (Craven and Wahba 1979, *Numerische Mathematik*
-//! 31, 377). Degrees of freedom count 1.4-fold, so that noise does not add pieces (Kim and Gu 2004, *Journal
-//! of the Royal Statistical Society* B 66, 337). A crank moves the head smoothly over tenths of a second, so
-//! that a few pieces average the noise of thousands of frames; motion by hand needs more pieces. A cubic
-//! smoothing spline has two to three times the position error on noisy cosines.
+//! 31, 377). Each degree of freedom counts as 1.4, so that noise does not add pieces (Kim and Gu 2004,
+//! *Journal of the Royal Statistical Society* B 66, 337). A crank moves the head smoothly over tenths of a
+//! second, so that a few pieces average the noise of thousands of frames; motion by hand needs more pieces. A
+//! cubic smoothing spline has two to three times the position error on noisy cosines.
 //!
 //! Tracking noise is correlated over a few frames (vibration, sub-pixel bias), and cross-validation would
 //! mistake it for motion. Points are therefore averaged in blocks, and each block is compared with the
@@ -19,8 +19,8 @@ const DEGREE: usize = 5;
 const SUPPORT: usize = DEGREE + 1;
 /// Number of B-splines that are nonzero in two adjacent pieces, which a block may span.
 const BLOCK_WIDTH: usize = SUPPORT + 1;
-/// Weight of the third differences of the coefficients, relative to a block. The weight matters only if a gap
-/// leaves a piece without points.
+/// Weight of the third differences of the coefficients in the least-squares fit, relative to the weight of a
+/// block. The weight matters only if a gap leaves a piece without points.
 const BRIDGE: f64 = 1e-7;
 /// Factor by which degrees of freedom are multiplied in cross-validation.
 const CAUTION: f64 = 1.4;
@@ -43,7 +43,7 @@ pub(super) struct SmoothingSpline {
     variance_m2: f64,
 }
 
-/// First and last frame.
+/// First and last frame of the span of a spline.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct FrameSpan(f64, f64);
 
@@ -68,7 +68,7 @@ pub(super) fn fit_smoothing_spline(frames: &[usize], positions: &[f64], length: 
         .take_while(|pieces| *pieces <= most)
         .map(|pieces| SmoothingSpline::fit_pieces(span, trend, pieces, &blocks));
     let best = tried.min_by(|a, b| a.0.total_cmp(&b.0));
-    // the trial numbers of pieces always include one
+    // one piece is always among the trial numbers of pieces
     best.map_or_else(|| unreachable!("no curve"), |(_, curve)| curve)
 }
 
@@ -102,7 +102,8 @@ fn evaluate_polynomial(coefficients: &[f64], x: f64) -> f64 {
     coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c)
 }
 
-/// Least-squares polynomial through all points; its degree is lower if there are few points.
+/// Coefficients of the least-squares polynomial of degree 5 through all points; the degree is lower if there
+/// are few points.
 fn fit_trend(frames: &[usize], positions: &[f64], span: FrameSpan) -> [f64; SUPPORT] {
     let terms = SUPPORT.min(frames.len());
     let powers = DMatrix::from_fn(frames.len(), terms, |row, k| {
@@ -148,7 +149,8 @@ impl SmoothingSpline {
         (piece, x - piece as f64)
     }
 
-    /// Least-squares curve with this number of pieces, and its cross-validation score.
+    /// Least-squares curve with the given number of pieces, and its cross-validation score, which comes first
+    /// in the result.
     fn fit_pieces(
         span: FrameSpan,
         trend: [f64; SUPPORT],
@@ -191,7 +193,8 @@ impl SmoothingSpline {
         (piece, b_splines(x))
     }
 
-    /// Multiplies a row vector of coefficients by their covariance, m^2, in place.
+    /// Multiplies a row vector, with one number per coefficient of the curve, by the covariance matrix of the
+    /// coefficients, m^2, in place.
     pub(crate) fn multiply_covariance(&self, row: &mut [f64]) {
         self.information.solve_in_place(row);
         row.iter_mut().for_each(|x| *x *= self.variance_m2);
@@ -262,12 +265,12 @@ impl BandedMatrix {
     }
 }
 
-/// Lower Cholesky factor of a band matrix, stored in the same way.
+/// Lower Cholesky factor of a band matrix; each column is stored from the main diagonal down.
 #[derive(Debug, Clone, PartialEq)]
 struct CholeskyFactor(Vec<[f64; BLOCK_WIDTH]>);
 
 impl CholeskyFactor {
-    /// Replaces the right-hand side by the solution.
+    /// Replaces the right-hand side of the linear system by its solution.
     fn solve_in_place(&self, right: &mut [f64]) {
         for (j, column) in self.0.iter().enumerate() {
             right[j] /= column[0];

@@ -24,7 +24,7 @@ impl EventLoop<'_> {
         }
         if let Some((from, cause)) = before {
             if cause.is_none() {
-                self.recent.note_event(self.t); // impacts have been noted already
+                self.recent.note_event(self.t); // (impacts were noted earlier)
             }
             self.record_transition(from, TipMode::Flight, cause.unwrap_or(TransitionCause::LiftOff));
         }
@@ -44,7 +44,8 @@ impl EventLoop<'_> {
     /// has order 1 regardless of the other terms. In other cases, a lower-order term may be neglected if it
     /// is positive and smaller, because it only widens the gap.
     pub(super) fn gap_order(&self, state: &FlightState) -> u8 {
-        /// Length of this short time, as a fraction of the shortest period.
+        /// Length of the short time over which the terms are compared, as a fraction of the shortest period
+        /// of the links.
         const SHARE: f64 = 1e-3;
         let time = SHARE * self.shortest_period_s;
         let phase = FlightPhase { system: self.system, lean: self.lean };
@@ -56,8 +57,8 @@ impl EventLoop<'_> {
         let [first, second, third] = [state.gap_rate_m_per_s, 0.5 * now * time, change * time / 6.0];
         match () {
             () if first > 0.0 && (now < 0.0 || first > second.max(third)) => 1,
-            // order 2 also for a negative third term: division by that term would make a rising tip look like
-            // a landing one
+            // the order is 2 also if the third term is negative: with order 3, a rising tip would look like a
+            // landing tip
             () if second.abs() > third => 2,
             () => 3,
         }
@@ -108,7 +109,8 @@ impl EventLoop<'_> {
         }
     }
 
-    /// Expected duration of a rebound, `2 v_n / |gap''|`, s, for constant acceleration of the gap.
+    /// Expected duration of a rebound, `2 v_n / |gap''|`, s, if the acceleration `gap''` of the gap stays
+    /// constant; `v_n` is the tip's velocity away from the glass.
     fn rebound_s(&self, state: &FlightState) -> Option<f64> {
         let acceleration = self.gap_acceleration(self.t, state);
         (state.gap_m == 0.0 && state.gap_rate_m_per_s > 0.0 && acceleration < 0.0)
@@ -176,16 +178,16 @@ impl EventLoop<'_> {
     }
 
     /// Computes the impact with the scene's restitution, or with zero restitution if the train of rebounds
-    /// counts as over. The remaining rebounds last `T (1 + e + e^2 + ...)` and transmit the same impulse as
-    /// contact during that time. Ending the train early therefore moves the tip by at most the height of a
-    /// rebound.
+    /// counts as over. With the restitution `e` and the duration `T` of the next rebound, the remaining
+    /// rebounds last `T (1 + e + e^2 + ...)` and transmit the same impulse as contact during that time.
+    /// Ending the train early therefore moves the tip by at most the height of a rebound.
     fn rebound_or_close(&mut self, strike: TipStrike) -> Option<(FlightState, ImpactOutcome)> {
-        /// A rebound shorter than this fraction of the shortest period ends its train. The fraction is ten
-        /// times that of chattering, so that the train ends before it counts as chattering.
+        /// A rebound shorter than this fraction of the links' shortest period ends its train of rebounds. The
+        /// fraction is ten times that of chattering, so that the train ends before it counts as chattering.
         const RESOLUTION: f64 = 1e-5;
-        /// A rebound shorter than this fraction of the shortest period counts as short. A train has at most
-        /// `MOST_SHORT` consecutive short rebounds, because it might never end for a restitution near 1. With
-        /// a restitution of 0.99, rebounds shorten from `SHORT` to `RESOLUTION` in 690 rebounds.
+        /// A rebound shorter than this fraction of the links' shortest period counts as short. A train has at
+        /// most `MOST_SHORT` consecutive short rebounds, because it might never end for a restitution near 1.
+        /// With a restitution of 0.99, rebounds shorten from `SHORT` to `RESOLUTION` in 690 rebounds.
         const SHORT: f64 = 1e-2;
         const MOST_SHORT: u32 = 1000;
         let rebound = self.solve_strike(&strike)?;

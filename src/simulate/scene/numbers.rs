@@ -45,7 +45,7 @@ impl SceneReader<'_> {
         Ok(Some((place, recording.get_ref().clone())))
     }
 
-    /// Start of the cosine, s.
+    /// Time at which the cosine motion of the head starts, s; 0 if left out.
     pub(crate) fn read_delay_s(&self, written: &DriveFile) -> Result<f64, SceneError> {
         let Some(delay) = &written.delay_s else { return Ok(0.0) };
         let found = *delay.get_ref();

@@ -22,7 +22,7 @@ pub struct RunSettings {
     /// [`MOST_EVALUATIONS`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub most_evaluations: Option<u64>,
-    /// Tables that are written.
+    /// Output tables that the run writes.
     #[serde(skip)]
     pub outputs: Vec<OutputTable>,
 }
@@ -109,7 +109,7 @@ pub enum StartKind {
     SteadySlide,
     /// In a given state.
     State(Pose),
-    /// In a given state off the glass, for tests with exact solutions; scene files cannot ask for it.
+    /// In a given state off the glass, for tests with exact solutions; a scene file cannot select it.
     Airborne(FlightState),
 }
 

@@ -20,10 +20,10 @@ use crate::simulate::solution_segment::{SegmentSolution, SolutionSegment};
 use crate::simulate::{Impact, Transition, initial_pose};
 use std::ops::ControlFlow;
 
-/// A guard that has fallen to zero, before the next piece is known.
+/// A guard that has fallen to zero, kept until the next piece of the solution is known.
 #[derive(Debug, Clone, Copy)]
 struct TriggeredGuard {
-    /// Rate of the guard; `None` if derivatives are infinite or unknown.
+    /// Rate of the guard, in the unit of the guard per s; `None` if the derivatives are infinite or unknown.
     rate: Option<f64>,
     /// Rates of the state at the zero of the guard: `theta'`, `phi'`, `theta''`, `phi''`, `gap'`, `gap''`.
     rates: [f64; 6],
@@ -32,11 +32,11 @@ struct TriggeredGuard {
 /// Status of the derivatives in the run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum TangentStatus {
-    /// Valid at the end of the last piece.
+    /// The derivatives are valid at the end of the last piece of the solution.
     Current,
-    /// Moved to a transition time, before the next piece.
+    /// The derivatives were moved to a transition time; the next piece has not begun.
     AtTransition,
-    /// Unknown from here on.
+    /// The derivatives are unknown from here to the end of the run.
     Lost,
 }
 
@@ -58,7 +58,7 @@ pub(super) struct TangentPropagator<'a, O> {
     place: Option<StretchPlace>,
     /// End of the last piece, s.
     end_s: f64,
-    /// A guard grazes zero if its rate is below this fraction of the absolute terms of the rate.
+    /// A guard grazes zero if its rate is below this fraction of the sum of the absolute terms of the rate.
     grazing: f64,
     d_time_s: Vec<f64>,
 }
@@ -71,9 +71,10 @@ impl<'a, O> TangentPropagator<'a, O> {
         room: &'a mut TangentWorkspace,
         [tolerance, accuracy]: [f64; 2],
     ) -> Self {
-        /// Smallest rate of a guard, as a fraction of the sum of its absolute terms: the larger of `GRAZING`
-        /// and `TOLERANCES` times the tolerance. The rate has the error of the solution, so that at this
-        /// limit derivatives of the transition time have relative errors of about a thousandth.
+        /// Smallest rate at which a guard does not graze zero, as a fraction of the sum of the absolute terms
+        /// of the rate: the larger of `GRAZING` and `TOLERANCES` times the tolerance. The rate has the error
+        /// of the solution, so that at this limit derivatives of the transition time have relative errors of
+        /// about a thousandth.
         const GRAZING: f64 = 1e-6;
         const TOLERANCES: f64 = 1e3;
         let TangentWorkspace { blocks, works } = room;
@@ -114,7 +115,7 @@ impl<'a, O> TangentPropagator<'a, O> {
         }
     }
 
-    /// Moves the derivatives to the transition time of the guard that has fallen.
+    /// Moves the derivatives to the transition time, at which a guard has fallen to zero.
     fn apply_transition(&mut self) {
         let Some(fallen) = self.fallen.take() else { return };
         if self.stand == TangentStatus::Lost {
@@ -149,7 +150,7 @@ impl<'a, O> TangentPropagator<'a, O> {
     }
 }
 
-/// Contact and side of the shoulder of a piece.
+/// Mode of contact, and side of the shoulder on which the neck leans, in a piece of the solution.
 fn contact_of(piece: &SolutionSegment<'_>, motion: &TaylorMotion) -> (ContactMode, ShoulderContact) {
     match &piece.solution {
         SegmentSolution::Slip(slip, _) => (ContactMode::Slip(slip.direction), slip.lean),
@@ -231,7 +232,8 @@ impl<O: TangentObserver> RunWatcher for TangentPropagator<'_, O> {
     fn watch_strike(&mut self, strike: &TipStrike) {
         let is_fall = self.fallen.is_some();
         self.apply_transition();
-        // a tip jams at a pole of its force or at the start of a run; neither has a guard
+        // a tip jams at a pole of the contact force or at the start of a run; in neither case does a guard
+        // fall to zero
         if !is_fall || strike.origin == ImpactOrigin::Jam || self.stand == TangentStatus::Lost {
             self.stand = TangentStatus::Lost;
             return;

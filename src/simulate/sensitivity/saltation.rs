@@ -25,7 +25,7 @@ pub(super) struct FallingGuard<'a> {
     pub span: &'a TangentStretch<'a>,
 }
 
-/// Slope of a guard at its zero.
+/// Rate of change of a guard at its zero, per s.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct GuardSlope {
     pub rate: f64,
@@ -37,7 +37,7 @@ pub(super) struct GuardSlope {
 type GuardTerm = (Channel, f64);
 
 impl FallingGuard<'_> {
-    /// Terms of the guard; none for a guard without a derivative.
+    /// Terms of the guard; no terms for a guard without a derivative.
     fn guard_terms(&self) -> [Option<GuardTerm>; 2] {
         let TangentStretch { system, course, .. } = self.span;
         let limit = Some((Channel::NormalForce, system.linkage.friction.static_coefficient()));
@@ -57,7 +57,8 @@ impl FallingGuard<'_> {
         }
     }
 
-    /// Rate of the guard; `None` for a guard without a derivative.
+    /// Rate of the guard at its zero, with the sum of the absolute terms of the rate; `None` for a guard
+    /// without a derivative.
     pub(crate) fn guard_slope(&self) -> Option<GuardSlope> {
         let (terms, motion) = (self.guard_terms(), self.span.course.motion);
         terms[0]?;
@@ -98,8 +99,8 @@ impl FallingGuard<'_> {
             }
             let Some(own) = &seed.linkage else { continue };
             match terms[0] {
-                // both guards contain the contact angle, with a plus sign off the shoulder and a minus sign
-                // on it
+                // the guards of both corners contain the contact angle, with a plus sign while the neck is
+                // off the shoulder and a minus sign while it leans on it
                 Some((Channel::NeckAngle, _)) if lean == ShoulderContact::Off => {
                     block.guard += own.contact_angle_rad
                 }
@@ -121,9 +122,9 @@ pub(super) struct StrikeTangent<'a> {
 }
 
 impl StrikeTangent<'_> {
-    /// Derivatives of the state after an impact from those before the impact, at the varied time of the
-    /// strike. `d_velocity` contains the derivatives of the head's velocity at this time, m/s. `None` if the
-    /// derivatives do not exist.
+    /// Derivatives of the state after an impact from those before the impact, both at the time of the strike,
+    /// which varies too. `d_velocity` contains the derivatives of the head's velocity at this time, m/s.
+    /// `None` if the derivatives do not exist.
     pub(super) fn state_after(
         &self,
         seed: &BlockSeed,
@@ -145,7 +146,7 @@ impl StrikeTangent<'_> {
         d_velocity: f64,
         lane: usize,
     ) -> Option<[f64; 3]> {
-        /// Tolerance of the impacts that are compared: far below their differences.
+        /// Relative tolerance of the impacts in the finite difference: far below their differences.
         const TOLERANCE: f64 = 1e-14;
         let TipStrike { pose, restitution, .. } = self.strike;
         let d = [before.angle[0], before.angle[1], before.rate[0], before.rate[1]].map(|row| row[lane]);

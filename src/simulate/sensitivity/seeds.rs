@@ -20,10 +20,10 @@ pub(super) struct DriveTangent {
     pub stretch: LaneVector,
 }
 
-/// Directions that share a block of lanes.
+/// Up to four directions, one per lane of a block.
 #[derive(Debug, Clone, Default)]
 pub(super) struct BlockSeed {
-    /// Sources of the directions, each with its factor.
+    /// Sources (elementary changes) of the directions of the block, each with its factor.
     pub changes: Vec<SourceFactor>,
     /// Derivatives of the linkage's constants, if any constant changes.
     pub linkage: Option<Box<LinkageTangent>>,
@@ -33,7 +33,8 @@ pub(super) struct BlockSeed {
     pub start: StateTangent,
     /// Derivatives of the coefficient of restitution.
     pub restitution: LaneVector,
-    /// Relative change of the parameter per unit of the direction; 0 if no constant changes.
+    /// Relative change of the parameter per unit of the direction; 0 if the direction changes no constant of
+    /// the linkage.
     pub relative: LaneVector,
 }
 
@@ -46,7 +47,8 @@ pub(super) struct SourceFactor {
     pub factor: f64,
 }
 
-/// Directions of derivatives, resolved for a scene.
+/// Directions of derivatives (the quantities with respect to which a run is differentiated), prepared for a
+/// scene.
 #[derive(Debug, Clone)]
 pub struct TangentSeeds {
     pub(super) blocks: Vec<BlockSeed>,
@@ -57,7 +59,7 @@ pub struct TangentSeeds {
 }
 
 impl TangentSeeds {
-    /// Resolves directions for a scene. Up to four directions cost as much as one.
+    /// Prepares directions for a scene. Up to four directions cost as much as one.
     ///
     /// # Errors
     /// [`SceneError::Key`] for an unknown parameter, or for a parameter of an absent part.
@@ -276,11 +278,12 @@ pub(super) const SIX_POINTS: [(f64, f64); 6] = [
     (3.0, 1.0 / 60.0),
 ];
 
-/// Step relative to the scale of the function. The truncation error, the sixth power of the step, is below
-/// rounding, and the rounding error divided by the step is 1e-13.
+/// Step of a central difference, relative to the scale over which the function changes. The truncation error,
+/// the sixth power of the step, is below rounding, and the rounding error divided by the step is 1e-13.
 pub(super) const DIFFERENCE_STEP: f64 = 1e-3;
 
-/// Derivative of `f` at 0; `None` if `f` has no value at one of the points.
+/// Derivative of `f` at 0 by a central difference with six points; `None` if `f` has no value at one of the
+/// points.
 pub(super) fn central_difference<const N: usize>(
     step: f64,
     mut f: impl FnMut(f64) -> Option<[f64; N]>,
@@ -298,8 +301,8 @@ mod tests {
     use super::*;
     use crate::model::tangent::LinkageConstant;
 
-    /// A rounding error of a difference quotient must not count as a change of a constant, because each
-    /// change costs time.
+    /// A rounding error of a finite difference must not count as a change of a constant, because each change
+    /// costs time.
     #[test]
     fn a_parameter_changes_only_the_constants_that_it_enters() {
         let text = include_str!("../../../data/scenes/actual-blade.toml");

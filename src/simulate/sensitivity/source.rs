@@ -1,4 +1,4 @@
-//! Sources of the directions: changes of the linkage's constants and of the head's motion.
+//! Sources of the directions: elementary changes of the linkage's constants and of the head's motion.
 
 use super::stretch::SeriesReference;
 use crate::model::tangent::{
@@ -6,7 +6,7 @@ use crate::model::tangent::{
 };
 use crate::simulate::drive::Drive;
 
-/// An elementary change; a direction is a sum of such changes.
+/// An elementary change; a direction is a sum of elementary changes, each with a factor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum TangentSource {
     Constant(LinkageConstant),
@@ -44,7 +44,7 @@ impl<'a> HeadPolynomial<'a> {
         Some(Self { start_s, position_m, velocity: &velocity[..used] })
     }
 
-    /// Position of the head, m.
+    /// Position of the head at the times `x` after the start of the piece, m.
     fn position(&self, x: LaneVector) -> LaneVector {
         let mut sum = LaneVector::ZERO;
         for (k, v) in self.velocity.iter().enumerate().rev() {
@@ -53,7 +53,7 @@ impl<'a> HeadPolynomial<'a> {
         LaneVector::splat(self.position_m) + sum * x
     }
 
-    /// Velocity, acceleration and jerk of the head.
+    /// Velocity, acceleration and jerk of the head at the times `x` after the start of the piece.
     fn motion_rates(&self, x: LaneVector) -> [LaneVector; 3] {
         let mut sums = [LaneVector::ZERO; 3];
         for (k, &v) in self.velocity.iter().enumerate().rev() {

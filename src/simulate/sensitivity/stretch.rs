@@ -1,4 +1,5 @@
-//! Stretches, parts of a piece over which derivatives are collocated, and the choice of their length.
+//! Stretches, and the choice of their length. A stretch is a part of a piece of the solution over which
+//! derivatives are computed by collocation.
 
 use super::source::{HeadPolynomial, TangentSource};
 use crate::model::series::ContactMode;
@@ -14,7 +15,7 @@ use portable_math as math;
 /// Number of coefficients of the series of a motion.
 pub(super) const SERIES_TERMS: usize = hybrid_ode::polynomial::TERMS + 2;
 
-/// The motion whose derivatives are computed.
+/// The motion whose derivatives are computed, with its Taylor series.
 pub(super) type SeriesReference<'a> = tangent::ReferenceMotion<'a, SERIES_TERMS>;
 
 impl LaneNumber for LaneVector {
@@ -96,7 +97,7 @@ impl<'a> TangentStretch<'a> {
 pub(super) struct StretchPlanner {
     /// Largest phase or decay of the fastest derivative that each number of nodes resolves, rad.
     limits: [f64; MOST_NODES + 1],
-    /// Latest rates in stick, slip and flight, 1/s; first for a neck off the shoulder, then for one on it.
+    /// Latest rates in stick, slip and flight, 1/s; first for a neck off the shoulder, then for a neck on it.
     rapid: [f64; 6],
 }
 
@@ -104,7 +105,8 @@ impl StretchPlanner {
     /// A planner for this relative tolerance; `fastest` is a first guess of the largest rate, 1/s.
     ///
     /// For a sine over `z` radians, `s` nodes have the error `z^(s + 2) s! / (4 s^2 (2 s)!)`: this is the
-    /// first Legendre polynomial missing from the approximation of the second derivative, integrated twice.
+    /// contribution of the first Legendre polynomial that the approximation of the second derivative lacks,
+    /// integrated twice.
     pub(crate) fn new(relative: f64, fastest: f64) -> Self {
         let mut limits = [0.0; MOST_NODES + 1];
         let mut ratio = 1.0; // (2 s)! / s!
@@ -119,7 +121,7 @@ impl StretchPlanner {
     pub(crate) fn plan(&self, course: &SeriesReference<'_>, rest: f64) -> (&'static CollocationRule, f64) {
         /// Maximum number of stretches of a step, even if the rate is not finite.
         const MOST_PARTS: f64 = 1e3;
-        /// Factor on the latest rate, which may have risen since.
+        /// Factor on the latest rate, because the rate may have risen since then.
         const MARGIN: f64 = 1.1;
         let rapid = MARGIN * self.rapid[rate_index(course)];
         let parts = (rapid * rest / self.limits[MOST_NODES]).ceil().clamp(1.0, MOST_PARTS);

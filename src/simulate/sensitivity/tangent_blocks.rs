@@ -25,7 +25,7 @@ pub(super) struct TangentBlock {
     pub second: NodeArray<[LaneVector; 3]>,
     /// Derivatives of the state at the end of the last stretch, or at the transition time there.
     pub state: StateTangent,
-    /// Derivatives of the guard that has fallen, and of the transition time.
+    /// `guard` has the derivatives of the guard that has fallen to zero, `time` those of the transition time.
     pub guard: LaneVector,
     pub time: LaneVector,
 }
@@ -61,7 +61,8 @@ pub(super) struct TangentBlocks<'a> {
     pub pace: StretchPlanner,
 }
 
-/// Both ends of a stretch: attitudes of the links, and displacement and velocity of the tip by each source.
+/// Both ends of a stretch: angles and rates of the links, and displacement and velocity of the tip by each
+/// source.
 struct StretchEnds {
     attitude: LinkAttitudes,
     tip: Vec<[LaneVector; 2]>,
@@ -73,8 +74,9 @@ impl<'a> TangentBlocks<'a> {
         self.all.iter_mut().zip(&self.seeds.blocks)
     }
 
-    /// Propagates the derivatives over the next stretch from `from` towards `to`, s after `start_s`. With
-    /// `is_fresh`, stick begins here, and the derivative of the tip's velocity may still be nonzero.
+    /// Propagates the derivatives over the next stretch from `from` towards `to`, s after `start_s`. If
+    /// `is_fresh` is true, a phase begins at `from`; if it is a stick phase, the derivative of the tip's
+    /// velocity may still be nonzero there.
     pub(crate) fn propagate_stretch<'c>(
         &mut self,
         course: &SeriesReference<'c>,
@@ -103,7 +105,7 @@ impl<'a> TangentBlocks<'a> {
         StretchWorkspace: SelectEquations<D>,
         'a: 'c,
     {
-        /// Maximum number of plans for a stretch before its rate is accepted.
+        /// Maximum number of times that a stretch is planned before its rate is accepted.
         const MOST_LOOKS: usize = 4;
         let mut looks = 0;
         let span = loop {
@@ -329,7 +331,8 @@ pub(super) fn rates_after(motion: &TaylorMotion, mode: TipMode, x: f64) -> [f64;
 }
 
 impl StateTangent {
-    /// Adds the change of the state that a change `time` of its instant causes: `rates` times `time`.
+    /// Adds `rates` times `time`, the change of the state if the instant at which it is taken changes by
+    /// `time`.
     pub(super) fn shift_in_time(&mut self, rates: &[f64; 6], time: LaneVector) {
         let ([theta, phi], [theta_rate, phi_rate]) = (&mut self.angle, &mut self.rate);
         let rows = [theta, phi, theta_rate, phi_rate, &mut self.gap_m, &mut self.gap_rate];

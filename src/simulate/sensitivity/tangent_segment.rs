@@ -49,7 +49,7 @@ impl TangentSegment<'_> {
         ChannelWeights::over_interval(place, interval, course.motion.order)
     }
 
-    /// Value or integral of a channel, from the series of the piece.
+    /// Value or integral of a channel (as the weights define it), from the series of the piece.
     #[must_use]
     pub fn channel_value(&self, channel: Channel, weights: &ChannelWeights) -> f64 {
         let (motion, start_s) = (self.span.course.motion, self.span.place.start_s);
@@ -105,13 +105,14 @@ impl TangentSegment<'_> {
     }
 }
 
-/// Weighted sum of the series of a quantity that starts at zero and has this rate.
+/// Weighted sum of the series of a quantity that starts at zero; `rate` has the Taylor coefficients of its
+/// rate.
 fn sum_integrated(weights: &ChannelWeights, rate: &[f64]) -> f64 {
     let terms = weights.powers[1..].iter().zip(rate).zip(&RECIPROCALS[1..]);
     terms.rev().fold(0.0, |sum, ((factor, rate), share)| sum + factor * (rate * share))
 }
 
-/// Maximum number of blocks that are summed at a time.
+/// Maximum number of blocks of directions that are summed at a time.
 const MOST_BLOCKS: usize = 64 / LANES;
 
 // Values and integrals as weighted sums over the coefficients of series and over nodes.
@@ -129,7 +130,7 @@ pub(super) const RECIPROCALS: [f64; SERIES_TERMS + 1] = {
     shares
 };
 
-/// Four times, s after the start of the motion, and their weights.
+/// Four instants, s after the start of the motion's series, and their weights.
 #[derive(Debug, Clone, Copy, Default)]
 struct QuadraturePart {
     x: LaneVector,
@@ -203,7 +204,8 @@ pub(super) struct DerivativeSum {
     second: [NodeArray<f64>; 3],
     place: f64,
     own: [f64; MOST_SOURCES],
-    /// Numbers of unknowns and nodes, whether any source acts directly, and whether any unknown has a weight.
+    /// Number of unknowns, number of nodes, whether any source contributes directly, and whether any unknown
+    /// has a weight.
     unknowns: usize,
     nodes: usize,
     has_own: bool,
@@ -246,7 +248,7 @@ impl DerivativeSum {
             matches!(source, TangentSource::Constant(_)) && source.displaces_points(course)
         };
         let form = match channel {
-            // these forms do not need the attitude of the links
+            // these forms do not need the angles of the links
             Channel::TipX => course.tip_position_form(),
             Channel::HeadX => course.head_position_form(),
             _ => {
@@ -259,8 +261,8 @@ impl DerivativeSum {
         self.add_displaced(span, part, &form, at.as_ref());
     }
 
-    /// Adds a linear form, and its direct change by sources that displace head or tip. Constants and rates
-    /// need `at`.
+    /// Adds a linear form, and its direct change by sources that displace head or tip. `at` is required for
+    /// constants of the linkage and for forms with rates.
     fn add_displaced(
         &mut self,
         span: &TangentStretch<'_>,
@@ -334,7 +336,7 @@ impl DerivativeSum {
         }
     }
 
-    /// Derivatives with respect to the directions of a block.
+    /// Derivatives of the value or integral with respect to the directions of a block.
     pub(crate) fn block_derivatives(&self, block: &TangentBlock, seed: &BlockSeed) -> LaneVector {
         let mut row = self.place * block.place;
         if self.has_second {

@@ -3,9 +3,9 @@
 //! Between samples, the trace is a quintic through the six nearest samples; its mean over the open shutter is
 //! exact. With [`LEAST_OVERSAMPLING`] samples per frame, a sine of half the frame rate has an error of 0.12 %
 //! of its amplitude relative to the exact exposure sinc, and a sine of a quarter of the frame rate an error
-//! of 0.002 %. Faster, aliased sines need 8 samples per cycle for 0.12 %. At the jumps of acceleration in
-//! stick-slip, the error falls with the square of the sampling interval: 2 nm on the bundled blade at 20,000
-//! samples/s.
+//! of 0.002 %. Faster, aliased sines need 8 samples per cycle for an error of 0.12 %. At the jumps of
+//! acceleration in stick-slip, the error falls with the square of the sampling interval: 2 nm on the bundled
+//! blade at 20,000 samples/s.
 
 use super::Camera;
 use crate::recording::channel::ReversalInstants;
@@ -17,7 +17,8 @@ use portable_math::StandardNormal;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Minimum number of samples of the fine trace per frame that gives the errors above.
+/// Minimum number of samples of the fine trace per frame; with it, a sine of half the frame rate has an error
+/// of 0.12 % of its amplitude.
 pub const LEAST_OVERSAMPLING: f64 = 4.0;
 /// Nodes and weights of the three-point Gauss-Legendre rule on [0, 1], exact to degree 5 (Abramowitz and
 /// Stegun, table 25.4).
@@ -180,8 +181,8 @@ impl FrameShutter {
         (self.first + frame as f64 * self.samples_per_frame).clamp(0.0, self.last)
     }
 
-    /// Mean of a column over the open shutter of a frame, by a rule that is exact for the quintics between
-    /// samples.
+    /// Mean of a column over the time for which the shutter of a frame is open, by a quadrature rule that is
+    /// exact for the quintics between samples.
     fn frame_mean(&self, column: &[Option<f64>], frame: usize) -> Option<f64> {
         let centre = self.first + frame as f64 * self.samples_per_frame;
         if self.open == 0.0 {

@@ -4,11 +4,12 @@ use crate::recording::Recording;
 use crate::recording::channel::{ReversalInstants, median_in_place};
 use portable_math as math;
 
-/// Smallest sum of squares of `q`, relative to the fourth power of the spread of the positions. With a
-/// smaller sum, the positions have only two values and show no curvature.
+/// Smallest mean square of the fitted parabola `q`, relative to the fourth power of the standard deviation of
+/// the positions along the sweep. With a smaller value, the positions have only two values and show no
+/// curvature.
 const LEAST_BEND: f64 = 1e-6;
 
-/// A curve `y = height(stroke) + slope x + bend q(x)`. The parabola `q` is `x^2` minus its projection on the
+/// A curve `y = height(stroke) + slope x + bend q(x)`. The parabola `q` is `x^2` minus its least-squares
 /// line, so that `slope` is the mean slope of a curved path.
 pub(super) struct GlassLine {
     pub slope: f64,
@@ -19,8 +20,8 @@ pub(super) struct GlassLine {
     /// Sum of the squared distances of the positions from the mean of their stroke, m^2. The variance of
     /// `slope` is the variance of a height divided by this sum.
     pub slope_information_m2: f64,
-    /// Sum of the squares of `q`, m^4, which gives the variance of `bend` in the same way; zero if the path
-    /// shows no curvature.
+    /// Sum of the squares of the parabola `q`, m^4: the variance of `bend` is the variance of a height
+    /// divided by this sum. Zero if the path shows no curvature.
     pub bend_information_m4: f64,
     /// Marks the points through which the line is fitted.
     pub on_glass: Vec<bool>,
@@ -121,10 +122,10 @@ const NORMAL_MEDIAN: f64 = 0.674_489_75;
 /// A tip within this distance of the line always counts as on the glass, m: the rounding of a trace without
 /// noise.
 const LEAST_DISTANCE_M: f64 = 1e-9;
-/// Largest distance by which a position may lie outside the travel, as a fraction of the travel; a position
-/// farther out is an outlier.
+/// Largest distance of a position from the range of the tip's positions along the sweep, without the
+/// outermost hundredth at either end, as a fraction of this range. A position farther out is an outlier.
 const BEYOND_STEPS: f64 = 0.1;
-/// Maximum number of iterations; the frames on the glass rarely change after five.
+/// Maximum number of repetitions of the fit; the frames on the glass rarely change after five.
 const MOST_REPETITIONS: usize = 30;
 
 /// Fits a line through the frames with the tip on the glass. The first line has the median slope between
@@ -154,7 +155,7 @@ fn inliers_along_sweep(path: &TipPath) -> Vec<bool> {
     path.points.iter().map(|p| p.x_m >= low - beyond && p.x_m <= high + beyond).collect()
 }
 
-/// Marks the points that are as near to the line as noise, or the step of the heights, explains.
+/// Marks the points whose distance from the line can come from noise or from the step of the heights.
 fn points_near_line(distances_m: &[f64], within: &[bool], step_m: f64) -> Vec<bool> {
     let scale = median_or_zero(distances_m.iter().map(|distance| distance.abs())) / NORMAL_MEDIAN;
     let limit = (NEAR_DEVIATIONS * scale.max(step_m)).max(LEAST_DISTANCE_M);
@@ -193,19 +194,19 @@ fn median_or_zero(values: impl Iterator<Item = f64>) -> f64 {
     median_in_place(&mut values.collect::<Vec<_>>()).unwrap_or(0.0)
 }
 
-/// Maximum number of frames; of a longer recording, only every n-th frame is used. These frames determine the
-/// angle far better than needed.
+/// Maximum number of frames from which the tilt is measured; of a longer recording, only every n-th frame is
+/// used. These frames determine the angle far better than needed.
 const MOST_FRAMES: usize = 100_000;
-/// Fraction of the positions at either end that the travel of a stroke leaves out, because they may be
-/// outliers.
+/// Fraction of the positions at either end of their range that are left out when the travel of a stroke is
+/// measured, because they may be outliers.
 const TRIMMED: f64 = 0.01;
 
-/// The tip in a frame that has both of its coordinates.
+/// Position of the tip in a frame in which both coordinates are known.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TipPoint {
     /// Index of the frame among the frames that are used.
     pub frame: usize,
-    /// Index of the stroke: the number of turns before it.
+    /// Index of the stroke: the number of turns of the head before it.
     pub stroke: usize,
     pub x_m: f64,
     pub y_m: f64,
@@ -259,8 +260,8 @@ fn stroke_travel_m(stroke: &[TipPoint]) -> f64 {
     ends.map_or(0.0, |(low, high)| high - low)
 }
 
-/// Maximum number of values for the correlation of errors. Longer recordings are averaged in groups of
-/// frames, which preserves the slow errors that matter for a slope.
+/// Maximum number of values from which the correlation of errors is computed. Longer recordings are averaged
+/// in groups of frames, which preserves the slow errors that matter for a slope.
 const MOST_VALUES: usize = 20_000;
 /// Ratio of the largest lag in the sum of correlations to the number of correlated values; the largest lag is
 /// then five correlation times (Sokal 1997). Longer lags only add noise.
