@@ -2,10 +2,10 @@
 //! JSON per record.
 //!
 //! The first line is a [`CheckpointHeader`] with the fingerprint of the problem. Every other line is a
-//! [`CheckpointRecord`]: an evaluation of a fit or a point of a study. Numbers are [`ExactNumber`]s, which
-//! are strings with the shortest decimal that keeps every bit, because JSON readers may round numbers. Every
-//! line ends with a checksum, and a line with a wrong checksum is refused. An incomplete last line is
-//! dropped.
+//! [`CheckpointRecord`]: an evaluation of a fit or a point of a study. Numbers are written as
+//! [`ExactNumber`]s: strings with the shortest decimal that keeps every bit, because JSON readers may round
+//! numbers. Every line ends with a checksum. A complete line with a wrong checksum is refused, and an
+//! incomplete last line is dropped.
 
 mod checksum;
 mod error;

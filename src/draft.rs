@@ -83,34 +83,36 @@ impl CommentedToml {
 /// Role of a parameter of the blade in a first job.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum ParameterRole {
-    /// Measured on the blade by the user: free with this relative standard deviation, held constant without
-    /// one.
+    /// Measured on the blade by the user. Free with a prior of this relative standard deviation; held
+    /// constant if there is none.
     Yours(Option<f64>),
-    /// Poorly known before a fit: free with this relative standard deviation around the value of the example.
+    /// Poorly known before a fit. Free with a prior of this relative standard deviation around the value of
+    /// the example.
     Guessed(f64),
     /// Fitted between two bounds.
     Fitted([f64; 2]),
-    /// Fitted between two bounds in units of the reciprocal of the maximum head speed.
+    /// Fitted between two bounds. Each bound is this number divided by the maximum head speed, m/s.
     FittedOverSpeed([f64; 2]),
 }
 
-// Bounds are about a decade wide. With wider ones, searches that start far from the middle fail.
+// Bounds are about a decade wide. With wider bounds, searches that start far from their middle fail.
 
 /// Bounds of the part of the friction coefficient that decays with speed, for rubber on wet glass.
 const FALLING: [f64; 2] = [0.03, 0.6];
 /// Bounds of the friction coefficient at high speed.
 const STAYING: [f64; 2] = [0.1, 0.8];
-/// Bounds of the decay rate of the friction, multiplied by the maximum head speed. Within them, the speed
-/// over which the friction decays is between an eighth of the maximum head speed and five times that speed;
-/// outside them, the friction looks constant.
+/// Bounds of the product of the decay rate of the friction, s/m, and the maximum head speed, m/s. Within
+/// them, the friction decays over a speed between an eighth of the maximum head speed and five times that
+/// speed; outside them, the friction looks constant.
 const DECAY: [f64; 2] = [0.2, 8.0];
 /// Bounds of the natural frequency of the neck, Hz, around the 195 Hz of the blade in the paper.
 const NECK_HZ: [f64; 2] = [60.0, 600.0];
-/// Bounds of the stiffness ratio: from a negligible shoulder to a nearly rigid one.
+/// Bounds of the ratio of shoulder stiffness to neck stiffness: from a negligible shoulder to a nearly rigid
+/// one.
 const SHOULDER: [f64; 2] = [4.0, 60.0];
 /// Mass or inertia of a part, weighed or computed from its cross section.
 const WEIGHED: ParameterRole = ParameterRole::Yours(Some(0.05));
-/// Preload, read from a scale below the blade.
+/// Preload, read from a scale on which the blade is pressed.
 const PRELOAD: ParameterRole = ParameterRole::Yours(Some(0.05));
 /// Length, measured on a picture of the cross section; a fit holds it constant.
 const MEASURED: ParameterRole = ParameterRole::Yours(None);

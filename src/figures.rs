@@ -1,5 +1,5 @@
-//! Figures of the reports. Each file holds the data, the drawing and the caption of one figure, and is named
-//! after its SVG file.
+//! Figures of the reports. Each file contains the data, the drawing and the caption of one figure, and is
+//! named after its SVG file.
 
 pub mod analysis;
 pub mod animation;

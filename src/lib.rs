@@ -23,8 +23,9 @@
 //! # The equations
 //!
 //! The model is that of the paper "Investigation of the dynamics of the wiper blade around the reversal":
-//! equations (1) to (3) for neck, lip and normal force ([`model`]), (4) and (5) for friction
-//! ([`model::friction`]). In reduced form, with `q = (theta, phi)`,
+//! equations (1) to (3) for neck, lip and normal force, (4) and (5) for friction ([`model::friction`]). In
+//! reduced form, with `q = (theta, phi)`, `d` and `dot` for time derivatives, and `A`, `w` and `n` as in
+//! [`model`],
 //!
 //! ```text
 //! A qdd + b = f w      N = n.qdd + N0
@@ -43,8 +44,8 @@
 //! | `l1`, `l2` | lengths of neck and lip | m |
 //! | `k0`, `k1`, `k2` | stiffness of the head's support, the neck, the lip | N/m, N m/rad |
 //!
-//! All quantities are in SI units; files and fields have their unit in the name. The parameters of a scene
-//! are in one table, [`model::parameters::PARAMETERS`].
+//! All quantities are in SI units; the names of columns, keys and fields contain their unit. The parameters
+//! of a scene are in one table, [`model::parameters::PARAMETERS`].
 //!
 //! # From a tracking export to a report
 //!

@@ -27,9 +27,9 @@ pub struct Report {
     pub title: String,
     /// Outcome of the search.
     pub search: SearchLine,
-    /// Misfit of the model to the traces; `None` in a fit of features alone.
+    /// Misfit of the model to the traces; `None` in a fit to features only.
     pub misfit: Option<TraceMisfit>,
-    /// Estimated errors of the cameras, and estimates of freed constants.
+    /// Estimated errors of the cameras, and estimates of constants of the scene that the job also fits.
     pub nuisances: Vec<NuisanceResult>,
     /// The recordings; empty if only published numbers were fitted.
     pub recordings: Vec<RecordingLine>,
@@ -43,17 +43,18 @@ pub struct Report {
     pub parameters: Vec<ParameterLine>,
     /// Friction of the best model at rest and at the largest speed of the tip.
     pub friction: Vec<FrictionLine>,
-    /// Products of powers of the parameters, which the features determine or leave undetermined.
+    /// Products of powers of the parameters, each with whether the features determine it.
     pub combinations: Vec<CombinationLine>,
     /// Advice on additional measurements, one sentence each.
     pub advice: Vec<String>,
-    /// The best model's run in each condition.
+    /// Summary of the run of the best model in each condition.
     pub runs: Vec<RunSummary>,
     /// Each recording compared with the model.
     pub comparison: Vec<ComparisonSummary>,
-    /// Results of the probes of the gate before the search, one per point.
+    /// Results of the identifiability check before the search (the gate), one per tested point of the search
+    /// box.
     pub gate: Vec<ProbeLine>,
-    /// Notes of the gate, one sentence each.
+    /// Notes of the identifiability check before the search (the gate), one sentence each.
     pub gate_notes: Vec<String>,
     /// Figures in the order of the page.
     #[serde(skip)]
@@ -61,7 +62,7 @@ pub struct Report {
     /// Tables of the comparison, as files.
     #[serde(skip)]
     pub tables: Vec<ComparisonTable>,
-    /// Reservations, one sentence each.
+    /// Reservations about the results, one sentence each.
     pub notes: Vec<String>,
     /// Files, version and commands from which the numbers were obtained.
     pub provenance: Provenance,
@@ -80,7 +81,7 @@ pub struct FigureGroup {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FigureSubject {
-    /// Evidence for the answer: recording and model, friction, residuals, parameters.
+    /// Evidence for the answer at the top: recording and model, friction, residuals, parameters.
     Evidence,
     /// All measurements compared with the model.
     #[default]

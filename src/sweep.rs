@@ -28,7 +28,7 @@ use rayon::prelude::*;
 use std::ops::ControlFlow;
 use std::sync::mpsc::{Receiver, sync_channel};
 
-/// Maximum number of points that wait for the disk, so that a slow disk does not fill the memory.
+/// Maximum number of finished points that wait to be written, so that a slow disk does not fill the memory.
 const WAITING: usize = 4096;
 
 /// Reason why a study stopped.

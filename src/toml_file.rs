@@ -133,7 +133,7 @@ impl TryFrom<Vec<f64>> for NumberPair {
     }
 }
 
-/// An error without its file: the key, and what was found, what was expected and what to do.
+/// A refusal that does not name the file: the key; and what was found, what was expected and what to do.
 pub(crate) type KeyRefusal = (String, String);
 
 pub(crate) fn refuse_key<T>(key: impl Into<String>, problem: impl Into<String>) -> Result<T, KeyRefusal> {
@@ -151,8 +151,8 @@ pub(crate) fn check_above_zero(key: impl Into<String>, found: f64) -> Result<f64
 pub(crate) fn suggest_key(key: &str, known: &[&str]) -> String {
     /// Jaro-Winkler similarity above which a known key is suggested; below it, all known keys are listed.
     const SIMILAR: f64 = 0.75;
-    /// Similarity assigned to a short key with one slip (a letter added, missing or wrong, or two letters
-    /// swapped), for which the Jaro-Winkler similarity is far too low.
+    /// Similarity assigned to a short key with one typing error (a letter added, missing or wrong, or two
+    /// letters swapped). The Jaro-Winkler similarity of short keys is far too low for this.
     const ONE_SLIP: f64 = 0.9;
     let key = key.to_lowercase();
     let one_slip = |known: &str| key.chars().count() > 2 && strsim::osa_distance(&key, known) == 1;

@@ -1,4 +1,4 @@
-//! Exceptions of `wiperlab.errors` for the failures of the program.
+//! Turns failures of the Rust code into Python exceptions of the module `wiperlab.errors`.
 
 use pyo3::PyErr;
 use pyo3::prelude::*;
@@ -11,17 +11,17 @@ fn new_exception(py: Python<'_>, class: &str, message: String) -> PyErr {
     made.map_or_else(|error| error, PyErr::from_value)
 }
 
-/// `InputError`, for bad input.
+/// Makes an `InputError`, the Python exception for bad input.
 pub fn input_error(py: Python<'_>, message: impl ToString) -> PyErr {
     new_exception(py, "InputError", message.to_string())
 }
 
-/// `InternalError`, for a defect of the program.
+/// Makes an `InternalError`, the Python exception for a defect of the program.
 pub fn internal_error(py: Python<'_>, message: impl ToString) -> PyErr {
     new_exception(py, "InternalError", message.to_string())
 }
 
-/// The exception that represents a failure of the program.
+/// Makes the Python exception for a failure of the program.
 pub fn failure_error(py: Python<'_>, failure: Failure) -> PyErr {
     match failure {
         Failure::Input(message) => input_error(py, message),
@@ -29,13 +29,13 @@ pub fn failure_error(py: Python<'_>, failure: Failure) -> PyErr {
     }
 }
 
-/// Runs Rust code; a panic of it becomes a Python exception.
+/// Runs Rust code. If the code panics, the panic is returned as a Python exception.
 pub fn catch_panic<T>(py: Python<'_>, work: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
     catch_unwind(AssertUnwindSafe(work))
         .unwrap_or_else(|panic| Err(internal_error(py, panic_message(&*panic))))
 }
 
-/// The message of a panic.
+/// The text with which Rust code panicked.
 pub fn panic_message(panic: &(dyn std::any::Any + Send)) -> String {
     let said = panic.downcast_ref::<String>().cloned();
     let said = said.or_else(|| panic.downcast_ref::<&str>().map(|text| (*text).to_owned()));

@@ -1,4 +1,4 @@
-//! Jobs, with the posterior density of their unknown parameters.
+//! Fit jobs for Python, with the posterior density of their unknown parameters.
 
 use crate::errors;
 use crate::workers;
@@ -9,7 +9,7 @@ use std::sync::Arc;
 use wiperlab::cli::read;
 use wiperlab::fit::posterior::Posterior;
 
-/// A job with its scenes and recordings.
+/// A fit job with its scenes and recordings.
 #[pyclass(module = "wiperlab", frozen, subclass, name = "Job")]
 pub struct PyJob {
     posterior: Arc<Posterior>,
@@ -50,7 +50,7 @@ impl PyJob {
         let posterior = read.map_err(|failure| errors::failure_error(py, failure))?;
         let refused = |error| errors::input_error(py, format!("{}: {error}", path.display()));
         let posterior = Arc::new(posterior.map_err(refused)?);
-        // a process with another working directory may read the job again
+        // kept as an absolute path: another process may read the job again from another working directory
         let path = std::path::absolute(&path).unwrap_or(path);
         Ok(Self { posterior, path })
     }
@@ -65,7 +65,7 @@ impl PyJob {
         &self.posterior.problem().job().title
     }
 
-    /// SHA-256 of everything on which the cost of a point depends.
+    /// SHA-256 of all inputs that determine the cost of a set of parameter values.
     #[getter]
     fn fingerprint(&self) -> &str {
         self.posterior.problem().fingerprint()

@@ -11,8 +11,9 @@ use wiperlab::simulate::scene::Scene;
 use wiperlab::simulate::scene::error::SceneError;
 use wiperlab::sweep::{PointOutcome, Study};
 
-/// Runs the scene with the values in each row of `points` for the named parameters. Returns the values of the
-/// maps of a study, one row per point, with not-a-number for a missing value; and how each run ended.
+/// Runs the scene once for each row of `points`; a row contains one value for each parameter in `names`.
+/// Returns a table of the readings that the text `maps` defines, with one row per run and one column per
+/// reading (NaN if a reading is missing), and for each run how it ended.
 #[pyfunction]
 #[pyo3(signature = (scene, names, points, maps, workers = None))]
 pub fn simulate_points<'py>(
@@ -30,7 +31,7 @@ pub fn simulate_points<'py>(
     }
     let study = Study::parse_maps("read", maps).map_err(|error| errors::input_error(py, error))?;
     let scene = Arc::clone(&scene.inner);
-    // an unknown name is an error of the call; a value that the scene refuses only fails its own point
+    // an unknown name makes the whole call fail; a value that the scene refuses makes only its own row fail
     if let Some(name) = names.iter().find(|name| scene.value(name).is_none()) {
         let refused = scene.with_parameter(name, 1.0).err().map_or_else(String::new, |e| e.to_string());
         return Err(errors::input_error(py, format!("names: {refused}")));
@@ -46,7 +47,7 @@ pub fn simulate_points<'py>(
         let run = |row| PointOutcome::run_point_scene(&study, || at(row), || StopFlag(stop).flow());
         rows.par_iter().map(|row| StopFlag(stop).flow().is_continue().then(|| run(row))).collect()
     })?;
-    // an interrupted run has already raised an exception
+    // `None` would mean an interrupted run, for which an exception was already raised
     let outcomes = outcomes.unwrap_or_default();
     let values = outcomes.iter().flat_map(|outcome| &outcome.values);
     let values: Vec<f64> = values.map(|value| *value.as_ref().unwrap_or(&f64::NAN)).collect();

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use wiperlab::cli::read::{self, SpectrumOptions};
 use wiperlab::recording::{self, FrameGrid, Traces};
 
-/// Tracked positions of tip and head on the frame grid.
+/// Tracked positions of tip and head in every frame.
 #[pyclass(module = "wiperlab", frozen, from_py_object, name = "Recording")]
 #[derive(Clone)]
 pub struct PyRecording {
@@ -30,7 +30,7 @@ impl PyRecording {
         Ok(Self { inner: Arc::new(recording), exposure_s })
     }
 
-    /// Makes a recording from columns; not-a-number means that a position was not tracked.
+    /// Makes a recording from columns with one value per frame; NaN means that a position was not tracked.
     #[staticmethod]
     #[pyo3(signature = (name, frame_rate_hz, columns, *, start_s = 0.0, exposure_s = None, synthetic = false))]
     fn from_columns(
@@ -65,7 +65,7 @@ impl PyRecording {
         })
     }
 
-    /// Positions by column, m; not-a-number if a point was not tracked.
+    /// Positions by column name, m, one value per frame; NaN in frames in which the point was not tracked.
     fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let all = PyDict::new(py);
         for (name, column) in self.inner.traces().columns() {
@@ -110,7 +110,7 @@ impl PyRecording {
     }
 }
 
-/// The files that `wiperlab spectrum` writes, by file name.
+/// Analyses a recording. Returns the contents of the files that `wiperlab spectrum` writes, by file name.
 #[pyfunction]
 #[pyo3(signature = (recording, channel, window, detrend, band_hz, max_components, exposure_s))]
 #[expect(clippy::too_many_arguments, reason = "a Python function has named arguments")]

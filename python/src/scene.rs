@@ -16,8 +16,8 @@ use wiperlab::simulate::outputs::{
 use wiperlab::simulate::scene::Scene;
 use wiperlab::simulate::{ModelSample, Observer, SolutionSegment, SolverOptions, run_scene_with};
 
-/// Parts from which a scene is restored: name and text of its file, folder of the recording that drives it,
-/// and replaced values.
+/// Parts from which a scene is restored: the name and the text of its file, the folder of the recording that
+/// drives its head, and the parameter values that were replaced after reading.
 type SceneParts = (String, String, Option<PathBuf>, Vec<(String, f64)>);
 
 /// A blade with its friction, its drive and the settings of its run.
@@ -76,7 +76,7 @@ impl PyScene {
         catch_panic(py, || Self::from_source(py, parts))
     }
 
-    /// The same scene with other values of its parameters.
+    /// A copy of the scene in which the given parameters have other values.
     fn replace(&self, py: Python<'_>, values: Vec<(String, f64)>) -> PyResult<Self> {
         catch_panic(py, || {
             let inner = replace_values(py, (*self.inner).clone(), &values)?;
@@ -84,12 +84,13 @@ impl PyScene {
         })
     }
 
-    /// Value of a parameter, however it is written in the file.
+    /// Value of a parameter in its SI unit, converted if the file states an equivalent parameter; `None` for
+    /// a part that the scene does not have.
     fn value(&self, name: &str) -> Option<f64> {
         self.inner.value(name)
     }
 
-    /// The parameters with their values as they are written in the file.
+    /// The numbers of the scene file as written there, each with the name of its parameter.
     fn written_values(&self) -> Vec<(&'static str, f64)> {
         self.inner.written_values().collect()
     }
@@ -114,7 +115,7 @@ impl PyScene {
         self.inner.run.sample_rate_hz
     }
 
-    /// Sentences on implausible values, one for each.
+    /// One sentence for each implausible value of the scene.
     #[getter]
     fn findings(&self) -> Vec<String> {
         self.inner.find_implausible().iter().map(ToString::to_string).collect()
@@ -124,14 +125,14 @@ impl PyScene {
         self.inner == other.inner
     }
 
-    /// The parts from which the scene can be restored: name and text of its file, the recording that drives
-    /// it, and the replaced values.
+    /// The parts from which the scene can be restored: the name and the text of its file, the folder of the
+    /// recording that drives its head, and the replaced parameter values.
     fn parts(&self) -> SceneParts {
         (self.file.clone(), self.text.clone(), self.driver.clone(), self.set.clone())
     }
 }
 
-/// Observer that ends a run when asked to stop.
+/// Stops a run of the model when the flag is true.
 pub struct StopFlag<'a>(pub &'a AtomicBool);
 
 impl StopFlag<'_> {
@@ -147,14 +148,16 @@ impl Observer for StopFlag<'_> {
     }
 }
 
-/// Names of the numeric columns: those of trace.csv and state.csv.
+/// Names of the numeric columns of a run; they are the columns of trace.csv and state.csv.
 const COLUMNS: &str = "time_s,tip_x_m,tip_y_m,head_x_m,head_y_m,neck_angle_rad,lip_angle_rad,neck_rate_rad_per_s,\
                        lip_rate_rad_per_s,head_drop_m,tip_velocity_m_per_s,normal_force_n,friction_force_n";
 
-/// Columns of the samples, contact mode of each sample, columns of the transitions, and the summary as JSON.
+/// Results of a run: columns of the samples, contact mode of each sample, columns of the transitions, and the
+/// summary as JSON.
 type RunArrays<'py> = (Bound<'py, PyDict>, Vec<&'static str>, Bound<'py, PyDict>, String);
 
-/// Runs a scene; samples it at the scene's own rate, or at the given ascending instants.
+/// Runs a scene and samples its motion at the sample rate of the scene or, if `times_s` is given, at these
+/// instants, s, in ascending order.
 #[pyfunction]
 #[pyo3(signature = (scene, times_s = None))]
 pub fn simulate_scene<'py>(

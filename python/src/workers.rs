@@ -1,5 +1,5 @@
-//! Runs work without the interpreter lock. Ctrl-C ends the work, and a forked process creates its threads
-//! anew.
+//! Runs work without the interpreter lock of Python. Ctrl-C ends the work. A forked process creates threads
+//! of its own.
 
 use crate::errors;
 use pyo3::prelude::*;
@@ -10,10 +10,11 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
-/// Interval between checks for signals.
+/// Interval between two checks for signals such as Ctrl-C.
 const POLL: Duration = Duration::from_millis(50);
 
-/// The thread pool, with the id of its process: a forked process has none of the threads of its parent.
+/// The thread pool, with the id of the process that created it. After a fork, the new process has none of
+/// these threads.
 static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
 
 fn process_pool() -> Result<Arc<ThreadPool>, String> {
@@ -25,7 +26,7 @@ fn process_pool() -> Result<Arc<ThreadPool>, String> {
         return Ok(Arc::clone(pool));
     }
     let made = Arc::new(build_pool(0)?);
-    // a forked process cannot end the threads of its parent
+    // the old pool is not dropped, since a forked process cannot end the threads of its parent
     std::mem::forget(held.replace((process, Arc::clone(&made))));
     Ok(made)
 }
@@ -43,7 +44,7 @@ pub fn run_detached<T: Send + 'static>(
     let pool = process_pool().map_err(|error| no_threads_error(py, &error))?;
     let (send, mut receive) = mpsc::channel();
     pool.spawn(move || {
-        // fails only if the receiver has stopped waiting
+        // sending fails only if the receiver has stopped waiting
         let _ = send.send(catch_unwind(AssertUnwindSafe(work)));
     });
     loop {

@@ -1,7 +1,8 @@
-//! The checksum at the end of a line, and the fingerprint of a problem.
+//! The checksum at the end of each line of a journal, and the fingerprint of a problem.
 //!
-//! A line is a JSON object whose last key is `sha256`. Its value is the first digits of the SHA-256 of all
-//! bytes before the comma that precedes this key, so that `sha256sum` can verify a line.
+//! A line is a JSON object whose last key is `sha256`. The value of this key is the first 16 hexadecimal
+//! digits of the SHA-256 of all bytes before the comma in front of the key, so that `sha256sum` can verify a
+//! line.
 
 use serde::Serialize;
 use serde_json::Value;
@@ -9,11 +10,11 @@ use sha2::{Digest, Sha256};
 
 const CHECKSUM_KEY: &str = ",\"sha256\":\"";
 const LINE_END: &str = "\"}";
-/// Number of hexadecimal digits of the checksum. With these 64 bits, one accidental change in 2e19 goes
-/// unnoticed.
+/// Number of hexadecimal digits of the checksum. They have 64 bits, so that an accidental change of a line
+/// goes unnoticed with a probability of only 1 in 2e19.
 const CHECKSUM_DIGITS: usize = 16;
 
-/// Appends the checksum to a JSON object, which makes it a line of a journal.
+/// Appends the checksum to a JSON object; the result is a line of a journal without its line feed.
 #[must_use]
 pub fn append_checksum(object: &str) -> String {
     let content = object.strip_suffix('}').unwrap_or(object);
@@ -23,7 +24,7 @@ pub fn append_checksum(object: &str) -> String {
 /// Result of the check of a line.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum LineChecksum {
-    /// The checksum is right; the value is the object without it.
+    /// The checksum is right; contains the bytes of the JSON object without the checksum.
     Valid(Vec<u8>),
     /// The checksum in the line differs from the computed one.
     Broken { found: String, computed: String },
@@ -42,7 +43,7 @@ impl LineChecksum {
     }
 }
 
-/// Splits a line into the bytes before the checksum and the checksum.
+/// Splits a line into the bytes before the checksum, and the digits of the checksum.
 fn split_checksum(line: &[u8]) -> Option<(&[u8], &[u8])> {
     let line = line.strip_suffix(LINE_END.as_bytes())?;
     let (rest, digits) = line.split_at_checked(line.len().checked_sub(CHECKSUM_DIGITS)?)?;
@@ -53,9 +54,9 @@ fn hex_checksum(content: &[u8]) -> String {
     Sha256::digest(content).iter().take(CHECKSUM_DIGITS / 2).map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// SHA-256, in hexadecimal, of the canonical JSON of a problem, which has sorted keys and writes each number
-/// as the shortest decimal that keeps every bit. Equal values have equal fingerprints, whatever the layout of
-/// their files.
+/// SHA-256, in hexadecimal, of the canonical JSON of a problem: keys are sorted, and each number is the
+/// shortest decimal that keeps every bit. Problems with equal values have equal fingerprints, whatever the
+/// layout of their files.
 pub(crate) fn fingerprint(problem: &impl Serialize) -> String {
     // serializing finite numbers and string keys cannot fail
     let value = serde_json::to_value(problem).unwrap_or_default();

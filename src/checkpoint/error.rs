@@ -89,7 +89,7 @@ pub enum CheckpointError {
         /// What was found and what was expected.
         problem: String,
     },
-    /// A record differs from its recomputation.
+    /// The outcome in a record differs from the outcome of the same computation made again.
     #[error(
         "{file}:{line}: found {found}, but computed again the {} gives {computed}; the line was edited, or made on a machine that does not calculate alike to the last digit (another processor, system or build): resume where it was written, or move the journal away to start over",
         kind.record()
@@ -101,9 +101,9 @@ pub enum CheckpointError {
         line: usize,
         /// Kind of computation that the journal records.
         kind: CheckpointKind,
-        /// Outcome in the line.
+        /// Outcome that the line states.
         found: String,
-        /// Recomputed outcome.
+        /// Outcome of the same computation made again.
         computed: String,
     },
     /// Two journals contain different outcomes of the same point.
@@ -113,15 +113,15 @@ pub enum CheckpointError {
     Conflict {
         /// File as named by the user.
         file: String,
-        /// Line number in that file, counted from 1.
+        /// Line number of the record in `file`, counted from 1.
         line: usize,
-        /// Outcome in that line.
+        /// Outcome of the point according to `file`.
         found: String,
-        /// Journal that was read earlier, as named by the user.
+        /// The other journal, which was read earlier, as named by the user.
         other_file: String,
-        /// Line number in that file, counted from 1.
+        /// Line number of the record in `other_file`, counted from 1.
         other_line: usize,
-        /// Outcome in that line.
+        /// Outcome of the point according to `other_file`.
         expected: String,
     },
 }

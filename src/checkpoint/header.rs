@@ -22,7 +22,7 @@ pub enum CheckpointKind {
 }
 
 impl CheckpointKind {
-    /// Words for messages: the computation, one of its records, and its input file.
+    /// Words for messages: the name of the computation, of one of its records, and of its input file.
     fn words(self) -> [&'static str; 3] {
         match self {
             Self::Fit => ["fit", "evaluation", "job"],
@@ -31,12 +31,12 @@ impl CheckpointKind {
         }
     }
 
-    /// Word for a record.
+    /// Word for a record of a journal of this kind, such as `point`.
     pub(crate) fn record(self) -> &'static str {
         self.words()[1]
     }
 
-    /// Word for the input file.
+    /// Word for the input file of a computation of this kind, such as `study`.
     pub(crate) fn input(self) -> &'static str {
         self.words()[2]
     }
@@ -48,15 +48,15 @@ impl fmt::Display for CheckpointKind {
     }
 }
 
-/// First line of a journal; `B` is the part that differs between the kinds of journals.
+/// First line of a journal; `B` is the type of the part that differs between the kinds of journals.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CheckpointHeader<B> {
     /// Kind of the computation.
     pub journal: CheckpointKind,
-    /// Version of the journal's layout.
+    /// Version of the layout of the journal.
     pub layout: u32,
-    /// Fingerprint of the problem, its data and the program, from `checksum`.
+    /// Fingerprint of the problem, its data and the program: SHA-256 in hexadecimal.
     pub fingerprint: String,
     /// Version of the program.
     pub version: String,

@@ -56,7 +56,7 @@ impl<R: CheckpointRecord, S: BufRead> CheckpointReader<R, S> {
     }
 }
 
-/// The error for a repeated record; `before` is empty or names the earlier line, as in `of line 3 `.
+/// Makes the error for a repeated record; `before` is empty or names the earlier line, such as `of line 3 `.
 #[must_use]
 pub fn duplicate_record_error<R: CheckpointRecord>(
     file: &str,
@@ -66,13 +66,14 @@ pub fn duplicate_record_error<R: CheckpointRecord>(
     line_error::<R>(file, found.line, format!("the {} {before}a second time", R::KIND.record()))
 }
 
-/// Whether a line is complete: it has a line end, or a checksum, which is written last.
+/// Whether a line is complete: it has a line end, or a checksum, which is the part of a line that is written
+/// last.
 fn is_complete(line: &RawLine) -> bool {
     line.ended || LineChecksum::check(strip_byte_order_mark(line.bytes)) != LineChecksum::Absent
 }
 
 impl<R: CheckpointRecord> CheckpointFile<R> {
-    /// Compares the record at index `place` with its recomputation.
+    /// Compares the record at index `place` with the result of the same computation made again.
     ///
     /// # Errors
     /// [`CheckpointError::Recomputed`] if they differ.
@@ -87,7 +88,7 @@ impl<R: CheckpointRecord> CheckpointFile<R> {
     }
 }
 
-/// Compares a record with its recomputation.
+/// Compares a record with the result of the same computation made again.
 ///
 /// # Errors
 /// [`CheckpointError::Recomputed`] if they differ.
@@ -109,7 +110,7 @@ fn parse_header<R: CheckpointRecord>(
     let at_header = |problem| CheckpointError::Header { file: file.clone(), problem };
     let line = strip_byte_order_mark(line);
     let object = check_line(line);
-    // a header without a checksum may be of an older layout, which gets an error message of its own
+    // a header without a checksum may have an older layout, for which there is a more specific error
     let json = match &object {
         Ok(object) => object.as_slice(),
         Err(problem) if problem == MISSING_CHECKSUM => line,
@@ -127,7 +128,8 @@ fn parse_header<R: CheckpointRecord>(
 
 const MISSING_CHECKSUM: &str = "found no checksum at the end of the line, expected `\"sha256\":\"...\"}`";
 
-/// The object in a line, without its checksum, or the problem with the checksum.
+/// Checks the checksum of a line. Returns the JSON object without the checksum, or a description of the
+/// problem.
 fn check_line(line: &[u8]) -> Result<Vec<u8>, String> {
     match LineChecksum::check(line) {
         LineChecksum::Valid(object) => Ok(object),
@@ -154,7 +156,7 @@ pub(super) struct RawLine<'a> {
     pub bytes: &'a [u8],
     /// Whether the line has a line end; the last line of a file may lack it.
     pub ended: bool,
-    /// Offset of the next line in the file, bytes.
+    /// Offset of the next line from the start of the file, bytes.
     pub end_offset: usize,
 }
 
@@ -174,12 +176,12 @@ pub(super) fn strip_byte_order_mark(line: &[u8]) -> &[u8] {
     line.strip_prefix("\u{feff}".as_bytes()).unwrap_or(line)
 }
 
-/// Number of records that are recomputed when a journal is resumed. A few suffice, because a machine or build
-/// with different arithmetic differs in nearly every record.
+/// Number of records that are recomputed when a journal is resumed. A few suffice: on a machine or in a build
+/// with different arithmetic, nearly every record differs.
 pub const RECHECKED_RECORDS: usize = 8;
 
-/// Indices of at most [`RECHECKED_RECORDS`] records. The journal is divided into that many equal parts, and
-/// the seed draws one record from each.
+/// Random indices of at most [`RECHECKED_RECORDS`] of `records` records: the journal is divided into equal
+/// parts, and one record is drawn from each. Equal seeds give equal indices.
 #[must_use]
 pub fn sample_records(records: usize, seed: u64) -> Vec<usize> {
     let parts = RECHECKED_RECORDS.min(records);
@@ -188,8 +190,8 @@ pub fn sample_records(records: usize, seed: u64) -> Vec<usize> {
     (0..parts).map(draw).collect()
 }
 
-/// Upper limit of the length of a line, bytes: far above any line that the program writes, so that a file of
-/// another kind does not fill the memory.
+/// Maximum length of a line that is read, bytes. It is far above the length of any line that the program
+/// writes, and prevents a file of another kind from filling the memory.
 const LONGEST_LINE: u64 = 1 << 28;
 
 /// Reads a journal line by line, so that it may be larger than the memory.
@@ -210,7 +212,7 @@ pub struct CheckpointEnd {
     /// Number of bytes up to the end of the last complete line. The file is truncated to this length before
     /// lines are appended.
     pub intact_bytes: usize,
-    /// Whether an incomplete line follows; it is dropped.
+    /// Whether an incomplete line follows the last complete line; it is dropped.
     pub torn: bool,
     /// Whether the last complete line lacks its line end, which is added before lines are appended.
     pub unended: bool,
@@ -269,7 +271,7 @@ impl<R: CheckpointRecord, S: BufRead> CheckpointReader<R, S> {
         Ok(Some(StoredRecord { record, line: *line - 1 }))
     }
 
-    /// End of the journal; it is valid once all records have been read.
+    /// End of the part of the journal that has been read; after the last record, the end of the journal.
     pub(crate) fn end(&self) -> CheckpointEnd {
         self.end
     }
@@ -279,9 +281,10 @@ impl<R: CheckpointRecord, S: BufRead> CheckpointReader<R, S> {
 #[derive(Debug)]
 struct LineReader<S> {
     from: S,
-    /// The bytes that were read last, up to a line feed: several lines if lines end in CR alone.
+    /// The bytes that were read last, up to a line feed. They are several lines if the lines of the file end
+    /// in CR only.
     chunk: Vec<u8>,
-    /// Offset of the chunk in the file.
+    /// Offset of the chunk from the start of the file, bytes.
     start: usize,
     /// Number of bytes of the chunk that have been returned.
     used: usize,

@@ -30,7 +30,7 @@ pub trait CheckpointRecord: Clone + Debug + PartialEq {
     /// Makes a record from a row.
     ///
     /// # Errors
-    /// What was found and what was expected.
+    /// A text that says what was found and what was expected.
     fn from_row(row: Self::Row, body: &Self::Body) -> Result<Self, String>;
 
     /// First difference between two outcomes of the same computation, as a text for each outcome; `None` if
@@ -63,7 +63,8 @@ pub fn format_record_line<R: CheckpointRecord>(record: &R, at: usize) -> String 
 }
 
 fn format_json_line<T: Serialize>(value: &T) -> String {
-    // serializing string keys and finite numbers cannot fail; an empty line would be refused when it is read
+    // serializing string keys and finite numbers cannot fail; if it did, the empty line would be refused by a
+    // reader
     append_checksum(&serde_json::to_string(value).unwrap_or_default()) + "\n"
 }
 
@@ -87,7 +88,7 @@ impl<'de> Deserialize<'de> for ExactNumber {
     }
 }
 
-/// Serializes a number as an [`ExactNumber`], for `#[serde(with)]`.
+/// Serializes a number as an [`ExactNumber`], for the attribute `#[serde(with)]`.
 pub(crate) mod exact {
     use super::ExactNumber;
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -101,7 +102,8 @@ pub(crate) mod exact {
     }
 }
 
-/// Stores lines durably: when `append` returns, they are on disk. Only then is a record counted or reported.
+/// Stores lines durably: when `append` returns, they are on disk. A record is counted or reported only after
+/// that.
 pub trait CheckpointSink: Send {
     /// Appends one or more lines, each with its newline.
     ///
@@ -120,7 +122,7 @@ impl CheckpointSink for NullSink {
     }
 }
 
-/// Keeps the lines in memory.
+/// Collects the lines of a journal in memory.
 impl CheckpointSink for String {
     fn append(&mut self, lines: &str) -> Result<(), String> {
         self.push_str(lines);

@@ -3,11 +3,11 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// Maximum number of shards, more than any cluster has cores.
+/// Maximum number of shards; it is larger than the number of cores of any cluster.
 const MAX_SHARDS: usize = 1_000_000;
 
-/// The points of a study, or the jobs of a list, whose index modulo `total` is `number`. This spreads slow
-/// regions over all shards.
+/// A shard: the points of a study, or the jobs of a list, whose index modulo `total` is `number`.
+/// Neighbouring points, which often take similar times, belong to different shards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
     number: usize,
@@ -42,8 +42,8 @@ impl Shard {
         index % self.total == self.number
     }
 
-    /// Whether two shards may share a point: their numbers agree modulo the greatest common divisor of their
-    /// totals.
+    /// Whether two shards can have a point in common: their numbers are equal modulo the greatest common
+    /// divisor of their totals.
     pub(crate) fn overlaps(self, other: Self) -> bool {
         let (mut common, mut rest) = (self.total, other.total);
         while rest > 0 {

@@ -34,11 +34,11 @@ const OUTPUTS: [&str; 5] = [
     "paper/work-precision-85mm.svg",
     "paper/work-precision-170mm.svg",
 ];
-/// Number of rounds; every setting is timed once per round, so that other load on the machine affects all
-/// settings alike.
+/// Number of rounds of timing. Each round times every setting once, so that other load on the machine affects
+/// all settings alike.
 const ROUNDS: u32 = 15;
-/// Number of rounds in which every setting takes part; after these, a setting takes part only until its total
-/// time reaches the duration given here.
+/// Number of rounds that time every setting, and a minimum total time per setting. Later rounds time only the
+/// settings whose total time is still below that minimum.
 const MIN_TIMING: (u32, Duration) = (3, Duration::from_millis(250));
 
 impl AccuracyArgs {
@@ -96,8 +96,8 @@ fn work_precision_diagram(
 ) -> WorkPrecision {
     let run = reference.run_result();
     let length_s = (1e4 * (run.stopped_at_s - scene.start_s)).round() / 1e4;
-    // without transitions, or if the references disagree on the transitions, the error is that of the
-    // deflection
+    // the error is that of the transition times; without transitions, or if the two reference runs disagree
+    // on them, it is the error of the deflection
     let timed = run.transitions > 0 && reference.lists_agree;
     let (unit, error_label, floor) = if timed {
         (" s", "worst error of a transition time, s", reference.apart_s)
@@ -121,7 +121,8 @@ fn work_precision_diagram(
     }
 }
 
-/// The claim of the diagram: the setting with the smallest error, and its time.
+/// Heading of the diagram: the smallest error, with the setting that reaches it and the wall time of that
+/// setting.
 fn diagram_title(rows: &[AccuracyRow], error: impl Fn(&AccuracyRow) -> Option<f64>, unit: &str) -> String {
     let least = rows.iter().filter_map(|row| Some((error(row)?, row))).min_by(|a, b| a.0.total_cmp(&b.0));
     let Some((error, row)) = least else { return "No setting has an error to show".to_owned() };
@@ -151,7 +152,7 @@ fn print_study(scene: &Scene, reference: &ReferenceRun<'_>, rows: &[AccuracyRow]
     );
 }
 
-/// Prints how accurate the reference is.
+/// Prints how accurate the reference run is.
 fn print_reference_error(reference: &ReferenceRun<'_>) {
     let (method, other) = (IntegrationMethod::default().name(), reference.checked_by.name());
     if !reference.lists_agree {

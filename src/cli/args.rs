@@ -6,7 +6,8 @@ use clap::Args;
 use std::str::FromStr;
 use std::time::Duration;
 
-/// Parses a whole number of 1 or more; [`clap`] adds the name of the option and the text found.
+/// Parses a whole number of 1 or more. To the error message, [`clap`] adds the name of the option and the
+/// text found.
 pub(crate) fn parse_count(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(count) if count > 0 => Ok(count),
@@ -31,8 +32,8 @@ pub(crate) struct GlobalArgs {
     pub csv_dialect: CsvDialect,
 }
 
-/// Maximum number of threads; few machines have as many cores. Each thread needs megabytes of memory, so that
-/// a hundred thousand threads would bring down the machine.
+/// Maximum number of threads. Few machines have more cores, and each thread needs megabytes of memory: a
+/// hundred thousand threads would exhaust the memory of the machine.
 const MOST_THREADS: usize = 1024;
 
 fn parse_threads(text: &str) -> Result<usize, String> {
@@ -49,7 +50,7 @@ impl GlobalArgs {
         rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(Failure::internal)
     }
 
-    /// What a command may overwrite, and the requested dialect of its tables.
+    /// The files that the command may overwrite, and the dialect of its tables that the user requested.
     pub(crate) fn write_policy(&self, maker: OutputCommand, overwrite: Overwrite) -> WritePolicy {
         WritePolicy { csv: self.csv_dialect, ..WritePolicy::new(maker, overwrite) }
     }
@@ -59,7 +60,7 @@ impl GlobalArgs {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct TimeLimit(pub Duration);
 
-/// Longest time limit, s: a year.
+/// Longest time limit that is accepted, s: a leap year.
 const MAX_TIME_LIMIT_S: u64 = 366 * DAY_S;
 const DAY_S: u64 = 86_400;
 const TIME_LIMIT_UNITS: [(&str, u64); 5] = [("min", 60), ("d", DAY_S), ("h", 3600), ("m", 60), ("s", 1)];
@@ -87,7 +88,7 @@ fn parse_clock_time(text: &str) -> Option<u64> {
     in_range.then_some(total.checked_add(minutes * 60 + seconds)?)
 }
 
-/// Sum, s, of numbers with their units, such as `1h30min`.
+/// Parses a sum of numbers with units of time, such as `1h30min`; returns seconds.
 fn parse_unit_time(text: &str) -> Option<u64> {
     let mut rest = text;
     let mut total: u64 = 0;

@@ -33,8 +33,8 @@ pub(crate) struct BladeArgs {
     pub overwrite: Overwrite,
 }
 
-/// Force, N: about the weight of 1 g, which moves the tip of a blade of some centimetres by tenths of a
-/// millimetre.
+/// Default force on the tip, N: about the weight of 1 g. It moves the tip of a piece of blade of some
+/// centimetres by tenths of a millimetre.
 const DEFAULT_FORCE_N: f64 = 0.01;
 
 fn parse_above_zero(text: &str) -> Result<f64, String> {
@@ -42,7 +42,7 @@ fn parse_above_zero(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| "expected a number above 0, without a unit".to_owned())
 }
 
-/// Contents of `blade.json` and `checks.json`: the result, and the implausible values of the file.
+/// Contents of `blade.json` and `checks.json`: the result, and the implausible values of the input file.
 #[derive(Serialize)]
 struct BladeJson<T> {
     #[serde(flatten)]
@@ -72,7 +72,7 @@ impl BladeArgs {
         Ok(())
     }
 
-    /// Writes the files, if a folder is given.
+    /// Writes the files if the user gave a folder for them.
     fn write_files(&self, answers: &[(&str, Vec<u8>)]) -> Outcome<()> {
         let writer = WritePolicy::new(OutputCommand::Blade, self.overwrite);
         self.out.as_ref().map_or(Ok(()), |out| files::write_outputs(out, &writer, answers))

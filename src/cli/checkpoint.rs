@@ -16,7 +16,7 @@ use std::io::{self, BufRead, BufReader, ErrorKind, Read, Write};
 /// Name of a journal in the folder of its fit or study.
 pub(crate) const CHECKPOINT_FILE: &str = "journal.jsonl";
 
-/// Largest length of a first line that is read, bytes.
+/// Maximum number of bytes that are read of the first line of an existing file.
 const MAX_HEADER_BYTES: u64 = 1 << 24;
 
 /// A journal on disk.
@@ -59,8 +59,8 @@ impl CheckpointWriter {
         })
     }
 
-    /// Like [`Self::open`], for a journal larger than memory: `each` visits the records one by one, and only
-    /// the header is returned.
+    /// Like [`Self::open`], for a journal larger than memory: the function `each` visits the records one by
+    /// one, and only the header is returned.
     pub(crate) fn open_each<R: CheckpointRecord>(
         path: &Path,
         resume: bool,
@@ -75,7 +75,7 @@ impl CheckpointWriter {
         })
     }
 
-    /// Locks the journal. If the journal is resumed and has a header, `take` reads its contents.
+    /// Locks the journal. If the journal is resumed and has a header, the function `take` reads the records.
     fn open_with<R: CheckpointRecord, T>(
         path: &Path,
         resume: bool,
@@ -131,13 +131,13 @@ impl CheckpointWriter {
         });
     }
 
-    /// Removes an incomplete last line, even if nothing was appended.
+    /// Removes an incomplete last line, or renames the old journal, even if no line was appended.
     pub(crate) fn finish(mut self) -> Outcome<()> {
         self.apply_pending()
             .map_err(|problem| Failure::Internal(format!("{}: {problem}", self.path.display())))
     }
 
-    /// Carries out the pending action.
+    /// Carries out the pending action on the existing journal.
     fn apply_pending(&mut self) -> Result<(), String> {
         let refused = |error: io::Error| error.to_string();
         match (self.due.take(), &mut self.file) {
@@ -201,8 +201,8 @@ fn lock_existing(path: &Path, kind: CheckpointKind) -> Outcome<Option<File>> {
     Ok(Some(file))
 }
 
-/// Locks a journal: two programs that append to one file would mix up their lines. On file systems without
-/// locks nothing prevents that.
+/// Locks a journal, because the lines of two programs that append to one file would be mixed. On a file
+/// system without locks, nothing prevents this.
 fn lock_file(file: &File, kind: CheckpointKind) -> Result<(), String> {
     match file.try_lock() {
         Err(TryLockError::WouldBlock) => Err(format!(
@@ -212,8 +212,9 @@ fn lock_file(file: &File, kind: CheckpointKind) -> Result<(), String> {
     }
 }
 
-/// Refuses to replace the file by a new journal unless it is a journal of the same kind of input, complete or
-/// not. Journals of fits to features and to traces are of the same kind.
+/// Refuses to replace an existing file by a new journal, unless its first line is incomplete or it is a
+/// journal with the same kind of input file. Fits to features and fits to traces both have a job as their
+/// input file.
 fn check_same_kind(name: &str, bytes: &[u8], kind: CheckpointKind) -> Outcome<()> {
     if !has_whole_line(bytes) || detect_kind(bytes).is_some_and(|found| found.input() == kind.input()) {
         return Ok(());
@@ -228,7 +229,7 @@ fn set_aside(path: &Path) -> io::Result<PathBuf> {
     let mut number = 1;
     loop {
         let to = numbered_path(path, number);
-        // creating the file reserves the name, in case another program wants it
+        // creating the file reserves the name, in case another program wants to use it
         match File::create_new(&to) {
             Ok(_) => {
                 fs::rename(path, &to)?;

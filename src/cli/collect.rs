@@ -89,7 +89,8 @@ impl CollectArgs {
     }
 }
 
-/// Numbers of the shards of which a point is missing, for a division into `of` shards; in ascending order.
+/// Divides the study into `of` shards. Returns the numbers of the shards with a missing point, in ascending
+/// order.
 fn incomplete_tasks(points: &PointCollection<File>, of: usize) -> Outcome<TaskList> {
     Shard::new(0, of).ok_or_else(|| too_many_shards(of))?;
     let mut due = vec![false; of];
@@ -97,7 +98,7 @@ fn incomplete_tasks(points: &PointCollection<File>, of: usize) -> Outcome<TaskLi
     Ok((0..of).filter(|at| due[*at]).collect())
 }
 
-/// The failure if a single file was given.
+/// The failure to report if the user names a single file instead of a folder or several jobs.
 fn one_file_failure(file: &Path) -> Outcome<Failure> {
     let problem = if is_study(file)? {
         "found a study, expected the folder of its shards: `wiperlab collect DIR` with the --out of `wiperlab sweep`"

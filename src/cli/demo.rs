@@ -76,7 +76,7 @@ impl DemoArgs {
         Ok(CommandOutcome::done_if(!missed && solved.result.status == FitStatus::Converged))
     }
 
-    /// Makes the checks of all four steps before any file is written.
+    /// Checks, before any file is written, that all four steps of the demo may write their outputs.
     fn check_outputs(&self) -> Outcome<()> {
         let steps: [(OutputCommand, &str, &[&str]); 4] = [
             (OutputCommand::Import, "data", &[TRACE_FILE, DESCRIPTION_FILE, EXPORT]),

@@ -62,7 +62,7 @@ impl Failure {
 
     /// Prints the message and returns the exit code.
     pub(crate) fn print_message(&self) -> u8 {
-        // each problem of a file is on its own line; only the first line begins at the margin
+        // each problem of a file has its own line; only the first line is not indented
         for (i, line) in self.to_string().split('\n').enumerate() {
             warn_line!("{}{line}", if i == 0 { "error: " } else { "       " });
         }

@@ -36,7 +36,7 @@ pub(crate) fn display_name(path: &Path) -> String {
     full.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
 }
 
-/// The folder in which a file lies.
+/// The folder that contains a file.
 pub(crate) fn containing_folder(file: &Path) -> &Path {
     file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
@@ -60,13 +60,14 @@ pub(crate) fn resolve_existing_path(file: &Path, named: &str) -> Result<PathBuf,
     ))
 }
 
-/// A path relative to `folder`; absolute if there is no relative path.
+/// Rewrites a path so that it is relative to `folder`; the result is absolute if there is no relative path.
 pub(crate) fn relative_path(folder: &Path, path: &Path) -> Outcome<String> {
     let in_full = |path: &Path| {
         std::path::absolute(path)
             .map_err(|error| Failure::at(path.display(), format!("cannot be found from here: {error}")))
     };
-    // links are resolved as far as the path exists, since `..` after a link leads elsewhere
+    // symbolic links are resolved in the part of the path that exists, since `..` after a link leads to the
+    // parent of its target
     let real = |path: &Path| -> Outcome<PathBuf> {
         let full = in_full(path)?;
         let there = full.ancestors().find(|part| part.exists()).unwrap_or(Path::new(""));
@@ -83,8 +84,8 @@ pub(crate) fn relative_path(folder: &Path, path: &Path) -> Outcome<String> {
     })
 }
 
-/// Writes all files of a command into `folder` (created if missing): all are first written next to their
-/// final places, then renamed.
+/// Writes all files of a command into `folder`, which is created if missing. All files are first written
+/// under temporary names next to their final places, then renamed.
 pub(crate) fn write_outputs(
     folder: &Path,
     writer: &WritePolicy,
@@ -94,8 +95,8 @@ pub(crate) fn write_outputs(
     commit_files(OutputStaging::new(folder, writer, &file_names(files))?, files)
 }
 
-/// Like [`write_outputs`], for files that no marker lists; the caller knows that they replace nothing of
-/// value.
+/// Like [`write_outputs`], for files that are not listed in the marker of the folder; the caller ensures that
+/// they replace nothing of value.
 pub(crate) fn write_unmarked(folder: &Path, files: &[(impl AsRef<str>, Vec<u8>)]) -> Outcome<()> {
     OutputFolder::find_writable_ancestor(folder)?;
     commit_files(OutputStaging::new_unmarked(folder, &file_names(files))?, files)
@@ -112,7 +113,8 @@ fn commit_files(mut staging: OutputStaging, files: &[(impl AsRef<str>, Vec<u8>)]
     staging.commit()
 }
 
-/// The files of a figure: for the screen, and under `paper/` for a column and a page of a journal.
+/// The files of a figure: one for the screen and, under `paper/`, one for a column and one for a page of a
+/// journal.
 pub(crate) fn figure_files(name: &str, figure: &Figure) -> [(String, Vec<u8>); 3] {
     let file = |name: String, medium| (name, figure.to_svg(medium).into_bytes());
     [
@@ -155,8 +157,8 @@ impl<I: Iterator<Item = String>> Read for ChunkReader<I> {
 pub(crate) struct OutputFolder {
     folder: PathBuf,
     writer: WritePolicy,
-    /// Folder of the nameless files until they are complete: the final folder, or its nearest existing
-    /// parent.
+    /// Folder of the unnamed temporary files until they are complete: the output folder or, if that does not
+    /// exist yet, its nearest existing parent.
     temporary_folder: PathBuf,
 }
 
@@ -194,8 +196,8 @@ impl OutputFolder {
         Ok(near)
     }
 
-    /// A file that is written while the results are computed; it gets its name when all files are
-    /// [finished](Self::commit).
+    /// A file that is written while the results are computed; it gets its name when all files are complete
+    /// ([`Self::commit`]).
     pub(crate) fn create_file(&self, name: &'static str) -> Outcome<PendingFile> {
         let path = self.folder.join(name);
         let file =
@@ -220,7 +222,8 @@ impl OutputFolder {
     }
 }
 
-/// A nameless file for data that do not fit into memory, in a folder or in its nearest existing parent.
+/// An unnamed temporary file for data that do not fit into memory. It is in `folder` or in the nearest
+/// existing parent.
 pub(crate) fn create_scratch_file(folder: &Path) -> Outcome<File> {
     let near = OutputFolder::find_writable_ancestor(folder)?;
     tempfile::tempfile_in(&near).map_err(|error| write_failure(&near, &error))
@@ -269,7 +272,7 @@ pub(crate) struct FigureArgs {
 }
 
 impl FigureArgs {
-    /// Checks before the work that the figures with these names can be written.
+    /// Checks, before the results are computed, that the figures with these names can be written.
     pub(crate) fn check_folder(&self, names: &[&str], overwrite: Overwrite) -> Outcome<()> {
         let Some(folder) = &self.folder else { return Ok(()) };
         let files = names.iter().flat_map(|name| figure_files(name, &Figure::default()));
@@ -300,7 +303,8 @@ impl FigureArgs {
 pub(crate) struct StreamedTable {
     pub file: PendingFile,
     row: String,
-    /// Rows held back until the table has its minimum number of rows, and number of rows still missing.
+    /// First rows, which are kept in memory until the table has its minimum number of rows; and the number of
+    /// rows that are still missing from that minimum.
     held: String,
     missing: usize,
     /// Time spent on formatting and writing, which does not count towards the time of the run.

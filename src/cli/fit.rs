@@ -128,8 +128,8 @@ impl LoadedJob {
         })
     }
 
-    /// Runs a search with its journal, whose records are called `records`; `expected` is the approximate
-    /// number of them.
+    /// Runs a search and writes its journal. `records` is the word for the records of the journal in
+    /// messages; `expected` is their approximate number.
     fn search<R: CheckpointRecord>(
         &self,
         global: &GlobalArgs,
@@ -168,7 +168,7 @@ impl LoadedJob {
         shown.bar.finish_and_clear();
         sink.finish()?;
         if result.status == FitStatus::Interrupted {
-            // an earlier result is kept; a resumed fit continues from the journal
+            // an earlier result file is kept; a resumed fit continues from the journal
             stops.announce_stop(&kept());
         } else {
             self.write_outputs(&result, &writer)?;
@@ -176,7 +176,8 @@ impl LoadedJob {
         Ok(CompletedFit { result, replayed: shown.replayed, wall })
     }
 
-    /// Approximate number of evaluations: the budget, and the evaluations for gate, profiles and twins.
+    /// Approximate number of evaluations of the model: the budget of the search, plus those for the
+    /// identifiability check before it (the gate), the profile likelihoods and the twins (bootstrap).
     fn expected_evaluations(&self) -> usize {
         let (job, parameters) = (self.job(), self.job().parameters.len());
         let gate = crate::fit::identifiability::PROBE_COUNT * (2 * parameters + 1);
@@ -197,11 +198,12 @@ impl LoadedJob {
 type ResumedCheckpoint<'a, R> = Option<(&'a str, &'a CheckpointFile<R>)>;
 type FitOutcome = Result<FitResult, FitError>;
 
-/// Approximate number of iterates per stage, from the recovery study; used to estimate the remaining time.
+/// Approximate number of iterates per stage of a fit to traces, from the recovery study; used to estimate the
+/// remaining time.
 const ITERATES_A_STAGE: usize = 14;
-/// Number of starts that most fits need: two that agree.
+/// Number of starts of the search that most fits need: two starts must agree.
 const STARTS: usize = 2;
-/// Approximate number of iterates per twin, and per side of a parameter's profile.
+/// Approximate number of iterates per twin (bootstrap data set), and per side of the profile of a parameter.
 const ITERATES_A_TWIN: usize = 5;
 const ITERATES_A_SIDE: usize = 2;
 
@@ -213,7 +215,8 @@ struct SearchDisplay {
 }
 
 impl SearchDisplay {
-    /// Moves the bar. The remaining time is estimated from computed evaluations only, not from replayed ones.
+    /// Moves the bar. The remaining time is estimated only from evaluations that were computed, not from
+    /// those that were read from the journal.
     fn advance(&mut self, made: usize, replayed: usize, journaled: usize, words: String) -> ControlFlow<()> {
         self.bar.set_length(self.bar.length().unwrap_or(0).max(made as u64));
         self.bar.set_position(made as u64);

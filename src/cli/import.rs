@@ -184,7 +184,8 @@ impl ImportOptionArgs {
         Ok(options)
     }
 
-    /// What the import may overwrite: a measured recording only if it is from the same exports.
+    /// Files that the import may overwrite; a measured recording only if it was imported from the same
+    /// exported files.
     fn write_policy(&self, sources: &[ImportSource]) -> WritePolicy {
         let exports = import::source::preserved_files(sources).into_iter();
         let exports = exports.map(|(_, bytes)| crate::text::sha256(bytes)).collect();
@@ -254,13 +255,13 @@ fn print_preview(imported: &Import, sources: &[ImportSource]) {
     }
 }
 
-/// Maximum length of a line of an export, bytes: enough for a hundred thousand columns.
+/// Maximum length of a line of an exported table, bytes: enough for a hundred thousand columns.
 const LONGEST_LINE: usize = 1_000_000;
-/// Number of bytes of the line that a refusal shows.
+/// Number of bytes at the start of a refused line that the error message shows.
 const LINE_SHOWN: usize = 40;
 
-/// Reads a table. A file without line ends is refused, since its cells would fill the memory; a file with
-/// markup may be a single line.
+/// Reads an exported table. A file without line ends is refused, since its cells would fill the memory; only
+/// a file with markup may be a single line.
 fn read_table(path: &Path) -> Outcome<Vec<u8>> {
     let bytes = files::read_data(path)?;
     let is_markup = bytes.iter().take(16).any(|byte| *byte == b'<');
@@ -278,7 +279,7 @@ fn read_table(path: &Path) -> Outcome<Vec<u8>> {
     }
 }
 
-/// Reads a file with its companions.
+/// Reads an exported file with the companion files that belong to it.
 fn read_source(path: &Path) -> Outcome<ImportSource> {
     if files::is_standard_input(path) {
         return Ok(ImportSource::without_companions(files::display_name(path), read_table(path)?));
@@ -286,7 +287,7 @@ fn read_source(path: &Path) -> Outcome<ImportSource> {
     let name = path.display().to_string();
     let mut names = import::companion_names(&name);
     names.retain(|companion| *companion != name && Path::new(companion).is_file());
-    // on file systems that ignore case, one file is found under two spellings
+    // a file system that ignores case finds one file under two spellings
     names.dedup_by(|a, b| a.eq_ignore_ascii_case(b));
     let read = |name: String| Ok(CompanionFile { bytes: files::read_data(Path::new(&name))?, name });
     let companions = names.into_iter().map(read).collect::<Outcome<Vec<_>>>()?;
@@ -304,8 +305,8 @@ pub(crate) fn import_into(
     write_recording(folder, &WritePolicy::new(OutputCommand::Import, overwrite), sources, &imported)
 }
 
-/// Preserves what the user wrote into a description that is about to be replaced, unless the command line
-/// gives it: facts of the test, and the folder of the video frames.
+/// Copies what the user wrote into the existing description (facts of the test, folder of the video frames)
+/// to the description that replaces it, unless the command line gives it.
 fn keep_user_notes(folder: &Path, description: &mut RecordingFile) {
     let Ok(text) = files::read_text(&folder.join(DESCRIPTION_FILE)) else { return };
     let Ok(replaced) = RecordingFile::parse(DESCRIPTION_FILE, &text) else { return };

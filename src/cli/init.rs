@@ -85,7 +85,7 @@ impl InitArgs {
         Ok((vec![(SCENE, scene), (JOB, job)], found.describe()))
     }
 
-    /// The stroke as given by the options.
+    /// Amplitude and frequency of the stroke, as far as the options give them.
     fn known_stroke(&self) -> Outcome<KnownStroke> {
         let typed = [("--amplitude-m", self.amplitude_m), ("--frequency-hz", self.frequency_hz)];
         let is_wrong = |value: &f64| !(value.is_finite() && *value > 0.0);

@@ -42,7 +42,7 @@ pub(crate) struct InspectArgs {
 }
 
 impl InspectArgs {
-    /// Prints the verdict even with `--quiet`, since the command is run for it.
+    /// Prints the verdict even with `--quiet`, since the verdict is the purpose of the command.
     pub(crate) fn run(&self, global: &GlobalArgs) -> Outcome {
         let scene = self.scene.as_deref().map(read_scene).transpose()?;
         self.figures.check_folder(&[FIGURE], self.overwrite)?;
@@ -110,7 +110,7 @@ fn print_slope(found: &Inspection) {
     }
 }
 
-/// Maximum number of turns listed in the table; the JSON lists all turns.
+/// Maximum number of reversals listed in the table; the JSON lists all reversals.
 const MOST_TURNS: usize = 10;
 
 fn print_reversals(turns: &[InspectedReversal]) {
@@ -178,7 +178,8 @@ pub(crate) struct InspectedReversal {
 }
 
 impl Inspection {
-    /// Inspects a recording with its description; `more` are findings on the folder of the recording.
+    /// Inspects a recording with its description; `more` are findings on the files in the folder of the
+    /// recording.
     pub(crate) fn from_folder(
         recording: &Recording,
         file: Option<&RecordingFile>,

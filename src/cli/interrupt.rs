@@ -75,7 +75,7 @@ pub(crate) fn register_stoppable(kept: impl Fn() -> String + Send + 'static) -> 
     StopGuard
 }
 
-/// Until this is dropped, the command counts as one that can stop.
+/// While this value exists, the command counts as one that can stop early.
 pub(crate) struct StopGuard;
 
 impl StopGuard {
@@ -83,7 +83,7 @@ impl StopGuard {
     /// signal ends it.
     pub(crate) fn announce_stop(&self, what: &str) {
         lock_state().finishing = true;
-        progress::finish_in_words(); // the sentence replaces the bar
+        progress::finish_in_words(); // the message replaces the progress bar
         warn_line!("{}: {what}", why());
     }
 }
@@ -152,7 +152,8 @@ fn why() -> &'static str {
 fn end_program() -> ! {
     let state = lock_state();
     for path in state.passing.iter().rev() {
-        // the next command removes any remaining files; only empty folders are removed
+        // files that cannot be removed are left to the next command; of the folders, only empty ones are
+        // removed
         let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir(path));
     }
     let kept = state.kept.as_ref().map_or_else(nothing_saved, |kept| kept());

@@ -53,7 +53,7 @@ impl LoadedRecording {
     pub(crate) fn exposure_s(&self) -> Option<f64> {
         self.file.as_ref().and_then(|file| file.camera.exposure_s)
     }
-    /// Finding on sources of the recording at `path` that have changed since the import.
+    /// A finding if source files of the recording at `path` have changed since the import.
     pub(crate) fn changed_sources(&self, path: &Path) -> Option<QualityFinding> {
         let source = self.file.as_ref()?.source.as_ref()?;
         let description = description_path(path);
@@ -134,7 +134,7 @@ fn trace_path(path: &Path) -> Outcome<PathBuf> {
     Ok(trace)
 }
 
-/// Whether a file is a study, which has axes or maps; no job has these.
+/// Whether a TOML file is a study: it has the key `axis` or `map`, which no job has.
 pub(crate) fn is_study(file: &Path) -> Outcome<bool> {
     let table: Option<toml::Table> = files::read_toml(file)?.parse().ok();
     Ok(table.is_some_and(|table| ["axis", "map"].iter().any(|key| table.contains_key(*key))))

@@ -82,18 +82,18 @@ pub(crate) struct ProgressReporter {
 }
 
 impl ProgressReporter {
-    /// Interval between two lines.
+    /// Time between two printed lines of progress.
     const PAUSE: Duration = Duration::from_secs(60);
-    /// Time until the first line; short, so that a mistake shows early.
+    /// Time until the first line of progress; it is short, so that a mistake shows early.
     const FIRST: Duration = Duration::from_secs(10);
 
-    /// Prints nothing if `says` is false or the bar is drawn.
+    /// A reporter that prints nothing if `says` is false or if the bar is drawn on a terminal.
     pub(crate) fn new(bar: &ProgressBar, says: bool) -> Self {
         let due = (says && bar.is_hidden()).then(|| Instant::now() + Self::FIRST);
         Self { bar: bar.clone(), due: Mutex::new(due) }
     }
 
-    /// Prints a line if one is due.
+    /// Prints a line of progress if enough time has passed since the previous line.
     pub(crate) fn report_if_due(&self) {
         let now = Instant::now();
         let mut due = self.due.lock().unwrap_or_else(PoisonError::into_inner);

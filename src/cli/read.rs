@@ -60,7 +60,7 @@ pub struct SpectrumOptions {
     pub window: String,
     /// Trend to be removed first; `auto` chooses it from the record.
     pub detrend: String,
-    /// Band in which components are sought, Hz; `None` for all frequencies.
+    /// Frequency band that is searched for components, Hz; `None` for all frequencies.
     pub band_hz: Option<(f64, f64)>,
     /// Maximum number of listed components; `None` for the default.
     pub max_components: Option<usize>,
@@ -71,7 +71,7 @@ pub struct SpectrumOptions {
 /// The files that `wiperlab spectrum` writes, by name.
 ///
 /// # Errors
-/// As [`read_scene`], with the options in place of keys.
+/// [`Failure::Input`] with file or option, what was found, what was expected and what to do.
 pub fn spectrum_files(recording: Recording, of: &SpectrumOptions) -> Result<Vec<(String, Vec<u8>)>, Failure> {
     let mut args =
         SpectrumArgs::new(Path::new(""), &of.channel, &of.window, Path::new(""), Default::default());

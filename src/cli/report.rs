@@ -60,7 +60,7 @@ struct ReportedFit {
     name: String,
     problem: LoadedJob,
     result: FitResult,
-    /// Pictures of the frames, for every recording that has some.
+    /// For every recording, pictures of its video frames; `None` if it has no pictures.
     videos: Vec<Option<FramePictures>>,
 }
 

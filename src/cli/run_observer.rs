@@ -1,11 +1,12 @@
-//! Observer of a run for which a user waits.
+//! Observer of a run of the model that shows progress to a waiting user.
 
 use super::{interrupt, progress};
 use crate::simulate::{Observer, SolutionSegment};
 use indicatif::ProgressBar;
 use std::ops::ControlFlow;
 
-/// Number of segments between two updates of the bar; each segment takes microseconds.
+/// Number of integration segments between two updates of the progress bar; computing a segment takes
+/// microseconds.
 const PIECES_A_LOOK: u32 = 64;
 
 /// Shows the progress of a run, and stops it on request.
@@ -16,7 +17,7 @@ pub(crate) struct ProgressObserver {
 }
 
 impl ProgressObserver {
-    /// Observer of a run between two instants, s.
+    /// Observer of a run from `start_s` to `stop_s`, s.
     pub(crate) fn new([start_s, stop_s]: [f64; 2], command: &'static str, quiet: bool) -> Self {
         let bar = progress::start_bar(to_milliseconds(stop_s - start_s), command, "ms of the model", quiet);
         Self { bar, start_s, pieces: 0 }

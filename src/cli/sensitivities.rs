@@ -93,7 +93,8 @@ struct SensitivityTables<I: Iterator<Item = f64>> {
     samples: StreamedTable,
     events: StreamedTable,
     times: Peekable<I>,
-    /// Derivatives of one column.
+    /// Derivatives of one column at one instant, one value per parameter; the memory is used again for every
+    /// row.
     row: Vec<f64>,
 }
 
@@ -128,7 +129,7 @@ impl<I: Iterator<Item = f64>> TangentObserver for SensitivityTables<I> {
     }
 }
 
-/// Appends numbers as cells, or `count` empty cells.
+/// Appends `count` cells: the given numbers, or empty cells if there are none.
 fn push_numbers(text: &mut String, count: usize, numbers: Option<&[f64]>) {
     for i in 0..count {
         let _ = match numbers {

@@ -17,7 +17,8 @@ pub(crate) fn shard_checkpoint(folder: &Path, shard: Shard) -> PathBuf {
     folder.join(SHARDS_FOLDER).join(shard.file_stem() + ".jsonl")
 }
 
-/// The shards in a folder of results, sorted by their number of shards, then by their own number.
+/// The shards in a folder of results, sorted by the number of shards in their division, then by their number
+/// in it.
 pub(crate) fn shard_files(folder: &Path) -> Outcome<Vec<(Shard, PathBuf)>> {
     let folder = folder.join(SHARDS_FOLDER);
     if !folder.is_dir() {
@@ -35,8 +36,9 @@ pub(crate) fn shard_files(folder: &Path) -> Outcome<Vec<(Shard, PathBuf)>> {
     Ok(shards)
 }
 
-/// Reads another shard: calls `each` with its records if they are `wanted`. A shard of another problem or
-/// version is refused; a damaged shard is left to `wiperlab collect`.
+/// Reads the journal of another shard. If `wanted`, calls `each` with every record. A journal of another
+/// problem or program version is refused; a damaged one only causes a warning, since `wiperlab collect`
+/// reports the damage.
 pub(crate) fn scan_shard<R: CheckpointRecord>(
     path: &Path,
     header: &CheckpointHeader<R::Body>,

@@ -77,7 +77,7 @@ struct StudiedWindow {
     analysis: SpectralAnalysis,
     /// The analysed frames and what was removed from them, as text.
     note: String,
-    /// Advice on a better window, if this one contains a whole flip.
+    /// Advice on a better window, if the analysed window contains a whole flip of the blade.
     hint: Option<String>,
 }
 
@@ -200,7 +200,7 @@ impl SpectrumRequest {
         let frames = self.window.resolve_frames(&recording, &instants).map_err(Failure::input)?;
         let grid = recording.grid();
         let samples = self.channel.samples(&recording);
-        // (a resolved window lies inside the recording)
+        // (a window whose frames were found is inside the recording)
         let inside = samples.get(frames.clone()).unwrap_or_default();
         let record = SampledRecord { samples: inside, frame_rate_hz: grid.frame_rate_hz, exposure_s };
         let refuse = |error| {
@@ -238,7 +238,7 @@ impl SpectrumRequest {
         Ok(outputs)
     }
 
-    /// Both spectra in one figure.
+    /// One figure with the spectra of the simulated and of the measured window.
     fn comparison_figure(&self, simulated: &StudiedWindow, measured: &StudiedWindow) -> Figure {
         let [model, recording] =
             [simulated, measured].map(|studied| (studied.recording.name(), &studied.note));
@@ -253,7 +253,8 @@ impl SpectrumRequest {
     }
 }
 
-/// Advice for a window that contains a whole flip: no smooth trend fits the motion on both sides of the flip.
+/// Advice for a window that contains a whole flip of the blade: no smooth trend fits the motion on both sides
+/// of the flip.
 fn flip_hint(instants: &ReversalInstants, (from_s, to_s): (f64, f64)) -> Option<String> {
     let mut flips = (1..).zip(&instants.reversals).filter_map(|(k, reversal)| Some((k, reversal.flip?)));
     let (k, flip) = flips.find(|(_, flip)| from_s < flip.start_s && flip.end_s < to_s)?;

@@ -184,7 +184,7 @@ fn executable_path() -> Outcome<PathBuf> {
     EXECUTABLE_PATH.get().map_or_else(|| std::env::current_exe().map_err(unknown), |path| Ok(path.clone()))
 }
 
-// POSIX shell.
+// Quoting for a POSIX shell.
 
 /// A word, quoted for the shell if needed.
 pub(crate) fn quote_word(word: &str) -> String {
@@ -195,7 +195,7 @@ pub(crate) fn quote_word(word: &str) -> String {
     format!("'{}'", word.replace('\'', r"'\''"))
 }
 
-/// A command line from its words.
+/// Joins words to a command line for the shell.
 pub(crate) fn join_words(words: &[String]) -> String {
     words.iter().map(|word| quote_word(word)).collect::<Vec<_>>().join(" ")
 }

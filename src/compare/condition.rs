@@ -17,8 +17,8 @@ use rayon::prelude::*;
 use short_spectra::Target;
 use std::ops::Range;
 
-/// Channels by which a model is judged, in order of preference. The deflection shows stick and slip best, but
-/// it can be computed only if the head is tracked.
+/// Channels on which the model is judged, in order of preference; the first one that is tracked is used. The
+/// deflection shows stick and slip best, but it can be computed only if the head is tracked.
 const JUDGED: [Channel; 3] = [Channel::Deflection, Channel::TipX, Channel::HeadX];
 
 /// A fitted recording with its description and its video.
@@ -42,29 +42,30 @@ pub struct ConditionComparison<'a> {
     pub condition: usize,
     /// The recording; `None` if only published numbers are known.
     pub measured: Option<FittedRecording<'a>>,
-    /// The model's run at the estimates.
+    /// The run of the model with the estimates of the parameters.
     pub model: &'a ModelRun,
-    /// Shift of the model's clock and origin to those of the recording; zero without a recording.
+    /// Shifts of time and position that align the model with the recording; zero without a recording.
     pub alignment: Alignment,
-    /// Later conditions that share this run of the model; `None` if an earlier condition has the same run.
+    /// Indices of later conditions with the same run of the model; `None` if an earlier condition has the
+    /// same run.
     pub same_run: Option<Vec<usize>>,
-    /// Measured minus model, at the times of the recording.
+    /// Measured minus aligned model, in every frame of the recording.
     pub residual: Option<MotionTraces>,
-    /// Ridges of recording and model: frequency against time.
+    /// Ridges of recording and model: the frequency of the strongest component against time.
     pub ridges: RidgePair,
     noise: Option<RecordingNoise>,
     measured_instants: Option<ReversalInstants>,
-    /// Instants on the model's own clock.
+    /// Instants of the reversals in the model, on the clock of the model.
     model_instants: ReversalInstants,
 }
 
-/// A recording, or the model's view, with the instants of its reversals. All times are on the clock of that
-/// recording.
+/// A recording, or the model as a camera would record it, with the instants of its reversals. The instants
+/// are on the clock of this recording or model.
 #[derive(Debug, Clone, Copy)]
 pub struct TimedRecording<'a> {
     /// The traces.
     pub recording: &'a Recording,
-    /// Instants of the reversals.
+    /// Instants of the reversals in the recording.
     pub instants: &'a ReversalInstants,
 }
 
@@ -75,8 +76,8 @@ impl<'a> ConditionComparison<'a> {
         self.model.view.stick_s.iter().map(|[from, to]| (from + shift_s, to + shift_s)).collect()
     }
 
-    /// Compares the conditions of a job, in order. `measured` holds the recordings, which belong to the first
-    /// conditions.
+    /// Compares recording and model in every condition of a job, in the order of the job. The recordings
+    /// `measured` belong to the first conditions; the other conditions have no recording.
     #[must_use]
     pub fn compare_conditions(
         job: &'a Job,
@@ -119,24 +120,24 @@ impl<'a> ConditionComparison<'a> {
         self.recording().is_some_and(Recording::is_synthetic)
     }
 
-    /// The recording with its instants; `None` without a recording.
+    /// The recording with the instants of its reversals; `None` without a recording.
     pub(crate) fn measured_side(&self) -> Option<TimedRecording<'_>> {
         let instants = self.measured_instants.as_ref()?;
         self.recording().map(|recording| TimedRecording { recording, instants })
     }
 
-    /// The model with its instants, on its own clock.
+    /// The model with the instants of its reversals, on the clock of the model.
     pub(crate) fn model_side(&self) -> TimedRecording<'_> {
         TimedRecording { recording: &self.model.view.recording, instants: &self.model_instants }
     }
 
-    /// The recording with its instants; without a recording, the model.
+    /// The recording with the instants of its reversals; without a recording, the model with its instants.
     pub(crate) fn measured_or_model(&self) -> TimedRecording<'_> {
         self.measured_side().unwrap_or_else(|| self.model_side())
     }
 
-    /// Noise of a recorded channel, m, measured as in a fit to traces: from the smooth path of the head and
-    /// from the tip on the glass, since stick and slip move the tip as fast as noise does. If that is not
+    /// Standard deviation of the noise of a recorded channel, m, measured as in a fit to traces: along the
+    /// sweep from the head, whose motion is smooth, and in height from the tip on the glass. If that is not
     /// possible, it is the scatter between frames. `None` without a recording or without noise.
     pub(crate) fn noise_m(&self, channel: Channel) -> Option<f64> {
         let noise = self.noise.as_ref()?;
@@ -149,8 +150,9 @@ impl<'a> ConditionComparison<'a> {
         known_m.or_else(|| noise_floor(&channel.samples(self.recording()?))).filter(|noise_m| *noise_m > 0.0)
     }
 
-    /// The channel by which the model is judged, and its noise, m. `None` without a recording, if the heads
-    /// turn in opposite directions, or if the noise is unknown.
+    /// The channel on which the model is judged, and the standard deviation of its noise, m. `None` without a
+    /// recording, if the heads of recording and model turn in opposite directions, or if the noise is
+    /// unknown.
     pub(crate) fn judged_channel(&self) -> Option<(Channel, f64)> {
         let residual = self.residual.as_ref().filter(|_| !self.alignment.opposite_turn)?;
         let is_known = |channel: &Channel| residual.column(*channel).iter().any(Option::is_some);
@@ -166,7 +168,7 @@ impl<'a> ConditionComparison<'a> {
         }
     }
 
-    /// The target frequencies of the condition, each with the model's frequency.
+    /// Every target frequency of the condition with the corresponding frequency of the model.
     pub(crate) fn frequency_comparisons(&self) -> impl Iterator<Item = FrequencyComparison> + '_ {
         self.targets().filter_map(|aim| compare_frequency(aim, self.result))
     }
@@ -181,14 +183,14 @@ impl<'a> ConditionComparison<'a> {
         self.job.conditions.get(self.condition).map_or("", |condition| condition.name.as_str())
     }
 
-    /// The model's run with its hard events.
+    /// Summary of the run of the model: how it ended, its sticks, losses of contact, impacts and jams.
     pub(crate) fn run_summary(&self) -> RunSummary {
         let line = summarize_run(self.name(), self.model.scene.start_s, &self.model.motion);
         RunSummary { opposite_turn: self.alignment.opposite_turn, ..line }
     }
 }
 
-/// The later conditions with the same run; `None` if an earlier condition has the same run.
+/// Indices of later conditions with the same run; `None` if an earlier condition has the same run.
 fn later_same_runs(runs: &[ModelRun], condition: usize) -> Option<Vec<usize>> {
     let scene = &runs.get(condition)?.scene;
     let mut same = (0..runs.len()).filter(|i| runs.get(*i).is_some_and(|other| other.scene == *scene));
@@ -196,7 +198,7 @@ fn later_same_runs(runs: &[ModelRun], condition: usize) -> Option<Vec<usize>> {
 }
 
 impl TimedRecording<'_> {
-    /// Time of the given instant of the first reversal, s.
+    /// Time of the given kind of instant at the first reversal, s.
     pub(crate) fn instant_s(&self, anchor: InstantKind) -> Option<f64> {
         self.instants.time_s(anchor, 1).ok()
     }
@@ -222,12 +224,12 @@ impl TimedRecording<'_> {
 
 // The windows of a job's targets, and their frequencies.
 
-/// A window of a channel with the targets that share it.
+/// A window of a channel, with the targets that are read from this window.
 #[derive(Debug, Clone)]
 pub(crate) struct FitWindow<'a> {
     pub channel: Channel,
     pub window: Window,
-    /// The first band of a target in the window; it determines the trend that is removed.
+    /// The first frequency band of a target in the window; it also determines the trend that is removed.
     pub band: Option<&'a FeatureBand>,
     /// The targets in the window, in the order of the job.
     pub targets: Vec<&'a FitTarget>,
@@ -240,11 +242,11 @@ pub(crate) struct FrequencyComparison {
     pub target: Target,
     /// Frequency of the model at the estimates, Hz; `None` if the model has no such component.
     pub model_hz: Option<f64>,
-    /// Whether the model's frequency is within the job's tolerance.
+    /// Whether the frequency of the model is within the tolerance of the job.
     pub met: bool,
 }
 
-/// The band of a target, if it is measured from a spectrum.
+/// The frequency band of a target that is read from a spectrum; `None` for any other target.
 pub(crate) fn spectral_band(aim: &FitTarget) -> Option<&FeatureBand> {
     aim.feature.reading.band()
 }
@@ -278,7 +280,7 @@ impl FitWindow<'_> {
         self.targets.iter().map(|aim| aim.feature.name.clone()).collect()
     }
 
-    /// The target frequencies in the window, each with the model's frequency.
+    /// Every target frequency in the window with the corresponding frequency of the model.
     pub(crate) fn frequency_comparisons(&self, result: &FitResult) -> Vec<FrequencyComparison> {
         self.targets.iter().filter_map(|aim| compare_frequency(aim, result)).collect()
     }

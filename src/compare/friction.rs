@@ -26,7 +26,7 @@ pub(crate) struct FrictionPoint {
 /// Coefficients of friction from a recording.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct MeasuredFriction {
-    /// Coefficients in steady sliding.
+    /// Coefficients during steady sliding of the tip.
     pub steady_sliding: Vec<FrictionPoint>,
     /// Mean coefficients over stick-slip cycles.
     pub over_cycles: Vec<FrictionPoint>,
@@ -42,9 +42,10 @@ const MIN_BLOCK_FRAMES: usize = 8;
 const CYCLE_BLOCK_S: f64 = 0.02;
 /// Length of a block of stick-slip cycles, in cycles of the slowest target frequency.
 const SLOW_CYCLES: f64 = 2.0;
-/// Largest scatter about a parabola that counts as steady sliding, in units of the noise.
+/// The tip counts as sliding steadily if the scatter of its positions about a parabola, divided by the
+/// standard deviation of the noise, is at most this value.
 const MAX_SCATTER_OVER_NOISE: f64 = 1.2;
-/// Largest change of the speed within a block, as a fraction of its mean.
+/// Largest change of the speed within a block, as a fraction of the mean speed in the block.
 const MAX_SPEED_CHANGE: f64 = 0.4;
 /// Smallest speed at which the tip counts as moving, in standard deviations of the measured speed of a tip at
 /// rest.
@@ -53,7 +54,8 @@ const MIN_SPEED_SD: f64 = 5.0;
 const MAX_POINTS: usize = 60;
 
 impl MeasuredFriction {
-    /// Measures the recording of a condition; empty without tip and head.
+    /// Measures coefficients of friction in the recording of a condition; finds none if tip or head was not
+    /// tracked.
     pub(crate) fn measure(case: &ConditionComparison) -> Self {
         let Some(side) = case.measured_side() else { return Self::default() };
         let deflections = static_deflections(&case.model.scene.linkage);
@@ -92,8 +94,8 @@ struct FrictionBlock {
 }
 
 impl FrictionBlock {
-    /// The coefficient of friction for which the deflection is in equilibrium. `deflections` holds
-    /// coefficients with their static deflections, m, in ascending order.
+    /// The coefficient of friction for which the mean deflection of the block is in static equilibrium. It is
+    /// interpolated in `deflections`: coefficients with their static deflections, m, in ascending order.
     fn friction_point(&self, deflections: &[(f64, f64)]) -> Option<FrictionPoint> {
         let after = deflections.partition_point(|(_, deflection_m)| *deflection_m < self.deflection_m);
         let (a, b) = (deflections.get(after.checked_sub(1)?)?, deflections.get(after)?);
@@ -103,7 +105,8 @@ impl FrictionBlock {
     }
 }
 
-/// The blocks in which the tip moves in one direction at nearly constant speed.
+/// Divides a recording into blocks of `length_s`, and returns those in which the tip moves in one direction
+/// at nearly constant speed.
 fn one_way_blocks(side: &TimedRecording, length_s: f64, noise_m: f64) -> Vec<FrictionBlock> {
     let grid = side.recording.grid();
     let frames = ((length_s * grid.frame_rate_hz).round() as usize).max(MIN_BLOCK_FRAMES);
@@ -137,7 +140,7 @@ struct TipParabola {
 }
 
 impl TipParabola {
-    /// Least-squares fit; `None` with too few frames.
+    /// Least-squares fit; `None` with fewer than [`MIN_BLOCK_FRAMES`] tracked frames.
     fn fit(samples: &[Option<f64>], frame_s: f64) -> Option<Self> {
         let middle = 0.5 * (samples.len() as f64 - 1.0);
         let samples = samples.iter().enumerate();
@@ -175,7 +178,7 @@ pub(crate) struct LawCoefficient {
     pub name: &'static str,
     /// Symbol in the law.
     pub symbol: &'static str,
-    /// Derivative of the law with respect to the coefficient, at a given speed.
+    /// Derivative of the law with respect to the coefficient, at a speed of the tip, m/s.
     slope: fn(&FrictionLaw, f64) -> f64,
 }
 
@@ -190,7 +193,7 @@ pub(crate) const COEFFICIENTS: [LawCoefficient; 3] = [
     LawCoefficient { name: "friction.c", symbol: "C", slope: |_, _| 1.0 },
 ];
 
-/// Half width of an interval, as a function of the speed of the tip, m/s.
+/// Half width of an interval of the coefficient of friction, as a function of the speed of the tip, m/s.
 pub(crate) type HalfInterval = Box<dyn Fn(f64) -> f64>;
 
 /// Half width of the 95 % interval of the coefficient of friction, propagated linearly from the intervals and

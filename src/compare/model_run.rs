@@ -17,7 +17,7 @@ use serde::{Serialize, Serializer};
 pub struct ModelRun {
     /// The scene with the estimates as its values.
     pub scene: Scene,
-    /// The run as the condition's camera records it.
+    /// The motion of the model as the camera of the condition records it.
     pub view: TwinView,
     /// States of the run.
     pub motion: RunMotion,
@@ -43,7 +43,8 @@ pub fn run_conditions(
     (0..job.conditions.len()).into_par_iter().map(at).collect()
 }
 
-/// Summary of the best model's run in a condition: its end and its hard events.
+/// Summary of a run of the model at the estimates: how it ended, its sticks, losses of contact, impacts and
+/// jams.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct RunSummary {
     /// Name of the condition.
@@ -59,7 +60,7 @@ pub struct RunSummary {
     pub transitions: usize,
     /// Number of sticks.
     pub sticks: usize,
-    /// The longest stick, s.
+    /// Duration of the longest stick, s.
     pub longest_stick_s: Option<f64>,
     /// Fraction of the run for which the tip sticks.
     pub stick_share: Option<f64>,
@@ -73,7 +74,7 @@ pub struct RunSummary {
     pub indeterminate: bool,
     /// Whether the run ended because too many transitions followed each other within a very short time.
     pub chattering: bool,
-    /// Whether the recorded head turns in the opposite direction to the model's.
+    /// Whether the head in the recording turns in the opposite direction to the head of the model.
     #[serde(rename = "opposed")]
     pub opposite_turn: bool,
     /// Smallest normal force in contact, N.
@@ -129,7 +130,7 @@ mod tests {
     const SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
     const FLY: &str = "\n[contact]\nloss = \"fly\"\njam = \"impact\"\n";
 
-    /// The actual blade, pressed with another force and driven faster than any wiper.
+    /// Runs the actual blade with another preload, and with a drive faster than that of any wiper.
     fn ran(preload_n: f64, frequency_hz: f64, contact: &str) -> RunSummary {
         let text = SCENE.replace("preload_force_n = 0.126", &format!("preload_force_n = {preload_n}"));
         let text = text.replace("frequency_hz = 0.749", &format!("frequency_hz = {frequency_hz:?}"));

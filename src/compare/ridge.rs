@@ -11,12 +11,13 @@ use std::ops::Range;
 
 /// Segment lengths to try, relative to the default length, in ascending order.
 const SEGMENT_LENGTH_FACTORS: [f64; 8] = [0.15, 0.2, 0.3, 0.45, 0.7, 1.0, 1.4, 2.0];
-/// Minimum number of adjoining segments in a record, which limits their length; with fewer, the ridge has no
-/// course.
+/// Minimum number of adjoining segments in a record, which limits the length of a segment. With fewer
+/// segments, the ridge has no part that follows one component.
 const MIN_SEGMENTS: f64 = 3.0;
-/// Fraction of the longest course above which a course counts as equally long.
+/// A segment length is good enough if the fraction of its segments that follow one component is at least this
+/// multiple of the largest such fraction for any length.
 const NEARLY_BEST: f64 = 0.95;
-/// Maximum number of points of a ridge against speed, so that they do not overlap in a figure.
+/// Maximum number of points of a ridge that are plotted against speed; more would overlap in a figure.
 const MAX_SPEED_POINTS: usize = 40;
 
 /// The ridges of a condition.
@@ -24,7 +25,8 @@ const MAX_SPEED_POINTS: usize = 40;
 pub struct RidgePair {
     /// Ridge of the recording; `None` if no segment has enough frames.
     pub measured: Option<TrackedRidge>,
-    /// Ridge of the model, with segments of the same length; times are on the model's clock.
+    /// Ridge of the model, in segments as long as those of the recording; times are on the clock of the
+    /// model.
     pub model: Option<TrackedRidge>,
 }
 
@@ -39,9 +41,9 @@ pub struct TrackedRidge {
     pub ridge: Ridge,
     /// Parts of the ridge that follow one component.
     pub courses: Vec<Vec<RidgePoint>>,
-    /// Band of the search, Hz.
+    /// Frequency band in which the ridge was searched, Hz.
     pub band_hz: (f64, f64),
-    /// A selection of the points of the courses, each with the speed of the tip.
+    /// A selection of the points in `courses`, each with the speed of the tip.
     pub over_speed: Vec<SpeedPoint>,
 }
 
@@ -58,7 +60,8 @@ impl RidgePair {
     }
 }
 
-/// Window from the release of the tip to its next hold; open at an end that is not found.
+/// Window from the release of the tip at the first reversal to the hold at the second. If one of these
+/// instants is not found, the window is open at that end.
 fn release_window(side: &TimedRecording) -> Window {
     let end = |anchor, reversal| match side.instants.time_s(anchor, reversal) {
         Ok(_) => WindowEnd::Found { anchor, reversal, offset_s: 0.0 },
@@ -67,8 +70,8 @@ fn release_window(side: &TimedRecording) -> Window {
     Window { from: end(InstantKind::Release, 1), to: end(InstantKind::Hold, 2) }
 }
 
-/// Frames of the model from its own release on; if the recording has no release, the frames within the time
-/// of the recording.
+/// Frames of the model from the release of its tip on. If there is a recording without a release, the frames
+/// at the times of that recording.
 fn model_frames(case: &ConditionComparison, model: &TimedRecording) -> Option<Range<usize>> {
     let Some(side) = case.measured_side().filter(|side| side.instant_s(InstantKind::Release).is_none())
     else {
@@ -96,8 +99,8 @@ fn job_segment_s(case: &ConditionComparison) -> Option<f64> {
     })
 }
 
-/// Smallest length of a segment, s: two cycles of the slowest target frequency. In a segment of about one
-/// cycle, the oscillation appears as a slower component.
+/// Smallest length of a segment, s: two cycles of the slowest target frequency. In a segment as short as one
+/// cycle, an oscillation would appear as a slower component.
 fn min_segment_s(case: &ConditionComparison) -> f64 {
     const CYCLES: f64 = 2.0;
     case.frequency_comparisons().map(|sought| CYCLES / sought.target.frequency_hz).fold(0.0, f64::max)
@@ -133,9 +136,9 @@ fn track_ridge(
     Some(TrackedRidge { start_s, spectrogram, ridge, courses, band_hz, over_speed })
 }
 
-/// The ridge in segments of the given length. If no length is given, the shortest segments are used whose
-/// courses are nearly as long as the longest: short segments resolve changes, but segments that are too short
-/// interrupt the courses.
+/// The ridge in segments of the given length. Without a given length, chooses the shortest segments in which
+/// nearly the largest fraction of the ridge follows one component: short segments resolve changes, but in
+/// segments that are too short the ridge breaks up.
 fn choose_ridge(
     fast: &[Option<f64>],
     rate_hz: f64,
@@ -162,12 +165,14 @@ fn choose_ridge(
     all.into_iter().find(|(share, _)| *share >= NEARLY_BEST * most).or(Some(first)).map(|(_, ridge)| ridge)
 }
 
-/// Decay in nepers per cycle above which an oscillation dies out within a cycle: a damping ratio of 0.22.
+/// Decay, in nepers per cycle, above which an oscillation counts as dying out within a cycle; it corresponds
+/// to a damping ratio of 0.22.
 const MAX_DECAY_PER_CYCLE: f64 = 1.4;
 
-/// The record without its trend and without the oscillations below a frequency, m.
+/// The record, m, without its trend, without oscillations below a frequency, and without those that die out
+/// within a cycle.
 fn remove_slow_components(analysis: &SpectralAnalysis, rate_hz: f64, low_hz: f64) -> Vec<Option<f64>> {
-    // an oscillation that dies out within a cycle belongs to the flip
+    // an oscillation that dies out within a cycle belongs to the flip of the blade
     let rings =
         |o: &&Oscillation| o.frequency_hz >= low_hz && o.decay_per_s < MAX_DECAY_PER_CYCLE * o.frequency_hz;
     let kept: Vec<_> = analysis.oscillations.iter().filter(rings).collect();
@@ -177,7 +182,8 @@ fn remove_slow_components(analysis: &SpectralAnalysis, rate_hz: f64, low_hz: f64
     analysis.residual_m.iter().enumerate().map(at).collect()
 }
 
-/// Points of the courses, each with the mean speed of the tip in its segment.
+/// Points of the courses (the parts of a ridge that follow one component), each with the mean speed of the
+/// tip in its segment.
 fn ridge_over_speed(
     side: &TimedRecording,
     first: usize,
@@ -200,7 +206,7 @@ fn ridge_over_speed(
 }
 
 impl TrackedRidge {
-    /// Lowest and highest frequency of the courses, Hz.
+    /// Lowest and highest frequency of the points in `courses`, Hz.
     pub(crate) fn frequency_range_hz(&self) -> Option<(f64, f64)> {
         let all = || self.courses.iter().flatten().map(|p| p.frequency_hz);
         all().reduce(f64::min).zip(all().reduce(f64::max))

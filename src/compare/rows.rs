@@ -16,7 +16,8 @@ pub struct TargetComparison {
     pub target: f64,
     /// Standard deviation of the target, if known.
     pub target_sd: Option<f64>,
-    /// Whether the job states the target, as a published or assumed number; otherwise it is measured.
+    /// Whether the job states the value of the target, which is then published or assumed; otherwise it is
+    /// measured.
     pub given: bool,
     /// Whether the target was measured on a synthetic recording.
     pub synthetic: bool,
@@ -31,13 +32,13 @@ pub struct TargetComparison {
     pub tolerance_relative: Option<f64>,
     /// Whether the target is met.
     pub pass: bool,
-    /// Standard deviation of the value among twins of the best model, if there are twins.
+    /// Standard deviation of the value of the model over its twins (synthetic data sets), if there are twins.
     pub twin_sd: Option<f64>,
-    /// Scatter of the model's value between neighbouring parameter values, if there is any.
+    /// Scatter of the value of the model between neighbouring parameter values, if there is any.
     pub model_scatter: Option<f64>,
-    /// Level of the model's peak below that of the strongest peak in its band, dB.
+    /// How far the peak of the model is below the strongest peak in its band, dB.
     pub below_db: Option<f64>,
-    /// The model's second-best candidate for the target.
+    /// The peak of the model that is the second-best candidate for the target.
     pub next_peak: Option<NextPeak>,
     /// Reason why the model has no value.
     pub missing: Option<String>,
@@ -48,7 +49,7 @@ pub struct TargetComparison {
 pub struct NextPeak {
     /// Frequency of the peak, Hz.
     pub frequency_hz: f64,
-    /// Level of the peak below that of the strongest peak in the band, dB.
+    /// How far the peak is below the strongest peak in the band, dB.
     pub below_db: f64,
 }
 
@@ -63,9 +64,9 @@ pub struct ParameterLine {
     pub unit: String,
     /// Estimate.
     pub estimate: f64,
-    /// Lower end of the widest 95 % interval; `None` if it is open.
+    /// Lower end of the widest of the 95 % intervals of the parameter; `None` if it is open.
     pub lower_95: Option<f64>,
-    /// Upper end of the widest 95 % interval; `None` if it is open.
+    /// Upper end of the widest of the 95 % intervals of the parameter; `None` if it is open.
     pub upper_95: Option<f64>,
     /// Whether the data determine the parameter.
     pub verdict: ParameterVerdict,
@@ -73,14 +74,14 @@ pub struct ParameterLine {
     pub why: Option<String>,
     /// Bounds of the search.
     pub bounds: [f64; 2],
-    /// Whether the job gives a prior.
+    /// Whether the job gives a prior for the parameter.
     pub prior: bool,
     /// 95 % interval of the linear model, if that determines the parameter.
     pub linear_95: Option<[f64; 2]>,
     /// Ends of the 95 % interval of the profile likelihood; `None` if the profile does not cross the
     /// threshold within the bounds.
     pub profile_95: [Option<f64>; 2],
-    /// 95 % interval from refitted twins of the best model, if there are twins.
+    /// 95 % interval from refits to twins (synthetic data sets of the best model), if there are twins.
     pub bootstrap_95: Option<[f64; 2]>,
     /// The true value, if the data are synthetic.
     pub truth: Option<TrueValue>,

@@ -14,29 +14,29 @@ pub struct ComparisonSummary {
     pub condition: String,
     /// Name of the recording.
     pub recording: Option<String>,
-    /// Shift added to the model's times, s.
+    /// Time added to the times of the model to align it with the recording, s.
     pub clock_shift_s: Option<f64>,
-    /// Standard deviation of the shift, s; infinite if the path does not determine the shift, `None` if no
-    /// path was aligned.
+    /// Standard deviation of the shift between the clocks of model and recording, s. Infinite if the path
+    /// does not determine the shift; `None` if no path was aligned.
     pub clock_shift_sd_s: Option<f64>,
-    /// Offset added to the positions of the model's head and tip along the sweep, m.
+    /// Offset added to the positions of head and tip of the model along the sweep, m.
     pub along_m: Option<f64>,
-    /// Offset added to the model's head drop, m.
+    /// Offset added to the head drop of the model, m.
     pub drop_m: Option<f64>,
-    /// The point whose path was aligned.
+    /// The point of the blade whose paths in model and recording were aligned.
     pub followed: Option<AlignmentPoint>,
-    /// Whether the recorded head turns in the opposite direction to the model's.
+    /// Whether the head in the recording turns in the opposite direction to the head of the model.
     pub opposite_turn: bool,
     /// Residuals, one for each channel.
     pub residuals: Vec<ResidualSummary>,
-    /// The channel by which the model is judged; `None` if the heads turn in opposite directions or the noise
-    /// is unknown.
+    /// The channel on which the model is judged; `None` if the heads of recording and model turn in opposite
+    /// directions or the noise is unknown.
     pub judged: Option<&'static str>,
     /// The windows of the job's targets.
     pub windows: Vec<WindowSummary>,
     /// The ridges of the deflection after the release of the tip.
     pub ridge: RidgeSummaries,
-    /// Number of changes of contact mode in the model's run.
+    /// Number of changes of contact mode in the run of the model.
     pub transitions: usize,
 }
 
@@ -47,23 +47,23 @@ pub struct ResidualSummary {
     pub channel: &'static str,
     /// Root mean square of measured minus model, m.
     pub rms_m: f64,
-    /// Noise of the recorded channel, m.
+    /// Standard deviation of the noise of the recorded channel, m.
     pub noise_m: Option<f64>,
     /// `rms_m / noise_m`.
     pub rms_over_noise: Option<f64>,
 }
 
-/// A window of the job's targets. Each interval is from the start of its first frame to the end of its last
-/// frame, s.
+/// A window of the targets of a job. Each interval is from the start of the first frame to the end of the
+/// last frame, s.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct WindowSummary {
     /// Names of the targets in the window.
     pub features: Vec<String>,
     /// Name of the channel.
     pub channel: &'static str,
-    /// The window in the recording.
+    /// Start and end of the window in the recording, s.
     pub measured_s: Option<[f64; 2]>,
-    /// The window in the model, on the clock of the recording.
+    /// Start and end of the window in the model, on the clock of the recording, s.
     pub model_s: Option<[f64; 2]>,
 }
 
@@ -81,20 +81,20 @@ pub struct RidgeSummaries {
 pub struct RidgeSummary {
     /// Length of a segment, s.
     pub segment_s: f64,
-    /// Band of the search, Hz.
+    /// Frequency band in which the ridge was searched, Hz.
     pub band_hz: [f64; 2],
     /// Number of segments.
     pub segments: usize,
     /// Number of segments with a component above the noise.
     pub points: usize,
-    /// Number of segments whose components belong to a course.
+    /// Number of segments that belong to parts of the ridge that follow one component.
     pub course_points: usize,
-    /// Lowest and highest frequency of the courses, Hz.
+    /// Lowest and highest frequency of the parts of the ridge that follow one component, Hz.
     pub range_hz: Option<[f64; 2]>,
 }
 
 impl ComparisonSummary {
-    /// Residual of the channel by which the model is judged.
+    /// Residual of the channel on which the model is judged.
     pub(crate) fn judged_residual(&self) -> Option<&ResidualSummary> {
         self.residuals.iter().find(|line| Some(line.channel) == self.judged)
     }

@@ -42,8 +42,8 @@ pub(crate) fn comparison_tables(cases: &[ConditionComparison]) -> Vec<Comparison
     ]
 }
 
-/// Table of every recording with the model at its frames, aligned to the clock and origin of the recording,
-/// in the order of the job; `None` without a recording.
+/// Table of every recording and of the model in the same frames, in the order of the job. The model is
+/// aligned with the clock and the origin of each recording. `None` without a recording.
 pub(crate) fn comparison_table(
     job: &Job,
     measured: &[FittedRecording<'_>],
@@ -109,8 +109,8 @@ fn ridge_rows(case: &ConditionComparison) -> Vec<Vec<String>> {
     [measured, rows("model", &case.ridges.model, case.alignment.shift_s)].concat()
 }
 
-/// Rows of all points of a ridge, each with the number of its course, counted from 1; the number is empty
-/// outside courses.
+/// Rows of all points of a ridge. Each row has the number, counted from 1, of the part of the ridge that
+/// follows one component; the number is empty outside these parts.
 fn tracked_ridge_rows(source: &str, followed: &TrackedRidge, shift_s: f64) -> Vec<Vec<String>> {
     let row = |point: &RidgePoint| {
         let course = followed.courses.iter().position(|course| course.contains(point));

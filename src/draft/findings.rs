@@ -14,8 +14,8 @@ use short_spectra::{Component, ComponentVerdict, SampledRecord, SpectralAnalysis
 pub(super) enum DraftHead {
     /// The motion of the head in the recording.
     Recorded,
-    /// A cosine in the clock of the recording; `origin_m` is the position in the recording at which the
-    /// stroke starts.
+    /// A cosine of the time on the clock of the recording; `origin_m` is the position along the sweep at
+    /// which the stroke starts, in the coordinates of the recording, m.
     Cosine { stroke: Stroke, origin_m: f64 },
 }
 
@@ -53,7 +53,7 @@ pub(crate) struct DraftFindings {
     pub drop: bool,
     /// Reversals of the head.
     pub reversals: Vec<Reversal>,
-    /// Maximum speed of the head, m/s; that of the tip if the head was not tracked.
+    /// Maximum speed of the head or, if the head was not tracked, of the tip, m/s.
     pub greatest_speed_m_per_s: f64,
     /// Start and end of the simulated run, s.
     pub run_s: [f64; 2],
@@ -71,13 +71,14 @@ pub(crate) struct DraftFindings {
 const LEAST_TRACKED_SHARE: f64 = 0.5;
 /// Smallest travel of the head, m: a few pixels of the usual 20 um.
 const LEAST_TRAVEL_M: f64 = 5e-5;
-/// Interval between the sampled speeds, s. Each is averaged over twice this time, a few cycles of chatter.
+/// Interval between the sampled speeds, s. Each speed is averaged over twice this time, a few cycles of
+/// chatter.
 const SPEED_S: f64 = 5e-3;
 /// Maximum number of frames of a first fit, so that it ends within minutes.
 const MOST_FITTED: usize = 12_000;
 /// Fraction of the fitted frames that precede the first reversal.
 const SHARE_BEFORE_REVERSAL: f64 = 0.3;
-/// Lower and upper limit of the band of a component in a job, in units of its frequency.
+/// Lower and upper limit of the band of a component in a job, divided by the frequency of the component.
 const BAND_FACTORS: [f64; 2] = [0.6, 1.5];
 /// Highest frequency used, divided by the Nyquist frequency; above it, the exposure and the tracker attenuate
 /// too much.
@@ -90,10 +91,10 @@ const MOST_RELATIVE_SD: f64 = 0.05;
 /// Lowest frequency of a component, Hz; the frequency of the stroke is lower.
 const LOWEST_HZ: f64 = 10.0;
 
-/// Maximum number of reversals in a list.
+/// Maximum number of reversals that the findings list one by one.
 const MOST_TURNS: usize = 6;
 
-/// Components that are sought after a reversal: name, channel, start and end of the window relative to the
+/// Components to look for after a reversal: name, channel, start and end of the window relative to the
 /// release, s, and whether the frequency is below [`BETWEEN_HZ`].
 const WANTED_COMPONENTS: [(&str, Channel, [&str; 2], bool); 3] = [
     ("low", Channel::HeadDrop, ["+0.01", "+0.2"], true),
@@ -254,12 +255,12 @@ impl DraftComponent {
     }
 }
 
-/// Rounds a time to 0.1 ms, s.
+/// Rounds a time, s, to 0.1 ms.
 fn round_time_s(time_s: f64) -> f64 {
     (1e4 * time_s).round() / 1e4
 }
 
-/// Times, s, and mean speeds of a point, m/s, every [`SPEED_S`] along the recording.
+/// Times, s, and mean speeds of a point, m/s, once per [`SPEED_S`] of the recording.
 fn sample_speeds(grid: FrameGrid, moving: &[Option<f64>]) -> Vec<(f64, f64)> {
     let step = ((SPEED_S * grid.frame_rate_hz) as usize).max(2);
     let at = |first: usize| {
@@ -270,7 +271,7 @@ fn sample_speeds(grid: FrameGrid, moving: &[Option<f64>]) -> Vec<(f64, f64)> {
     (0..grid.frames).step_by(step).filter_map(at).collect()
 }
 
-/// Part of a long recording that a first fit uses, s; `None` for a short recording.
+/// Start and end of the part of a long recording that a first fit uses, s; `None` for a short recording.
 fn choose_fit_window(frames: usize, [start_s, end_s]: [f64; 2], reversals: &[Reversal]) -> Option<[f64; 2]> {
     if frames <= MOST_FITTED {
         return None;

@@ -8,11 +8,12 @@ use crate::fit::measure_targets;
 use crate::recording::Recording;
 use crate::text::{format_digits, format_percent, format_speed, join_with_and, round_to_digits};
 
-/// Standard deviation of the camera's tilt in a first fit, degrees; so small a tilt goes unnoticed.
+/// Standard deviation of the prior for the tilt of the camera in a first fit, degrees; a tilt of this size is
+/// hardly visible.
 const TILT_SD_DEG: f64 = 0.3;
-/// Relative standard deviation of the scale, taken from a ruler in the picture.
+/// Relative standard deviation of the prior for the scale, if it was taken from a ruler in the picture.
 const SCALE_SD: f64 = 0.005;
-/// Standard deviation of the distance of a marker from the point that it stands for, m.
+/// Standard deviation of the distance between a tracked marker and the point of the blade that it marks, m.
 const OFFSET_SD_M: f64 = 0.002;
 /// Standard deviation of the offset between the clocks of the camera and of the stroke, s, if the head was
 /// not tracked.

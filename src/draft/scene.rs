@@ -11,7 +11,7 @@ use crate::simulate::scene::error::SceneError;
 use crate::simulate::scene::{Scene, StartKind};
 use crate::text::{capitalise, format_digits, format_interval, format_percent, make_printable};
 
-/// The blade of every draft.
+/// The bundled scene whose blade every draft uses.
 const EXAMPLE_SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
 /// Marks a number that only the user knows.
 pub(crate) const YOURS_MARK: &str = "YOURS";
@@ -286,7 +286,7 @@ mod tests {
         for text in SCENES {
             let scene = Scene::parse("scene", text).unwrap();
             reads_back(&scene);
-            // a number that needs all its digits, and a parameter that the scene writes as another quantity
+            // a number that needs all its digits, and a parameter that the scene states by another quantity
             let moved = scene.with_parameter("friction.a", 0.1 + 0.2).unwrap();
             reads_back(&moved.with_parameter("blade.neck_natural_frequency_hz", 1000.0 / 3.0).unwrap());
         }

@@ -1,8 +1,8 @@
 //! Estimates the stroke of a head that was not tracked from the motion of the tip.
 //!
-//! A sliding tip trails the head by a nearly constant length `d`, so that its position is `x = c + d s + P
-//! cos(w t) + Q sin(w t)`, where `s` is the sign of its speed. The model is linear in all parameters except
-//! the frequency.
+//! A sliding tip trails the head by a nearly constant length `d`. So the position of the tip is
+//! `x = c + d s + P cos(w t) + Q sin(w t)`, where `s` is the sign of the velocity of the tip. The model is
+//! linear in all parameters except the angular frequency `w`.
 
 use crate::recording::Recording;
 use crate::recording::channel::mean_speed_m_per_s;
@@ -68,7 +68,7 @@ pub(super) fn estimate_stroke(recording: &Recording, known: KnownStroke) -> Opti
     Some(EstimatedStroke { stroke, origin_m: middle_m - amplitude_m })
 }
 
-/// Mean time, s, mean position, m, and sign of the speed of the sliding tip, once per [`SPEED_S`].
+/// Mean time, s, mean position, m, and sign of the velocity of the sliding tip, once per [`SPEED_S`].
 fn select_sliding(recording: &Recording) -> Vec<[f64; 3]> {
     let (grid, tip) = (recording.grid(), &recording.traces().tip_x_m);
     let step = ((SPEED_S * grid.frame_rate_hz) as usize).max(2);
@@ -86,8 +86,9 @@ fn select_sliding(recording: &Recording) -> Vec<[f64; 3]> {
     slides.map(|[t, x, speed]| [t, x, speed.signum()]).collect()
 }
 
-/// Mean squared residual, m2, and the terms `c`, `d`, `P` and `Q`, m, for a frequency. While the blade flips,
-/// the tip does not trail the head: points far from a first solution are left out of the second one.
+/// Fits the stroke for a given frequency. Returns the mean squared residual, m2, and the terms `c`, `d`, `P`
+/// and `Q`, m. While the blade flips, the tip does not trail the head; so points far from a first fit are
+/// left out of a second fit.
 fn fit_terms(sliding: &[[f64; 3]], frequency_hz: f64) -> Option<(f64, [f64; 4])> {
     /// Residuals above this multiple of their median are left out.
     const FAR: f64 = 4.0;
@@ -101,7 +102,7 @@ fn fit_terms(sliding: &[[f64; 3]], frequency_hz: f64) -> Option<(f64, [f64; 4])>
     Some((left.iter().map(|r| r * r).sum::<f64>() / left.len() as f64, found))
 }
 
-/// Absolute residuals, m, and the least-squares solution, for the points `used`.
+/// Absolute residuals, m, and the least-squares solution for the terms, from the points `used` only.
 fn solve_terms(sliding: &[[f64; 3]], used: &[usize], frequency_hz: f64) -> Option<(Vec<f64>, [f64; 4])> {
     /// Minimum number of points: twice the number of terms.
     const FEWEST: usize = 8;

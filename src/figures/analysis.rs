@@ -92,15 +92,16 @@ pub(super) fn spectrum_curve(analysis: &SpectralAnalysis) -> SpectrumCurve {
     }
 }
 
-/// A level at the frequencies of the spectrum; `None` if the two lengths differ.
+/// A level, m, at the frequencies of the spectrum; `None` if level and spectrum have different lengths.
 pub(super) fn spectrum_level(analysis: &SpectralAnalysis, amplitude_m: &[f64]) -> Option<SpectrumLevel> {
     let frequency_hz = &analysis.spectrum.frequency_hz;
     (amplitude_m.len() == frequency_hz.len())
         .then(|| SpectrumLevel { frequency_hz: frequency_hz.clone(), amplitude_m: amplitude_m.to_vec() })
 }
 
-/// A component, drawn at the height of the spectrum at its frequency. Its fitted amplitude may be larger:
-/// that of a decay is the amplitude at the start, and that of a drifting component is a mean.
+/// Label of a component, at the height of the spectrum at the frequency of the component. The fitted
+/// amplitude may be larger: for a decaying component it is the amplitude at the start, for a drifting
+/// component a mean.
 pub(super) fn label_component(c: &Component, spectrum: &Spectrum) -> LabelledComponent {
     let bin_hz = spectrum.frequency_hz.get(1).copied().unwrap_or(f64::INFINITY);
     let height_m = spectrum.amplitude_m.get((c.frequency_hz / bin_hz).round() as usize).copied();
@@ -121,7 +122,7 @@ pub(super) fn label_component(c: &Component, spectrum: &Spectrum) -> LabelledCom
 /// A point of a ridge, with the mean speeds of tip and head in its segment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CoursePoint {
-    /// Time of the recording, s.
+    /// Time on the clock of the recording, s.
     pub time_s: f64,
     pub frequency_hz: f64,
     /// Standard deviation of the frequency, Hz.
@@ -235,7 +236,7 @@ impl AnalysedWindow<'_> {
 
 // A window decomposed into trend, components and residual.
 
-/// Points per cycle of the fastest oscillation; enough for a smooth line.
+/// Points of a drawn line per cycle of the fastest oscillation; enough for a smooth line.
 const POINTS_A_CYCLE: f64 = 12.0;
 /// Maximum number of points of a fitted line; more would lie closer together than pixels.
 const MOST_POINTS: f64 = 40_000.0;
@@ -276,7 +277,7 @@ impl AnalysedWindow<'_> {
         }
     }
 
-    /// The largest component that decays; its data are the component plus the residual.
+    /// The largest component that decays; the data drawn with it are this component plus the residual.
     fn largest_decay(&self, time_s: &[f64]) -> Option<ComponentDecay> {
         let analysis = self.analysis;
         let decays = |c: &&Component| {
@@ -310,7 +311,7 @@ impl AnalysedWindow<'_> {
         value(before) + (place - before as f64) * (value(before + 1) - value(before))
     }
 
-    /// A function of the time after the first frame, sampled for a smooth line.
+    /// Samples a function of the time after the first frame, s, densely enough for a smooth line.
     fn fine_trace(&self, value: impl Fn(f64) -> f64) -> RingDownTrace {
         let grid = self.recording.grid();
         let (start_s, length_s) =
@@ -407,7 +408,7 @@ mod tests {
         (window.spectra(), spectrum_curve(&analysed(&quiet)))
     }
 
-    /// Fraction of the bins above the lowest frequency whose interval contains the given amplitude.
+    /// Fraction of the bins from number 20 on whose 95 % interval contains the given amplitude.
     fn covered(shown: &SpectraPlot, amplitude_m: &[f64]) -> f64 {
         let interval = shown.interval_95.as_ref().unwrap();
         let bins = interval.lower_m.iter().zip(&interval.upper_m).zip(amplitude_m);

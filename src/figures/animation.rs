@@ -42,7 +42,7 @@ pub struct Animation {
     pub hold_s: [f64; 2],
     /// Measured motion; `None` without a recording.
     pub measured: Option<TrackedMotion>,
-    /// The shown parts and their slow-down factors.
+    /// The shown parts of the motion and their slow-down factors.
     pub pace: PlaybackPace,
 }
 
@@ -59,7 +59,8 @@ pub struct TrackedMotion {
     pub head_drop_m: Vec<Option<f64>>,
 }
 
-/// Style that hides the moving elements from readers who prefer reduced motion; the drawn poses stay.
+/// Style that hides the moving elements from readers who prefer reduced motion; the still poses remain
+/// visible.
 const LESS_MOTION: &str = "<style>@media (prefers-reduced-motion:reduce){svg .moves{display:none}}</style>\n";
 
 /// The animation as SVG; the same data always give the same bytes. The animation starts with the hold. A
@@ -257,7 +258,8 @@ impl PlaybackPart {
     }
 }
 
-/// Consecutive parts without gaps; after the last part, its final picture stays for a second.
+/// Pace of the playback: consecutive parts without gaps. After the last part, the final picture stays for a
+/// second.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PlaybackPace {
     /// The parts, in order of time.
@@ -277,8 +279,8 @@ const RELEASE_LEAD: f64 = 0.02;
 const FOLLOW_UP: f64 = 0.3;
 
 impl PlaybackPace {
-    /// Two parts: the hold of the tip and, slowed down more, its release with some cycles. Both are limited
-    /// to the interval `within`; `None` if both lie outside that interval.
+    /// Two parts: the hold of the tip, and its release with some cycles, which is slowed down more than the
+    /// hold. Both are limited to the interval `within`; `None` if both are outside that interval.
     #[must_use]
     pub fn around_hold([hold_s, release_s]: [f64; 2], within: [f64; 2]) -> Option<Self> {
         let length = release_s - hold_s;
@@ -303,7 +305,7 @@ impl PlaybackPace {
         self.parts.last().map_or(self.span_s(), |p| [p.from_s, p.to_s])
     }
 
-    /// The same pace with all instants shifted by `shift_s`.
+    /// The same playback pace with all instants shifted by `shift_s`.
     pub(crate) fn shift_by(self, shift_s: f64) -> Self {
         let later =
             |p: PlaybackPart| PlaybackPart { from_s: p.from_s + shift_s, to_s: p.to_s + shift_s, ..p };
@@ -323,7 +325,7 @@ impl PlaybackPace {
     }
 }
 
-/// The nearest number of the form 1, 2 or 5 times a power of ten, on a logarithmic scale.
+/// The number of the form 1, 2 or 5 times a power of ten that is nearest to `value` on a logarithmic scale.
 pub(super) fn round_to_125(value: f64) -> f64 {
     let power = math::powf(10.0, math::log10(value).floor());
     let apart = |candidate: &f64| math::ln(candidate / value).abs();

@@ -23,7 +23,7 @@ pub struct CornerParameter {
     pub estimate: f64,
     /// The 95 % interval that the page states; `None` for an open end.
     pub stated: [Option<f64>; 2],
-    /// Standard deviation from the linear model.
+    /// Standard deviation of the estimate from the linear model.
     pub sd: Option<f64>,
     /// Mean and standard deviation of the prior.
     pub prior: Option<(f64, f64)>,
@@ -60,12 +60,13 @@ const REGIONS: [(&str, Colour, Mark, f64); 2] = [
 ];
 /// Number of intervals in the outline of a region and in a curve.
 const POINTS: u32 = 48;
-/// Half width of a cell, half width of its contents, and height of the likelihood curve in it.
+/// Half width of a cell, half width of its contents, and height of the likelihood curve in it; the distance
+/// between the centres of neighbouring cells is 1.
 const HALF: f64 = 0.5;
 const INSIDE: f64 = 0.44;
 const CURVE: f64 = 0.72;
-/// Smallest range that a cell shows on either side of the estimate, standard deviations, and margin of the
-/// cell as a fraction of its range.
+/// Smallest range that a cell shows on either side of the estimate, standard deviations; then the margin on
+/// either side of the shown range, as a fraction of that range.
 const SHOWN_SD: f64 = 2.8;
 const ROOM: f64 = 0.06;
 /// Smallest margin of a cell, in the unit scale of the search; a smaller range is rounding error.
@@ -74,7 +75,7 @@ const LEAST: f64 = 1e-9;
 const Z_95: f64 = 1.96;
 
 impl CornerPlot {
-    /// The parameters of a fit; `lines` hold units and true values.
+    /// The parameters of a fit; `lines` contain units and true values.
     pub(crate) fn from_fit(job: &Job, result: &FitResult, lines: &[ParameterLine]) -> Self {
         let free: Vec<&FreeParameter> =
             job.parameters.iter().filter(|p| result.parameters.contains_key(&p.name)).take(MOST).collect();
@@ -116,7 +117,8 @@ fn corner_parameter(
     let (found, bounds) = (result.parameters.get(&free.name)?, &free.bounds);
     let line = lines.iter().find(|line| line.name == free.name);
     let estimate = bounds.unit_coordinate(found.estimate);
-    // an end may have been cut at a bound, so the longer half is used
+    // one end of the interval may have been cut at a bound, so the longer half determines the standard
+    // deviation
     let half = found.linear_95.map(|ends| {
         ends.iter().map(|end| (bounds.unit_coordinate(*end) - estimate).abs()).fold(0.0, f64::max)
     });
@@ -152,7 +154,7 @@ fn prior_in_search_scale(prior: &Prior, bounds: &Bounds) -> Option<(f64, f64)> {
     Some((at, sd / bounds.slope(at))).filter(|(at, sd)| at.is_finite() && sd.is_finite() && *sd > 0.0)
 }
 
-/// The range of a parameter that its cells show.
+/// The range of a parameter that its cells show, including margins.
 fn shown_range(known: &CornerParameter) -> (f64, f64) {
     let by_sd = known.sd.map(|sd| [known.estimate - SHOWN_SD * sd, known.estimate + SHOWN_SD * sd]);
     let open =
@@ -166,7 +168,7 @@ fn shown_range(known: &CornerParameter) -> (f64, f64) {
     (low - room, high + room)
 }
 
-/// Position of a value relative to the middle of a cell.
+/// Position of a value relative to the middle of a cell; the distance between cell centres is 1.
 fn cell_position(value: f64, (low, high): (f64, f64)) -> f64 {
     INSIDE * (2.0 * (value - low) / (high - low) - 1.0)
 }
@@ -216,8 +218,8 @@ fn draw_cells(shown: &CornerPlot) -> Vec<Series> {
     let pairs = || (0..count).flat_map(|i| (0..i).map(move |j| (i, j)));
     let pair = |(i, j): (usize, usize)| (&shown.parameters[i], &shown.parameters[j]);
     let diagonal = || shown.parameters.iter().enumerate();
-    // `point` converts a value of the column's parameter and one of the row's parameter; `upright` converts a
-    // value and a height in a diagonal cell
+    // `point` converts the values of two parameters to a point in their common cell; `upright` converts a
+    // value and a height to a point in a diagonal cell
     let point = |(i, j): (usize, usize), x: f64, y: f64| {
         clip_to_cell((cell_position(x, spans[j]), cell_position(y, spans[i])), cell_centre(shown, i, j))
     };
@@ -292,7 +294,7 @@ fn draw_cells(shown: &CornerPlot) -> Vec<Series> {
     all
 }
 
-/// Height in a cell at which a relative likelihood is drawn.
+/// Height, relative to the centre of a cell, at which a relative likelihood is drawn.
 fn likelihood_height(share: f64) -> f64 {
     -INSIDE + CURVE * share
 }

@@ -32,16 +32,17 @@ pub struct CycleOverSpeed {
 
 /// Height of the panel, mm.
 const HEIGHT_MM: f64 = 72.0;
-/// Ratio of the ends of the axes to the largest shown value.
+/// Ratio of the upper end of each axis to the largest value shown on it.
 const AXIS_MARGIN: f64 = 1.12;
-/// Positions of the names along their lines, fractions of the width; the names of lines that lie close
-/// together use these positions in turn.
+/// Positions of names along their horizontal lines, as fractions of the width of the axes. Names of lines
+/// that are close together use these positions in turn.
 const LABEL_POSITIONS: [f64; 3] = [0.24, 0.52, 0.79];
 /// Number of letters after which the name of a target is cut.
 const MAX_LABEL_LETTERS: usize = 12;
-/// Distance between two lines below which their names have different positions, as a fraction of the height.
+/// Lines closer than this have names at different positions along the lines; a fraction of the height of the
+/// axes.
 const CLOSE_LEVELS: f64 = 0.09;
-/// Distance of a name from its line, fraction of the height.
+/// Distance of a name from its line, as a fraction of the height of the axes.
 const LABEL_OFFSET: f64 = 0.022;
 
 /// Draws the figure.
@@ -100,7 +101,7 @@ fn deviation_ribbon(target: &Target, right: f64) -> Option<Ribbon> {
     Some(Ribbon::new("target \u{b1} 2 sd", Colour::Blue, [(0.0, low, high), (right, low, high)]))
 }
 
-/// The names above their lines; the names of lines that lie close together stand side by side.
+/// The names above their lines; names of lines that are close together are placed side by side.
 fn level_names(lines: &[(String, f64, Colour)], (right, top): (f64, f64)) -> Vec<TextAnnotation> {
     let (mut place, mut before) = (0, f64::NEG_INFINITY);
     let mut named = Vec::new();
@@ -113,7 +114,7 @@ fn level_names(lines: &[(String, f64, Colour)], (right, top): (f64, f64)) -> Vec
     named
 }
 
-/// The cycles of model and recording; the recording's is drawn on top.
+/// The points of the cycle in model and recording; those of the recording are drawn on top.
 fn cycle_series(shown: &CycleOverSpeed) -> impl Iterator<Item = Series> {
     let model = speed_series("model", Colour::Vermilion, MarkerShape::Square, &shown.model);
     let measured = speed_series("measured", Colour::Black, MarkerShape::Disc, &shown.measured);
@@ -165,16 +166,17 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     Some(case.figure_block("cycle", words, draw_figure(&shown)))
 }
 
-/// Lowest frequency of the stick-slip cycle, Hz: the frequency above the highest wide gap, since a ridge may
-/// jump between the cycle and the slow swing of the head; 0 without such a gap.
+/// Lowest frequency that counts as the stick-slip cycle, Hz. A ridge may jump between the cycle and the slow
+/// swing of the head; so this is the frequency above the highest wide gap in the sorted frequencies, or 0
+/// without such a gap.
 fn cycle_threshold_hz(mut all: Vec<f64>) -> f64 {
     all.sort_by(f64::total_cmp);
     let gap = all.windows(2).rev().find(|pair| pair[1] > COMPONENT_RATIO * pair[0]);
     gap.map_or(0.0, |pair| pair[1])
 }
 
-/// The main result, from the recording if it shows a cycle, else from the model. A component below the neck's
-/// natural frequency may be the swing of the head, so it is not called a cycle.
+/// The main result, from the recording if it shows a cycle, otherwise from the model. A component below the
+/// natural frequency of the neck may be the swing of the head, so it is not called a cycle.
 fn claim_sentence(shown: &CycleOverSpeed, (low, high): (f64, f64)) -> String {
     let neck_hz = shown.natural_hz.iter().find(|(name, _)| name == "neck").map_or(0.0, |(_, hz)| *hz);
     let what = if high < neck_hz { "strongest component" } else { "cycle" };
@@ -195,7 +197,7 @@ fn claim_sentence(shown: &CycleOverSpeed, (low, high): (f64, f64)) -> String {
     }
 }
 
-/// The measured cycle, or the model's if none was measured.
+/// The points of the measured cycle or, if none was measured, those of the cycle of the model.
 fn cycle_points(shown: &CycleOverSpeed) -> &[SpeedPoint] {
     if shown.measured.is_empty() { &shown.model } else { &shown.measured }
 }

@@ -49,8 +49,8 @@ pub struct EvidencePlot {
     pub parts: Vec<EvidencePart>,
 }
 
-/// A residual counts as noise only if the ratio of its root mean square to the noise is at most this value;
-/// the value exceeds 1 since the noise is known only to a few per cent.
+/// A residual counts as noise only if its root mean square, divided by that of the noise, is at most this
+/// value. The value exceeds 1 since the noise is known only to a few per cent.
 pub(crate) const NOTHING_LEFT: f64 = 1.1;
 /// Heights of the panels, mm.
 const HEIGHT_MM: f64 = 30.0;
@@ -83,7 +83,7 @@ fn draw_panels(shown: &EvidencePlot, index: usize, part: &EvidencePart) -> [Pane
         let scaled: TimeCurve = course.iter().map(|p| p.map(|(t, x)| (t, x * factor))).collect();
         Series::new(label, colour, mark, thin_points(&scaled, part.span_s))
     };
-    // frames are dots in an enlarged part, and a line for the whole recording
+    // frames are drawn as dots in an enlarged part, and as a line in the panel of the whole recording
     let (frames, measured) =
         if whole { (Mark::Thin, "measured") } else { (Mark::Dots, "measured, frame by frame") };
     let details = |of: &[(&TimeCurve, f64)]| {
@@ -121,8 +121,8 @@ fn draw_panels(shown: &EvidencePlot, index: usize, part: &EvidencePart) -> [Pane
     [upper, lower]
 }
 
-/// Maximum number of frames of a curve that a page holds in full; longer curves would exceed the page's size
-/// limit of 1 MB.
+/// A page contains all frames of a curve if there are at most this many; longer curves would exceed the size
+/// limit of a page, 1 MB.
 const MOST_FRAMES: usize = 15_000;
 
 /// All frames of a curve; `None` for fewer than two known values or more than [`MOST_FRAMES`] frames.
@@ -140,12 +140,12 @@ fn sample_curve(course: &TimeCurve, factor: f64) -> Option<SampledSeries> {
 
 // Evidence for a condition: whole recording, release, and worst part after the release.
 
-/// Times by which the enlarged part begins before and ends after the release, s.
+/// Time by which the enlarged part begins before the release, and time by which it ends after the release, s.
 const AROUND_RELEASE_S: (f64, f64) = (0.005, 0.03);
-/// Length of the worst part, s: a dozen cycles of the high component.
+/// Length of the part with the worst misfit, s: a dozen cycles of the high component.
 const LATE_S: f64 = 0.015;
-/// Minimum fraction of the frames of the worst part that have a value. The mean square of fewer values
-/// scatters more, and could be the largest by chance.
+/// Minimum fraction of the frames of a part that must have a value. The mean square of few values scatters
+/// more, and could be the largest by chance.
 const LEAST_PRESENT: f64 = 0.5;
 
 /// The figure of a condition; `None` without a recording, or if recording and model move in opposite
@@ -226,8 +226,8 @@ fn channel_between(motion: &MotionTraces, channel: Channel, (from_s, to_s): (f64
     all.filter(|(t, _)| **t >= from_s && **t <= to_s).map(|(t, x)| x.map(|x| (*t, x))).collect()
 }
 
-/// A smooth curve from the states of the model; `None` if the frames of the recording are at least as close
-/// together as these states.
+/// A smooth curve from the states of the model. `None` for the head drop, or if the frames of the recording
+/// are at least as close together as these states.
 fn model_states_curve(
     case: &ConditionComparison,
     channel: Channel,

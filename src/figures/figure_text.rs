@@ -6,8 +6,8 @@ use crate::model::parameters;
 use crate::text::{join_with_and, truncate_text};
 use plain_charts::Figure;
 
-/// Number of letters after which a title and a name are cut in a heading, so that room for the figure is
-/// left.
+/// Maximum numbers of letters of a title and of a name in a heading. Longer ones are cut, so that room for
+/// the figure is left.
 const TITLE_LETTERS: usize = 120;
 const NAME_LETTERS: usize = 50;
 
@@ -45,14 +45,14 @@ impl ConditionComparison<'_> {
         }
     }
 
-    /// The block of a figure that shows recording and model.
+    /// Builds the block of a figure that shows recording and model.
     pub(crate) fn figure_block(&self, name: &str, words: FigureText, figure: Figure) -> FigureBlock {
         let figure = Figure { subtitle: about(&self.figure_title(), &figure.subtitle), ..figure };
         self.drawing_block(name, words, Drawing::Chart(figure))
     }
 
-    /// The block of a figure of the model alone. Conditions with the same run share this figure, so its
-    /// details name the condition.
+    /// Builds the block of a figure that shows only the model. Conditions with the same run share this
+    /// figure, so its details name the condition.
     pub(crate) fn model_figure_block(&self, name: &str, words: FigureText, drawing: Drawing) -> FigureBlock {
         let of = self.distinct_name().map_or_else(String::new, |name| format!("{name}: "));
         let details = format!("{of}{}{}", words.details, self.sharing_note());

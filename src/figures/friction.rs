@@ -34,7 +34,7 @@ pub struct FrictionPlot {
     pub synthetic: bool,
     /// Fitted law: speeds, ascending, and coefficients.
     pub curve: Vec<(f64, f64)>,
-    /// Smallest and largest speed of the slipping tip.
+    /// Smallest and largest speed of the tip while it slips during the run.
     pub visited: Option<(f64, f64)>,
     /// Speeds, each with the lower and upper end of the coefficient's 95 % interval; empty if there is no
     /// interval.
@@ -121,7 +121,7 @@ fn law_series(law: &FrictionPlot) -> Vec<Series> {
     drawn.into_iter().filter(|s| !s.points.is_empty()).collect()
 }
 
-/// The axis of the coefficients; points far from the law do not widen it.
+/// The axis of the coefficients; its range does not include points far from the law.
 fn coefficient_axis(law: &FrictionPlot) -> ChartAxis {
     const FAR: f64 = 0.5;
     const ROOM: f64 = 0.06;
@@ -144,7 +144,7 @@ fn coefficient_axis(law: &FrictionPlot) -> ChartAxis {
 /// Number of intervals of the curve, and number of speed bins.
 const CURVE_POINTS: usize = 200;
 const SPEED_BINS: usize = 30;
-/// Ratio of the end of the curve to the largest tip speed.
+/// Ratio of the speed at which the curve ends to the largest speed of the tip.
 const SPEED_MARGIN: f64 = 1.15;
 
 /// The figure of a condition; `None` for a model that never slips.
@@ -191,7 +191,7 @@ fn claim_sentence(law: &FrictionLaw, fastest: f64) -> String {
     format!("Friction {how} from {rest} at rest to {moving} at {}", format_speed(fastest))
 }
 
-/// The true law of a synthetic blade; `None` if its file contains none.
+/// The true law of a synthetic blade; `None` if the description of the recording contains none.
 fn true_law(case: &ConditionComparison) -> Option<FrictionLaw> {
     let twin = case.measured.and_then(|m| m.file).and_then(|file| file.twin.as_ref())?;
     let known = twin.get("truth").and_then(toml::Value::as_table)?;

@@ -38,8 +38,8 @@ pub struct TimeHistory {
 const HEIGHT_MM: f64 = 24.0;
 const ENLARGED_HEIGHT_MM: f64 = 32.0;
 const RESIDUAL_HEIGHT_MM: f64 = 13.0;
-/// Height of a window's row, and minimum height of the panel of windows, mm; the label of a lower panel would
-/// not fit.
+/// Height of the row of a window, and minimum height of the panel of windows, mm; in a lower panel its label
+/// would not fit.
 const ROW_MM: f64 = 3.0;
 const LEAST_ROWS_MM: f64 = 12.0;
 /// A quantity whose values span less than this, m, is drawn in micrometres.
@@ -53,7 +53,7 @@ const ENLARGED: [Channel; 3] = [Channel::TipX, Channel::Deflection, Channel::Hea
 pub fn draw_figure(history: &TimeHistory) -> Figure {
     let mut panels = stack_panels(history, &MOTION_CHANNELS, motion_span_s(history), HEIGHT_MM);
     if let Some((from, to)) = history.zoom_s.filter(|(from, to)| from < to) {
-        // outlined, since in grey a third shade could not be told from the other two
+        // drawn as an outline: in grey, a third shade could not be told from the two shades of the sticks
         let marked = ShadedSpan::outline("enlarged", Colour::Black, from, to);
         panels.iter_mut().for_each(|panel| panel.shaded_spans.push(marked.clone()));
     }
@@ -185,7 +185,7 @@ fn draw_window_panel(history: &TimeHistory) -> Option<Panel> {
     (!history.windows.is_empty()).then(|| Panel::new(x, y, height_mm, [series]))
 }
 
-/// Display unit for lengths in this range, and the factor from metres to that unit.
+/// The unit in which lengths of this range are shown, and the factor from metres to that unit.
 pub(super) fn length_unit(values: impl Iterator<Item = f64>) -> (&'static str, f64) {
     let (low, high) = value_span(values);
     if high - low < MICROMETRES_BELOW_M && high.abs().max(low.abs()) < 10.0 * MICROMETRES_BELOW_M {
@@ -198,13 +198,14 @@ pub(super) fn length_unit(values: impl Iterator<Item = f64>) -> (&'static str, f
 // Shaded spans of the stick intervals.
 
 /// Neighbouring sticks are drawn as one span if their durations and the gap between them are below this
-/// fraction of the shown time; on a page, it is less than a millimetre.
+/// fraction of the shown time, which is less than a millimetre on a page.
 const MIN_STICK_GAP: f64 = 0.005;
 
 const STICKS_LABEL: &str = "tip sticks (model)";
 const CYCLES_LABEL: &str = "stick-slip cycles (model)";
 
-/// Shaded spans of long sticks, and of groups of short sticks that are too close together to be told apart.
+/// Shaded spans: one for each long stick, and one for each group of short sticks that are too close together
+/// to be told apart.
 pub(crate) fn stick_spans(stick_s: &[(f64, f64)], (from, to): (f64, f64)) -> Vec<ShadedSpan> {
     let shown: Vec<(f64, f64)> =
         stick_s.iter().filter(|s| s.1 > from && s.0 < to).map(|s| (s.0.max(from), s.1.min(to))).collect();

@@ -25,7 +25,7 @@ pub(crate) fn draw_figure(title: &str, motion: &RunMotion) -> Figure {
     figure.subtitle = format!("simulation; {title}");
     figure.description = format!("A simulated run: {}.", figure.title);
     figure.panels.extend(draw_force_panel(motion, &history));
-    // thin lines, since there is no measurement on top
+    // thin lines, since no measured points are drawn on top
     figure.panels.iter_mut().flat_map(|panel| &mut panel.series).for_each(|series| series.mark = Mark::Thin);
     figure
 }

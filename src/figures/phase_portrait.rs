@@ -82,8 +82,8 @@ fn draw_panel(part: &PortraitPart, frames: Mark) -> Panel {
 /// axis.
 fn deflection_limits_mm(part: &PortraitPart) -> (f64, f64) {
     const AXIS_MARGIN: f64 = 0.05;
-    // smallest margin, relative to the largest value; a smaller one is rounding error and too small for tick
-    // labels
+    // smallest margin, relative to the largest value; a smaller margin would be rounding error and too small
+    // for tick labels
     const LEAST_SPAN: f64 = 1e-4;
     let all = part.measured.iter().chain(&part.model).flatten().map(|(x, _)| x * 1e3);
     let (low, high) = value_span(all.filter(|x| x.is_finite()));
@@ -100,25 +100,26 @@ pub(crate) const MAX_VELOCITY_NOISE: f64 = 0.1;
 /// 0.4 %, but the velocity noise 51 mm/s, a quarter of a typical velocity range.
 const MAX_DIFFERENCE_PERIODS: f64 = 0.2;
 
-/// Central difference: velocity from the positions in two frames, equally far before and after.
+/// Central difference: the velocity in a frame, from the positions in one frame before it and one equally far
+/// after it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CentralDifference {
-    /// Number of frames from the middle to either of the two frames.
+    /// Number of frames from the middle frame to either of the two frames.
     pub half_frames: usize,
     /// Frame rate, 1/s.
     pub frame_rate_hz: f64,
 }
 
 impl CentralDifference {
-    /// The difference between the frames directly before and after.
+    /// The central difference between the frames directly before and after.
     pub(crate) fn of_neighbouring_frames(frame_rate_hz: f64) -> Self {
         Self { half_frames: 1, frame_rate_hz }
     }
 
-    /// The shortest difference whose velocity noise, for white position noise, m, is below
-    /// [`MAX_VELOCITY_NOISE`] times the velocity range, m/s. The time between its frames is at most a fifth
-    /// of a period of the fastest component, Hz, even if the noise is then larger. If that frequency is
-    /// unknown, the difference is that between neighbouring frames.
+    /// The shortest difference whose velocity noise is below [`MAX_VELOCITY_NOISE`] times the velocity range
+    /// `swing_m_per_s`; `noise_m` is the standard deviation of the white position noise. The time between the
+    /// two frames is at most a fifth of a period of `fastest_hz`, even if the noise is then larger. If
+    /// `fastest_hz` is unknown, it is the difference between neighbouring frames.
     pub(crate) fn for_noise(rate_hz: f64, noise_m: f64, swing_m_per_s: f64, fastest_hz: Option<f64>) -> Self {
         let shortest = Self::of_neighbouring_frames(rate_hz);
         let least = (shortest.noise_m_per_s(noise_m) / (MAX_VELOCITY_NOISE * swing_m_per_s)).ceil();
@@ -132,20 +133,20 @@ impl CentralDifference {
         2.0 * self.half_frames as f64 / self.frame_rate_hz
     }
 
-    /// Standard deviation of the velocity, m/s, for white position noise, m: `sqrt(2)` times the noise,
-    /// divided by the time between the frames.
+    /// Standard deviation of the velocity, m/s: `sqrt(2)` times the standard deviation of the white position
+    /// noise, m, divided by the time between the two frames.
     pub(crate) fn noise_m_per_s(&self, noise_m: f64) -> f64 {
         noise_m * std::f64::consts::SQRT_2 / self.frame_gap_s()
     }
 
-    /// Gain at a frequency, Hz: `sin(x)/x`, where `x` is pi times the frequency times the time between the
-    /// frames.
+    /// Ratio of the velocity amplitude given by the difference to the true one, at a frequency, Hz:
+    /// `sin(x)/x`, where `x` is pi times the frequency times the time between the two frames.
     pub(crate) fn velocity_gain(&self, frequency_hz: f64) -> f64 {
         let x = std::f64::consts::PI * frequency_hz * self.frame_gap_s();
         if x > 0.0 { math::sin(x) / x } else { 1.0 }
     }
 
-    /// Time from the middle to either frame, s.
+    /// Time from the middle frame to either of the two frames, s.
     pub(crate) fn half_width_s(&self) -> f64 {
         self.half_frames as f64 / self.frame_rate_hz
     }
@@ -301,12 +302,12 @@ fn stick_duration_s(case: &ConditionComparison, from_s: f64, length_s: f64) -> f
     case.model.motion.stick_s.iter().map(inside_s).sum()
 }
 
-/// The chosen difference, and the values from which it was chosen.
+/// The chosen central difference, and the values from which it was chosen.
 struct VelocityEstimate {
     difference: CentralDifference,
     /// Noise of the recorded tip, m.
     noise_m: Option<f64>,
-    /// Smallest velocity range of the model in any part, m/s; the range of a recording would include noise.
+    /// Smallest velocity range of the model in any part, m/s. The range in a recording would include noise.
     swing_m_per_s: Option<f64>,
     fastest_hz: Option<f64>,
 }
@@ -351,8 +352,8 @@ fn build_part(
     PortraitPart { name: span.name.clone(), measured: measured.unwrap_or_default(), model }
 }
 
-/// States of the model at every sample, with velocities from the same difference as those of the recording;
-/// `None` if the samples are too far apart.
+/// States of the model at every sample. Their velocities come from the same central difference as those of
+/// the recording. `None` if the samples are too far apart.
 fn differenced_states(
     case: &ConditionComparison,
     (from_s, to_s): (f64, f64),
@@ -483,8 +484,8 @@ mod tests {
 
     const FASTEST_HZ: f64 = 900.0;
 
-    /// Position of a tip that oscillates with the given amplitude, m, in the given number of frames, with
-    /// white noise, m; and its exact velocity.
+    /// Positions, m, of a tip that oscillates with the given amplitude, m, with added white noise of the
+    /// given standard deviation, m; and the exact velocities, m/s.
     fn swinging(rate_hz: f64, amplitude_m: f64, noise_m: f64, frames: u32) -> (Vec<Option<f64>>, Vec<f64>) {
         let mut state = 7_u64;
         let mut draw = || {
@@ -497,7 +498,7 @@ mod tests {
         (tip, (0..frames).map(|i| amplitude_m * angular * phase(i).cos()).collect())
     }
 
-    /// Standard deviation of the velocities from `share` times the exact velocities, m/s.
+    /// Root mean square of the velocities minus `share` times the exact velocities, m/s.
     fn off(difference: CentralDifference, tip: &[Option<f64>], exact: &[f64], share: f64) -> f64 {
         let found = difference.phase_points(tip, tip);
         let squares: Vec<f64> = found

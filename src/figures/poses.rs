@@ -27,7 +27,7 @@ pub struct ReversalPose {
     pub head_m_per_s: f64,
 }
 
-/// Largest distance in time between a hold and the reversal, as a fraction of the run.
+/// Largest time between a hold and the reversal, as a fraction of the duration of the run.
 const NEAR_TURN: f64 = 0.05;
 /// Ratio of the deflection at the pose `half way` to the deflection at the start of the hold.
 const HALF_WAY: f64 = 0.5;
@@ -224,28 +224,30 @@ const HEIGHT_MM: f64 = 40.0;
 
 // The following constants are in lengths of the upright blade, so that every blade fits its drawing.
 
-/// Smallest half width of a drawing; margin beside the tip of a blade that leans farther; half width of the
-/// glass.
+/// Smallest half width of a drawing; margin next to the tip of a blade that leans farther than that; half
+/// width of the glass. All are in lengths of the upright blade.
 const HALF_WIDTH: f64 = 0.5;
 const BESIDE_TIP: f64 = 0.1;
 const GLASS: f64 = 0.85;
-/// Lower and upper end of a drawing.
+/// Heights of the lower and the upper end of a drawing above the glass, in lengths of the upright blade.
 const FOOT: f64 = -0.5;
 const TOP: f64 = 1.34;
-/// Half width and height of the head.
+/// Half width and height of the drawn head, in lengths of the upright blade.
 const HEAD: (f64, f64) = (0.16, 0.14);
 /// Length of the longest arrow, size of its barbs, and heights at which the arrows of velocity and friction
-/// are drawn.
+/// are drawn, in lengths of the upright blade.
 const ARROW: f64 = 0.36;
 const BARB: f64 = 0.06;
 const VELOCITY_AT: f64 = 1.24;
 const FRICTION_AT: f64 = -0.13;
-/// Height of the time label, and distance of the state label below it in a drawing of the smallest width.
+/// Height of the time label, and distance of the state label below it in a drawing of the smallest width, in
+/// lengths of the upright blade.
 const TEXT_AT: f64 = -0.28;
 const TEXT_APART: f64 = 0.13;
-/// Largest length of the scale bar, its height, and the distance of its label above it.
+/// Largest length of the scale bar, its height, and the distance of its label above it, in lengths of the
+/// upright blade.
 const SCALE_BAR: (f64, f64, f64) = (0.4, 0.55, 0.09);
-/// Spacing and depth of the hatching of the glass.
+/// Spacing and depth of the hatching of the glass, in lengths of the upright blade.
 const HATCHING: (f64, f64) = (0.08, 0.06);
 /// Arrows shorter than this fraction of the longest arrow are not drawn; only their barbs would show.
 const LEAST_ARROW: f64 = 0.25;
@@ -286,7 +288,8 @@ impl ArrowScale {
 fn draw_panel(shown: &PoseSequence, longest: &ArrowScale, pose: &ReversalPose, first: bool) -> Panel {
     let length_m = shown.linkage.l1_m + shown.linkage.l2_m;
     let unit_mm = 1e3 * length_m;
-    // relative to the head, in lengths of the upright blade
+    // positions along the sweep relative to the head, and heights above the glass, in lengths of the upright
+    // blade
     let [head, hinge, tip] = joint_positions(&shown.linkage, &pose.sample)
         .map(|(x, y)| ((x - pose.sample.head_x_m) / length_m, y / length_m));
     let lean = |p: &ReversalPose| (p.sample.tip_x_m - p.sample.head_x_m).abs() / length_m;
@@ -316,13 +319,13 @@ fn draw_panel(shown: &PoseSequence, longest: &ArrowScale, pose: &ReversalPose, f
     // a wider drawing has a smaller scale, but letters keep their size
     let apart = TEXT_APART * half / HALF_WIDTH;
     let state = pose.sample.mode.name().replace('-', "\u{2212}");
-    // samples are about a tenth of a millisecond apart
+    // one decimal, since samples are about a tenth of a millisecond apart
     let time = format!("{} ms", format_decimals(1e3 * pose.after_turn_s, 1));
     let mut texts = vec![text(time, (0.0, TEXT_AT)), text(state, (0.0, TEXT_AT - apart))];
     if first {
         let (most, height, over) = SCALE_BAR;
         let bar_mm = scale_bar_mm(most * unit_mm);
-        let end = -HALF_WIDTH.copysign(tip.0); // on the side to which the blade does not lean
+        let end = -HALF_WIDTH.copysign(tip.0); // on the side away from the tip
         let bar = (end, end - (bar_mm / unit_mm).copysign(end));
         series.push(line("", Colour::Black, Mark::Thick, vec![Some((bar.0, height)), Some((bar.1, height))]));
         texts.push(text(format!("{} mm", format_short(bar_mm)), ((bar.0 + bar.1) / 2.0, height + over)));

@@ -1,5 +1,5 @@
-//! Profile likelihoods: rise of the cost along each parameter with the other parameters refitted, and the
-//! intervals that follow from it.
+//! Profile likelihoods: rise of the cost along each parameter while the other parameters are refitted, and
+//! the intervals that follow from it.
 
 use super::figure_text::parameter_symbol;
 use crate::compare::ParameterLine;
@@ -29,7 +29,8 @@ pub struct ParameterProfile {
     pub estimate: f64,
     /// True value, if the data are synthetic.
     pub truth: Option<f64>,
-    /// Values of the parameter, ascending, each with the rise of the least cost at that value.
+    /// Values of the parameter, ascending, each with the rise of the least cost at that value above the least
+    /// cost of all.
     pub points: Vec<(f64, f64)>,
     /// Values of the parameter, each with the rise of the cost that the linear model at the estimate
     /// predicts; empty if that model does not determine the parameter.
@@ -59,8 +60,8 @@ pub struct ProfilePlot {
 const HEIGHT_MM: f64 = 29.0;
 /// Upper end of the cost axis, in units of the threshold; values with a higher cost are excluded anyway.
 const SHOWN: f64 = 3.0;
-/// Names, symbols and heights (in units of the threshold) of the intervals; they lie inside the cup of the
-/// profile.
+/// Names, symbols and heights (in units of the threshold) of the intervals; they are drawn between the two
+/// branches of the profile.
 const STATED: (&str, f64) = ("95 % interval, as stated", 1.2);
 const INTERVALS: [(&str, Colour, MarkerShape, f64); 3] = [
     ("profile", Colour::Blue, MarkerShape::Disc, 1.6),
@@ -71,7 +72,7 @@ const INTERVALS: [(&str, Colour, MarkerShape, f64); 3] = [
 const ROOM: f64 = 0.06;
 
 impl ProfilePlot {
-    /// The profiles of a fit; `lines` hold units and true values.
+    /// The profiles of a fit; `lines` contain units and true values.
     pub(crate) fn from_fit(job: &Job, result: &FitResult, lines: &[ParameterLine]) -> Self {
         let parameters = job.parameters.iter().filter_map(|free| parameter_profile(free, result, lines));
         Self {
@@ -248,7 +249,7 @@ fn interval_bar(
     })
 }
 
-/// Shaded spans of those parts of the shown range that lie outside the bounds.
+/// Shaded spans over those parts of the x axis that are outside the bounds of the search.
 fn out_of_bounds_spans(profile: &ParameterProfile, factor: f64, (low, high): (f64, f64)) -> Vec<ShadedSpan> {
     let (lower, upper) = (profile.bounds.0 * factor, profile.bounds.1 * factor);
     let band = |from, to| ShadedSpan::new("out of bounds", Colour::Grey, from, to);
@@ -343,7 +344,7 @@ fn title_word(verdict: ParameterVerdict) -> String {
     verdict.name().replace('-', " ")
 }
 
-/// Whether both ends of the profile's interval are known.
+/// Whether both ends of the interval from the profile are known.
 fn is_closed(profile: &ParameterProfile) -> bool {
     profile.intervals[0].is_some_and(|ends| ends.iter().all(Option::is_some))
 }
@@ -362,7 +363,7 @@ fn describe_interval(profile: &ParameterProfile) -> String {
     format!("{} {ends} {unit}", profile.symbol).trim_end().to_owned()
 }
 
-/// Whether the cost exceeds the threshold on a side on which the interval is open.
+/// Whether the interval is open on a side on which the cost nevertheless exceeds the threshold.
 fn is_open_but_rising(profile: &ParameterProfile, threshold: f64) -> bool {
     let [lower, upper] = profile.intervals[0].unwrap_or_default();
     let rises = |below: bool| {
@@ -533,7 +534,7 @@ mod tests {
         }
     }
 
-    /// Rise of a parabola at its point nearest to a value.
+    /// Rise of the cost at the point of a parabola that is nearest to a value of the parameter.
     fn at(parabola: &[(f64, f64)], value: f64) -> f64 {
         parabola.iter().min_by(|a, b| (a.0 - value).abs().total_cmp(&(b.0 - value).abs())).unwrap().1
     }

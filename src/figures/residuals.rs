@@ -1,5 +1,5 @@
 //! Comparison of the residual of a model with white noise: size, autocorrelation, spectrum, and growth with
-//! the length of a run.
+//! the length of the segments in which the model is run.
 
 use super::{FigureBlock, FigureText};
 use crate::compare::ConditionComparison;
@@ -18,11 +18,12 @@ pub struct ResidualDiagnostics {
     pub note: String,
     /// Whether the recording is synthetic.
     pub synthetic: bool,
-    /// Bins of the histogram of residual over noise: lower edge, upper edge, and density of the frames.
+    /// Bins of the histogram of residual divided by noise: lower edge, upper edge, and fraction of the frames
+    /// per unit of the ratio.
     pub histogram: Vec<(f64, f64, f64)>,
     /// Lags, s, and the autocorrelation of the residual.
     pub correlation: Vec<(f64, f64)>,
-    /// Value that the absolute autocorrelation of white noise exceeds at only 5 % of the lags.
+    /// Value that the absolute autocorrelation of white noise exceeds at 5 % of the lags.
     pub white_95: f64,
     /// Frequencies, Hz, each with the ratio of the power density of the residual to that of the noise.
     pub spectrum: Vec<(f64, f64)>,
@@ -119,7 +120,7 @@ fn draw_growth(shown: &ResidualDiagnostics) -> Option<Panel> {
 /// Number of bins of the histogram, and minimum half width of its range, standard deviations of the noise.
 const HISTOGRAM_BINS: usize = 40;
 const MIN_HISTOGRAM_RANGE: f64 = 4.0;
-/// Longest lag, in frames and as a fraction of the recording.
+/// Longest lag of the autocorrelation: the smaller of a number of frames and a fraction of the recording.
 const MAX_LAGS: usize = 60;
 const MAX_LAG_FRACTION: f64 = 0.25;
 /// Minimum number of frames that a figure needs.
@@ -130,8 +131,8 @@ const MAX_SPECTRUM_POINTS: usize = 300;
 const TAPERS: usize = 9;
 /// Half width of a two-sided 95 % interval, standard deviations.
 const Z_95: f64 = 1.96;
-/// A residual counts as white noise if the ratio of its root mean square to the noise is below 1 plus this
-/// value and the absolute correlation of neighbouring frames is below this value.
+/// A residual counts as white noise if its root mean square, divided by that of the noise, is below 1 plus
+/// this value, and the absolute correlation of neighbouring frames is below this value.
 const WHITE_NOISE_TOLERANCE: f64 = 0.1;
 
 /// The figure of a condition; `None` without a recording, with too few frames, or if recording and model move
@@ -190,8 +191,7 @@ fn claim_sentence(rms: f64, neighbours: f64) -> String {
     format!("The residual is {is} noise: {size} times its size, correlation {r}")
 }
 
-/// Histogram of the values, over a range symmetric about zero: lower edge, upper edge and density of each
-/// bin.
+/// Histogram of the values over a range symmetric about zero: lower edge, upper edge and density of each bin.
 fn histogram_bins(values: &[f64]) -> Vec<(f64, f64, f64)> {
     let end = values.iter().map(|x| x.abs()).filter(|x| x.is_finite()).fold(MIN_HISTOGRAM_RANGE, f64::max);
     let width = 2.0 * end / HISTOGRAM_BINS as f64;

@@ -26,7 +26,7 @@ pub struct ComponentDecay {
     pub fitted: RingDownTrace,
     /// Upper envelope of the component.
     pub envelope: RingDownTrace,
-    /// The data without the trend and the other components.
+    /// The data minus the trend and the other components.
     pub data: RingDownTrace,
 }
 
@@ -127,7 +127,7 @@ fn frame_mark(trace: &RingDownTrace) -> Mark {
 fn draw_whole_panel(shown: &RingDown) -> Panel {
     let traces = [
         ("data", Colour::Grey, frame_mark(&shown.data), &shown.data),
-        // not called a fit, since the sum is not a model of the blade
+        // this curve is not called a fit, since the sum is not a model of the blade
         ("trend + oscillations", Colour::Vermilion, Mark::Line, &shown.fitted),
         ("trend", Colour::Blue, Mark::ThinDashed, &shown.trend),
     ];

@@ -76,7 +76,8 @@ pub struct SpectrogramPlot {
 /// Heights of the two panels, mm.
 const HEIGHT_MM: f64 = 72.0;
 const SPEED_HEIGHT_MM: f64 = 38.0;
-/// Fraction of the cells that lie below the first colour; these cells contain only noise.
+/// Fraction of the cells, those of smallest amplitude, whose values are below that of the first colour; they
+/// contain only noise.
 const UNDER_COLOURS: f64 = 0.1;
 /// The range of colours begins and ends at multiples of this, dB.
 const STEP_DB: f64 = 5.0;
@@ -202,8 +203,8 @@ pub(crate) fn describe_ridge_segments(
 
 // Data of a spectrogram and of its ridge.
 
-/// Adds to a plot the times, frequencies and amplitudes of a spectrogram, up to a number of frequency bins,
-/// and the parts of its ridge with gaps between them.
+/// Copies times, frequencies and amplitudes of a spectrogram, up to a number of frequency bins, to a plot;
+/// also the parts of its ridge, with gaps between them.
 pub(super) fn fill_map(
     plot: SpectrogramPlot,
     spectrogram: &time_frequency::Spectrogram,
@@ -233,12 +234,12 @@ pub(super) fn fill_map(
 
 /// Number of letters after which a name is cut in a map.
 const MAX_LABEL_LETTERS: usize = 14;
-/// Distance of a name from its line, and smallest distance of two lines whose names are both above them;
-/// fractions of the height.
+/// Distance of a name from its line, and smallest distance of two lines whose names are both above them, as
+/// fractions of the height of the map.
 const LABEL_OFFSET: f64 = 0.05;
 const CLOSE_TARGETS: f64 = 0.1;
-/// Range within which the middle of a name lies, fractions of the width, so that the name stays inside the
-/// axes.
+/// Range of the middle of a name along the time axis, as fractions of the width of the map, so that the name
+/// stays inside the axes.
 const LABEL_LIMITS: (f64, f64) = (0.3, 0.7);
 
 /// Target lines over the ridges; met and missed targets have different styles.

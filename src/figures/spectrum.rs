@@ -27,7 +27,7 @@ pub struct SpectraPlot {
     pub title: String,
     /// Quantity, such as "deflection".
     pub quantity: String,
-    /// Origin of the record, such as its window; empty for none.
+    /// Note on the analysed record, such as its window; empty for none.
     pub note: String,
     /// Whether the measured motion is synthetic.
     pub synthetic: bool,
@@ -43,7 +43,7 @@ pub struct SpectraPlot {
     pub noise_floor: Option<SpectrumLevel>,
     /// 95 % interval of the measured spectrum, from its noise floor.
     pub interval_95: Option<AmplitudeInterval>,
-    /// Leakage of the removed flip into the spectrum.
+    /// Amplitude that the removed trend, which contains the flip of the blade, would have in the spectrum.
     pub leakage: Option<SpectrumLevel>,
     /// Components of the measured spectrum with their uncertainty.
     pub components: Vec<LabelledComponent>,

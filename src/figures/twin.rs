@@ -27,7 +27,7 @@ pub(crate) struct TwinPlot<'a> {
     pub tracked: &'a Recording,
     /// Exposure of a frame, s.
     pub exposure_s: f64,
-    /// Standard deviation of a tracked coordinate, m.
+    /// Standard deviation of the noise of a tracked coordinate, m.
     pub noise_m: f64,
     /// Intervals in which the tip sticks, s.
     pub stick_s: &'a [[f64; 2]],
@@ -94,14 +94,14 @@ fn deflection_points(recording: &Recording) -> Vec<Option<(f64, f64)>> {
     (0..grid.frames).map(|at| Some((grid.time_s(at), 1e3 * deflection_m(recording, at)?))).collect()
 }
 
-/// Noise-free points of the frames in which head or tip is lost.
+/// Points of the motion without noise in those frames in which head or tip is lost.
 fn lost_points(twin: &TwinPlot) -> Vec<Option<(f64, f64)>> {
     let tracked = deflection_points(twin.tracked);
     let seen = deflection_points(twin.seen).into_iter().zip(tracked);
     seen.filter(|(_, found)| found.is_none()).map(|(seen, _)| seen).collect()
 }
 
-/// Deflection in a recording minus that of the motion at the same instant, m.
+/// Deflection in a recording minus the deflection of the simulated motion at the same instants, m.
 fn difference_points(twin: &TwinPlot, of: &Recording) -> Vec<Option<(f64, f64)>> {
     let (grid, traces) = (of.grid(), twin.motion.traces());
     let difference = |at: usize| {
@@ -225,7 +225,7 @@ mod tests {
         assert_eq!(release_instants(&twin), [("longest stick ends", 1.2), ("stick-slip", 1.45)]);
         let missing = deflection_points(&tracked).iter().filter(|point| point.is_none()).count();
         assert!(missing > 50 && lost_points(&twin).iter().flatten().count() == missing);
-        // there is no blur in this view, and the difference has the stated noise
+        // these frames have no motion blur; the scatter of the tracked frames is the stated noise
         assert!(difference_points(&twin, twin.seen).into_iter().flatten().all(|(_, m)| m.abs() < 2e-7));
         let noise: Vec<f64> =
             difference_points(&twin, &tracked).into_iter().flatten().map(|(_, m)| m).collect();

@@ -21,8 +21,8 @@ const SHOWN: [(&str, &str); 4] = [
 const NEAR: usize = 5;
 /// Height of a panel, mm.
 const DRAWING_MM: f64 = 42.0;
-/// Number of pixels across a panel; then the part of the video frame that is shown, in lengths of the blade:
-/// half width about the head, and heights above the glass. This part is larger than any panel.
+/// Number of pixels across a panel; then the part of the video frame that is resampled, in lengths of the
+/// blade: half width about the head, and heights above the glass. This part is larger than any panel.
 const FRAME_POINTS: usize = 256;
 const FRAME_HALF: f64 = 1.5;
 const FRAME_HEIGHTS: [f64; 2] = [-0.3, 1.3];
@@ -51,8 +51,8 @@ impl Frame {
     }
 }
 
-/// A frame of the recording with the pose of the model. Positions are along the sweep, relative to the
-/// model's head, and above the glass, m.
+/// A frame of the recording with the pose of the model. Each position, m, is relative to the head of the
+/// model along the sweep, and above the glass in height.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Instant {
     /// Name of the event, such as `upright`.
@@ -68,7 +68,7 @@ pub struct Instant {
 }
 
 impl Instant {
-    /// Distances of the tracked head and tip from those of the model, m, each with the name of the point.
+    /// Distances between tracked and modelled position of head and tip, m, each with the name of the point.
     fn distances_m(&self) -> [(&'static str, f64); 2] {
         let [head, _, tip] = self.joints_m;
         let apart = |(x, y): (f64, f64), (to_x, to_y): (f64, f64)| math::hypot(to_x - x, to_y - y);
@@ -120,7 +120,7 @@ fn instant(
     let at = frames.filter(|at| (0.0..grid.frames as f64).contains(at)).map(|at| at as usize).find(has)?;
     let time_s = grid.time_s(at);
     let model_s = time_s - case.alignment.shift_s;
-    // measured minus model at the instant, minus an offset
+    // measured minus model at the instant, minus the offset that aligns the model
     let apart_m = |measured: &[Option<f64>], model: &[Option<f64>], added_m: f64| {
         Some((*measured.get(at)?)? - view.interpolate_column(model, model_s)? - added_m)
     };

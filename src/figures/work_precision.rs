@@ -27,7 +27,7 @@ pub struct WorkPrecision {
     pub error_label: String,
     /// The runs.
     pub points: Vec<WorkPrecisionRun>,
-    /// Accuracy of the reference; errors smaller than this are drawn at this value.
+    /// Error of the reference itself; errors smaller than this are drawn at this value.
     pub floor: Option<f64>,
 }
 

@@ -105,7 +105,7 @@ fn fill_report_sections(
     }
 }
 
-/// The condition whose friction figure also represents the condition `of`, since both have the same run.
+/// The condition whose friction figure is also that of the condition `of`, since both have the same run.
 fn shared_law_case<'a, 'b>(
     cases: &'b [ConditionComparison<'a>],
     of: usize,
@@ -126,9 +126,9 @@ fn condition_figures(case: &ConditionComparison, law: Option<&ConditionCompariso
     parts.into_iter().flatten().collect()
 }
 
-/// The figures of all conditions: histories, spectra, spectrograms and phase portraits, and for every
-/// condition except `telling` also its [`condition_figures`]. Those of `telling` are in the answer at the top
-/// of the page.
+/// The figures of all conditions: histories, spectra, spectrograms and phase portraits. All conditions except
+/// `telling` also get their [`condition_figures`] here; those of `telling` are in the answer at the top of
+/// the page.
 fn measured_figures(cases: &[ConditionComparison], telling: usize) -> Vec<FigureBlock> {
     let all = |(i, case): (usize, &ConditionComparison)| {
         let shown = shared_law_case(cases, telling).map(|law| law.condition);
@@ -194,12 +194,13 @@ fn probe_line(found: &crate::fit::identifiability::Probe) -> ProbeLine {
     }
 }
 
-/// Notes of the fit, without those of the gate, which have a section of their own.
+/// Notes of the fit, without the notes of the gate (the check before the search), which have their own
+/// section.
 fn fit_notes(measured: &[FittedRecording], result: &FitResult) -> Vec<String> {
     let mut notes: Vec<String> =
         result.notes.iter().filter(|note| !result.gate.notes.contains(note)).cloned().collect();
     let freed = result.nuisances.iter().any(|nuisance| nuisance.recording.is_none());
-    // a fit to traces without freed constants already has such a note
+    // a fit to traces in which no constants are fitted already has such a note
     let exact = match (freed, &result.misfit) {
         (true, _) => Some("every number of the scene that is not freed"),
         (false, None) => Some("every other number of the scene"),
@@ -241,7 +242,7 @@ mod tests {
         };
         let conditions: Vec<ModelCondition> = job.conditions.iter().map(|_| condition()).collect();
         let model = SceneModel::new(conditions, job.parameter_names(), PlausibilityLimits::default());
-        // everything in one thread, in which the runs are counted
+        // everything runs in one thread, since the runs are counted per thread
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
         let (runs, figures) = pool.install(|| {
             let models = run_conditions(&job, &model, &result).unwrap();

@@ -123,7 +123,7 @@ pub struct ComparedFit {
 }
 
 impl FitComparison {
-    /// The statements as lines of text.
+    /// The statements of the comparison as lines of text.
     pub(crate) fn summary(&self) -> Vec<String> {
         self.statements.iter().map(Statement::plain_text).collect()
     }
@@ -188,7 +188,7 @@ impl IntervalRelation {
     }
 }
 
-/// Verdicts with which the interval reflects the data; an open end extends to infinity.
+/// Verdicts for which the interval of a parameter reflects the data; an open end then extends to infinity.
 const COMPARABLE_VERDICTS: [ParameterVerdict; 3] =
     [ParameterVerdict::Identified, ParameterVerdict::OpenBelow, ParameterVerdict::OpenAbove];
 

@@ -49,7 +49,7 @@ fn assemble_page(report: &Report, narrow: bool) -> String {
     ]
     .concat();
     let measured = if report.recordings.is_empty() { "The model alone" } else { "Measured against model" };
-    // the gate examines features, on which a fit to traces does not depend
+    // the gate (the check before the search) examines features, which a fit to traces does not use
     let search = if report.misfit.is_some() { "Search" } else { "Search and gate" };
     let sections = [
         open("answer", "Answer", answer),
@@ -193,7 +193,7 @@ fn commands_html(p: &Provenance) -> String {
     )
 }
 
-/// A row of the table of events: its name, its value for a run, and whether any value but `none` is bad.
+/// A row of the table of events: its name, its value for a run, and whether every value except `none` is bad.
 type EventRow = (&'static str, fn(&RunSummary) -> String, bool);
 
 const EVENT_ROWS: [EventRow; 12] = [
@@ -228,7 +228,8 @@ const EVENT_ROWS: [EventRow; 12] = [
 ];
 
 const NO_EVENTS: &str = "none";
-/// Forces below this are rounding errors of zero, N; the preload of the blade is some 0.1 N.
+/// Smaller forces, N, are shown as zero, since they are rounding errors; the preload of the blade is about
+/// 0.1 N.
 const ROUNDING_N: f64 = 1e-9;
 
 fn force_text(newtons: f64) -> String {

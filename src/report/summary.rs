@@ -15,9 +15,9 @@ use crate::text::{
 };
 use serde::Serialize;
 
-/// Ratio of residual to noise above which a run visibly deviates from the recording.
+/// A run visibly deviates from the recording if the ratio of its residual to the noise exceeds this value.
 const SEEN: f64 = 3.0;
-/// Deviation of the model from a met target above which it is mentioned, in standard deviations.
+/// Number of standard deviations from a met target above which the deviation of the model is mentioned.
 const FAR_SD: f64 = 1.96;
 
 /// The answer of a report.
@@ -143,7 +143,7 @@ fn trace_headline(report: &Report, misfit: &TraceMisfit) -> Statement {
     Statement::with_details(words, details, Some(misfit.explained))
 }
 
-/// Sentence on the deviation of a single run from its start; traces are fitted in shorter segments.
+/// Sentence on the residual of one run of the model from start to end; the fit itself uses shorter segments.
 fn single_run_sentence(report: &Report) -> Option<Sentence> {
     let (condition, r) = farthest_residual(report)?;
     let ratio = r.rms_over_noise.filter(|ratio| *ratio > NOTHING_LEFT)?;
@@ -170,7 +170,8 @@ fn channel_point_name(channel: &str) -> &str {
     }
 }
 
-/// Index of the condition whose single run has the largest ratio of residual to noise, with that residual.
+/// Index of the condition in which the residual of one run of the model is largest relative to the noise; and
+/// that residual.
 pub(in crate::report) fn farthest_condition(
     conditions: &[ComparisonSummary],
 ) -> Option<(usize, &ResidualSummary)> {
@@ -339,10 +340,11 @@ fn next_step_sentence(report: &Report) -> Sentence {
     Sentence::new("Test the model on a recording that was not fitted, at another speed or preload.")
 }
 
-/// An estimate lies at a bound if it is closer to it than this fraction of the range.
+/// An estimate counts as being at a bound if its distance from the bound is below this fraction of the range
+/// between the bounds.
 const AT_BOUND: f64 = 1e-3;
 
-/// Whether a search ended at a bound; the best value may then lie beyond the bound.
+/// Whether the estimate of a parameter is at a bound; a better value may then exist beyond the bound.
 fn is_at_bound(p: &ParameterLine) -> bool {
     let [lower, upper] = p.bounds;
     let near = AT_BOUND * (upper - lower);

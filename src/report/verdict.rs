@@ -15,7 +15,7 @@ use serde::Serialize;
 
 /// The verdict on a fit.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
-#[allow(clippy::struct_excessive_bools)] // one for each question of a script
+#[allow(clippy::struct_excessive_bools)] // one for each question that a script may have
 pub struct ReportVerdict {
     /// Whether the model explains the traces that were fitted. In a fit without traces: whether the estimated
     /// errors of the cameras are compatible with their priors.
@@ -116,7 +116,7 @@ fn verdict_statements(report: &Report) -> Vec<Statement> {
     found
 }
 
-/// Statement for features that are met only with a camera far from its prior.
+/// Statement that the features are met only with estimated camera errors far from their priors.
 fn far_camera_statement(report: &Report) -> Option<Statement> {
     let reasons = far_from_priors(&report.nuisances);
     let is_far = report.misfit.is_none() && !reasons.is_empty();
@@ -145,7 +145,7 @@ fn residual_sentence(c: &ChannelMisfit) -> Sentence {
 const NOUNS: [[&str; 2]; 3] =
     [["value that was", "values that were"], ["component", "components"], ["feature", "features"]];
 
-/// Statement such as "2 of 2 components are met", with details on the `listed` ones.
+/// Statement such as "2 of 2 components are met", with details on the entries for which `listed` is true.
 fn met_statement(
     noun: &str,
     how: &str,
@@ -266,7 +266,7 @@ fn ending_statements(report: &Report) -> Vec<Statement> {
     found
 }
 
-/// Statement on losses of contact and jams after which a run went on; `None` if there were none.
+/// Statement on how often the tip lost contact or jammed in a run; `None` if it never did.
 fn hard_event_statement(run: &RunSummary) -> Option<Statement> {
     let counts = [(run.contact_losses, "leaves the glass"), (run.jams, "jams")];
     let happened = counts.into_iter().filter(|(count, _)| *count > 0);

@@ -23,7 +23,7 @@ pub struct RecordingLine {
 }
 
 impl RecordingLine {
-    /// Adds findings that only the folder of the recording could show.
+    /// Adds findings that follow from the files in the folder of the recording.
     pub(crate) fn add_findings(&mut self, more: impl IntoIterator<Item = QualityFinding>) {
         let kept = std::mem::take(&mut self.findings);
         self.findings = more.into_iter().chain(kept).collect();
@@ -41,8 +41,8 @@ pub struct CombinationLine {
     pub words: String,
     /// Whether the features determine the product.
     pub determined: bool,
-    /// Standard deviation of its logarithm; for an undetermined product, the largest one that the search box
-    /// allows.
+    /// Standard deviation of the natural logarithm of the product; for an undetermined product, the largest
+    /// value that the bounds of the search allow.
     pub sd_relative: f64,
 }
 
@@ -62,12 +62,12 @@ pub struct SearchLine {
     pub cost: f64,
     /// Rise of the cost at the ends of a 95 % interval.
     pub threshold: f64,
-    /// Number of twins of the best model that were fitted.
+    /// Number of twins (synthetic data sets of the best model) that were fitted.
     pub twins: usize,
     /// Number of combinations of the parameters that the features determine at the estimates.
     pub rank: usize,
-    /// Ratio of the largest to the smallest singular value of the sensitivities; `None` if one of them is
-    /// zero.
+    /// Ratio of the largest to the smallest singular value of the matrix of sensitivities; `None` if a
+    /// singular value is zero.
     pub condition: Option<f64>,
 }
 
@@ -79,14 +79,15 @@ pub struct FailureCount {
     pub count: usize,
 }
 
-/// Result of a probe of the gate at one point of the search box.
+/// Result of the identifiability check before the search (the gate) at one point of the search box.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct ProbeLine {
     /// Number of features that the model showed at that point.
     pub features_seen: usize,
     /// Number of combinations of the parameters that these features determine at that point.
     pub rank: usize,
-    /// Ratio of the largest to the smallest singular value; `None` if one of them is zero.
+    /// Ratio of the largest to the smallest singular value of the sensitivities; `None` if one of them is
+    /// zero.
     pub condition: Option<f64>,
     /// Parameters that these features determine individually.
     pub determines: Vec<String>,

@@ -1,6 +1,6 @@
 //! Points of a study, collected from any number of journals without repetition.
 //!
-//! The points are stored in a temporary file; memory holds eight bytes per point.
+//! The points are stored in a temporary file; the memory needed is eight bytes per point.
 
 use super::journal::{SweepHeader, SweepPoint};
 use super::point::PointOutcome;
@@ -10,7 +10,7 @@ use std::io::{self, BufRead, BufWriter, Read, Seek, SeekFrom, Write};
 /// Reason why points cannot be collected.
 #[derive(Debug, thiserror::Error)]
 pub enum CollectError {
-    /// A journal is refused, or two disagree.
+    /// A journal is refused, or two journals have different outcomes of a point.
     #[error(transparent)]
     Journal(#[from] CheckpointError),
     /// The temporary file cannot be written or read.
@@ -41,8 +41,8 @@ pub struct PointCollection<F: Write> {
     known: usize,
 }
 
-/// Number of bytes before the text of a point: number of its journal (4), its line (8), length of the text
-/// (4).
+/// Number of bytes before the text of a point: index of its journal (4 bytes), its line number (8 bytes),
+/// length of the text (4 bytes).
 const HEAD_BYTES: usize = 16;
 
 impl<F: Read + Write + Seek> PointCollection<F> {
@@ -52,8 +52,8 @@ impl<F: Read + Write + Seek> PointCollection<F> {
         Self { header, places, files: Vec::new(), spool: BufWriter::new(spool), end: 0, known: 0 }
     }
 
-    /// Adds the points of a journal; returns `None` if it has no complete header. Errors call the journal
-    /// `file`.
+    /// Adds the points of a journal; returns `None` if the journal has no complete header. `file` is the name
+    /// of the journal in error messages.
     ///
     /// # Errors
     /// [`CollectError`] if the journal is of another study or version, is damaged, or disagrees with an

@@ -11,8 +11,8 @@ use sobol::Sobol;
 use sobol::params::JoeKuoD6;
 use std::sync::OnceLock;
 
-/// Number of significant digits of a value between the two ends of an axis: it is then short, and the same on
-/// every machine.
+/// Number of significant digits to which the values between the two ends of an axis are rounded, so that they
+/// are short and the same on every machine.
 const DIGITS: usize = 12;
 
 /// Spacing of the values of an axis.
@@ -38,7 +38,7 @@ pub struct SweepAxis {
 }
 
 impl AxisSpacing {
-    /// Value at the fraction `share` of the range.
+    /// Value at the fraction `share` of the range, rounded to [`DIGITS`] significant digits.
     pub(crate) fn interpolate_value(self, from: f64, to: f64, share: f64) -> f64 {
         let value = match self {
             Self::Linear => from + share * (to - from),
@@ -95,7 +95,7 @@ pub(crate) fn grid_indices(lengths: &[usize], index: usize) -> Vec<usize> {
 
 // Sampled points.
 
-/// Maximum number of dimensions of a sample, more than a scene has parameters.
+/// Maximum number of dimensions of a sample; a scene has fewer parameters.
 const MOST_DIMENSIONS: usize = 64;
 /// Number of bits of a coordinate and of the index of a point.
 const BITS: usize = 32;
@@ -125,8 +125,8 @@ pub enum SampleSequence {
 }
 
 impl SamplePlan {
-    /// Coordinates of point `index` in the unit box, each above 0 and below 1. The Gray code of the index
-    /// gives a point directly, without those before it.
+    /// Coordinates of point `index` in the unit box, each above 0 and below 1. They are computed directly
+    /// from the Gray code of the index, without the preceding points.
     pub(crate) fn unit_coordinates(&self, index: usize) -> impl Iterator<Item = f64> {
         let SampleSequence::Sobol = self.method;
         let mut shifts = Xoshiro256PlusPlus::seed_from_u64(self.seed);
@@ -172,7 +172,8 @@ mod tests {
         sample(index).zip(sample(0)).take(dimensions).map(|(a, b)| digits(a) ^ digits(b)).collect()
     }
 
-    /// The crate computes each point from the previous one.
+    /// The crate computes each point of the sequence from the previous one; here each comes from its index
+    /// only.
     #[test]
     fn a_point_by_itself_is_that_of_the_sequence() {
         let sequence = Sobol::<u32>::new(12, &JoeKuoD6::minimal());
@@ -181,7 +182,8 @@ mod tests {
         }
     }
 
-    /// In every dimension and with every seed, 2^k points have one coordinate in each of 2^k equal parts.
+    /// In every dimension and with every seed, 2^k points have exactly one coordinate in each of 2^k equal
+    /// parts.
     #[test]
     fn every_coordinate_is_stratified() {
         for seed in [0, 1, 99] {
@@ -196,8 +198,8 @@ mod tests {
         }
     }
 
-    /// Integrates a product of known integral with 4,096 points in six dimensions; a random sample errs by
-    /// 0.01.
+    /// Integrates a product whose integral is known, with 4,096 points in six dimensions; with random points
+    /// the error is about 0.01.
     #[test]
     fn a_sample_integrates_better_than_random_numbers() {
         let sample = SamplePlan { method: SampleSequence::Sobol, points: 4096, seed: 3 };

@@ -177,7 +177,7 @@ pub(crate) struct PointRecheck {
 }
 
 impl PointRecheck {
-    /// An empty selection; each `seed` selects other points.
+    /// An empty selection; different values of `seed` select different points.
     pub(crate) fn new(seed: u64) -> Self {
         Self { drawn: Vec::new(), offered: 0, generator: Xoshiro256PlusPlus::seed_from_u64(seed) }
     }
@@ -192,7 +192,8 @@ impl PointRecheck {
         }
     }
 
-    /// Computes the selected points again and compares every bit. Errors call the journal `file`.
+    /// Computes the selected points again and compares every bit. `file` is the name of the journal in
+    /// errors.
     ///
     /// # Errors
     /// [`CheckpointError::Recomputed`] at the first difference.

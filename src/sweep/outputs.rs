@@ -32,7 +32,8 @@ pub(crate) fn csv_row(study: &Study, index: usize, outcome: &PointOutcome) -> St
     cells.join(",") + "\n"
 }
 
-/// Maps that lack a value for a reason other than the early end of the run: `column: reason; column: reason`.
+/// Text on the maps whose value is missing, but not because the run ended early:
+/// `column: reason; column: reason`.
 fn describe_missing(study: &Study, outcome: &PointOutcome) -> String {
     let ended = outcome.ended.as_ref().map(|ended| ended.reason);
     let of = |(map, value): (&SweepMap, &Result<f64, MissingReason>)| {

@@ -14,8 +14,8 @@ use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Maximum number of evaluations of the right-hand side in a run: several hundred times the number for one
-/// reversal, or a few seconds of computing.
+/// Maximum number of evaluations of the right-hand side of the equations of motion in a run: several hundred
+/// times the number for one reversal, or a few seconds of computing.
 const MOST_EVALUATIONS: u64 = 20_000_000;
 
 /// Outcome of a point.
@@ -76,7 +76,8 @@ impl PointOutcome {
         self.ended.as_ref().map_or("completed", |ended| ended.reason.name())
     }
 
-    /// The outcome; if nothing can be read, the reason and the time at which the run ended, s.
+    /// Runs a point and takes its readings. If nothing can be read, returns the reason and the time at which
+    /// the run ended, s.
     fn try_run(
         study: &Study,
         scene: impl FnOnce() -> Result<Scene, SceneError>,

@@ -8,11 +8,11 @@ use super::point::PointOutcome;
 use super::study::Study;
 use serde::Serialize;
 
-/// Maximum count of numbers in memory, values and coordinates together.
+/// Maximum count of numbers in memory: values of maps and coordinates of points together.
 const MOST_NUMBERS: usize = 2_000_000;
-/// Maximum number of points; with this number, the error of a correlation is below 0.01.
+/// Maximum number of selected points; with this number, the error of a correlation is below 0.01.
 const MOST_POINTS: usize = 200_000;
-/// Minimum number of pairs for a correlation.
+/// Minimum number of points with a value for which a correlation is computed.
 const FEWEST_PAIRS: usize = 20;
 
 /// Values of every map at a selection of the points.
@@ -45,7 +45,8 @@ impl RankCorrelations {
 
     /// Adds a point to the selection, or leaves it out.
     pub(crate) fn look(&mut self, study: &Study, index: usize, outcome: &PointOutcome) {
-        // the fractional parts of multiples of the golden ratio sample every regular part of a grid evenly
+        // the fractional parts of multiples of the golden ratio are spread evenly, also over any regular part
+        // of a grid
         if (index as f64 * 0.618_033_988_749_894_9).fract() >= self.share {
             return;
         }

@@ -17,7 +17,7 @@ use serde::Serialize;
 /// Maximum number of frames of a run: a mistyped rate is refused before it fills the memory of every thread.
 pub(crate) const MOST_FRAMES: f64 = 1e6;
 
-/// Maximum number of points of a map: a figure one column wide shows 200 by 200 cells.
+/// Maximum number of points of a map: a figure that is one column wide can show 200 by 200 cells.
 const MOST_MAPPED: usize = 40_000;
 
 /// A checked study.
@@ -81,7 +81,7 @@ impl Study {
         check().map_err(value_error(file))
     }
 
-    /// Reads a study without its axes, so that its only point is the scene itself.
+    /// Reads the maps of a study without its axes, so that the only point of the study is the scene itself.
     ///
     /// # Errors
     /// [`StudyError`] at the first problem.
@@ -205,7 +205,7 @@ fn value_error(file: &str) -> impl Fn(KeyRefusal) -> StudyError {
     move |(key, problem)| StudyError::Value { file: file.to_owned(), key, problem }
 }
 
-/// Refuses `key` if `holds` is false.
+/// Returns a refusal of `key` if `holds` is false.
 fn require(holds: bool, key: &str, problem: impl FnOnce() -> String) -> Result<(), KeyRefusal> {
     if holds { Ok(()) } else { refuse_key(key, problem()) }
 }
@@ -224,7 +224,8 @@ struct StudyFingerprint<'a> {
 
 // Axes: each is a parameter of the scene with rising values.
 
-/// Maximum number of points of a study: a cluster computes them in a day, and a mistyped number is refused.
+/// Maximum number of points of a study. A cluster computes them in a day; a larger number is probably
+/// mistyped.
 const MOST_POINTS: usize = 100_000_000;
 /// Maximum number of values of an axis.
 const MOST_VALUES: usize = 100_000;
@@ -296,7 +297,7 @@ fn check_axis(written: &StudyAxisFile, sampled: bool) -> Result<SweepAxis, KeyRe
     }
 }
 
-/// Number of values of a sampled axis: two, the ends of its range. Refuses `values` and `points`.
+/// Number of values of a sampled axis: two, the ends of its range. Refuses the keys `values` and `points`.
 fn check_sampled_ends(
     key: &impl Fn(&str) -> String,
     written: &StudyAxisFile,

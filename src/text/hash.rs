@@ -5,15 +5,15 @@ use sha2::{Digest, Sha256};
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// SHA-256 of a text that arrives in pieces. A byte-order mark at its start is ignored, and CRLF counts as
-/// LF, so that a checkout that changes line endings does not change the hash. For a text with neither, it
-/// equals the SHA-256 of the bytes.
+/// LF, so that a checkout that changes line endings does not change the hash. Without byte-order mark and
+/// CRLF, it equals the SHA-256 of the bytes.
 #[derive(Debug, Clone, Default)]
 pub struct TextHash {
     digest: Sha256,
     /// The first bytes, kept until they show whether they are a byte-order mark.
     start: Vec<u8>,
     started: bool,
-    /// Whether the last byte was a CR whose successor is not yet known.
+    /// Whether the last byte was a CR; the next byte shows whether a LF follows.
     ends_in_cr: bool,
 }
 
@@ -80,7 +80,7 @@ pub fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// [`TextHash`] of a complete text.
+/// SHA-256 of a complete text, as computed by [`TextHash`].
 #[must_use]
 pub fn text_sha256(text: impl AsRef<[u8]>) -> String {
     let mut hash = TextHash::default();

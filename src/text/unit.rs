@@ -7,7 +7,7 @@ const PREFIXES: [(&str, f64); 3] = [("", 1.0), ("m", 1e3), ("\u{b5}", 1e6)];
 /// Units that get no prefix or have another name in text: name in files, name in text, and factor.
 const UNPREFIXED_UNITS: [(&str, &str, f64); 5] =
     [("1", "", 1.0), ("", "", 1.0), ("kg", "g", 1e3), ("kg m2", "g mm\u{b2}", 1e9), ("s/m", "s/m", 1.0)];
-/// A larger prefix is kept if the number is then at least this: 0.2 N is as readable as 200 mN.
+/// The larger unit is kept if the number in that unit is at least this: 0.2 N is as readable as 200 mN.
 const LEAST_UNPREFIXED: f64 = 0.1;
 
 /// A unit with the prefix that makes the largest of some values readable, and the factor to that unit; the
@@ -41,7 +41,7 @@ pub(crate) fn format_speed(metres_per_s: f64) -> String {
     format!("{} mm/s", format_digits(metres_per_s * 1e3, 3))
 }
 
-/// A time, s, as milliseconds with one decimal. A time of 10 s or more, such as that of a clock, stays in
+/// A time, s, as milliseconds with one decimal. A time of 10 s or more, such as the time of a clock, stays in
 /// seconds.
 pub(crate) fn format_milliseconds(seconds: f64) -> String {
     const CLOCK_S: f64 = 10.0;
@@ -68,7 +68,7 @@ pub(crate) fn format_signed_percent(share: f64) -> String {
 /// 0.01 um.
 const LEAST_SHOWN_DEGREES: f64 = 1e-4;
 
-/// An angle with its standard deviation, rad, as degrees in ASCII: `0.300(1) degrees`.
+/// An angle with its standard deviation, both in rad, as degrees in ASCII: `0.300(1) degrees`.
 pub(crate) fn format_degrees(angle_rad: f64, sd_rad: f64) -> String {
     let sd = sd_rad.to_degrees().max(LEAST_SHOWN_DEGREES);
     format!("{} degrees", to_ascii(&format_with_sd(angle_rad.to_degrees(), sd)))

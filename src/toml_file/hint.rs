@@ -83,8 +83,8 @@ fn suggest_without_unit(key: &str, text: &str) -> Option<String> {
     if unit.is_empty() {
         return None;
     }
-    // (a key of a quotient, such as `_n_per_m`, ends in the unit of its denominator; there is no conversion
-    // for it)
+    // (a key of a quotient, such as `_n_per_m`, ends in the unit of its denominator, so the number is not
+    // converted)
     let mut prefixes = PREFIXES.iter().filter(|_| !key.contains("_per_"));
     let size = prefixes.find_map(|(prefix, factor)| {
         let rest = unit.strip_prefix(prefix)?;

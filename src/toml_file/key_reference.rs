@@ -81,7 +81,8 @@ fn describe_takes(root: &Value, part: &Value) -> String {
     }
 }
 
-/// A schema with its reference resolved; among several alternatives, the one that is a table or a list.
+/// The schema to which a schema refers, or the schema itself; of several alternatives, the one that is a
+/// table or a list.
 fn resolve_container<'a>(root: &'a Value, part: &'a Value) -> &'a Value {
     let part = resolve_reference(root, part);
     let ways = part.get("anyOf").and_then(Value::as_array).into_iter().flatten();

@@ -141,7 +141,7 @@ impl<'a> SchemaCheck<'a> {
     }
 }
 
-/// A schema with its reference resolved.
+/// The schema to which a schema refers; the schema itself if it is not a reference.
 pub(super) fn resolve_reference<'a>(root: &'a Schema, schema: &'a Schema) -> &'a Schema {
     let pointer = schema["$ref"].as_str().and_then(|place| place.strip_prefix('#'));
     pointer.and_then(|pointer| root.pointer(pointer)).unwrap_or(schema)
@@ -161,7 +161,8 @@ fn suggests_key(problem: &TomlError, known: &str) -> bool {
     matches!(problem, TomlError::UnknownKey { advice, .. } if advice.contains(&format!("`{known}`?")))
 }
 
-/// Key in a schema for a description of the accepted values, used if the types alone say too little.
+/// Key of a schema that contains a description of the accepted values, for cases in which their types say too
+/// little.
 const IN_WORDS: &str = "x-expected";
 
 /// Accepted values of a schema, in words.
@@ -217,7 +218,7 @@ fn matches_schema(schema: &Schema, value: &DeValue<'_>) -> bool {
         | (DeValue::Boolean(_), "boolean")
         | (DeValue::Array(_), "array")
         | (DeValue::Table(_), "object") => true,
-        // a negative count is refused here, since its Rust type cannot represent it
+        // a negative count is refused here, since the Rust type of the field has no negative numbers
         (DeValue::Integer(number), "integer") => {
             let least = schema.get("minimum").and_then(Schema::as_f64).unwrap_or(f64::NEG_INFINITY);
             number.as_str().parse::<f64>().map_or(true, |number| number >= least)

@@ -1,5 +1,6 @@
-//! Rules for overwriting: a command may overwrite files that it provably made itself, other files only with
-//! `--force`, and a measured recording never.
+//! Rules for overwriting. A command may overwrite files that it provably made itself, and other files only
+//! with `--force`. A measured recording is never overwritten, except by a new import of the same exported
+//! files.
 
 use super::marker::{FolderMarker, OutputCommand, WritePolicy, hash_file};
 use super::preserved_files::{FolderRecording, SIMULATION_SUMMARY, is_simulation_summary};
@@ -48,9 +49,9 @@ impl OutputGuard {
         Ok(guard)
     }
 
-    /// Refuses to overwrite a file that was not provably made by the command. Returns the hash of a file that
-    /// may be overwritten because the command made it. `coming` is the hash of the new contents, if known:
-    /// identical contents are always allowed.
+    /// Refuses to overwrite the file `name`, unless the command provably made it, `--force` is given, or the
+    /// new contents are identical. `coming` is the hash of the new contents, if known. Returns the hash of
+    /// the existing file if the command made it.
     pub(crate) fn check_overwrite(&self, name: &str, coming: Option<&str>) -> Outcome<Option<String>> {
         let path = self.folder.join(name);
         let Some(found) = hash_file(&path)? else { return Ok(None) };
@@ -80,8 +81,8 @@ impl OutputGuard {
         ))
     }
 
-    /// Files to remove after the command has written `names`: unchanged files of its last run and, with
-    /// `--force`, unchanged files of another recording.
+    /// Files to remove after the command has written `names`: unchanged files of the previous run of the
+    /// command and, with `--force`, unchanged files of a recording that another command made.
     pub(crate) fn outdated_files(&self, names: &[&str]) -> Vec<String> {
         let maker = self.writer.maker;
         let of_last_run = |by: OutputCommand| by == maker && maker.replaces_last_run();
@@ -92,7 +93,8 @@ impl OutputGuard {
         listed.filter(|(name, _)| self.is_unchanged(name)).map(|(name, _)| name.clone()).collect()
     }
 
-    /// Whether a file listed in the marker is unchanged and lies in or below the folder, not behind a link.
+    /// Whether a file that the marker lists is unchanged and is in the folder or a subfolder, not behind a
+    /// symbolic link.
     fn is_unchanged(&self, name: &str) -> bool {
         let path = self.folder.join(name);
         let inside = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
@@ -102,8 +104,8 @@ impl OutputGuard {
         inside && !linked && is_file && hash_file(&path).is_ok_and(|found| found.is_some_and(is_own))
     }
 
-    /// Protects a measured recording from everything except a new import of the same exports, which loses
-    /// nothing.
+    /// Protects a measured recording from being overwritten, except by a new import of the same exported
+    /// files, which loses nothing.
     fn protect_recording(&self, names: &[&str]) -> Outcome<()> {
         let FolderRecording::Measured { why, exports, files } =
             FolderRecording::detect(&self.folder, &self.marker)?
@@ -160,7 +162,7 @@ impl OutputGuard {
     }
 }
 
-/// Whether two imports have the same exports, in any order.
+/// Whether two imports read the same exported files, in any order.
 fn have_same_exports(some: &[String], others: &[String]) -> bool {
     let sorted = |hashes: &[String]| {
         let mut hashes = hashes.to_vec();

@@ -9,17 +9,17 @@ use std::path::Path;
 use std::str::FromStr;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Name that stands for standard input on the command line.
+/// The file name that means standard input on the command line.
 const STANDARD_INPUT: &str = "-";
-/// Size limit of a TOML file. A job with a thousand components has a quarter of this size. Parsing a file
-/// needs up to a hundred times its size in memory.
+/// Size limit of a TOML file: four times the size of a job with a thousand components. Parsing a file needs
+/// memory of up to a hundred times its size.
 const TOML_LIMIT: ReadLimit =
     ReadLimit { largest: FileSize(500_000), advice: "this is no file that people write; name another one" };
 /// Size limit of the result of a fit: about a hundred times the size of the results in this repository.
 const JSON_LIMIT: ReadLimit =
     ReadLimit { largest: FileSize(16_000_000), advice: "this program writes none so large; make it again" };
 
-/// Size limit of a data file, bytes: `--max-file-size`.
+/// Size limit of a data file, bytes; the option `--max-file-size` sets it.
 static MAX_DATA_BYTES: AtomicU64 = AtomicU64::new(FileSize::DEFAULT.0);
 
 /// A number of bytes.
@@ -27,7 +27,8 @@ static MAX_DATA_BYTES: AtomicU64 = AtomicU64::new(FileSize::DEFAULT.0);
 pub(crate) struct FileSize(u64);
 
 impl FileSize {
-    /// About the size of the longest recording that can be read, with ten million frames.
+    /// Default size limit: about the size of a recording with ten million frames, the longest that can be
+    /// read.
     pub(crate) const DEFAULT: Self = Self(1_000_000_000);
     const UNITS: [(&str, u64); 5] =
         [("GB", 1_000_000_000), ("MB", 1_000_000), ("kB", 1_000), ("B", 1), ("", 1)];
@@ -88,32 +89,33 @@ impl ReadLimit {
     }
 }
 
-/// Whether a path stands for standard input.
+/// Whether a path means standard input.
 pub(crate) fn is_standard_input(path: &Path) -> bool {
     path.as_os_str() == STANDARD_INPUT
 }
 
-/// Bytes of a data file.
+/// Reads a data file as bytes, up to the size limit of data files.
 pub(crate) fn read_data(path: &Path) -> Outcome<Vec<u8>> {
     read_limited(path, ReadLimit::for_data())
 }
 
-/// Refuses an open data file that is larger than the limit for reading into memory.
+/// Refuses an open data file that is too large to be read into memory, according to the size limit of data
+/// files.
 pub(crate) fn check_data_size(path: &Path, file: &File) -> Outcome<()> {
     ReadLimit::for_data().check_open_file(path, file)
 }
 
-/// Text of a data file in UTF-8 (a byte-order mark is removed).
+/// Reads a data file as UTF-8 text; a byte-order mark is removed.
 pub(crate) fn read_text(path: &Path) -> Outcome<String> {
     decode_utf8(path, read_data(path)?)
 }
 
-/// Text of a TOML file. These are written by people.
+/// Reads a TOML file as text, up to the size limit for files that people write.
 pub(crate) fn read_toml(path: &Path) -> Outcome<String> {
     decode_utf8(path, read_limited(path, TOML_LIMIT)?)
 }
 
-/// Text of a JSON file that this program has written.
+/// Reads a JSON file that this program has written, as text.
 pub(crate) fn read_json(path: &Path) -> Outcome<String> {
     decode_utf8(path, read_limited(path, JSON_LIMIT)?)
 }
@@ -147,15 +149,15 @@ fn read_all(path: &Path, from: impl Read, limit: ReadLimit) -> Outcome<Vec<u8>> 
     bytes.ok_or_else(|| limit.too_large_failure(path, &format!("more than {}", limit.largest)))
 }
 
-/// All bytes, or `None` if there are more than `largest`.
+/// Reads all bytes; returns `None` if there are more than `largest`.
 fn read_at_most(from: impl Read, largest: FileSize) -> io::Result<Option<Vec<u8>>> {
     let mut bytes = Vec::new();
     from.take(largest.0.saturating_add(1)).read_to_end(&mut bytes)?;
     Ok((bytes.len() as u64 <= largest.0).then_some(bytes))
 }
 
-/// Refuses anything but a regular file: only such a file has an end, and gives the same contents when read
-/// twice.
+/// Refuses a path that is not a regular file. Only a regular file certainly has an end and gives the same
+/// contents when it is read twice.
 fn check_regular_file(path: &Path, found: &Metadata) -> Outcome<()> {
     let problem = match found.file_type() {
         kind if kind.is_file() => return Ok(()),

@@ -13,8 +13,8 @@ use std::path::Path;
 pub(crate) const MARKER_FILE: &str = ".wiperlab.json";
 const MARKER_FORMAT: u32 = 1;
 
-/// The files that commands have made in a folder. There are no timestamps, so that the same outputs give the
-/// same marker.
+/// The marker of a folder: the files that commands have made in the folder. It contains no timestamps, so
+/// that the same outputs give the same marker.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct FolderMarker {
@@ -29,10 +29,10 @@ pub(crate) struct FolderMarker {
 pub(crate) struct MarkedFile {
     pub by: OutputCommand,
     pub version: String,
-    /// Hash of the contents as text, without line ends and byte-order mark.
+    /// SHA-256 of the contents; CRLF counts as LF, and a byte-order mark is ignored.
     pub sha256: String,
-    /// Hash of the replaced file, if a command had made that file too. Until all files are renamed, or if the
-    /// program is killed before that, either file may be on the disk.
+    /// Hash of the file that this one replaces, if the same command had made it. Until all files are renamed,
+    /// or if the program is killed before that, the disk may contain either of the two.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub replaces: Option<String>,
 }
@@ -50,8 +50,8 @@ impl Default for FolderMarker {
 }
 
 impl FolderMarker {
-    /// Reads the marker of a folder. If there is none, or if it cannot be read, returns an empty marker; in
-    /// the latter case with the reason.
+    /// Reads the marker of a folder. If there is none, returns an empty marker; if it cannot be read, returns
+    /// an empty marker and the reason.
     pub(crate) fn load(folder: &Path) -> Outcome<(Self, Option<String>)> {
         let path = folder.join(MARKER_FILE);
         if !path.exists() {
@@ -88,7 +88,7 @@ pub(crate) fn read_small_file(path: &Path) -> Result<Vec<u8>, String> {
     fs::read(path).map_err(|error| error.to_string())
 }
 
-/// Hash of a file, as in markers; `None` if the file does not exist.
+/// Hash of a file, computed as for a marker; `None` if the file does not exist.
 pub(crate) fn hash_file(path: &Path) -> Outcome<Option<String>> {
     let refused = |error: io::Error| Failure::at(path.display(), format!("cannot be read: {error}"));
     if !path.is_file() {
@@ -150,14 +150,14 @@ impl OutputCommand {
         matches!(self, Self::Import | Self::Simulate | Self::Twin)
     }
 
-    /// Whether a run of the command replaces the whole previous run: files of that run that are not written
-    /// again are removed. An import keeps exports; init, demo and figures write next to files of other
-    /// commands.
+    /// Whether a run of the command replaces the whole previous run: files of the previous run that are not
+    /// written again are removed. This is not so for an import, which keeps exports, and for init, demo and
+    /// figures, which write next to files of other commands.
     pub(crate) fn replaces_last_run(self) -> bool {
         !matches!(self, Self::Demo | Self::Figures | Self::Import | Self::Init)
     }
 
-    /// Advice for the case that the command would overwrite a file.
+    /// Advice to a user whose command would overwrite a file that it did not make.
     pub(crate) fn overwrite_advice(self) -> &'static str {
         match self {
             Self::Fit => "move the file away",
@@ -176,7 +176,7 @@ pub(crate) struct Overwrite {
     pub force: bool,
 }
 
-/// The command that writes, and what it may overwrite.
+/// The command that writes files, what it may overwrite, and the dialect of its tables.
 #[derive(Debug, Clone)]
 pub(crate) struct WritePolicy {
     pub maker: OutputCommand,
@@ -210,8 +210,8 @@ pub(crate) enum CsvDialect {
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 impl CsvDialect {
-    /// Converts a table to this dialect. Numeric cells get its decimal mark; all other cells stay as they
-    /// are.
+    /// Converts a plain table to this dialect. Numeric cells get the decimal mark of the dialect; all other
+    /// cells are unchanged.
     pub(crate) fn convert_table(self, plain: impl Read, mut to: impl Write) -> io::Result<()> {
         to.write_all(BYTE_ORDER_MARK)?;
         let decimal_comma = self == Self::ExcelDe;

@@ -5,9 +5,9 @@ use crate::cli::failure::Outcome;
 use crate::recording::files::{DESCRIPTION_FILE, RecordingFile, TRACE_FILE};
 use std::path::Path;
 
-/// Name of the summary that `simulate` writes next to its trace; no import writes one.
+/// Name of the summary that `simulate` writes next to its trace; `import` writes no file of this name.
 pub(crate) const SIMULATION_SUMMARY: &str = "summary.json";
-/// Keys that the summary of a simulation has and that of a study lacks.
+/// Keys that occur in the summary of a simulation, but not in that of a study.
 const KEYS_OF_A_SIMULATION: [&str; 2] = ["stopped_at_s", "rhs_evaluations"];
 
 /// Whether a file is the summary of a simulation.
@@ -70,7 +70,8 @@ impl FolderRecording {
     }
 }
 
-/// The recording in a folder with a description; `trace` is the hash of its trace.
+/// Determines the recording in a folder that has a description; `trace` is the hash of its trace, if it has
+/// one.
 fn from_description(folder: &Path, marker: &FolderMarker, trace: Option<&str>) -> FolderRecording {
     let bytes = read_small_file(&folder.join(DESCRIPTION_FILE));
     let text = bytes.and_then(|bytes| String::from_utf8(bytes).map_err(|error| error.to_string()));

@@ -25,8 +25,8 @@ const TEMPORARY_NAME: (&str, &str) = (".wiperlab-", ".tmp");
 /// locks its temporary files within microseconds of their creation, until it ends.
 const ABANDONED_AFTER: Duration = Duration::from_secs(60);
 
-/// Files of a command under temporary names. They are removed if this is dropped before
-/// [`OutputStaging::commit`].
+/// Files of a command under temporary names. If the value is dropped before [`OutputStaging::commit`], the
+/// files are removed.
 pub(crate) struct OutputStaging {
     folder: PathBuf,
     guard: Option<(OutputGuard, WritePolicy)>,
@@ -49,7 +49,8 @@ impl OutputStaging {
         Ok(Self { guard: Some((guard, writer.clone())), ..Self::new_unguarded(folder, names)? })
     }
 
-    /// Prepares files that no marker lists; the caller knows that they replace nothing of value.
+    /// Prepares files that are not listed in the marker; the caller ensures that they replace nothing of
+    /// value.
     pub(crate) fn new_unmarked(folder: &Path, names: &[&str]) -> Outcome<Self> {
         refuse_measured(folder, names)?;
         Self::new_unguarded(folder, names)
@@ -182,8 +183,8 @@ impl<'a> MarkerUpdate<'a> {
     }
 }
 
-/// Flushes folders to the disk, so that the names of new files survive a power failure. On file systems that
-/// cannot flush folders, this does nothing.
+/// Flushes folders to the disk, so that the names of new files survive a power failure. Does nothing on file
+/// systems that cannot flush folders.
 fn sync_folders(folders: &BTreeSet<PathBuf>) -> Outcome<()> {
     #[cfg(unix)]
     for folder in folders {
@@ -198,12 +199,12 @@ fn sync_folders(folders: &BTreeSet<PathBuf>) -> Outcome<()> {
     Ok(())
 }
 
-/// Folders that were created for files. Those that remain empty are removed.
+/// Folders that were created for files. When the value is dropped, folders that are still empty are removed.
 #[derive(Default)]
 struct CreatedFolders(Vec<PathBuf>);
 
 impl CreatedFolders {
-    /// Creates a folder with its missing parents, and records them, the outermost first.
+    /// Creates a folder with its missing parents, and records the created folders, the outermost first.
     fn create(&mut self, folder: &Path) -> Outcome<()> {
         let is_missing = |path: &&Path| !path.as_os_str().is_empty() && !path.exists();
         let mut missing: Vec<PathBuf> =
@@ -230,8 +231,8 @@ impl Drop for CreatedFolders {
     }
 }
 
-/// Refuses a path that something other than a file occupies, or that no file can have. All paths are checked
-/// before the first file is renamed, so that the files appear together.
+/// Refuses a path at which something other than a file exists, or that cannot be the path of a file. All
+/// paths are checked before the first file is renamed, so that the files appear together.
 pub(crate) fn check_path_free(path: &Path) -> Outcome<()> {
     let taken = |at: &Path, found: &str, expected: &str| {
         let at = at.display();
@@ -263,7 +264,7 @@ fn write_temporary(path: &Path, contents: impl Read) -> io::Result<(NamedTempFil
     Ok((file, contents.hash.finish()))
 }
 
-/// Like [`write_temporary`], for a table in another dialect.
+/// Like [`write_temporary`], but converts a plain table to another dialect.
 fn write_temporary_table(
     path: &Path,
     plain: impl Read,
@@ -294,7 +295,7 @@ fn is_abandoned(path: &Path) -> bool {
         && File::open(path).is_ok_and(|file| file.try_lock().is_ok())
 }
 
-/// Flushes files in parallel, so that one commit of the file system serves many of them.
+/// Flushes files to the disk in parallel, since the file system can commit many of them at once.
 fn flush_files(staged: &[StagedFile]) -> Outcome<()> {
     const AT_ONCE: usize = 64;
     let flushed = |staged: &StagedFile| {
@@ -309,8 +310,8 @@ fn flush_files(staged: &[StagedFile]) -> Outcome<()> {
     })
 }
 
-/// Permissions of an ordinary new file (the user's mask still applies); by default temporary files are
-/// private.
+/// Permissions of an ordinary new file, reduced by the mask (umask) of the user; temporary files are private
+/// by default.
 #[cfg(unix)]
 fn readable_by_all() -> fs::Permissions {
     std::os::unix::fs::PermissionsExt::from_mode(0o666)

@@ -14,7 +14,7 @@ pub(crate) enum BatchJobState {
     /// The job has a result that belongs to the present job and version of the program, and whose search
     /// converged; the value is the outcome of that fit.
     Done(CommandOutcome),
-    /// The job has no such result.
+    /// The job has no such result and must be fitted.
     Due,
 }
 

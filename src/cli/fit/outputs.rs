@@ -99,7 +99,7 @@ impl LoadedJob {
         Ok(files)
     }
 
-    /// The recording that drives the fitted scene of a condition, as named in that scene.
+    /// Path of the recording that drives the fitted scene of a condition, as written in that scene.
     fn driver_path(&self, at: usize) -> Outcome<Option<String>> {
         let condition = &self.job().conditions[at];
         let trace = self.problem.traces().iter().find(|trace| trace.condition == at);

@@ -83,7 +83,7 @@ fn print_notes(result: &FitResult) {
     print_line!("");
     result.combinations.iter().for_each(|found| print_line!("{}", describe_combination(found)));
     for note in &result.notes {
-        // notes of the gate say themselves when they were made
+        // a note of the gate (the check before the search) says itself when it was made and needs no prefix
         print_line!("{}{note}", if result.gate.notes.contains(note) { "" } else { "note: " });
     }
 }

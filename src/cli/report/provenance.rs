@@ -55,7 +55,8 @@ fn scene_files(name: String, path: &Path) -> Outcome<Vec<SourceFile>> {
     Ok(found)
 }
 
-/// Trace, description and exports of a recording; the hashes of the exports are those from the import.
+/// Trace, description and exports of a recording; the hashes of the exports are those that the import
+/// recorded.
 fn recording_files(
     role: &str,
     name: &str,

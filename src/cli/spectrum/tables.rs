@@ -89,8 +89,8 @@ pub(crate) fn description_json(request: &SpectrumRequest, studied: &StudiedWindo
     })
 }
 
-/// Contents of `spectrum.csv`, with one row per bin. A cell is empty if the analysis has no such value, as
-/// for a long record or one with gaps.
+/// Contents of `spectrum.csv`, with one row per frequency bin. A cell is empty if the analysis does not
+/// compute the value, for example for a long record or a record with gaps.
 pub(crate) fn spectrum_csv(analysis: &SpectralAnalysis) -> Vec<u8> {
     let spectrum = &analysis.spectrum;
     let cell = |text: &mut String, value: Option<f64>| match value {
@@ -124,7 +124,8 @@ pub(crate) fn spectrum_csv(analysis: &SpectralAnalysis) -> Vec<u8> {
     std::iter::once(header.to_owned()).chain(blocks).collect::<String>().into_bytes()
 }
 
-/// Contents of `ridge.csv`: the strongest component above the slow ones, as a function of time.
+/// Contents of `ridge.csv`: the strongest component at frequencies above those of the slow components, as a
+/// function of time.
 pub(crate) fn ridge_csv(course: &[CoursePoint]) -> Vec<u8> {
     let speed = |speed: Option<f64>| speed.map_or_else(String::new, |speed| format!("{speed:e}"));
     let row = |p: &CoursePoint| {

@@ -50,7 +50,8 @@ pub(crate) fn run_tasks(plan: &SubmissionPlan, global: &GlobalArgs) -> Outcome {
             stops.announce_stop(&kept);
             return Ok(CommandOutcome::StoppedEarly);
         }
-        // the other tasks would refuse the same input
+        // if a task refuses its input, no further task is started, since every task would refuse the same
+        // input
         let refused = ended.iter().any(FinishedTask::is_refused);
         while !refused && running.len() < at_once {
             let Some(task) = tasks.next() else { break };

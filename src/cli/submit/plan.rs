@@ -9,12 +9,13 @@ use crate::cli::{fit, sweep};
 use std::fs;
 use std::time::Duration;
 
-/// Shortest walltime, s; Slurm counts in minutes.
+/// Shortest walltime that is accepted, s; Slurm counts walltimes in minutes.
 const SHORTEST_S: u64 = 60;
 
-/// Fraction of the walltime by which a task ends early, to allow for points in progress and for a late start.
+/// Time by which a task ends before its walltime, as a fraction of the walltime. It allows for points in
+/// progress and for a late start.
 const MARGIN: f64 = 0.05;
-/// Smallest and largest value of this margin, s.
+/// Smallest and largest time by which a task ends before its walltime, s.
 const MARGINS_S: (u64, u64) = (30, 300);
 
 /// An array of tasks, and the final job that runs after them.
@@ -36,17 +37,17 @@ pub(crate) struct SubmissionPlan {
 }
 
 impl SubmissionPlan {
-    /// Command of a task, without its shard.
+    /// Command line of a task, as words, without the option that names its shard.
     pub(crate) fn task_command(&self) -> Vec<String> {
         [self.work.task_command(), self.options.clone()].concat()
     }
 
-    /// Command of the final job.
+    /// Command line of the final job, which puts the shards together, as words.
     pub(crate) fn collect_command(&self) -> Vec<String> {
         [self.work.collect_command(self.shards), self.options.clone()].concat()
     }
 
-    /// Time after which a task ends itself.
+    /// Time after its start at which a task ends itself, shortly before its walltime.
     pub(crate) fn time_limit(&self) -> Option<Duration> {
         self.walltime.map(|walltime| walltime.saturating_sub(time_margin(walltime)))
     }
@@ -146,7 +147,7 @@ impl SubmittedWork {
         Ok(Self::Jobs { jobs, out })
     }
 
-    /// Command of a task, without its shard.
+    /// Command line of a task, as words, without the option that names its shard.
     pub(crate) fn task_command(&self) -> Vec<String> {
         match self {
             Self::Study { study, out } => to_strings(&["sweep", study, "--out", out]),
@@ -154,7 +155,7 @@ impl SubmittedWork {
         }
     }
 
-    /// Command of the final job.
+    /// Command line of the final job, which puts the shards together, as words.
     pub(crate) fn collect_command(&self, shards: usize) -> Vec<String> {
         let shards = shards.to_string();
         match self {

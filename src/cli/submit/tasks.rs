@@ -1,4 +1,4 @@
-//! Selection of the tasks of an array that run.
+//! The list of those tasks of an array that are to run.
 
 use std::collections::BTreeSet;
 use std::fmt;

@@ -69,7 +69,7 @@ impl LoadedStudy {
         Ok(CommandOutcome::done_if(summary.has_values()))
     }
 
-    /// The sheet of a study: all its maps, or its rank correlations.
+    /// The figure with all maps of a study or, if the study is not drawn as maps, with its rank correlations.
     fn sheet_figure(&self, mapped: &[Point], correlations: &RankCorrelations) -> Figure {
         match self.study.is_mapped() {
             true => sweep_sheet::draw_figure(&self.study, &self.scene, mapped),
@@ -78,8 +78,8 @@ impl LoadedStudy {
     }
 }
 
-/// Warns of a point that ended with a panic. This is a defect of the program, not a property of the study,
-/// and must not be mistaken for one.
+/// Warns of a point whose run panicked. A panic is a defect of the program and must not be mistaken for a
+/// property of the study.
 fn warn_of_panic(index: usize, point: &Point) {
     if let Some(ended) = point.ended.as_ref().filter(|ended| ended.reason == MissingReason::Panicked) {
         let (number, why) = (index + 1, &ended.why);

@@ -9,10 +9,10 @@ use crate::sweep::journal::SweepPoint;
 use serde::{Deserialize, Serialize};
 use std::fs;
 
-/// Name of the note.
+/// File name of the note that names the study.
 const NOTE: &str = "study.json";
 
-/// Contents of the note.
+/// Contents of the note that names the study to which the shards in a folder belong.
 #[derive(Serialize, Deserialize)]
 struct StudyNote {
     /// Path of the study, relative to the folder of the note.
@@ -45,7 +45,8 @@ impl LoadedStudy {
         Ok(CommandOutcome::Done)
     }
 
-    /// Points that other shards contain. These are not computed again when a study is divided anew.
+    /// For each point, whether a shard other than `own` contains it. Such a point is not computed again when
+    /// a study is divided into another number of shards.
     fn points_in_other_shards(&self, out: &Path, own: Shard) -> Outcome<Vec<bool>> {
         let header = self.header();
         let mut held = vec![false; self.study.point_count()];
@@ -65,7 +66,7 @@ fn write_study_note(study: &Path, out: &Path) -> Outcome<()> {
     let folder = out.join(SHARDS_FOLDER);
     let made = |error| Failure::Internal(format!("{}: cannot be made: {error}", folder.display()));
     fs::create_dir_all(&folder).map_err(made)?;
-    // relative, since a shared folder may have a different path on each machine
+    // the path is relative, since a shared folder may have a different path on each machine
     let study = files::relative_path(&folder, study)?;
     let note = serde_json::to_string(&StudyNote { study }).map_err(Failure::internal)? + "\n";
     if fs::read_to_string(folder.join(NOTE)).is_ok_and(|found| found == note) {

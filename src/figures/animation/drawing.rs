@@ -1,4 +1,5 @@
-//! The linkage to scale: its joints and the panels in which it moves. Lengths in mm; heights above the glass.
+//! Draws the linkage to scale: its joints, and the panels in which it moves. Lengths are in mm; heights are
+//! above the glass.
 
 use super::Animation;
 use crate::figures::poses::joint_positions;
@@ -7,7 +8,7 @@ use crate::simulate::ModelSample;
 use plain_charts::{ChartAxis, Colour, Mark, Panel, Series, TextAnnotation, value_span};
 
 const MM: f64 = 1e3;
-/// Estimated width of the axes in half a page, mm; determines the scale of the drawing.
+/// Estimated width of axes that take half of the page, mm; determines the scale of the drawing.
 const AXES_MM: f64 = 70.0;
 /// Smallest and largest height of the drawing, mm.
 const HEIGHT_MM: (f64, f64) = (50.0, 80.0);
@@ -17,7 +18,7 @@ const BELOW: f64 = 0.13;
 /// Smallest distance between two pose names in a row, and distance between rows, mm.
 const LABEL_MM: f64 = 10.0;
 const ROW_MM: f64 = 3.2;
-/// Distance between the middle of a text and the end of the drawing, mm.
+/// Distance between the middle of a text and the left or right end of the drawing, mm.
 const MARGIN_MM: f64 = 5.0;
 /// Half width and height of the drawn head, in lengths of the blade; not to scale.
 pub(super) const HEAD_HALF_WIDTH: f64 = 0.22;
@@ -66,7 +67,7 @@ pub(super) fn draw_linkage_panel(animation: &Animation) -> Panel {
     Panel { equal_aspect: true, bare: true, annotations, ..Panel::new(x, y, height_mm, series) }
 }
 
-/// The glass, wider than any panel.
+/// A line for the glass that extends far beyond both sides of the panel.
 fn glass_line(left: f64, right: f64) -> Series {
     const FAR: f64 = 100.0;
     let ends = [left - FAR * (right - left), right + FAR * (right - left)];
@@ -77,10 +78,10 @@ fn text_at(text: &str, at: (f64, f64)) -> TextAnnotation {
     TextAnnotation::new(text, Colour::Black, at)
 }
 
-/// The panel of the enlarged tip, as wide as the path of the tip in the last shown part, in which the tip
-/// slips.
+/// The panel of the enlarged tip. With margins, it is as wide as the path of the tip in the last shown part,
+/// in which the tip slips.
 pub(super) fn draw_tip_panel(animation: &Animation, height_mm: f64) -> Panel {
-    /// Margins beside the path of the tip and below the glass, in units of the length of that path.
+    /// Margins at both ends of the path of the tip, and below the glass, in units of the length of that path.
     const ROOM: f64 = 0.12;
     const UNDER: f64 = 0.3;
     let [from_s, to_s] = animation.pace.last_part_s();

@@ -1,4 +1,5 @@
-//! The moving elements over the still figure: one SVG element per part, which contains its key frames.
+//! The moving elements over the still figure: one SVG element per moving part, with the key frames of that
+//! part.
 
 use super::drawing::{HEAD_HALF_WIDTH, HEAD_HEIGHT};
 use super::{Animation, PlaybackPace, PlaybackPart, drawing};
@@ -25,8 +26,8 @@ const TEXT_SIZE: f64 = 44.0;
 /// show anything shorter.
 const MIN_CROSS_FRACTION: f64 = 1.0 / 2000.0;
 
-/// A contact mode, its name, and the colour and outline of its symbol; the outline is in units of the half
-/// width.
+/// A contact mode, its name, and the colour and outline of its symbol. The outline is an SVG path in units of
+/// the half width of the symbol.
 type ContactModeSymbol = (TipMode, &'static str, Colour, &'static str);
 
 const CONTACT_MODE_SYMBOLS: [ContactModeSymbol; 4] = [
@@ -36,7 +37,7 @@ const CONTACT_MODE_SYMBOLS: [ContactModeSymbol; 4] = [
     (TipMode::Flight, "flight", Colour::Purple, "M0 -1.3L1.3 0L0 1.3L-1.3 0Z"),
 ];
 
-/// The moving elements; empty if the two drawings are missing.
+/// The moving elements; empty if the drawings of the linkage and of the enlarged tip are missing.
 pub(super) fn moving_elements(animation: &Animation, plots: &[PanelPlacement]) -> String {
     let [plot, close, strips @ ..] = plots else { return String::new() };
     [
@@ -151,7 +152,7 @@ fn enlarged_tip(animation: &Animation, plot: &PanelPlacement) -> String {
         measured_crosses(animation, plot),
     ]
     .concat();
-    // the id is made from the position: animations of a page that share an id have the same clipping frame
+    // the id contains the position: animations on one page with the same id also have the same clipping frame
     let name = format!("frame-{x}-{y}-{width}-{height}").replace('.', "_");
     let frame = format!(
         "<clipPath id=\"{name}\"><rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"/></clipPath>"
@@ -320,8 +321,8 @@ fn jumping_cross(animation: &Animation, time_s: &[f64], frames: &[Option<(f64, f
     )
 }
 
-/// The time cursors of the strips; a cursor waits at either end of a strip that covers only a part of the
-/// motion.
+/// The time cursors of the strips. While the shown instant is outside the time axis of a strip, its cursor
+/// rests at the nearer end.
 fn time_cursors(animation: &Animation, strips: &[PanelPlacement]) -> String {
     let turns: Vec<f64> = animation.pace.parts.iter().flat_map(|p| [p.from_s, p.to_s]).collect();
     let cursor = |(plot, [from_s, to_s]): (&PanelPlacement, [f64; 2])| {
@@ -401,8 +402,8 @@ impl AnimatedAttribute {
     }
 }
 
-/// The SMIL element that animates an attribute; empty for fewer than two key frames. The first value holds
-/// from the start, as SMIL requires, and the last value holds to the end.
+/// The SMIL element that animates an attribute; empty for fewer than two key frames. The first value is valid
+/// from the start, as SMIL requires, and the last value remains valid to the end.
 pub(super) fn animate_element<T>(
     changed: AnimatedAttribute,
     pace: &PlaybackPace,

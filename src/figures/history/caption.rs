@@ -15,11 +15,11 @@ use crate::text::{
     format_times, join_with_and,
 };
 
-/// Times by which the enlarged part begins before and ends after the release, s: a few cycles of the high
-/// component.
+/// Time by which the enlarged part begins before the release, and time by which it ends after the release, s:
+/// a few cycles of the high component.
 const ZOOM_S: (f64, f64) = (0.005, 0.03);
-/// Maximum number of reversals that are all marked. If there are more, only the first one is marked, since
-/// the labels need room.
+/// If there are at most this many reversals, all are marked. Otherwise only the first is marked, since the
+/// labels need room.
 const MOST_TURNS: usize = 4;
 /// Maximum number of windows drawn.
 const MOST_WINDOWS: usize = 10;

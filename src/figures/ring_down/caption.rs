@@ -23,8 +23,8 @@ pub(crate) fn lowest_window(case: &ConditionComparison, all: &[FitWindow]) -> Op
     lowest.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Lower limit of the amplitude of the component nearest to the target, in standard deviations of the noise;
-/// there is no figure below it.
+/// Smallest amplitude of the component nearest to the target for which the figure is drawn, in standard
+/// deviations of the noise.
 const LEAST_OVER_NOISE: f64 = 2.0;
 
 /// The figure of the window's analysis; `None` if the record is too long to be decomposed, or if the

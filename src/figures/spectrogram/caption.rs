@@ -12,7 +12,7 @@ use std::ops::Range;
 /// Ratio of the highest frequency shown to the highest frequency of the ridges.
 const RIDGE_MARGIN: f64 = 1.6;
 
-/// Recording or model, with its ridge and the shift of its clock, s.
+/// Recording or model, with its ridge and the shift from its clock to that of the recording, s.
 type ShiftedRidge<'a> = (SpectrogramSide, &'a TrackedRidge, f64);
 
 /// The figure of a condition; empty if neither recording nor model is long enough for a segment.

@@ -25,7 +25,8 @@ pub struct SpectrogramComparison {
     pub note: String,
     /// Whether the measured motion is synthetic.
     pub synthetic: bool,
-    /// Recording, model or both, with the same frequencies; the first one sets the colour scale.
+    /// The spectrograms of recording, model or both, with the same frequencies; the first one sets the colour
+    /// scale.
     pub sides: Vec<(SpectrogramSide, SpectrogramPlot)>,
 }
 

@@ -11,9 +11,10 @@ use portable_math as math;
 const CLEAR: f64 = 0.5;
 /// Smallest fraction of points with a value for which trends are stated.
 const MOSTLY_KNOWN: f64 = 0.5;
-/// Number of significant digits of the end of the range with the larger absolute value.
+/// Number of significant digits of that end of the range that has the larger absolute value.
 const DIGITS: i32 = 3;
-/// Both ends have the same number of decimals if the power of ten of that end is in this range.
+/// Both ends of a range have the same number of decimals if the power of ten of the end with the larger
+/// absolute value is in this interval.
 const PLAIN: std::ops::RangeInclusive<i32> = -3..=4;
 
 /// Range and trends of a map.

@@ -13,15 +13,17 @@ use portable_math as math;
 
 const ROW_MM: f64 = 5.5;
 const LEAST_HEIGHT_MM: f64 = 16.0;
-/// Margin of the axis beyond the outermost finite ends, as a fraction of the span of the ends.
+/// Margin of the axis beyond the outermost finite ends of the intervals, as a fraction of the span of these
+/// ends.
 const ROOM: f64 = 0.12;
-/// Margin of the axis if there is only one end, as a fraction of its value.
+/// Margin of the axis if the intervals have only one finite end, as a fraction of the value of that end.
 const ALONE: f64 = 0.1;
-/// Ratio of the largest to the smallest end above which the axis is logarithmic.
+/// The axis is logarithmic if the ratio of the largest to the smallest finite end of the intervals exceeds
+/// this.
 const WIDE: f64 = 30.0;
 
-/// The figures; none if no parameter is shared. The parameters are divided among as few figures as fit into a
-/// journal column.
+/// The figures; none if no parameter is shared. The parameters are divided among as few figures as possible,
+/// each of which fits into a journal column.
 pub(super) fn interval_figures(entries: &[ComparedFit], parameters: &[SharedParameter]) -> Vec<FigureBlock> {
     let shared: Vec<&SharedParameter> = parameters.iter().filter(|p| !p.pairs.is_empty()).collect();
     let fits = |figures: &[Figure]| figures.iter().all(|f| f.height_mm(Medium::Column) <= MAX_HEIGHT_MM);
@@ -150,15 +152,15 @@ fn draw_panel(entries: &[ComparedFit], parameter: &SharedParameter) -> Panel {
     }
 }
 
-/// The 95 % interval as an error bar. An open end lies outside the frame, which clips it, so that it has no
-/// cap.
+/// The 95 % interval as an error bar. The bar of an open end extends beyond the axes, so that no cap is
+/// visible there.
 fn interval_bar(line: &ParameterLine, y: f64, (log, low, high): (bool, f64, f64)) -> ErrorBar {
     let beyond = if log { (low / 10.0, high * 10.0) } else { (2.0 * low - high, 2.0 * high - low) };
     ErrorBar::Horizontal { y, from: line.lower_95.unwrap_or(beyond.0), to: line.upper_95.unwrap_or(beyond.1) }
 }
 
-/// Whether the axis is logarithmic, and its ends, which lie slightly beyond every finite end, estimate and
-/// true value.
+/// Whether the axis is logarithmic, and the ends of the axis, which are slightly beyond every finite end of
+/// an interval, every estimate and every true value.
 fn axis_range(having: &[(&ComparedFit, &ParameterLine)]) -> (bool, f64, f64) {
     let ends =
         having.iter().flat_map(|(_, p)| [Some(p.estimate), p.lower_95, p.upper_95, p.truth.map(|t| t.value)]);

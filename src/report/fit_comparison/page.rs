@@ -33,7 +33,7 @@ pub(crate) fn render_page(several: &FitComparison) -> String {
     render_document(&several.title, &several.fits.iter().map(data_lead).collect::<String>(), &sections)
 }
 
-/// The banner on the data of a fit, beginning with the name of the fit.
+/// The banner that states the kind of data of a fit, beginning with the name of the fit.
 fn data_lead(entry: &ComparedFit) -> String {
     let named = format!("role=\"note\">{}: ", isolate_name(&entry.name));
     data_banner(&entry.report).replacen("role=\"note\">", &named, 1)

@@ -17,8 +17,8 @@ const MICROMETRES: f64 = 1e6;
 /// Note in the subtitle if both synthetic and other recordings are drawn.
 const MIXED: &str = "some recordings are synthetic: no camera took those marked so";
 
-/// Common properties of the windows of a group: the channel, the instants at which they begin and end, and
-/// their number within their fit.
+/// What the windows of a group have in common: the channel, the instants at which they begin and end, and
+/// their number among the windows of this kind in a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct WindowKind {
     channel: Channel,
@@ -26,7 +26,7 @@ struct WindowKind {
     number: usize,
 }
 
-/// A component of a fit, as a member of a group.
+/// A target component of a fit, as a member of a group of components to be drawn together.
 struct SpectrumGroupMember<'a> {
     fitted: &'a ComparisonInput<'a>,
     aim: &'a FitTarget,
@@ -55,7 +55,7 @@ pub(super) fn spectra_figures(fits: &[ComparisonInput]) -> Vec<FigureBlock> {
     (1..).zip(drawn).map(block).collect()
 }
 
-/// The components of a fit; those with windows of the same kind are numbered.
+/// The target components of a fit; those with windows of the same kind are numbered.
 fn group_members<'a>(fitted: &'a ComparisonInput<'a>) -> Vec<SpectrumGroupMember<'a>> {
     let anchor = |end: WindowEnd| if let WindowEnd::Found { anchor, .. } = end { Some(anchor) } else { None };
     let mut found: Vec<SpectrumGroupMember> = Vec::new();
@@ -173,8 +173,8 @@ const MOST_OVER_EACH_OTHER: usize = 3;
 /// Heights of a panel with all spectra and of a panel with those of one fit, mm.
 const HEIGHT_MM: f64 = 70.0;
 const EACH_HEIGHT_MM: f64 = 36.0;
-/// Factor by which the frequency axis extends outside the bands of the components; then the upper and the
-/// lower end of the amplitude axis, relative to the highest peak.
+/// Factor by which the frequency axis extends beyond the bands of the components; then the upper and the
+/// lower end of the amplitude axis, as multiples of the highest peak.
 const BAND_MARGIN: f64 = 2.0;
 const OVER_PEAK: f64 = 2.0;
 const UNDER_PEAK: f64 = 2e-4;

@@ -1,4 +1,4 @@
-//! Sections on the parameters, the search and the gate.
+//! Sections on the parameters, the search, and the identifiability check before the search (the gate).
 
 use super::html::CellStyle::{Bad, Good, Number, Prose, Words};
 use super::html::*;
@@ -122,7 +122,8 @@ pub(super) fn search_html(report: &Report) -> String {
     let s = &report.search;
     let Some(status) = s.status else { return String::new() };
     let determined = format!("{} of {}", s.rank, report.parameters.len());
-    // a fit to traces has iterates and starts instead of evaluations and a gate
+    // the search of a fit to traces has iterates and starts instead of evaluations and a gate (check before
+    // it)
     if report.misfit.is_some() {
         return search_facts(&[
             ("status", status.name().to_owned()),

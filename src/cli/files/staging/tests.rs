@@ -32,7 +32,7 @@ fn text(folder: &Path, name: &str) -> String {
     fs::read_to_string(folder.join(name)).unwrap()
 }
 
-/// Leaves the folder as a program does that is killed after it has renamed `renamed` of its files.
+/// Simulates a program that is killed after it has renamed `renamed` of its files.
 fn killed(staging: OutputStaging, renamed: usize) {
     let (guard, writer) = staging.guard.as_ref().unwrap();
     MarkerUpdate::new(&staging.folder, guard, writer, &staging.files).unwrap().write_pending().unwrap();
@@ -93,8 +93,8 @@ fn a_loss_of_power_leaves_every_file_old_or_new_and_a_torn_marker_proves_nothing
     );
     drop(staging);
     assert_eq!(names(at), [MARKER_FILE, "a", "b", "gone"]);
-    // the marker itself is replaced as a whole; but even if it is torn or zeroed, the program only asks for
-    // `--force`
+    // the marker is replaced as a whole; but even if it were cut short or filled with zeros, the program
+    // would only require `--force`
     let whole = fs::read(at.join(MARKER_FILE)).unwrap();
     for torn in [&whole[..whole.len() / 2], &vec![0; whole.len()], b""] {
         fs::write(at.join(MARKER_FILE), torn).unwrap();
