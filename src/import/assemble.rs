@@ -3,7 +3,6 @@
 use super::error::{ImportError, ImportResult};
 use super::options::ImportOptions;
 use super::source::{Import, ImportReport, ImportSource, base_name, preserved_files};
-use crate::import::options::CoordinateScale;
 use crate::import::reader::calibration::calibrate;
 use crate::import::reader::encoding::DecodedText;
 use crate::import::reader::findings::new_finding;
@@ -31,24 +30,25 @@ pub(crate) fn assemble_recording(
 ) -> ImportResult<Import> {
     companion::read_camera_records(sources, &mut exports, options)?;
     track_choice::number_repeated_names(&mut exports);
-    let calibration = calibrate(&mut exports, options, &mut report)?;
-    let chosen = track_choice::choose_tracks(&exports, options)?;
+    let chosen = track_choice::choose_tracks(&exports, options);
+    let calibration = calibrate(&mut exports, &chosen, options, &mut report)?;
+    let chosen = chosen?;
     for export in &mut exports {
         report.notes.extend(export.notes.iter().map(|note| format!("{}: {note}", export.file)));
         report.findings.append(&mut export.findings);
     }
     let clocks = ClockGrid::align(&exports, &chosen, &calibration, options)?;
-    clocks.report_findings(&exports, &calibration, options, &mut report);
+    clocks.report_findings(&exports, options, &mut report);
     let synthetic = options.twin.is_some() || exports.iter().any(is_synthetic);
     let mut points = [0, 1].map(|index| GridPositions::from_track(&mut exports, &clocks, chosen[index]));
     refuse_no_position(&exports, &chosen, &points)?;
     note_points(&exports, &chosen, &points, &mut report);
-    for (point, choice) in points.iter_mut().zip(chosen) {
+    for ((point, choice), scales) in points.iter_mut().zip(chosen).zip(calibration.scales) {
         let Some((file, track)) = choice else { continue };
         let name = &exports[file].tracks[track].name;
-        report.findings.extend(findings::position_findings(name, &point.x, &point.y, calibration.scale));
+        report.findings.extend(findings::position_findings(name, &point.x, &point.y, scales[0]));
         point.reject_unlikely(name, options.min_likelihood, &mut report)?;
-        point.convert_to_metres(&calibration);
+        point.convert_to_metres(scales, calibration.y_axis);
     }
     drop(exports);
     for source in sources {
@@ -71,12 +71,10 @@ pub(crate) fn assemble_recording(
     };
     let recording = Recording::new(options.name.clone(), clocks.grid, traces, synthetic)
         .map_err(|problem| ImportError::unusable(file_name, problem))?;
-    let metres_per_pixel =
-        if let CoordinateScale::MetresPerPixel(metres) = calibration.scale { Some(metres) } else { None };
     let camera = CameraEntry {
-        frame_rate_hz: calibration.rate_hz,
+        frame_rate_hz: calibration.rate.hz,
         exposure_s: calibration.exposure_s,
-        metres_per_pixel,
+        metres_per_pixel: calibration.metres_per_pixel(),
         y_axis: Some(calibration.y_axis),
     };
     let optics = Optics::from(&camera);

@@ -6,7 +6,6 @@ mod dice;
 mod dippmotion;
 mod dltdv;
 mod framedias;
-mod generic;
 mod imagej;
 mod kinovea;
 mod motion_analysis;
@@ -41,8 +40,8 @@ static FORMATS: &[&dyn FileFormat] = &[
     &trackpy::Trackpy,
     &motion_analysis::MotionAnalysis,
     &framedias::FrameDias,
-    &plain::PlainFormat,
-    &generic::GenericFormat,
+    &plain::PLAIN,
+    &plain::GENERIC,
 ];
 
 /// Programs whose layout is not published; their tables need `--columns`.
@@ -76,7 +75,7 @@ fn detect_format(
     if options.columns.is_some() {
         // (tables of Kinovea's windows are filtered and lack samples, even if their columns are named)
         let windows = documents.iter().all(kinovea::is_window);
-        let format: &dyn FileFormat = if windows { &kinovea::Kinovea } else { &generic::GenericFormat };
+        let format: &dyn FileFormat = if windows { &kinovea::Kinovea } else { &plain::GENERIC };
         return Ok((format, "--columns names the columns".to_owned()));
     }
     let mut found: Option<RecognisedFormat> = None;
@@ -98,9 +97,9 @@ fn detect_format(
 fn recognise_document(document: &Document, options: &ImportOptions) -> ImportResult<RecognisedFormat> {
     let mut found = recognising_formats(document);
     let Some(first) = found.next() else {
-        let plain: &dyn FileFormat = &plain::PlainFormat;
+        let plain: &dyn FileFormat = &plain::PLAIN;
         // (the error is that of reading the table, or asks for the names of its columns)
-        let refusal = || document.table().map_or_else(|error| error, generic::unnamed_columns_error);
+        let refusal = || document.table().map_or_else(|error| error, plain::unnamed_columns_error);
         return plain.recognises(document).map(|reason| (plain, reason)).ok_or_else(refusal);
     };
     found.find_map(|(other, _)| refusal_by(other, document, options)).map_or(Ok(first), Err)
@@ -108,7 +107,7 @@ fn recognise_document(document: &Document, options: &ImportOptions) -> ImportRes
 
 /// The formats that recognise a document, except the plain table, which belongs to no program.
 fn recognising_formats<'d>(document: &'d Document) -> impl Iterator<Item = RecognisedFormat> + 'd {
-    let of_programs = FORMATS.iter().copied().filter(|format| format.name() != plain::PLAIN_NAME);
+    let of_programs = FORMATS.iter().copied().filter(|format| format.name() != plain::PLAIN.name());
     of_programs.filter_map(|format| format.recognises(document).map(|reason| (format, reason)))
 }
 

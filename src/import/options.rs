@@ -1,6 +1,7 @@
 //! Options of an import: facts that the export itself does not contain.
 
 use crate::import::error::ImportError;
+use crate::import::reader::CoordinateUnit;
 use crate::recording::files::YAxis;
 use toml::Value;
 
@@ -68,6 +69,9 @@ pub enum CoordinateScale {
     Unit(f64),
 }
 
+/// Largest relative difference between units that count as equal.
+const SAME_UNIT: f64 = 1e-9;
+
 /// Units of length by their symbol, m; `u`, the micro sign and the Greek mu all mean micro.
 const LENGTH_UNITS: [(&str, f64); 6] =
     [("m", 1.0), ("cm", 1e-2), ("mm", 1e-3), ("um", 1e-6), ("\u{b5}m", 1e-6), ("\u{3bc}m", 1e-6)];
@@ -91,6 +95,23 @@ impl CoordinateScale {
         let unit = unit(name.trim()).ok_or_else(refuse)?;
         // a double cannot hold 1e-6 exactly: multiplying by it rounds twice, dividing by 1e6 rounds once
         Ok(Self::MetresPerPixel(number / (1.0 / unit).round()))
+    }
+
+    /// Whether coordinates in `unit` have this scale.
+    pub(crate) fn agrees_with(self, unit: CoordinateUnit) -> bool {
+        match (self, unit) {
+            (Self::Unit(metres), CoordinateUnit::Metres(stated)) => (metres / stated - 1.0).abs() <= SAME_UNIT,
+            (Self::MetresPerPixel(_), CoordinateUnit::Pixel) => true,
+            _ => false,
+        }
+    }
+
+    /// The scale in words.
+    pub(crate) fn describe(self) -> String {
+        match self {
+            Self::MetresPerPixel(metres) => format!("{metres} m/px"),
+            Self::Unit(metres) => CoordinateUnit::Metres(metres).describe(),
+        }
     }
 
     /// Length of one unit of the coordinates in the file, m.

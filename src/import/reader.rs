@@ -2,6 +2,7 @@
 //! timing.
 
 pub(crate) mod calibration;
+pub(crate) mod column;
 pub(crate) mod companion;
 pub(crate) mod cut_numbers;
 pub(crate) mod dialect;
@@ -12,6 +13,7 @@ pub(crate) mod grid;
 pub(crate) mod instances;
 pub(crate) mod layout;
 pub(crate) mod number;
+pub(crate) mod rate;
 pub(crate) mod rows;
 pub(crate) mod spreadsheet;
 pub(crate) mod table;
@@ -28,9 +30,8 @@ pub(crate) use layout::{LostRule, PointCells, TableLayout};
 pub(crate) use number::{CellNumber, parse_number};
 pub(crate) use rows::{RowView, TextRow};
 pub(crate) use table::DelimitedTable;
-pub(crate) use track_file::{
-    Clock, Column, CoordinateUnit, Fact, Facts, TimeUnit, Track, TrackFile, clock_lines,
-};
+pub(crate) use column::{ColumnMeaning, ColumnUnit, CoordinateUnit, TimeUnit};
+pub(crate) use track_file::{Clock, Column, Fact, Facts, Track, TrackFile, clock_lines};
 
 /// A decoded file with its table and the texts of its companions.
 pub(crate) struct Document<'a> {

@@ -59,7 +59,7 @@ impl FileFormat for Dice {
             words: "whose STATUS_FLAG is a failure",
         });
         let (name, lost) = (document.stem.to_owned(), sigma.into_iter().chain(status).collect());
-        let points = vec![PointCells { name, x: vec![x, dx], y: vec![y, dy], confidence: None }];
+        let points = vec![PointCells { name, x: vec![x, dx], y: vec![y, dy], ..PointCells::default() }];
         let layout = TableLayout::new(index + 1, row.used_width(), points);
         let layout = TableLayout { frame: Some(frame), lost, ..layout };
         let mut export = layout.read_tracks(document, table, facts())?;

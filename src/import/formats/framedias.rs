@@ -4,7 +4,7 @@
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::format::FileFormat;
 use crate::import::options::{ImportOptions, TimeColumn};
-use crate::import::reader::timing::RATE_AGREEMENT;
+use crate::import::reader::rate::RATE_AGREEMENT;
 use crate::import::reader::{
     CellNumber, Clock, DelimitedTable, Document, Fact, Facts, LostRule, PointCells, TableLayout, TimeUnit,
     TrackFile,

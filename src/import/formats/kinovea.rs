@@ -3,7 +3,7 @@
 
 mod text;
 
-use super::generic::GenericFormat;
+use super::plain::GENERIC;
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::format::FileFormat;
 use crate::import::options::ImportOptions;
@@ -202,7 +202,7 @@ pub(crate) fn read_window<'a>(
     if let Some(rate) = options.frame_rate_hz.filter(|rate| *rate > HIGHEST_RATE_HZ) {
         return Err(samples_lost_error(table, rate));
     }
-    let mut export = GenericFormat.read(document, options)?;
+    let mut export = GENERIC.read(document, options)?;
     export.facts.time = TimeUnit::Seconds(1e-3);
     let found = format!(
         "{}: Kinovea's kinematics windows write positions after a low-pass filter of its own choice",

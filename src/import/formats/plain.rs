@@ -1,277 +1,210 @@
-//! Plain tables, as scripts write them, whose header names a clock and the coordinates of points.
+//! Tables of a clock and coordinates, as scripts write them. The header names the columns, or `--columns`
+//! names or numbers them; in both cases the header gives their units.
 
-mod header;
+mod columns;
 
-use crate::import::error::{ImportError, ImportResult};
+use crate::import::error::ImportResult;
 use crate::import::format::FileFormat;
 use crate::import::options::ImportOptions;
-use crate::import::reader::layout::ClockCell;
+use crate::import::reader::layout::{self, ClockCell};
 use crate::import::reader::{
-    CoordinateUnit, DelimitedTable, Document, Facts, PointCells, RowOrder, TableLayout, TextRow, TimeUnit,
-    TrackFile, layout,
+    CellNumber, ColumnMeaning, DelimitedTable, Document, Facts, PointCells, RowOrder, TableLayout, TextRow,
+    TimeUnit, TrackFile, new_finding,
 };
-use header::ColumnMeaning;
+use crate::recording::clock::{median_step_s, number_frames};
+use crate::recording::quality::{Check, QualityFinding, Severity};
+pub(super) use columns::unnamed_columns_error;
+use columns::{clock_difference_error, find_header_columns, find_mapped_columns};
 
-pub(crate) const PLAIN_NAME: &str = "plain";
-/// Number of rows at the top in which the column names are sought.
-const HEADER_ROWS: usize = 6;
-const ADVICE: &str = "say which columns are meant by their numbers (from 1): --columns frame=A,tip-x=B,tip-y=C,head-x=D,head-y=E \
-     with numbers for A to E";
+/// Format whose header names the columns.
+pub(super) static PLAIN: PlainFormat = PlainFormat { name: "plain" };
+/// Format whose columns `--columns` names or numbers.
+pub(super) static GENERIC: PlainFormat = PlainFormat { name: "generic" };
 
-/// Column of the frame numbers, and column and unit of the times.
-type ClockColumns = (Option<usize>, Option<(usize, TimeUnit)>);
-
-pub(crate) struct PlainFormat;
+pub(super) struct PlainFormat {
+    name: &'static str,
+}
 
 impl FileFormat for PlainFormat {
     fn name(&self) -> &'static str {
-        PLAIN_NAME
+        self.name
     }
 
+    /// Recognises a header that names a clock and a coordinate; nothing shows that `--columns` is meant.
     fn recognises(&self, document: &Document) -> Option<String> {
-        let header = PlainHeader::find(document.table.as_ref().ok()?)?;
-        Some(format!("line {} names a clock and coordinates", header.row.line))
+        let table = document.table.as_ref().ok().filter(|_| self.name == PLAIN.name)?;
+        let header = columns::find_header(table)?;
+        Some(format!("line {} names a clock and coordinates", table.head[header].line))
     }
 
-    fn read<'a>(&self, document: &'a Document<'a>, _options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
+    fn read<'a>(&self, document: &'a Document<'a>, options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
         let table = document.table()?;
-        let header = PlainHeader::find(table).ok_or_else(|| no_header_error(table))?;
-        let (frame, time) = header.clock_columns()?;
-        let points = header.all_point_cells()?;
-        let unit = header.coordinate_unit()?;
-        let start = header.first_data_row(table)?;
-        header.compare_times(table, start)?;
-        let key = if points.iter().all(|point| point.name.is_empty()) {
-            header.only_column(|meaning| *meaning == ColumnMeaning::Key, "names of the object of a row")?
-        } else {
-            None
+        let columns = match &options.columns {
+            Some(map) => find_mapped_columns(table, map)?,
+            None if self.name == PLAIN.name => find_header_columns(table)?,
+            None => return Err(unnamed_columns_error(table)),
         };
-        let key: Vec<usize> = key.into_iter().collect();
-        if key == [0] {
+        columns.refuse_other_clocks(table)?;
+        let (layout, start) = (columns.table_layout(table, document.stem), columns.start);
+        if layout.key == [0] {
             let advice = "rename it; if the line is a comment, move it above the header";
-            table.refuse_comment_names(header.row.line, "the name of an object", advice)?;
+            let line = table.head.get(start.saturating_sub(1)).map_or(0, |row| row.line);
+            table.refuse_comment_names(line, "the name of an object", advice)?;
         }
-        let name = |mut point: PointCells| {
-            if point.name.is_empty() && key.is_empty() {
-                document.stem.clone_into(&mut point.name);
-            }
-            point
-        };
-        let of_points =
-            points.iter().flat_map(|point| point.x.iter().chain(&point.y).copied().chain(point.confidence));
-        let last = of_points.chain(frame).chain(time.map(|time| time.0)).max();
-        let layout = TableLayout {
-            start,
-            width: last.map_or(0, |last| last + 1),
-            most: header.row.used_width(),
-            frame,
-            time: time.map(|time| time.0),
-            order: if key.is_empty() { RowOrder::AsWritten } else { RowOrder::Any },
-            skip_nameless: true,
-            points: points.into_iter().map(name).collect(),
-            key,
-            ..TableLayout::default()
-        };
-        let facts =
-            Facts { unit, time: time.map_or(TimeUnit::AssumedSeconds, |time| time.1), ..Facts::default() };
-        let mut export = layout.read_tracks(document, table, facts)?;
-        export.notes.extend(header.column_notes(&layout));
+        let time = columns.time.map_or(TimeUnit::AssumedSeconds, |time| time.1);
+        let mut export = layout.read_tracks(document, table, Facts { time, ..Facts::default() })?;
+        export.notes.push(columns.describe(table));
+        export.findings.extend(columns.unused_clock_finding(table)?);
         Ok(export)
     }
 }
 
-/// The row of column names, and the meanings of the names.
-struct PlainHeader<'t> {
-    file: &'t str,
-    index: usize,
-    row: &'t TextRow,
-    meanings: Vec<ColumnMeaning>,
-    /// The row of units below the names, if there is one.
-    units: Option<&'t TextRow>,
+/// The columns of a table that are read. Columns and rows are counted from 0.
+pub(super) struct TableColumns {
+    /// Whether the header gives the meaning of the columns, and not `--columns`.
+    by_header: bool,
+    /// Row of the names in the head of the table, if there is one.
+    header: Option<usize>,
+    /// Row of the units below the names, if there is one.
+    units: Option<usize>,
+    /// First row of data in the head of the table.
+    start: usize,
+    frame: Option<usize>,
+    time: Option<(usize, TimeUnit)>,
+    /// Column that names the object of a row.
+    track: Option<usize>,
+    points: Vec<PointCells>,
 }
 
-impl<'t> PlainHeader<'t> {
-    /// The first row that names a clock and a coordinate.
-    fn find(table: &'t DelimitedTable) -> Option<Self> {
-        table.head.iter().take(HEADER_ROWS).enumerate().find_map(|(index, row)| {
-            let meanings: Vec<_> = row.cells.iter().map(|cell| ColumnMeaning::parse(cell)).collect();
-            let clock = meanings.iter().any(|m| matches!(m, ColumnMeaning::Frame | ColumnMeaning::Time(_)));
-            let coordinate = meanings.iter().any(|m| matches!(m, ColumnMeaning::Coordinate { .. }));
-            (clock && coordinate)
-                .then_some(Self { file: table.file, index, row, meanings, units: None }.with_units(table))
-        })
+impl TableColumns {
+    fn name<'t>(&self, table: &'t DelimitedTable, column: usize) -> &'t str {
+        self.header.and_then(|row| table.head.get(row)).map_or("", |row| row.cell(column))
     }
 
-    /// Takes the units from a separate row below the names, if there is one.
-    fn with_units(mut self, table: &'t DelimitedTable) -> Self {
-        let words = |row: &&TextRow| !row.cells.iter().any(|cell| table.is_value(cell));
-        let Some(row) = table.head.get(self.index + 1).filter(words) else { return self };
-        for (meaning, cell) in self.meanings.iter_mut().zip(&row.cells) {
-            if meaning.take_unit(cell) {
-                self.units = Some(row);
-            }
-        }
-        self
+    fn clock(&self) -> impl Iterator<Item = usize> {
+        self.frame.into_iter().chain(self.time.map(|time| time.0))
     }
 
-    /// Indices of the columns with the wanted meaning.
-    fn columns_where(&self, wanted: impl Fn(&ColumnMeaning) -> bool) -> Vec<usize> {
-        self.meanings.iter().enumerate().filter(|(_, meaning)| wanted(meaning)).map(|(at, _)| at).collect()
+    /// All columns that are read.
+    fn used(&self) -> Vec<usize> {
+        let of_points =
+            self.points.iter().flat_map(|point| point.x.iter().chain(&point.y).copied().chain(point.confidence));
+        self.clock().chain(self.track).chain(of_points).collect()
     }
 
-    /// Index of the only column with the wanted meaning, if there is one; refuses several.
-    fn only_column(
-        &self,
-        wanted: impl Fn(&ColumnMeaning) -> bool,
-        what: &str,
-    ) -> ImportResult<Option<usize>> {
-        let found = self.columns_where(wanted);
-        if found.len() > 1 { Err(self.ambiguous_error(&found, what)) } else { Ok(found.first().copied()) }
+    /// Columns of times or frame numbers that are not read, with their meaning.
+    fn unused_clocks<'t>(&self, table: &'t DelimitedTable) -> Vec<(usize, ColumnMeaning)> {
+        let used = self.used();
+        let names = self.header.and_then(|row| table.head.get(row)).map_or(&[][..], |row| &row.cells);
+        let meanings = names.iter().enumerate().filter(|(column, _)| !used.contains(column));
+        meanings
+            .map(|(column, name)| (column, ColumnMeaning::parse(name)))
+            .filter(|(_, meaning)| matches!(meaning, ColumnMeaning::Frame | ColumnMeaning::Time(_)))
+            .collect()
     }
 
-    /// The columns of frame numbers and of times. If there are several columns of times, the first is used,
-    /// and [`Self::compare_times`] refuses the table if they differ.
-    fn clock_columns(&self) -> ImportResult<ClockColumns> {
-        let frame = self.only_column(|meaning| *meaning == ColumnMeaning::Frame, "numbers of the frames")?;
-        let times = self.columns_where(|meaning| matches!(meaning, ColumnMeaning::Time(_)));
-        let unit = |at: usize| match self.meanings.get(at) {
-            Some(ColumnMeaning::Time(unit)) => *unit,
-            _ => TimeUnit::AssumedSeconds,
-        };
-        let doubtful = |at: &usize| {
-            times.iter().any(|other| {
-                other != at && (unit(*other) == unit(*at) || !matches!(unit(*other), TimeUnit::Seconds(_)))
-            })
-        };
-        if times.iter().any(doubtful) {
-            return Err(self.ambiguous_error(&times, "times"));
-        }
-        Ok((frame, times.first().map(|&at| (at, unit(at)))))
-    }
-
-    /// Refuses a table in which columns of times differ in any row.
-    fn compare_times(&self, table: &DelimitedTable, start: usize) -> ImportResult<()> {
-        let clock = |(cell, meaning): (usize, &ColumnMeaning)| match meaning {
-            ColumnMeaning::Time(TimeUnit::Seconds(unit)) => Some(ClockCell { cell, unit: *unit }),
-            ColumnMeaning::Time(_) => Some(ClockCell { cell, unit: 1.0 }),
-            _ => None,
-        };
-        let clocks: Vec<ClockCell> = self.meanings.iter().enumerate().filter_map(clock).collect();
-        let [first, others @ ..] = clocks.as_slice() else { return Ok(()) };
-        for other in others {
-            if let Some(found) = layout::find_clock_difference(table, start, *first, *other)? {
-                let place = table.cell_location(found.line, found.cell);
-                let [one, two] = &found.texts;
-                let (first, other) = (self.column_name(first.cell), self.column_name(other.cell));
-                let found = format!("`{two}` in `{other}` where `{first}` says `{one}`");
-                return Err(ImportError::format(place, found, "one time of a row in both", ADVICE));
+    /// Refuses a table with another clock that differs from the one that is read.
+    fn refuse_other_clocks(&self, table: &DelimitedTable) -> ImportResult<()> {
+        let first_x: Vec<usize> = self.points.iter().filter_map(|point| point.x.first().copied()).collect();
+        for (column, meaning) in self.unused_clocks(table) {
+            let pair = match meaning {
+                ColumnMeaning::Frame => self.frame.map(|cell| (ClockCell { cell, unit: 1.0 }, 1.0)),
+                ColumnMeaning::Time(unit) => self.time.map(|(cell, used)| {
+                    (ClockCell { cell, unit: used.seconds_or_one() }, unit.seconds_or_one())
+                }),
+                _ => None,
+            };
+            // (with `--columns`, only a clock directly before a point may be the own clock of that point)
+            let of_table = self.by_header && meaning != ColumnMeaning::Frame;
+            if let Some((clock, unit)) = pair.filter(|_| of_table || first_x.contains(&(column + 1))) {
+                let other = ClockCell { cell: column, unit };
+                if let Some(found) = layout::find_clock_difference(table, self.start, clock, other)? {
+                    let names = [clock.cell, column].map(|cell| self.name(table, cell));
+                    return Err(clock_difference_error(table, clock.cell, names, &found));
+                }
             }
         }
         Ok(())
     }
 
-    /// The cells of every point that the columns name.
-    fn all_point_cells(&self) -> ImportResult<Vec<PointCells>> {
-        let mut names: Vec<&str> = vec![];
-        for meaning in &self.meanings {
-            if let ColumnMeaning::Coordinate { point, .. } = meaning
-                && !names.contains(&point.as_str())
-            {
-                names.push(point);
+    fn table_layout(&self, table: &DelimitedTable, stem: &str) -> TableLayout {
+        let name = |mut point: PointCells| {
+            if point.name.is_empty() && self.track.is_none() {
+                stem.clone_into(&mut point.name);
             }
-        }
-        names.into_iter().map(|name| self.point_cells(name)).collect()
-    }
-
-    fn point_cells(&self, name: &str) -> ImportResult<PointCells> {
-        let called = if name.is_empty() { String::new() } else { format!(" of `{name}`") };
-        let axis = |wanted: usize, letter: &str| {
-            let is = |meaning: &ColumnMeaning| match meaning {
-                ColumnMeaning::Coordinate { point, axis, .. } => point == name && *axis == wanted,
-                _ => false,
-            };
-            self.only_column(is, &format!("the {letter}{called}"))
+            point
         };
-        let (x, y) = (axis(0, "x")?, axis(1, "y")?);
-        let confidence = self.only_column(
-            |meaning| matches!(meaning, ColumnMeaning::Confidence { point } if point == name),
-            &format!("the confidence{called}"),
-        )?;
-        match x {
-            Some(x) => Ok(PointCells { confidence, ..PointCells::new(name, x, y) }),
-            None => Err(self.header_error(format!("a y{called} and no x"), "both")),
+        let named = self.header.and_then(|row| table.head.get(row)).map_or(0, TextRow::used_width);
+        // (the last cell of the first rows may be blank)
+        let filled = table.head.iter().skip(self.start).map(TextRow::used_width).collect::<Vec<_>>();
+        TableLayout {
+            start: self.start,
+            width: self.used().into_iter().max().map_or(0, |last| last + 1),
+            most: named.max(usual_width(filled)),
+            frame: self.frame,
+            time: self.time.map(|time| time.0),
+            key: self.track.into_iter().collect(),
+            skip_nameless: true,
+            order: if self.track.is_some() { RowOrder::Any } else { RowOrder::AsWritten },
+            points: self.points.iter().cloned().map(name).collect(),
+            ..TableLayout::default()
         }
     }
 
-    /// The unit of all coordinates; refuses different units.
-    fn coordinate_unit(&self) -> ImportResult<Option<(CoordinateUnit, String)>> {
-        let mut units = self.meanings.iter().enumerate().filter_map(|(at, meaning)| match meaning {
-            ColumnMeaning::Coordinate { unit, .. } => Some((at, *unit)),
-            _ => None,
-        });
-        let Some((first, unit)) = units.next() else { return Ok(None) };
-        match units.find(|(_, other)| *other != unit) {
-            Some((other, _)) => Err(self.ambiguous_error(&[first, other], "coordinates, in different units")),
-            None => Ok(unit.map(|unit| (unit, self.unit_source(first)))),
-        }
-    }
-
-    /// Text on where the unit of a column was found.
-    fn unit_source(&self, at: usize) -> String {
-        let (number, name) = (at + 1, self.column_name(at));
-        let below = self.units.and_then(|row| Some((row.line, row.cells.get(at)?)));
-        match below.filter(|_| ColumnMeaning::parse(name) != self.meanings[at]) {
-            Some((line, unit)) => format!("line {line} gives `{unit}` for column {number} (`{name}`)"),
-            None => format!("column {number} is called `{name}`"),
-        }
-    }
-
-    fn column_name(&self, at: usize) -> &str {
-        self.row.cell(at)
-    }
-
-    /// Index of the first row of numbers. A row without numbers directly below the names is skipped.
-    fn first_data_row(&self, table: &DelimitedTable) -> ImportResult<usize> {
-        let below = self.index + 1;
-        let row = table.head.get(below).ok_or_else(|| ImportError::header_only(table.file, self.row.line))?;
-        let words = !row.cells.iter().any(|cell| table.is_value(cell));
-        Ok(if words && table.head.len() > below + 1 { below + 1 } else { below })
-    }
-
-    /// Note on the clock, the units and the columns that were not read.
-    fn column_notes(&self, layout: &TableLayout) -> Vec<String> {
-        let clock = layout.frame.iter().chain(&layout.time);
-        let clock: Vec<String> = clock.map(|&at| format!("`{}`", self.column_name(at))).collect();
+    /// Note on the header, the clock, the units and the columns that are not read.
+    fn describe(&self, table: &DelimitedTable) -> String {
+        let line = |row: usize| table.head.get(row).map_or(1, |row| row.line);
+        let Some(header) = self.header else { return format!("the data start at line {}", line(self.start)) };
+        let clock: Vec<String> = self.clock().map(|cell| format!("`{}`", self.name(table, cell))).collect();
+        let clock = if clock.is_empty() { "their order".to_owned() } else { clock.join(" and ") };
         let units = match self.units {
-            Some(row) => format!("; line {} names the units", row.line),
-            None if layout.start > self.index + 1 => {
-                "; the row below the names holds no numbers and is left out".to_owned()
+            Some(row) => format!("; line {} names the units", line(row)),
+            None if self.start > header + 1 => {
+                "; what stands between the names and the numbers is left out".to_owned()
             }
             None => String::new(),
         };
-        let other = self.columns_where(|meaning| *meaning == ColumnMeaning::Other).into_iter();
-        let other: Vec<&str> = other.map(|at| self.column_name(at)).filter(|name| !name.is_empty()).collect();
-        let other =
-            if other.is_empty() { String::new() } else { format!("; not read: {}", other.join(", ")) };
-        vec![format!("the rows are placed by {}{units}{other}", clock.join(" and "))]
+        let used = self.used();
+        let names = table.head[header].cells.iter().enumerate();
+        let other: Vec<&str> = names
+            .filter(|(column, name)| !used.contains(column) && !name.is_empty())
+            .map(|(_, name)| name.as_str())
+            .collect();
+        let other = if other.is_empty() { String::new() } else { format!("; not read: {}", other.join(", ")) };
+        format!("line {} names the columns; the rows are placed by {clock}{units}{other}", line(header))
     }
 
-    fn ambiguous_error(&self, columns: &[usize], what: &str) -> ImportError {
-        let named: Vec<String> =
-            columns.iter().map(|at| format!("{} (`{}`)", at + 1, self.column_name(*at))).collect();
-        self.header_error(format!("columns {} that could all be {what}", named.join(", ")), "one")
-    }
-
-    fn header_error(&self, found: String, expected: &str) -> ImportError {
-        ImportError::columns(self.file, self.row.line, format!("found {found}, expected {expected}"), ADVICE)
+    /// Finding about a column of times that is not read while every row counts as a frame, if its steps are
+    /// not even.
+    fn unused_clock_finding(&self, table: &DelimitedTable) -> ImportResult<Option<QualityFinding>> {
+        let unused = self.unused_clocks(table).into_iter().find(|(_, kind)| *kind != ColumnMeaning::Frame);
+        let Some((column, _)) = unused.filter(|_| self.clock().next().is_none()) else { return Ok(None) };
+        let (mut times, mut rows) = (vec![], table.rows(self.start));
+        while let Some(record) = rows.next_row()? {
+            if let CellNumber::Value(time) = table.parse_cell(record.cell(column)) {
+                times.push(time);
+            }
+        }
+        let fit = median_step_s(&times).and_then(|step_s| number_frames(&times, step_s));
+        let Some(fit) = fit.filter(|fit| !fit.is_on_grid() || fit.frames.last() != Some(&(times.len() - 1))) else {
+            return Ok(None);
+        };
+        let (number, name) = (column + 1, self.name(table, column));
+        let found = format!(
+            "--columns frame=row takes every row for a frame, but the times in column {number} (`{name}`) depart \
+             from even frames, by up to {:.1} frames in row {}",
+            fit.worst_frames.max(1.0),
+            fit.worst_row + 1
+        );
+        let advice = "name that column: --columns time=...; frequencies and times are wrong without it";
+        let value = (fit.worst_frames, "frames");
+        Ok(Some(new_finding(Check::UnevenClock, Severity::Serious, value, found, advice)))
     }
 }
 
-fn no_header_error(table: &DelimitedTable) -> ImportError {
-    let problem = format!(
-        "found `{}` and no row that names the columns, expected a clock such as frame or time_s, and coordinates \
-         such as tip_x, tip_y",
-        table.first_texts().join(" ")
-    );
-    ImportError::columns(table.file, table.first_line(), problem, ADVICE)
+/// The most common of the widths, or the largest of several equally common ones; 0 for none.
+fn usual_width(mut widths: Vec<usize>) -> usize {
+    widths.sort_unstable();
+    let runs = widths.chunk_by(|a, b| a == b).max_by_key(|run| run.len());
+    runs.and_then(|run| run.first()).copied().unwrap_or(0)
 }

@@ -237,6 +237,7 @@ impl SleapColumns {
             name: node.name.clone(),
             has_y: true,
             has_confidence: node.score.is_some(),
+            ..PointFields::default()
         };
         let points = self.slots.first().map_or(vec![], |slot| slot.nodes.iter().map(point).collect());
         InstanceFields { has_frame: true, has_time: false, clock_cell: self.frame, points }

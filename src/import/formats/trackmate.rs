@@ -258,8 +258,8 @@ impl Trajectory {
         let column = |value: fn(&Spot) -> Option<f64>| self.spots.iter().map(value).collect();
         let (frame, time) = (Some(column(|spot| spot.frame)), timed.then(|| column(|spot| spot.time)));
         let (x, y) = (column(|spot| spot.x), Some(column(|spot| spot.y)));
-        let track = Track { name: self.name.clone(), clock, x, y, confidence: None };
-        (Clock { lines, cell, frame, time }, track)
+        let track = Track { name: self.name.clone(), clock, x, y, ..Track::default() };
+        (Clock { lines, cell, frame, time, digit: 0.0 }, track)
     }
 }
 

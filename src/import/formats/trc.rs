@@ -4,7 +4,7 @@
 use crate::import::error::{ImportError, ImportResult, TextLocation};
 use crate::import::format::FileFormat;
 use crate::import::options::ImportOptions;
-use crate::import::reader::timing::RATE_AGREEMENT;
+use crate::import::reader::rate::RATE_AGREEMENT;
 use crate::import::reader::{
     CellNumber, Column, CoordinateUnit, DelimitedTable, Document, Facts, PointCells, TableLayout, TextRow,
     TimeUnit, TrackFile, new_finding,

@@ -29,12 +29,14 @@ impl FileFormat for Wiperlab {
             x: column(x),
             y: Some(column(y)),
             confidence: confidence.map(column),
+            ..Track::default()
         };
         let clock = Clock {
             lines: clock_lines((0..grid.frames).map(|frame| frame + 2)),
             cell: 0,
             frame: Some((0..grid.frames).map(|frame| Some(frame as f64)).collect()),
             time: Some((0..grid.frames).map(|frame| Some(grid.time_s(frame))).collect()),
+            digit: 0.0,
         };
         let why = || "a trace.csv is in metres, seconds of the recording itself, and y upwards".to_owned();
         let source = "the column time_s of a trace.csv, which holds times of the recording itself";

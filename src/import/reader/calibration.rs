@@ -1,50 +1,73 @@
 //! Frame rate, scale, direction of y and unit of the times. They come from the user, the file or the
 //! documentation of its format; an import that lacks one is refused and asks for it.
 
-use super::timing::{RATE_AGREEMENT, times_fit_rate};
-use super::track_file::{CoordinateUnit, TimeUnit};
+use super::column::{CoordinateUnit, TimeUnit};
+use super::rate::{FrameRate, RATE_AGREEMENT, format_rate, implied_rate};
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::options::{CoordinateScale, ImportOptions, TimeColumn};
+use crate::import::reader::findings;
+use crate::import::reader::track_choice::TrackIndex;
 use crate::import::reader::track_file::TrackFile;
-use crate::import::reader::{findings, track_choice};
 use crate::import::source::ImportReport;
-use crate::recording::clock;
 use crate::recording::files::YAxis;
+use crate::recording::quality::QualityFinding;
 
 /// Times that imply a frame rate up to this value, 1/s, look like frame numbers: no camera that films a wiper
 /// is so slow.
 const SLOWEST_HZ: f64 = 1.0;
+/// A millisecond, s.
+const MILLISECOND_S: f64 = 1e-3;
 
 /// Explains what the direction of y depends on, if the format has no explanation of its own.
 const Y_AXIS_OPEN: &str = "world coordinates point up unless their axes were turned; image pixels point down";
 
 /// Facts that every import needs.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct ImportCalibration {
-    pub rate_hz: f64,
-    pub scale: CoordinateScale,
+    pub rate: FrameRate,
+    /// Largest relative difference between the rate and that of the file's times that their errors allow.
+    pub tolerance: f64,
+    /// Scales of x and y of the tip, and of x and y of the head.
+    pub scales: [[CoordinateScale; 2]; 2],
     pub y_axis: YAxis,
     /// Exposure time of a frame, s.
     pub exposure_s: Option<f64>,
 }
 
+impl ImportCalibration {
+    /// Length that a pixel shows, m, if any coordinate is in pixels.
+    pub(crate) fn metres_per_pixel(&self) -> Option<f64> {
+        self.scales.as_flattened().iter().find_map(|scale| match scale {
+            CoordinateScale::MetresPerPixel(metres) => Some(*metres),
+            CoordinateScale::Unit(_) => None,
+        })
+    }
+}
+
+/// Tracks of the tip and the head, or the error of their choice.
+type TrackChoice = ImportResult<[Option<TrackIndex>; 2]>;
+
 /// Converts the times of every export to seconds or frames, and collects the other facts. One error lists
 /// everything that is missing, with what the files suggest.
 pub(crate) fn calibrate(
     exports: &mut [TrackFile],
+    chosen: &TrackChoice,
     options: &ImportOptions,
     report: &mut ImportReport,
 ) -> ImportResult<ImportCalibration> {
     let mut missing = vec![];
-    if !exports.iter_mut().all(|export| convert_times(export, options.time)) {
-        missing.push(ASK_TIME.to_owned());
+    for export in exports.iter_mut() {
+        if !convert_times(export, options)? && missing.is_empty() {
+            missing.push(ASK_TIME.to_owned());
+        }
     }
-    let rate_hz = frame_rate_hz(exports, options, report)?;
-    if rate_hz.is_none() {
-        missing.push(ask_rate(exports));
+    let implied = exports.iter().find_map(implied_rate);
+    let rate = frame_rate(exports, implied.as_ref(), options, report)?;
+    if rate.is_none() {
+        missing.push(ask_rate(exports, implied.as_ref()));
     }
-    let scale = coordinate_scale(exports, options, report);
-    if scale.is_none() {
+    let scales = coordinate_scales(exports, chosen, options, report)?;
+    if scales.is_none() {
         missing.push(ask_scale(exports));
     }
     let y_axis = y_direction(exports, options, report);
@@ -52,11 +75,15 @@ pub(crate) fn calibrate(
         let open = exports.iter().find_map(|export| export.facts.y_axis_open).unwrap_or(Y_AXIS_OPEN);
         missing.push(format!("--y-axis up|down    {open}"));
     }
-    if let (Some(rate_hz), Some(scale), Some(y_axis), true) = (rate_hz, scale, y_axis, missing.is_empty()) {
+    if let (Some(rate), Some(scales), Some(y_axis), true) = (rate, scales, y_axis, missing.is_empty()) {
         let exposure_s = exposure_s(exports, options, report)?;
-        return Ok(ImportCalibration { rate_hz, scale, y_axis, exposure_s });
+        let tolerance = RATE_AGREEMENT + rate.error + implied.as_ref().map_or(0.0, |implied| implied.error);
+        if options.time != Some(TimeColumn::Playback) {
+            report.findings.extend(implied.and_then(|times| compare_rates(&rate, times, options)));
+        }
+        return Ok(ImportCalibration { rate, tolerance, scales, y_axis, exposure_s });
     }
-    if let Err(ImportError::Point { advice, .. }) = track_choice::choose_tracks(exports, options) {
+    if let Err(ImportError::Point { advice, .. }) = chosen {
         missing.push(format!("--point tip=NAME --point head=NAME   which tracks are meant; {advice}"));
     }
     let files = exports.iter().map(|export| export.file).collect::<Vec<_>>().join(", ");
@@ -66,9 +93,9 @@ pub(crate) fn calibrate(
 const ASK_TIME: &str = "--time UNIT         the times have the unit of the program's preferences, or another \
     that the file does not name: real (seconds), ms, frames, or playback";
 
-fn ask_rate(exports: &[TrackFile]) -> String {
+fn ask_rate(exports: &[TrackFile], implied: Option<&FrameRate>) -> String {
     let timed = exports.iter().flat_map(|export| &export.clocks).any(|clock| clock.time.is_some());
-    let hint = match exports.iter().find_map(implied_hz) {
+    let hint = match implied.map(|rate| rate.hz) {
         Some(hz) if hz <= SLOWEST_HZ => {
             "the file's times count like frame numbers: if they are, add --time frames".to_owned()
         }
@@ -94,64 +121,86 @@ fn ask_scale(exports: &[TrackFile]) -> String {
     format!("--scale S           {hint}")
 }
 
-/// Converts times to seconds, or to frame numbers if `declared` says so. Returns false if the unit of the
-/// times is unknown and the rows have no frame numbers.
-fn convert_times(export: &mut TrackFile, declared: Option<TimeColumn>) -> bool {
+/// Converts times to seconds, or to frame numbers if `--time` says so. Returns false if the unit of the
+/// times is unknown and the rows have no frame numbers. Refuses times whose unit in the file is another than
+/// the declared one.
+fn convert_times(export: &mut TrackFile, options: &ImportOptions) -> ImportResult<bool> {
     let numbered = export.clocks.iter().all(|clock| clock.frame.is_some());
-    let factor = match (declared, export.facts.time) {
+    let factor = match (options.time, export.facts.time) {
         (Some(TimeColumn::Frames), _) => {
             for clock in export.clocks.iter_mut().filter(|clock| clock.frame.is_none()) {
                 clock.frame = clock.time.take();
             }
-            return true;
+            return Ok(true);
         }
-        (Some(TimeColumn::Milliseconds), _) => 1e-3,
+        (Some(TimeColumn::Milliseconds), TimeUnit::Seconds(seconds)) if seconds != MILLISECOND_S => {
+            let expected = format!(
+                "the unit that {} gives for its times, {seconds} s: leave the option out, or correct the header",
+                export.file
+            );
+            return Err(ImportError::option("--time", "ms", expected));
+        }
+        (Some(TimeColumn::Milliseconds), _) => MILLISECOND_S,
         (_, TimeUnit::Seconds(seconds)) => seconds,
         (Some(TimeColumn::Real | TimeColumn::Playback), _) | (None, TimeUnit::AssumedSeconds) => 1.0,
         (None, TimeUnit::Unknown) => {
             for clock in export.clocks.iter_mut().filter(|clock| clock.frame.is_some()) {
                 clock.time = None;
             }
-            return numbered;
+            return Ok(numbered);
         }
     };
     // (a double cannot hold 1e-3 exactly: multiplying by it rounds twice, dividing by 1000 rounds once)
     let divide = if factor < 1.0 { (1.0 / factor).round() } else { 1.0 };
-    for time in export.clocks.iter_mut().filter_map(|clock| clock.time.as_mut()) {
-        if factor < 1.0 { time.divide(divide) } else { time.scale(factor) }
+    for clock in &mut export.clocks {
+        clock.digit *= factor;
+        if let Some(time) = &mut clock.time {
+            if factor < 1.0 { time.divide(divide) } else { time.scale(factor) }
+        }
     }
-    true
+    Ok(true)
 }
 
 /// The declared frame rate, or else that of the camera's record, or else that of times declared to be real.
-fn frame_rate_hz(
+fn frame_rate(
     exports: &[TrackFile],
+    implied: Option<&FrameRate>,
     options: &ImportOptions,
     report: &mut ImportReport,
-) -> ImportResult<Option<f64>> {
-    let records: Vec<&(f64, String)> =
-        exports.iter().filter_map(|export| export.facts.frame_rate_hz.as_ref()).collect();
-    let declared = options.frame_rate_hz.or(records.first().map(|first| first.0));
-    if let Some(declared_hz) = declared {
-        let disagrees = |rate_hz: f64| (rate_hz / declared_hz - 1.0).abs() > RATE_AGREEMENT;
-        if let Some((recorded_hz, record)) = records.iter().find(|record| disagrees(record.0)) {
-            let (recorded_hz, record) = (*recorded_hz, record.clone());
+) -> ImportResult<Option<FrameRate>> {
+    let records: Vec<FrameRate> = exports
+        .iter()
+        .filter_map(|export| export.facts.frame_rate_hz.as_ref())
+        .map(|(hz, record)| FrameRate::stated(*hz, record))
+        .collect();
+    let declared = options.frame_rate_hz.map(|hz| FrameRate::stated(hz, "--frame-rate-hz"));
+    if let Some(used) = declared.as_ref().or(records.first()) {
+        if let Some(other) = records.iter().find(|record| used.difference(record) > RATE_AGREEMENT) {
+            let (declared_hz, recorded_hz, record) = (used.hz, other.hz, other.source.clone());
             return Err(ImportError::RecordedRateMismatch { declared_hz, record, recorded_hz });
         }
-        if options.frame_rate_hz.is_none() {
-            let note = |(rate, record): &&(f64, String)| format!("recording rate {rate} frames/s: {record}");
-            report.notes.extend(records.first().map(note));
+        if declared.is_none() {
+            report.notes.push(format!("recording rate {} frames/s: {}", format_rate(used.hz), used.source));
         }
-        return Ok(declared);
+        report.findings.extend(records.iter().filter_map(|record| findings::rate_difference(used, record)));
+        return Ok(Some(used.clone()));
     }
     if !matches!(options.time, Some(TimeColumn::Real | TimeColumn::Milliseconds)) {
         return Ok(None);
     }
-    let implied = exports.iter().find_map(implied_hz);
-    report.findings.extend(implied.filter(|hz| *hz <= SLOWEST_HZ).map(findings::counted_frames_finding));
+    report.findings.extend(implied.filter(|rate| rate.hz <= SLOWEST_HZ).map(findings::counted_frames_finding));
     let source = "from the times, which --time declares to be the recording's own";
-    report.notes.extend(implied.map(|hz| format!("recording rate {hz} frames/s: {source}")));
-    Ok(implied)
+    report.notes.extend(implied.map(|rate| format!("recording rate {} frames/s: {source}", format_rate(rate.hz))));
+    Ok(implied.cloned())
+}
+
+/// Finding about the rate of the times: that it differs from the used one, or that it is coarse.
+fn compare_rates(used: &FrameRate, mut times: FrameRate, options: &ImportOptions) -> Option<QualityFinding> {
+    if used.source == times.source {
+        return findings::coarse_rate_finding(used);
+    }
+    times.hz *= options.frame_step.unwrap_or(1) as f64;
+    findings::rate_difference(used, &times)
 }
 
 /// The declared exposure time, or else that of the first camera's record. Refuses a record with another
@@ -177,43 +226,67 @@ fn exposure_s(
     Ok(Some(exposure_s))
 }
 
-/// Frame rate that the times of an export imply, 1/s.
-fn implied_hz(export: &TrackFile) -> Option<f64> {
-    let timed = export.clocks.iter().filter(|clock| clock.time.is_some());
-    let longest = timed.max_by_key(|clock| clock.len())?;
-    let times = longest.times();
-    if let (Some(frames), Some(column)) = (&longest.frame, &longest.time) {
-        let (frames, times): (Vec<f64>, Vec<f64>) =
-            frames.iter().zip(column.iter()).filter_map(|(frame, time)| frame.zip(time)).unzip();
-        let rate = (frames.last()? - frames.first()?) / (times.last()? - times.first()?);
-        return (rate.is_finite() && rate > 0.0)
-            .then(|| clock::simplest_rate(rate, |rate| times_fit_rate(&times, &frames, rate)));
-    }
-    let step_s = clock::median_step_s(&times)?;
-    let fit = (step_s > 0.0).then(|| clock::number_frames(&times, step_s))??;
-    let frames: Vec<f64> = fit.frames.iter().map(|frame| *frame as f64).collect();
-    Some(clock::simplest_rate(1.0 / fit.frame_s, |rate| times_fit_rate(&times, &frames, rate)))
-}
-
-/// The declared scale, or else a unit of length from the file; a contradiction between them gives a finding.
-fn coordinate_scale(
+/// Scales of x and y of both points: the unit in the header of a column, or else `--scale`, or else the unit
+/// of the file. `None` if a scale is missing. Refuses `--scale` where the header or the file states another
+/// unit of length.
+fn coordinate_scales(
     exports: &[TrackFile],
+    chosen: &TrackChoice,
     options: &ImportOptions,
     report: &mut ImportReport,
-) -> Option<CoordinateScale> {
-    let stated = exports.iter().find_map(|export| export.facts.unit.as_ref());
-    match (options.scale, stated) {
-        (Some(scale), Some((unit, why))) => {
-            report.findings.extend(findings::unit_mismatch_finding(scale, *unit, why));
-            Some(scale)
+) -> ImportResult<Option<[[CoordinateScale; 2]; 2]>> {
+    let all = exports.iter().enumerate().flat_map(|(file, export)| (0..export.tracks.len()).map(move |at| (file, at)));
+    let chosen = chosen.as_ref().map_or_else(|_| all.map(Some).collect(), |chosen| chosen.to_vec());
+    // (a column whose header has no unit takes that of the other coordinate of its point)
+    let stated = |(file, track): TrackIndex| {
+        let [x, y] = &exports[file].tracks[track].units;
+        let fact = exports[file].facts.unit.as_ref();
+        [x.as_ref().or(y.as_ref()).or(fact), y.as_ref().or(x.as_ref()).or(fact)]
+    };
+    let units: Vec<_> = chosen.iter().map(|track| track.map_or([None, None], stated)).collect();
+    let known = || units.as_flattened().iter().flatten();
+    let lengths = || known().filter(|(unit, _)| *unit != CoordinateUnit::Pixel);
+    let used = chosen.iter().flatten().count();
+    if let Some(scale) = options.scale {
+        // (a length a pixel is that of the columns in pixels, if there are any)
+        let of_pixels = matches!(scale, CoordinateScale::MetresPerPixel(_)) && lengths().count() < 2 * used;
+        let in_header = |stated: &(CoordinateUnit, String)| {
+            chosen.iter().flatten().any(|(file, track)| {
+                exports[*file].tracks[*track].units.iter().flatten().any(|unit| unit == stated)
+            })
+        };
+        let refused = |stated: &&(CoordinateUnit, String)| {
+            let length = stated.0 != CoordinateUnit::Pixel;
+            !scale.agrees_with(stated.0) && if length { !of_pixels } else { in_header(stated) }
+        };
+        if let Some((unit, why)) = known().copied().find(refused) {
+            let expected = format!(
+                "{} ({why}): leave the option out, or correct the unit in a copy of the file",
+                unit.describe()
+            );
+            return Err(ImportError::option("--scale", scale.describe(), expected));
         }
-        (Some(scale), None) => Some(scale),
-        (None, Some((unit @ CoordinateUnit::Metres(metres), why))) => {
-            report.notes.push(format!("lengths in {}: {why}", unit.describe()));
-            Some(CoordinateScale::Unit(*metres))
+        let pixels = known().find(|(unit, _)| *unit == CoordinateUnit::Pixel);
+        if let (CoordinateScale::Unit(_), Some((unit, why))) = (scale, pixels) {
+            report.findings.push(findings::unit_mismatch_finding(scale, *unit, why));
         }
-        (None, _) => None,
+    } else if let Some((unit, why)) = lengths().next() {
+        report.notes.push(format!("lengths in {}: {why}", unit.describe()));
+        let others = lengths().filter(|(other, _)| other != unit);
+        report.notes.extend(others.map(|(other, why)| format!("lengths in {}: {why}", other.describe())));
+        report.notes.dedup();
     }
+    let scale_of = |unit: &Option<&(CoordinateUnit, String)>| match unit {
+        Some((CoordinateUnit::Metres(metres), _)) => Some(CoordinateScale::Unit(*metres)),
+        _ => options.scale,
+    };
+    let scales: Vec<[Option<CoordinateScale>; 2]> = units.iter().map(|unit| [scale_of(&unit[0]), scale_of(&unit[1])]).collect();
+    let of_tracks = |point: usize| chosen.get(point).is_some_and(Option::is_some);
+    if (0..scales.len()).any(|point| of_tracks(point) && scales[point].contains(&None)) {
+        return Ok(None);
+    }
+    let any = scales.as_flattened().iter().flatten().next().copied().unwrap_or(CoordinateScale::Unit(1.0));
+    Ok(Some([0, 1].map(|point| scales.get(point).map_or([any; 2], |pair| pair.map(|scale| scale.unwrap_or(any))))))
 }
 
 fn y_direction(exports: &[TrackFile], options: &ImportOptions, report: &mut ImportReport) -> Option<YAxis> {

@@ -2,7 +2,7 @@
 //! rate, the step between saved frames and the exposure time; a record that contradicts the options or the
 //! table belongs to another video.
 
-use super::timing::RATE_AGREEMENT;
+use super::rate::RATE_AGREEMENT;
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::options::ImportOptions;
 use crate::import::reader::findings::new_finding;

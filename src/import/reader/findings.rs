@@ -1,8 +1,9 @@
 //! Findings about the quality of a recording that only its export shows: rounded times, lost points, doubtful
 //! units.
 
-use super::timing::find_quantum_s;
-use super::track_file::{Clock, CoordinateUnit};
+use super::column::CoordinateUnit;
+use super::rate::{FrameRate, find_quantum_s, format_rate};
+use super::track_file::Clock;
 use crate::import::options::CoordinateScale;
 use crate::recording::clock::OFF_GRID_LIMIT_FRAMES;
 use crate::recording::quality::{Check, QualityFinding, Severity};
@@ -26,8 +27,6 @@ const FEWEST_WHOLE: usize = 8;
 /// Rounding of times, in frames, above which the finding is a caution: a tenth of a frame shifts the phase of
 /// a component at a fifth of the frame rate by 7 degrees.
 const COARSE_FRAMES: f64 = 0.1;
-/// Largest relative difference between units that count as equal.
-const SAME_UNIT: f64 = 1e-9;
 
 pub(crate) fn new_finding(
     check: Check,
@@ -39,13 +38,13 @@ pub(crate) fn new_finding(
     QualityFinding::new(check, severity, value, unit, found).with_advice(advice)
 }
 
-/// Finding about times that are rounded to a noticeable fraction of a frame.
-pub(crate) fn rounded_times_finding(file: &str, times: &[f64], rate_hz: f64) -> Option<QualityFinding> {
+/// Finding about times that are rounded to a noticeable fraction of a frame; `implied_hz` is the rate that
+/// they imply.
+pub(crate) fn rounded_times_finding(file: &str, times: &[f64], implied_hz: f64) -> Option<QualityFinding> {
     let quantum_s = find_quantum_s(times).filter(|_| !times.is_empty())?;
-    let frames = quantum_s * rate_hz;
+    let frames = quantum_s * implied_hz;
     // the rounding changes nothing if a frame lasts a whole number of quanta
-    let even =
-        (1.0 / rate_hz / quantum_s - (1.0 / rate_hz / quantum_s).round()).abs() <= 1e-6 && frames <= 1.0;
+    let even = (1.0 / frames - (1.0 / frames).round()).abs() <= 1e-6 && frames <= 1.0;
     let severity = if frames > COARSE_FRAMES { Severity::Caution } else { Severity::Note };
     let found = format!("{file}: the times are rounded to {quantum_s} s, {frames:.2} of a frame");
     let advice = "the frames are taken from the grid of the rate, so nothing is lost; export frame numbers or \
@@ -61,35 +60,48 @@ pub(crate) fn implied_rate_finding(file: &str, implied_hz: f64, playback: bool) 
     new_finding(Check::ImpliedRate, Severity::Note, (implied_hz, "1/s"), found, "")
 }
 
-/// Finding about times that are declared as seconds but look like frame numbers.
-pub(crate) fn counted_frames_finding(implied_hz: f64) -> QualityFinding {
-    let found = format!("the times imply {implied_hz} frames/s: they look like frame numbers, not seconds");
-    let advice = "if they are, say --time frames and give --frame-rate-hz";
-    new_finding(Check::ImpliedRate, Severity::Serious, (implied_hz, "1/s"), found, advice)
+/// Finding about two statements of the frame rate that differ by more than their errors.
+pub(crate) fn rate_difference(used: &FrameRate, other: &FrameRate) -> Option<QualityFinding> {
+    let difference = used.difference(other);
+    let found = format!(
+        "{} says {} frames/s, but {} say {}: they differ by {:.2} %, and so would every frequency",
+        used.source, used.describe(), other.source, other.describe(), 100.0 * difference
+    );
+    let advice = "find out from the camera which is right, and give it as --frame-rate-hz";
+    let value = (other.hz, "1/s");
+    (difference > used.error + other.error)
+        .then(|| new_finding(Check::ImpliedRate, Severity::Caution, value, found, advice))
 }
 
-/// Finding about a unit in the file that differs from that of `--scale`.
-pub(crate) fn unit_mismatch_finding(
-    scale: CoordinateScale,
-    unit: CoordinateUnit,
-    why: &str,
-) -> Option<QualityFinding> {
-    let agrees = match (scale, unit) {
-        (CoordinateScale::Unit(metres), CoordinateUnit::Metres(stated)) => {
-            (metres / stated - 1.0).abs() <= SAME_UNIT
-        }
-        (scale, unit) => {
-            matches!(scale, CoordinateScale::MetresPerPixel(_)) && matches!(unit, CoordinateUnit::Pixel)
-        }
-    };
-    let declared = match scale {
-        CoordinateScale::Unit(metres) => CoordinateUnit::Metres(metres),
-        CoordinateScale::MetresPerPixel(_) => CoordinateUnit::Pixel,
-    };
-    let (declared, stated) = (declared.describe(), unit.describe());
+/// Largest error of a rate that needs no finding; a larger one shifts a frequency visibly in every figure.
+const COARSE_RATE: f64 = 0.01;
+
+/// Finding about times that know the frame rate only coarsely.
+pub(crate) fn coarse_rate_finding(rate: &FrameRate) -> Option<QualityFinding> {
+    let found = format!(
+        "{} imply {} frames/s: their steps have so few digits that the rate, and with it every frequency, is \
+         known to {:.1} % only",
+        rate.source, format_rate(rate.hz), 100.0 * rate.error
+    );
+    let advice = "give the rate of the camera as --frame-rate-hz, or export more digits";
+    let value = (rate.hz * rate.error, "1/s");
+    (rate.error > COARSE_RATE).then(|| new_finding(Check::ImpliedRate, Severity::Caution, value, found, advice))
+}
+
+/// Finding about times that are declared as seconds but look like frame numbers.
+pub(crate) fn counted_frames_finding(implied: &FrameRate) -> QualityFinding {
+    let found =
+        format!("the times imply {} frames/s: they look like frame numbers, not seconds", format_rate(implied.hz));
+    let advice = "if they are, say --time frames and give --frame-rate-hz";
+    new_finding(Check::ImpliedRate, Severity::Serious, (implied.hz, "1/s"), found, advice)
+}
+
+/// Finding about coordinates in pixels that `--scale` takes for lengths.
+pub(crate) fn unit_mismatch_finding(scale: CoordinateScale, unit: CoordinateUnit, why: &str) -> QualityFinding {
+    let (declared, stated) = (scale.describe(), unit.describe());
     let found = format!("--scale takes the coordinates for {declared}, but they are {stated} ({why})");
     let advice = "--scale counts; leave it out or correct it unless the coordinates were converted since";
-    (!agrees).then(|| new_finding(Check::Unit, Severity::Caution, (scale.metres(), "m"), found, advice))
+    new_finding(Check::Unit, Severity::Caution, (scale.metres(), "m"), found, advice)
 }
 
 /// Finding about a direction of y that differs from that of the format.

@@ -60,7 +60,7 @@ impl ClockGrid {
             let expected = format!("at most {most} frames for {rows} rows");
             return Err(ImportError::grid_mismatch(file, &found, &expected, "any one recording"));
         }
-        let (start_s, frame_rate_hz) = (earliest.placed.start_s, calibration.rate_hz);
+        let (start_s, frame_rate_hz) = (earliest.placed.start_s, calibration.rate.hz);
         let grid = FrameGrid { start_s, frame_rate_hz, frames: frames as usize };
         used.iter_mut().for_each(|clock| clock.shift -= from);
         Ok(Self { grid, used })
@@ -69,7 +69,6 @@ impl ClockGrid {
     pub(crate) fn report_findings(
         &self,
         exports: &[TrackFile],
-        calibration: &ImportCalibration,
         options: &ImportOptions,
         report: &mut ImportReport,
     ) {
@@ -79,9 +78,10 @@ impl ClockGrid {
             let implied =
                 placed.implied_hz.map(|hz| findings::implied_rate_finding(export.file, hz, playback));
             let times = export.clocks[*clock].times();
-            let rounded = (!playback)
-                .then(|| findings::rounded_times_finding(export.file, &times, calibration.rate_hz))
-                .flatten();
+            let rounded = placed
+                .implied_hz
+                .filter(|_| !playback)
+                .and_then(|hz| findings::rounded_times_finding(export.file, &times, hz));
             for finding in implied.into_iter().chain(rounded) {
                 // (clocks of one file often give the same findings)
                 if !report.findings.contains(&finding) {
@@ -99,9 +99,9 @@ fn place_clocks(
     calibration: &ImportCalibration,
     options: &ImportOptions,
 ) -> ImportResult<Vec<PlacedClock>> {
-    let rate_hz = calibration.rate_hz;
+    let (rate_hz, tolerance) = (calibration.rate.hz, calibration.tolerance);
     let playback = options.time == Some(TimeColumn::Playback);
-    let declared = DeclaredTiming { rate_hz, playback, step: options.frame_step.unwrap_or(1) };
+    let declared = DeclaredTiming { rate_hz, tolerance, playback, step: options.frame_step.unwrap_or(1) };
     let mut used: Vec<PlacedClock> = vec![];
     for &(file, track) in chosen.iter().flatten() {
         let (export, clock) = (&exports[file], exports[file].tracks[track].clock);
@@ -190,24 +190,26 @@ impl GridPositions {
         Ok(())
     }
 
-    pub(crate) fn convert_to_metres(&mut self, calibration: &ImportCalibration) {
-        let metres = calibration.scale.metres();
-        // a double cannot hold 1e-3 exactly: multiplying by it rounds twice, dividing by 1000 rounds once
-        let parts = (1.0 / metres).round();
-        let is_fraction =
-            matches!(calibration.scale, CoordinateScale::Unit(_)) && metres < 1.0 && metres == 1.0 / parts;
-        let length = |value: f64| {
-            if is_fraction { value / parts } else { value * metres }
-        };
-        for x in self.x.iter_mut().flatten() {
-            *x = length(*x);
-        }
-        for y in self.y.iter_mut().flatten() {
-            *y = if calibration.y_axis == YAxis::Down { 0.0 - length(*y) } else { length(*y) };
+    /// Converts x and y with their scales, and mirrors y if it points down.
+    pub(crate) fn convert_to_metres(&mut self, scales: [CoordinateScale; 2], y_axis: YAxis) {
+        convert_lengths(&mut self.x, scales[0]);
+        convert_lengths(&mut self.y, scales[1]);
+        if y_axis == YAxis::Down {
+            self.y.iter_mut().flatten().for_each(|y| *y = 0.0 - *y);
         }
     }
 
     pub(crate) fn tracked_frames(&self) -> Option<(usize, usize)> {
         Some((self.x.iter().position(Option::is_some)?, self.x.iter().rposition(Option::is_some)?))
+    }
+}
+
+fn convert_lengths(values: &mut [Option<f64>], scale: CoordinateScale) {
+    let metres = scale.metres();
+    // (a double cannot hold 1e-3 exactly: multiplying by it rounds twice, dividing by 1000 rounds once)
+    let parts = (1.0 / metres).round();
+    let is_fraction = matches!(scale, CoordinateScale::Unit(_)) && metres < 1.0 && metres == 1.0 / parts;
+    for value in values.iter_mut().flatten() {
+        *value = if is_fraction { *value / parts } else { *value * metres };
     }
 }

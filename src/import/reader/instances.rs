@@ -1,6 +1,7 @@
 //! Collects the rows of instances (tracks, blocks of rows) into clocks and tracks.
 
-use super::track_file::Column;
+use super::track_file::{Column, Fact};
+use crate::import::reader::column::CoordinateUnit;
 use crate::import::error::{ImportError, ImportResult, TextLocation};
 use crate::import::reader::track_file::{Clock, Track};
 use std::collections::HashMap;
@@ -24,9 +25,11 @@ pub(crate) struct RowStamp {
 }
 
 /// A point that every instance has.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct PointFields {
     pub name: String,
+    /// Units of x and y, where the header states them.
+    pub units: [Fact<CoordinateUnit>; 2],
     pub has_y: bool,
     pub has_confidence: bool,
 }
@@ -112,6 +115,7 @@ impl TrackCollector {
             frame: column(self.shape.has_frame),
             time: column(self.shape.has_time),
             lines: vec![],
+            digit: 0.0,
         };
         let points = self.shape.points.iter().map(|_| <[Column; 3]>::default()).collect();
         self.instances.push(CollectedInstance { key: key.to_owned(), clock, points });
@@ -149,7 +153,8 @@ impl TrackCollector {
                     (key, point) => format!("{key}:{point}"),
                 };
                 let (y, confidence) = (shape.has_y.then_some(y), shape.has_confidence.then_some(confidence));
-                tracks.push(Track { name, clock: clocks.len(), x, y, confidence });
+                let units = shape.units.clone();
+                tracks.push(Track { name, clock: clocks.len(), x, y, confidence, units });
             }
             clocks.push(instance.clock);
         }
@@ -182,6 +187,7 @@ impl CollectedInstance {
         self.clock = Clock {
             lines,
             cell: clock.cell,
+            digit: clock.digit,
             frame: clock.frame.as_ref().map(reordered),
             time: clock.time.as_ref().map(reordered),
         };
@@ -196,7 +202,7 @@ mod tests {
 
     fn collector(points: &[&str]) -> TrackCollector {
         let point =
-            |name: &&str| PointFields { name: (*name).to_owned(), has_y: true, has_confidence: false };
+            |name: &&str| PointFields { name: (*name).to_owned(), has_y: true, ..PointFields::default() };
         TrackCollector::new(InstanceFields {
             has_frame: true,
             has_time: false,

@@ -6,7 +6,8 @@ use super::cut_numbers::cut_numbers_finding;
 use super::number::CellNumber;
 use super::rows::RowView;
 use super::table::DelimitedTable;
-use super::track_file::{Facts, TrackFile};
+use super::track_file::{Fact, Facts, TrackFile};
+use crate::import::reader::column::CoordinateUnit;
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::reader::instances::{
     InstanceFields, PointFields, RowOrder, RowPosition, RowStamp, TrackCollector,
@@ -23,6 +24,8 @@ pub(crate) struct PointCells {
     /// Empty if the table has no y.
     pub y: Vec<usize>,
     pub confidence: Option<usize>,
+    /// Units of x and y, where the header states them.
+    pub units: [Fact<CoordinateUnit>; 2],
 }
 
 impl PointCells {
@@ -32,11 +35,12 @@ impl PointCells {
             name: self.name.clone(),
             has_y: !self.y.is_empty(),
             has_confidence: self.confidence.is_some(),
+            units: self.units.clone(),
         }
     }
 
     pub(crate) fn new(name: impl Into<String>, x: usize, y: Option<usize>) -> Self {
-        Self { name: name.into(), x: vec![x], y: y.into_iter().collect(), confidence: None }
+        Self { name: name.into(), x: vec![x], y: y.into_iter().collect(), ..Self::default() }
     }
 }
 
@@ -131,8 +135,10 @@ impl TableLayout {
         facts: Facts,
     ) -> ImportResult<TrackFile<'a>> {
         let mut collector = TrackCollector::new(self.instance_fields());
-        let (lost, nameless) = self.collect_rows(table, &mut collector)?;
-        let (clocks, tracks) = collector.finish(document.file, self.order)?;
+        let RowCounts { lost, nameless, time_decimals } = self.collect_rows(table, &mut collector)?;
+        let (mut clocks, tracks) = collector.finish(document.file, self.order)?;
+        let digit = time_decimals.map_or(0.0, |decimals| math::powi(10.0, -decimals));
+        clocks.iter_mut().for_each(|clock| clock.digit = digit);
         let mut export = TrackFile {
             table: Some(table),
             clocks,
@@ -154,14 +160,12 @@ impl TableLayout {
         self.frame.is_none() && self.time.is_none()
     }
 
-    /// Collects the rows; returns the number of positions that each rule marks as lost, and the number of
-    /// rows that do not name their instance.
     fn collect_rows(
         &self,
         table: &DelimitedTable,
         collector: &mut TrackCollector,
-    ) -> ImportResult<(Vec<usize>, usize)> {
-        let (mut lost, mut nameless) = (vec![0; self.lost.len()], 0);
+    ) -> ImportResult<RowCounts> {
+        let (mut lost, mut nameless, mut time_decimals) = (vec![0; self.lost.len()], 0, None);
         let (mut counted, mut last_line, mut key) = (0.0, 0, String::new());
         let mut positions = vec![RowPosition::default(); self.points.len()];
         let mut rows = table.rows(self.start);
@@ -191,10 +195,13 @@ impl TableLayout {
                 table.optional_number_at(&record, self.frame, "frame")?
             };
             let time = table.optional_number_at(&record, self.time, "time")?;
+            if let (Some(_), Some(cell)) = (time, self.time) {
+                time_decimals = time_decimals.max(Some(count_decimals(record.cell(cell), table.dialect.decimal)));
+            }
             counted += 1.0;
             collector.add_row(&key, RowStamp { line: record.line, frame, time }, &positions);
         }
-        Ok((lost, nameless))
+        Ok(RowCounts { lost, nameless, time_decimals })
     }
 
     /// Indices of the cells of the clock and the positions, without repetitions.
@@ -274,6 +281,16 @@ impl TableLayout {
     }
 }
 
+/// Counts over the rows of a table.
+struct RowCounts {
+    /// Number of positions that each rule marks as lost.
+    lost: Vec<usize>,
+    /// Number of rows that do not name their instance.
+    nameless: usize,
+    /// Largest number of decimals of a time; `None` if no row has a time.
+    time_decimals: Option<i32>,
+}
+
 fn blank_line_error(table: &DelimitedTable, line: usize) -> ImportError {
     let expected = "one row a frame: the table does not number its frames";
     let advice =
@@ -341,19 +358,20 @@ fn read_clock(
     let text = record.cell(clock.cell);
     match table.parse_cell(text) {
         CellNumber::Value(value) => {
-            Ok(Some((value * clock.unit, last_digit_value(text, table.dialect.decimal) * clock.unit)))
+            let digit = math::powi(10.0, -count_decimals(text, table.dialect.decimal));
+            Ok(Some((value * clock.unit, digit * clock.unit)))
         }
         CellNumber::Missing => Ok(None),
         CellNumber::Text => Err(table.not_a_number_error(record.line, clock.cell, text, "time")),
     }
 }
 
-/// Value of one unit in the last digit of a written number.
-fn last_digit_value(text: &str, decimal: char) -> f64 {
+/// Number of decimals of a written number: 3 for `0.017`, 2 for `1.7e-1`, and -2 for `1e2`.
+fn count_decimals(text: &str, decimal: char) -> i32 {
     let (mantissa, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
     let decimals = mantissa.split_once(decimal).map_or(0, |(_, decimals)| decimals.len());
     let exponent: i32 = exponent.replace('\u{2212}', "-").parse().unwrap_or(0);
-    math::powi(10.0, exponent - i32::try_from(decimals).unwrap_or(0))
+    i32::try_from(decimals).unwrap_or(0).saturating_sub(exponent)
 }
 
 /// Reads the tracks of a table with several clocks, with one layout per clock. Rows that are empty for a

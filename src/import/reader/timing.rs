@@ -1,6 +1,7 @@
 //! Frame numbers of the rows: from the frame column, or else from the grid that fits the times.
 
 use crate::import::error::{CellProblem, ImportError, ImportResult};
+use crate::import::reader::rate::{RATE_AGREEMENT, find_quantum_s};
 use crate::import::reader::track_file::{Clock, TrackFile};
 use crate::recording::clock::{self, FrameFit, MAX_FRAMES, OFF_GRID_LIMIT_FRAMES};
 
@@ -17,6 +18,8 @@ pub(crate) const MOST_SPREAD: i64 = 1000;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct DeclaredTiming {
     pub rate_hz: f64,
+    /// Largest relative difference between this rate and that of the times.
+    pub tolerance: f64,
     /// Whether the times are those of playback and only count frames.
     pub playback: bool,
     pub step: usize,
@@ -158,7 +161,7 @@ fn place_by_number(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<Ro
         let rounding_s = find_quantum_s(&clock.times()).unwrap_or(0.0);
         let expected_s = (last - first) as f64 / declared.rate_hz;
         if span_s.is_none_or(|span| (span - expected_s).abs() > rounding_s) {
-            check_rate(rows, implied, declared.rate_hz, None)?;
+            check_rate(rows, implied, declared, None)?;
         }
     }
     let counted_s = first as f64 / declared.rate_hz;
@@ -200,7 +203,7 @@ fn fit_declared_grid(
     row_s: f64,
     declared: DeclaredTiming,
 ) -> ImportResult<FrameFit> {
-    let agrees = |fit: &FrameFit| (fit.frame_s / row_s - 1.0).abs() <= RATE_AGREEMENT;
+    let agrees = |fit: &FrameFit| (fit.frame_s / row_s - 1.0).abs() <= declared.tolerance;
     if let Some(fit) = clock::number_frames(times, row_s)
         .filter(|fit| fit.is_on_grid() && agrees(fit) && fit.smallest_step() == 1)
     {
@@ -213,7 +216,8 @@ fn fit_declared_grid(
         let plausible = declared.step == 1
             && (2.0..=LARGEST_STEP).contains(&step)
             && (fit.frame_s / row_s / step - 1.0).abs() <= RATE_AGREEMENT;
-        check_rate(rows, 1.0 / fit.frame_s, 1.0 / row_s, plausible.then_some(step as usize))?;
+        let of_rows = DeclaredTiming { rate_hz: 1.0 / row_s, ..declared };
+        check_rate(rows, 1.0 / fit.frame_s, of_rows, plausible.then_some(step as usize))?;
     }
     Ok(fit)
 }
@@ -286,8 +290,14 @@ fn refuse_disorder(rows: ClockRows, row: usize, last: Option<f64>, next: f64) ->
     }
 }
 
-fn check_rate(rows: ClockRows, implied_hz: f64, declared_hz: f64, step: Option<usize>) -> ImportResult<()> {
-    if (implied_hz / declared_hz - 1.0).abs() <= RATE_AGREEMENT {
+fn check_rate(
+    rows: ClockRows,
+    implied_hz: f64,
+    declared: DeclaredTiming,
+    step: Option<usize>,
+) -> ImportResult<()> {
+    let declared_hz = declared.rate_hz;
+    if (implied_hz / declared_hz - 1.0).abs() <= declared.tolerance {
         return Ok(());
     }
     Err(ImportError::RateMismatch { file: rows.export.file.to_owned(), implied_hz, declared_hz, step })
@@ -328,34 +338,6 @@ fn cell_error(rows: ClockRows, row: usize, problem: CellProblem, found: Option<f
     ImportError::cell(rows.export.row_location(rows.clock, row), problem, (name, &found), remedy)
 }
 
-/// Largest relative difference between rates that count as equal. Cameras hold their rate to parts in ten
-/// thousand; wrong rates differ by far more.
-pub(crate) const RATE_AGREEMENT: f64 = 0.01;
-
-/// Decimal places to which programs round times, s.
-const QUANTA_S: [f64; 8] = [1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7];
-
-/// Whether times lie on the grid of `rate_hz` that starts at the first time, within the rounding of the
-/// times.
-pub(crate) fn times_fit_rate(times: &[f64], frames: &[f64], rate_hz: f64) -> bool {
-    let (Some(start), Some(first)) = (times.first(), frames.first()) else { return false };
-    let half_quantum = find_quantum_s(times).map_or(1e-9, |q| q / 2.0 * (1.0 + 1e-6));
-    // (twice, because the first time is rounded too)
-    let fits =
-        |(time, frame): (&f64, &f64)| (start + (frame - first) / rate_hz - time).abs() <= 2.0 * half_quantum;
-    times.iter().zip(frames).all(fits)
-}
-
-/// The coarsest decimal place to which all times are rounded, s.
-pub(crate) fn find_quantum_s(times: &[f64]) -> Option<f64> {
-    QUANTA_S.into_iter().find(|quantum| are_multiples(times, *quantum))
-}
-
-/// Whether every time is a multiple of `quantum_s`.
-fn are_multiples(times: &[f64], quantum_s: f64) -> bool {
-    times.iter().all(|t| (t / quantum_s - (t / quantum_s).round()).abs() <= 1e-6)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -369,7 +351,7 @@ mod tests {
     }
 
     fn declared(rate_hz: f64) -> DeclaredTiming {
-        DeclaredTiming { rate_hz, playback: false, step: 1 }
+        DeclaredTiming { rate_hz, tolerance: RATE_AGREEMENT, playback: false, step: 1 }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::Document;
 use crate::import::error::TextLocation;
-use crate::import::options::CoordinateScale;
+use crate::import::reader::column::{CoordinateUnit, TimeUnit};
 use crate::import::reader::table::DelimitedTable;
 use crate::import::source::base_name;
 use crate::recording::files::YAxis;
@@ -19,6 +19,8 @@ pub(crate) struct Clock {
     pub frame: Option<Column>,
     /// Times, if the file has them, in the unit of [`Facts::time`].
     pub time: Option<Column>,
+    /// Value of one unit in the last written digit of the times, in their unit; 0 if it is not known.
+    pub digit: f64,
 }
 
 /// Converts line numbers to the type in which a clock stores them.
@@ -42,7 +44,7 @@ impl Clock {
 }
 
 /// Positions of a point in the rows of its clock.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Track {
     pub name: String,
     /// Index of the clock of the track.
@@ -50,6 +52,8 @@ pub(crate) struct Track {
     pub x: Column,
     pub y: Option<Column>,
     pub confidence: Option<Column>,
+    /// Units of x and y, where the header states them.
+    pub units: [Fact<CoordinateUnit>; 2],
 }
 
 /// A fact, and a text on its source.
@@ -62,7 +66,7 @@ pub(crate) struct Facts {
     /// Text on what the direction of y depends on, if the format leaves it open; part of the question to the
     /// user.
     pub y_axis_open: Option<&'static str>,
-    /// Length unit of the coordinates.
+    /// Unit of all coordinates, which the file or the documentation of its format gives.
     pub unit: Fact<CoordinateUnit>,
     /// Rate at which the camera recorded, 1/s; never a rate that may be that of playback.
     pub frame_rate_hz: Fact<f64>,
@@ -151,61 +155,5 @@ impl Column {
 impl FromIterator<Option<f64>> for Column {
     fn from_iter<I: IntoIterator<Item = Option<f64>>>(values: I) -> Self {
         Self(values.into_iter().map(|value| value.unwrap_or(f64::NAN)).collect())
-    }
-}
-
-/// Unit of a file's times.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) enum TimeUnit {
-    /// Length of the unit, s.
-    Seconds(f64),
-    /// Seconds, assumed because nearly every table contains seconds.
-    #[default]
-    AssumedSeconds,
-    /// Unknown: the format allows several units, and the file does not name its unit.
-    Unknown,
-}
-
-impl TimeUnit {
-    /// Reads `s`, `sec`, `ms`, ...; `None` for any other name.
-    pub(crate) fn parse(name: &str) -> Option<Self> {
-        let seconds = match name.trim().trim_matches(['(', ')', '[', ']']).to_lowercase().as_str() {
-            "s" | "sec" | "secs" | "second" | "seconds" => 1.0,
-            "ms" | "msec" | "millisecond" | "milliseconds" => 1e-3,
-            "min" | "minute" | "minutes" => 60.0,
-            "us" | "usec" | "\u{b5}s" | "\u{3bc}s" | "microsecond" | "microseconds" => 1e-6,
-            "ns" | "nsec" | "nanosecond" | "nanoseconds" => 1e-9,
-            _ => return None,
-        };
-        Some(Self::Seconds(seconds))
-    }
-}
-
-/// Unit of a file's coordinates.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum CoordinateUnit {
-    /// A pixel of unknown size.
-    Pixel,
-    /// A length, m.
-    Metres(f64),
-}
-
-impl CoordinateUnit {
-    /// Reads `px`, `pixel`, `mm`, `micron`, ...; `None` for any other name.
-    pub(crate) fn parse(name: &str) -> Option<Self> {
-        let name = name.trim().trim_matches(['(', ')', '[', ']']).to_lowercase();
-        match name.as_str() {
-            "px" | "pixel" | "pixels" => Some(Self::Pixel),
-            "micron" | "microns" | "micrometer" | "micrometre" => Some(Self::Metres(1e-6)),
-            "inch" | "in" => Some(Self::Metres(0.0254)),
-            name => CoordinateScale::parse(name).ok().map(|scale| Self::Metres(scale.metres())),
-        }
-    }
-
-    pub(crate) fn describe(self) -> String {
-        match self {
-            Self::Pixel => "pixels".to_owned(),
-            Self::Metres(metres) => format!("units of {metres} m"),
-        }
     }
 }

@@ -94,6 +94,8 @@ checks! {
     ImpliedRate = "implied-rate",
     /// Times rounded to a noticeable part of a frame.
     RoundedTimes = "rounded-times",
+    /// A clock with uneven steps that is not used.
+    UnevenClock = "uneven-clock",
     /// Times that count frames because the interval was never set.
     FrameInterval = "frame-interval",
     /// Positions resampled to another rate.

@@ -88,8 +88,8 @@ fn add_track(export: &mut TrackFile, name: String, frames: &SparseFrames) {
     let numbers = frames.keys().map(|row| Some((row - 1) as f64)).collect();
     let x = frames.values().map(|entry| entry.x).collect();
     let y = Some(frames.values().map(|entry| entry.y).collect());
-    export.tracks.push(Track { name, clock: export.clocks.len(), x, y, confidence: None });
-    export.clocks.push(Clock { lines, cell: 0, frame: Some(numbers), time: None });
+    export.tracks.push(Track { name, clock: export.clocks.len(), x, y, ..Track::default() });
+    export.clocks.push(Clock { lines, frame: Some(numbers), ..Clock::default() });
 }
 
 fn read_size(table: &DelimitedTable) -> ImportResult<SparseTableSize> {

@@ -191,7 +191,7 @@ impl KinoveaTextReader<'_> {
 fn block_shape(name: &str, points: usize) -> InstanceFields {
     let called = |index: usize| if points == 1 { name.to_owned() } else { format!("{name}/{}", index + 1) };
     let points = (0..points)
-        .map(|index| PointFields { name: called(index), has_y: true, has_confidence: false })
+        .map(|index| PointFields { name: called(index), has_y: true, ..PointFields::default() })
         .collect();
     InstanceFields { has_frame: false, has_time: true, clock_cell: 0, points }
 }

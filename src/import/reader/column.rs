@@ -1,6 +1,6 @@
-//! Meanings of the column names of a plain table: clock, coordinates and their units.
+//! Meaning of a column from its name in the header: clock, coordinate of a point or confidence, and its unit.
 
-use crate::import::reader::{CoordinateUnit, TimeUnit};
+use crate::import::options::CoordinateScale;
 
 /// Names of columns of frame numbers, in lower case and without separators.
 const FRAMES: [&str; 16] = [
@@ -77,7 +77,16 @@ pub(crate) enum ColumnMeaning {
 }
 
 impl ColumnMeaning {
+    /// The meaning of a name. Programs that write several data sets put the name of the set before that of
+    /// the column (`VideoAnalysis: X Wrist (m)`).
     pub(crate) fn parse(name: &str) -> Self {
+        match (Self::parse_whole(name), name.split_once(": ")) {
+            (Self::Other, Some((_, column))) => Self::parse_whole(column),
+            (meaning, _) => meaning,
+        }
+    }
+
+    fn parse_whole(name: &str) -> Self {
         let (base, unit) = split_unit(name);
         if let Some(clock) = parse_clock(base, unit) {
             return clock;
@@ -185,6 +194,112 @@ fn split_last_part(name: &str) -> Option<(&str, &str)> {
 /// The name in lower case, without separators.
 fn squeeze_name(name: &str) -> String {
     name.chars().filter(|c| !SEPARATORS.contains(c)).flat_map(char::to_lowercase).collect()
+}
+
+// Units.
+
+/// Unit of a file's times.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) enum TimeUnit {
+    /// Length of the unit, s.
+    Seconds(f64),
+    /// Seconds, assumed because nearly every table contains seconds.
+    #[default]
+    AssumedSeconds,
+    /// Unknown: the format allows several units, and the file does not name its unit.
+    Unknown,
+}
+
+impl TimeUnit {
+    /// Length of the unit, s; 1 if it is not stated.
+    pub(crate) fn seconds_or_one(self) -> f64 {
+        if let Self::Seconds(seconds) = self { seconds } else { 1.0 }
+    }
+
+    /// Reads `s`, `sec`, `ms`, ...; `None` for any other name.
+    pub(crate) fn parse(name: &str) -> Option<Self> {
+        let seconds = match trim_brackets(name).to_lowercase().as_str() {
+            "s" | "sec" | "secs" | "second" | "seconds" => 1.0,
+            "ms" | "msec" | "millisecond" | "milliseconds" => 1e-3,
+            "min" | "minute" | "minutes" => 60.0,
+            "us" | "usec" | "\u{b5}s" | "\u{3bc}s" | "microsecond" | "microseconds" => 1e-6,
+            "ns" | "nsec" | "nanosecond" | "nanoseconds" => 1e-9,
+            _ => return None,
+        };
+        Some(Self::Seconds(seconds))
+    }
+}
+
+/// Unit of a file's coordinates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum CoordinateUnit {
+    /// A pixel of unknown size.
+    Pixel,
+    /// A length, m.
+    Metres(f64),
+}
+
+impl CoordinateUnit {
+    /// Reads `px`, `pixel`, `mm`, `micron`, ...; `None` for any other name.
+    pub(crate) fn parse(name: &str) -> Option<Self> {
+        let name = trim_brackets(name).to_lowercase();
+        match name.as_str() {
+            "px" | "pixel" | "pixels" => Some(Self::Pixel),
+            "micron" | "microns" | "micrometer" | "micrometre" => Some(Self::Metres(1e-6)),
+            "inch" | "in" => Some(Self::Metres(0.0254)),
+            name => CoordinateScale::parse(name).ok().map(|scale| Self::Metres(scale.metres())),
+        }
+    }
+
+    pub(crate) fn describe(self) -> String {
+        match self {
+            Self::Pixel => "pixels".to_owned(),
+            Self::Metres(metres) => format!("units of {metres} m"),
+        }
+    }
+}
+
+/// Unit of a column, by the quantity that it measures.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum ColumnUnit {
+    /// A pixel or a length: the column may hold a coordinate.
+    Coordinate(CoordinateUnit),
+    /// A time.
+    Time(TimeUnit),
+    /// Another quantity, such as a speed, an angle or a force.
+    Other,
+}
+
+/// Symbols of units that measure neither a length nor a time, in lower case; every unit with a slash or a
+/// power is another one.
+const OTHER_UNITS: [&str; 20] = [
+    "deg", "degree", "degrees", "\u{b0}", "rad", "radians", "hz", "khz", "n", "mn", "kn", "v", "mv", "pa", "kpa",
+    "mpa", "g", "kg", "%", "c",
+];
+
+impl ColumnUnit {
+    /// Reads a unit; `None` for a text that is no unit.
+    pub(crate) fn parse(text: &str) -> Option<Self> {
+        let symbol = trim_brackets(text).to_lowercase();
+        let derived = symbol.contains(['/', '^', '\u{b2}', '\u{b3}']);
+        if let Some(unit) = CoordinateUnit::parse(text) {
+            return Some(Self::Coordinate(unit));
+        }
+        if let Some(unit) = TimeUnit::parse(text) {
+            return Some(Self::Time(unit));
+        }
+        (derived || OTHER_UNITS.contains(&symbol.as_str())).then_some(Self::Other)
+    }
+
+    /// The unit in the name of a column.
+    pub(crate) fn in_name(name: &str) -> Option<Self> {
+        split_unit(name).1.and_then(Self::parse)
+    }
+}
+
+/// A unit without the brackets around it.
+fn trim_brackets(unit: &str) -> &str {
+    unit.trim().trim_matches(['(', ')', '[', ']'])
 }
 
 #[cfg(test)]

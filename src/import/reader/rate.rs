@@ -1,0 +1,116 @@
+//! Frame rates, with the largest error that their source allows.
+
+use super::track_file::{Clock, TrackFile};
+use crate::recording::clock;
+
+/// Largest relative difference between two rates that may both be right, besides their errors; if they differ
+/// by more, one of them is wrong, and the import is refused.
+pub(crate) const RATE_AGREEMENT: f64 = 0.01;
+/// Relative error of an oscillator: inexpensive ones hold their frequency to 50 parts in a million.
+const OSCILLATOR_ERROR: f64 = 5e-5;
+/// Fewest last digits in a step that may have been rounded before the times were added up; software that
+/// rounds a step to fewer digits would be wrong by more than an eighth.
+const FEWEST_DIGITS_PER_STEP: f64 = 4.0;
+/// Largest relative difference of two steps that count as equal.
+const EQUAL_STEPS: f64 = 1e-6;
+
+/// A frame rate with its uncertainty and its source.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct FrameRate {
+    /// The rate, 1/s.
+    pub hz: f64,
+    /// Largest error, as a fraction of the rate.
+    pub error: f64,
+    /// Text on the source.
+    pub source: String,
+}
+
+impl FrameRate {
+    /// A rate as a person or a camera states it. A rate with decimals is known to half of its last digit.
+    pub(crate) fn stated(hz: f64, source: impl Into<String>) -> Self {
+        let written = hz.to_string();
+        let decimals = written.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+        let half_digit = if decimals > 0 { 0.5 / portable_math::powi(10.0, decimals as i32) } else { 0.0 };
+        Self { hz, error: OSCILLATOR_ERROR.max(half_digit / hz), source: source.into() }
+    }
+
+    /// Standard deviation of the rate, 1/s: that of a uniform distribution between the largest errors.
+    pub(crate) fn sd_hz(&self) -> f64 {
+        self.hz * self.error / 3.0_f64.sqrt()
+    }
+
+    /// Relative difference from another rate.
+    pub(crate) fn difference(&self, other: &Self) -> f64 {
+        (self.hz / other.hz - 1.0).abs()
+    }
+
+    /// The rate with its error in words: `2000 +- 2`.
+    pub(crate) fn describe(&self) -> String {
+        format!("{} +- {}", format_rate(self.hz), format_rate(self.hz * self.error))
+    }
+}
+
+/// A rate with at most seven significant digits, without trailing zeros.
+pub(crate) fn format_rate(hz: f64) -> String {
+    format!("{:.6e}", hz).parse::<f64>().map_or_else(|_| hz.to_string(), |rounded| rounded.to_string())
+}
+
+/// The frame rate that the times of an export imply, from its longest clock.
+pub(crate) fn implied_rate(export: &TrackFile) -> Option<FrameRate> {
+    let timed = export.clocks.iter().filter(|clock| clock.time.is_some());
+    let longest = timed.max_by_key(|clock| clock.len())?;
+    let (frames, times, hz) = number_rows(longest)?;
+    let hz = clock::simplest_rate(hz, |rate| times_fit_rate(&times, &frames, rate));
+    let source = format!("the times of {}", export.file);
+    Some(FrameRate { hz, error: times_error(&times, &frames, (hz, longest.digit)), source })
+}
+
+/// Frame numbers and times of the rows of a clock, and the rate of their ends, 1/s.
+fn number_rows(clock: &Clock) -> Option<(Vec<f64>, Vec<f64>, f64)> {
+    if let (Some(frames), Some(times)) = (&clock.frame, &clock.time) {
+        let rows = frames.iter().zip(times.iter()).filter_map(|(frame, time)| frame.zip(time));
+        let (frames, times): (Vec<f64>, Vec<f64>) = rows.unzip();
+        let hz = (frames.last()? - frames.first()?) / (times.last()? - times.first()?);
+        return (hz.is_finite() && hz > 0.0).then_some((frames, times, hz));
+    }
+    let times = clock.times();
+    let step_s = clock::median_step_s(&times)?;
+    let fit = (step_s > 0.0).then(|| clock::number_frames(&times, step_s))??;
+    let frames = fit.frames.iter().map(|frame| *frame as f64).collect();
+    Some((frames, times, 1.0 / fit.frame_s))
+}
+
+/// Largest relative error of the rate of times that are written to `digit_s`. If each time was rounded, only
+/// the two ends count. If all steps are equal, the step itself may have been rounded to half a digit.
+fn times_error(times: &[f64], frames: &[f64], (hz, digit_s): (f64, f64)) -> f64 {
+    let span_s = times.last().zip(times.first()).map_or(0.0, |(last, first)| last - first);
+    let digits = 1.0 / hz / digit_s;
+    let equal = times.windows(2).zip(frames.windows(2)).all(|(time, frame)| {
+        ((time[1] - time[0]) * hz / (frame[1] - frame[0]) - 1.0).abs() <= EQUAL_STEPS
+    });
+    if equal && digits.is_finite() && digits >= FEWEST_DIGITS_PER_STEP { 0.5 / digits } else { digit_s / span_s }
+}
+
+/// Decimal places to which programs round times, s.
+const QUANTA_S: [f64; 8] = [1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7];
+
+/// Whether times lie on the grid of `rate_hz` that starts at the first time, within the rounding of the
+/// times.
+fn times_fit_rate(times: &[f64], frames: &[f64], rate_hz: f64) -> bool {
+    let (Some(start), Some(first)) = (times.first(), frames.first()) else { return false };
+    let half_quantum = find_quantum_s(times).map_or(1e-9, |q| q / 2.0 * (1.0 + 1e-6));
+    // (twice, because the first time is rounded too)
+    let fits =
+        |(time, frame): (&f64, &f64)| (start + (frame - first) / rate_hz - time).abs() <= 2.0 * half_quantum;
+    times.iter().zip(frames).all(fits)
+}
+
+/// The coarsest decimal place to which all times are rounded, s.
+pub(crate) fn find_quantum_s(times: &[f64]) -> Option<f64> {
+    QUANTA_S.into_iter().find(|quantum| are_multiples(times, *quantum))
+}
+
+/// Whether every time is a multiple of `quantum_s`.
+fn are_multiples(times: &[f64], quantum_s: f64) -> bool {
+    times.iter().all(|t| (t / quantum_s - (t / quantum_s).round()).abs() <= 1e-6)
+}
