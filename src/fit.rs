@@ -4,9 +4,10 @@
 //! components (frequencies) and other features. Targets are measured on the recordings or given in the job.
 //!
 //! A fit of features has three steps. It assesses which parameters the features can determine
-//! ([`identifiability`]), searches the unit box for the lowest cost with clouds of points and local searches
-//! ([`search`]), and computes intervals at the best point by profiles and twins ([`uncertainty`]). All
-//! evaluations are written to a journal from which the fit can be resumed.
+//! ([`identifiability`]), searches for the lowest cost with clouds of points and local searches ([`search`]),
+//! and computes intervals at the best point by profiles and twins ([`uncertainty`]). The search works in the
+//! unit box, in which each parameter runs from 0 at its lower bound to 1 at its upper bound. All evaluations
+//! are written to a journal from which the fit can be resumed.
 
 pub mod advice;
 pub mod bootstrap;
@@ -50,7 +51,7 @@ pub use targets::measure_targets;
 /// Reason why a fit cannot start or continue.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FitError {
-    /// The number of recordings differs from that of the job.
+    /// The number of recordings differs from the number that the job names.
     #[error("found {found} recordings, expected the {expected} of the job")]
     Recordings {
         /// Number of recordings given.
@@ -67,7 +68,7 @@ pub enum FitError {
         recording: String,
         /// Name of the component or feature.
         name: String,
-        /// Reason.
+        /// Reason why the feature cannot be measured.
         problem: String,
     },
     /// The journal does not belong to this fit.
@@ -78,9 +79,9 @@ pub enum FitError {
         "{file}: written by a search with seed {found}, the job has `seed = {expected}`; write `seed = {found}` into the job to go on from it, or move it away to start over"
     )]
     OtherSeed {
-        /// File as named by the user.
+        /// Path of the journal as the user gave it.
         file: String,
-        /// Seed in its header.
+        /// Seed in the header of the journal.
         found: u64,
         /// Seed of the job.
         expected: u64,
@@ -88,19 +89,20 @@ pub enum FitError {
     /// The journal cannot be written.
     #[error("the journal cannot be written: {problem}")]
     JournalWrite {
-        /// Reason.
+        /// Reason why the journal cannot be written.
         problem: String,
     },
-    /// The job cannot be fitted: the features determine nothing, or a scene refuses a value, for example.
+    /// The job cannot be fitted. For example, the features determine no parameter, or a scene refuses a
+    /// value.
     #[error("this job cannot be fitted: {why}")]
     CannotBeFitted {
         /// Reason and advice.
         why: String,
     },
-    /// The fit was allowed no evaluation.
+    /// The maximum number of evaluations is 0.
     #[error("found an allowance of {allowed} evaluations, expected at least 1; raise --max-evaluations")]
     NoEvaluation {
-        /// Number of evaluations allowed.
+        /// Maximum number of evaluations that was given.
         allowed: usize,
     },
 }

@@ -2,7 +2,8 @@
 //! job leaves undetermined.
 //!
 //! Candidate features are computed from runs of the model around one probe. A candidate is worth measuring if
-//! it changes by more than its own 95 % interval when an undetermined combination crosses the box.
+//! it changes by more than its own 95 % interval when an undetermined combination moves from one side of the
+//! search box to the other.
 
 use super::identifiability::ProbeEvaluation;
 use super::job::{FitTarget, Job};
@@ -21,17 +22,19 @@ const ROUGH_SD_RELATIVE: f64 = 0.05;
 const SPEED_SHARES: [f64; 3] = [0.25, 0.5, 0.8];
 /// Number of frames over which the head's speed is averaged.
 const SPEED_FRAMES: usize = 20;
-/// Segments in which a drifting frequency is measured, s: fine enough for a change within 0.1 s.
+/// Length of the segments in which a drifting frequency is measured, s: short enough to resolve a change
+/// within 0.1 s.
 const SEGMENT_S: f64 = 0.02;
 
-/// A feature that could be added to the job.
+/// A feature that could be added to the job as a target.
 struct CandidateFeature {
     description: String,
     sd_relative: f64,
     feature: Feature,
 }
 
-/// One sentence for each parameter combination that is undetermined at a probe.
+/// Advice on measurements: one sentence for each parameter combination that the job leaves undetermined at
+/// the given probe.
 pub(crate) fn advise_measurements(
     job: &Job,
     model: &dyn Model,
@@ -64,8 +67,8 @@ pub(crate) fn advise_measurements(
     sentences
 }
 
-/// Change of each candidate feature across the box along each parameter, in standard deviations of the
-/// candidate; zero where the model does not show it.
+/// Change of each candidate feature when one parameter moves from its lower to its upper bound, in standard
+/// deviations of the candidate; zero where the model does not show the feature.
 fn candidate_sensitivities(
     candidates: &[CandidateFeature],
     job: &Job,
@@ -123,7 +126,8 @@ fn candidate_features(job: &Job, model: &dyn Model, values: &[f64]) -> Vec<Candi
 const INTERVALS: [ReversalInterval; 3] =
     [ReversalInterval::ReleaseAfterReversal, ReversalInterval::StickDuration, ReversalInterval::FlipDuration];
 
-/// Mean deflections: they show the friction at each speed.
+/// Candidate mean deflections at several head speeds, each with a description. They show the friction at
+/// these speeds.
 fn quasi_static_readings(fastest_m_per_s: Option<f64>) -> Vec<(Reading, String)> {
     let mut found = Vec::new();
     for part in ["before", "after"] {
@@ -138,7 +142,7 @@ fn quasi_static_readings(fastest_m_per_s: Option<f64>) -> Vec<(Reading, String)>
     found
 }
 
-/// Amplitude, damping and frequency range in the bands of the components.
+/// Amplitude, damping and frequency range in the frequency band of each component.
 fn spectral_readings(aims: &[FitTarget], condition: usize) -> Vec<(Reading, String)> {
     let bands: Vec<(&FeatureBand, &str)> = aims
         .iter()

@@ -1,10 +1,12 @@
-//! Parametric bootstrap: twins of the best model are measured like the recording and fitted again from the
-//! best point (Efron and Tibshirani, An Introduction to the Bootstrap, 1993, chapter 6).
+//! Parametric bootstrap: recordings that are simulated with the best model (twins) are measured like the real
+//! recording and fitted again, starting from the best point (Efron and Tibshirani, An Introduction to the
+//! Bootstrap, 1993, chapter 6).
 //!
-//! In addition to the stated deviations, the spread of the refits contains the joint effect of noise, lost
-//! frames and starting state on the features of this blade. The camera errors of each twin are drawn from
-//! their priors. A refit takes damped Gauss-Newton steps from the best point with the Jacobian there,
-//! corrected by Broyden's rule. The spread is taken about the best point, so that it includes the bias.
+//! In addition to the standard deviations of the targets, the spread of the refits contains the joint effect
+//! of noise, lost frames and starting state on the features of this blade. The camera errors of each twin are
+//! drawn from their priors. A refit takes damped Gauss-Newton steps from the best point. It uses the Jacobian
+//! at the best point and corrects it by Broyden's rule. The spread of the refits is measured about the best
+//! point, so it includes the bias.
 
 use super::camera_calibration::draw_camera_errors;
 use super::evaluation::{Evaluation, EvaluationStage, Observed};
@@ -16,11 +18,11 @@ use nalgebra::DMatrix;
 use portable_math as math;
 use rayon::prelude::*;
 
-/// Number of Gauss-Newton steps of a refit: twins differ by a few deviations, where the linear
-/// model nearly holds.
+/// Number of Gauss-Newton steps of a refit. A few suffice, because the features of a twin are only a few
+/// standard deviations away, where the linear model is accurate.
 const REFIT_STEPS: usize = 3;
-/// Damping of a refit. It acts as a prior whose standard deviation is the side length of the box, and is
-/// negligible in any informative direction.
+/// Damping of a refit. It acts as a prior whose standard deviation is the side length of the unit box, and is
+/// negligible in any direction that the features determine.
 const REFIT_DAMPING: f64 = 1.0;
 /// Minimum number of refits from which a spread is computed.
 pub(crate) const MIN_TWINS: usize = 8;
@@ -28,16 +30,16 @@ pub(crate) const MIN_TWINS: usize = 8;
 /// Result of the refits.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Bootstrap {
-    /// Best points of the refits in the unit box, one per twin.
+    /// Points of the unit box at which the refits end, one per twin that could be simulated.
     pub refits: Vec<Vec<f64>>,
-    /// Standard deviation of each feature over the twins, in its own unit; `None` for a feature that fewer
-    /// than two twins show.
+    /// Standard deviation of each feature over the twins, in the unit of the feature; `None` if fewer than
+    /// two twins show the feature.
     pub feature_sd: Vec<Option<f64>>,
 }
 
 impl Bootstrap {
-    /// Root mean square distance of the refits from the best point along a coordinate; `None` with fewer
-    /// than [`MIN_TWINS`] refits.
+    /// Root mean square distance of the refits from the best point along one coordinate of the unit box;
+    /// `None` with fewer than [`MIN_TWINS`] refits.
     pub(crate) fn refit_spread(&self, axis: usize, best: f64) -> Option<f64> {
         let places: Vec<f64> = self.refits.iter().filter_map(|unit| unit.get(axis).copied()).collect();
         let mean_square = places.iter().map(|u| math::powi(u - best, 2)).sum::<f64>() / places.len() as f64;
@@ -45,7 +47,8 @@ impl Bootstrap {
     }
 }
 
-/// Simulates `twins` twins of `best` and fits each again; `jacobian` is the one at `best`.
+/// Simulates `twins` recordings with the parameters of `best` and fits each of them; `jacobian` is the
+/// Jacobian at `best`.
 ///
 /// # Errors
 /// [`StopReason`] when the evaluations are used up or the fit must stop.

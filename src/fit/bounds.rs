@@ -1,4 +1,5 @@
-//! Bounds of a parameter as one invertible transform between physical value, unit interval and real line.
+//! Bounds of a parameter, and the invertible transforms between its physical value, the unit interval and the
+//! real line.
 //!
 //! Clouds of points search the unit box. A search without bounds uses the real line with `u = (1 + sin z) /
 //! 2`, the transform of MINUIT (James and Roos, Comput. Phys. Commun. 10 (1975) 343): it reaches both bounds
@@ -19,7 +20,7 @@ pub enum BoundsSpacing {
     Linear,
 }
 
-/// Two numbers that are not valid bounds.
+/// Reason why two numbers are not valid bounds.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum BoundsError {
     /// A bound is infinite or not a number.
@@ -27,10 +28,10 @@ pub enum BoundsError {
     NotFinite {
         /// Key of the bound: `lower` or `upper`.
         key: &'static str,
-        /// Value of the bound.
+        /// Value of the bound that was found.
         found: f64,
     },
-    /// The bounds cross or are equal, or lie so close that no number fits between them.
+    /// The lower bound is not below the upper bound, or no floating-point number fits between them.
     #[error(
         "`lower` = {lower} and `upper` = {upper}: expected lower < upper; exchange or widen them, or fix the parameter in the scene"
     )]
@@ -62,7 +63,8 @@ impl Bounds {
     /// Checks the bounds.
     ///
     /// # Errors
-    /// [`BoundsError`] when they are not finite, cross or touch, or are logarithmic and not above zero.
+    /// [`BoundsError`] if a bound is not finite, if the lower bound is not below the upper bound, or if a
+    /// lower bound of a logarithmic range is not above zero.
     pub fn new(lower: f64, upper: f64, spacing: BoundsSpacing) -> Result<Self, BoundsError> {
         for (key, found) in [("lower", lower), ("upper", upper)] {
             if !found.is_finite() {
@@ -120,7 +122,7 @@ impl Bounds {
         value.clamp(self.lower, self.upper)
     }
 
-    /// `d p / d u` at `unit`, in the parameter's unit.
+    /// Derivative of the parameter value by the unit coordinate at `unit`, in the parameter's unit.
     pub(crate) fn slope(&self, unit: f64) -> f64 {
         match self.spacing {
             BoundsSpacing::Log => self.scaled_length() * self.value_at_unit(unit),
@@ -128,7 +130,8 @@ impl Bounds {
         }
     }
 
-    /// `d ln p / d u` at `unit`; `None` where the parameter is zero.
+    /// Derivative of the logarithm of the parameter value by the unit coordinate at `unit`; `None` where the
+    /// value is zero.
     pub(crate) fn log_slope(&self, unit: f64) -> Option<f64> {
         match self.spacing {
             BoundsSpacing::Log => Some(self.scaled_length()),
@@ -181,21 +184,21 @@ impl From<Bounds> for SearchAxis {
     }
 }
 
-/// Normal distribution of a parameter or of its logarithm.
+/// Prior: a normal distribution of a parameter or of the logarithm of the parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub enum Prior {
     /// Normal distribution of the parameter, in its own SI unit.
     Linear {
-        /// Mean.
+        /// Mean of the parameter.
         mean: f64,
-        /// Standard deviation.
+        /// Standard deviation of the parameter.
         sd: f64,
     },
-    /// Normal distribution of the natural logarithm of the parameter, whose scale is then logarithmic.
+    /// Normal distribution of the natural logarithm of the parameter, used if the bounds are logarithmic.
     Log {
-        /// Mean of the logarithm of the parameter in its SI unit.
+        /// Mean of the natural logarithm of the parameter's value in its SI unit.
         mean_ln: f64,
-        /// Standard deviation of the logarithm.
+        /// Standard deviation of the natural logarithm of the parameter's value.
         sd_ln: f64,
     },
 }
@@ -223,7 +226,8 @@ mod tests {
             for bounds in [log, linear] {
                 assert!((bounds.unit_coordinate(bounds.value_at_unit(unit)) - unit).abs() < 1e-14, "{unit}");
             }
-            // near the ends, u = (1 + sin z) / 2 is quadratic in z: z keeps half of its digits, u all of them
+            // near the ends, u = (1 + sin z) / 2 is quadratic in z, so z loses half of its digits and u loses
+            // none
             assert!((line_to_unit(unit_to_line(unit)) - unit).abs() < 1e-15, "{unit}");
         }
     }

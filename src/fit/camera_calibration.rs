@@ -1,11 +1,11 @@
 //! Calibration errors of cameras and their effect on features.
 //!
 //! A camera measures a deflection `d` as `(1 + scale) d + offset`: its scale is known to half a percent, and
-//! a marker is never exactly on the hinge. Both numbers are unknowns with priors, common to all features of a
-//! recording. Their effect does not need a run of the model, so they are no search parameters. At every point
-//! of the search, `CameraFit::estimate` chooses the values that minimise the cost, and the Jacobian is
-//! projected onto the complement of their derivatives (variable projection, Golub and Pereyra, SIAM J. Numer.
-//! Anal. 10 (1973) 413, in the form of Kaufman, BIT 15 (1975) 49).
+//! a marker is never exactly on the hinge. Scale and offset are unknowns with priors, common to all features
+//! of a recording. Their effect is computed without a run of the model, so they are not parameters of the
+//! search. At every point of the search, `CameraFit::estimate` chooses the values that minimise the cost, and
+//! the Jacobian is projected onto the complement of their derivatives (variable projection, Golub and
+//! Pereyra, SIAM J. Numer. Anal. 10 (1973) 413, in the form of Kaufman, BIT 15 (1975) 49).
 
 use super::evaluation::{Observation, Observed};
 use super::objective::{LOSS_KNEE, residual, robust_loss, total_sd};
@@ -18,14 +18,15 @@ use portable_math::StandardNormal;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Maximum number of Gauss-Newton steps. Three steps converge to rounding errors from a few deviations away,
-/// a dozen from far away.
+/// Maximum number of Gauss-Newton steps. From a few standard deviations away, three steps converge to
+/// rounding error; from far away, a dozen.
 const MAX_STEPS: usize = 60;
 /// Maximum number of halvings of a step that raises the cost.
 const MAX_HALVINGS: usize = 12;
 /// Length of a step, in prior standard deviations, below which the descent ends.
 const MIN_STEP: f64 = 1e-12;
-/// Distance between the seeds of two cameras, so that no two draws use the same random numbers.
+/// Difference between the random seeds of successive cameras, so that no two draws use the same random
+/// numbers.
 const CAMERA_SEEDS: u64 = 1 << 40;
 /// Variance of a uniform variable in the unit interval.
 const BOX_VARIANCE: f64 = 1.0 / 12.0;
@@ -35,18 +36,20 @@ const BOX_VARIANCE: f64 = 1.0 / 12.0;
 pub(crate) struct CameraEstimate {
     /// Index of the condition to which the camera belongs, from 0.
     pub condition: usize,
-    /// Name of the number in a result.
+    /// Name of the scale or offset in a result.
     pub name: &'static str,
-    /// Standard deviation of its prior, whose mean is 0.
+    /// Standard deviation of the prior of this number, in the unit that `name` states; the mean of the prior
+    /// is 0.
     pub prior_sd: f64,
-    /// Best value, in the unit of its name.
+    /// Estimated value, in the unit that `name` states.
     pub estimate: f64,
-    /// Half width of the 95 % interval by the linear model, in the same unit; `None` without a linear model.
+    /// Half width of the 95 % interval by the linear model, in the unit of `estimate`; `None` without a
+    /// linear model.
     pub half_95: Option<f64>,
 }
 
-/// The camera of a condition: standard deviations of scale and offset, and their values in units
-/// of these deviations.
+/// The camera of a condition: prior standard deviations of scale and offset, and the estimated values divided
+/// by these standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct ConditionCamera {
     condition: usize,
@@ -60,7 +63,7 @@ impl ConditionCamera {
     }
 }
 
-/// Names of the two numbers of a camera.
+/// Names of the scale and the offset of a camera in a result.
 const CAMERA_NUMBER_NAMES: [&str; 2] = ["scale_relative", "offset_x_m"];
 
 /// The cameras of the targets, with the scales and offsets that minimise the cost of the features.
@@ -68,8 +71,8 @@ const CAMERA_NUMBER_NAMES: [&str; 2] = ["scale_relative", "offset_x_m"];
 pub(crate) struct CameraFit(Vec<ConditionCamera>);
 
 impl CameraFit {
-    /// Estimates the cameras of `targets`; `features` are in the same order. Numbers of a camera without
-    /// features are the means of their priors.
+    /// Estimates the cameras of `targets`; `features` are in the same order. A camera without features gets
+    /// the prior means, which are 0.
     pub(crate) fn estimate(targets: &[TargetValue], features: &[Observed]) -> Self {
         let mut cameras: Vec<ConditionCamera> = Vec::new();
         for calibration in targets.iter().filter_map(|target| target.calibration) {
@@ -96,13 +99,13 @@ impl CameraFit {
         self.free_numbers().count()
     }
 
-    /// All estimated numbers: the camera and the index of the number, 0 for the scale and 1 for the offset.
+    /// All estimated numbers, each as its camera and an index: 0 for the scale, 1 for the offset.
     fn free_numbers(&self) -> impl Iterator<Item = (&ConditionCamera, usize)> {
         let all = self.0.iter().flat_map(|camera| [0, 1].map(|k| (camera, k)));
         all.filter(|(camera, k)| camera.sds[*k] > 0.0)
     }
 
-    /// Residuals of the priors of the estimated numbers, in standard deviations.
+    /// Distances of the estimated numbers from their prior means, in prior standard deviations.
     pub(crate) fn prior_residuals(&self) -> impl Iterator<Item = f64> {
         self.free_numbers().map(|(camera, k)| camera.place[k])
     }
@@ -122,8 +125,8 @@ impl CameraFit {
     }
 
     /// Projects the columns of `jacobian` onto the complement of the derivatives by the camera unknowns, with
-    /// the weights of the cost. The first rows of `jacobian` are the features, its last rows the camera
-    /// unknowns.
+    /// the weights of the cost. The first rows of `jacobian` belong to the features, the last rows to the
+    /// camera unknowns.
     pub(crate) fn project_jacobian(
         &self,
         jacobian: DMatrix<f64>,
@@ -141,8 +144,8 @@ impl CameraFit {
         jacobian - own * followed
     }
 
-    /// The estimated numbers, with 95 % intervals by the linear model. The rows of `jacobian` are
-    /// as in [`Self::project_jacobian`].
+    /// The estimated scales and offsets, with 95 % intervals by the linear model. `jacobian` has the same
+    /// rows as in [`Self::project_jacobian`].
     pub(crate) fn estimates(
         &self,
         jacobian: Option<&DMatrix<f64>>,
@@ -160,8 +163,8 @@ impl CameraFit {
         self.free_numbers().enumerate().map(estimate).collect()
     }
 
-    /// Marginal standard deviations of the camera unknowns, divided by those of their priors. Each parameter
-    /// has a prior with the variance of a uniform variable in the unit box.
+    /// Marginal standard deviations of the camera unknowns, divided by the prior standard deviations. Each
+    /// parameter is given a prior with the variance of a uniform variable in the unit box.
     fn standard_deviations(
         &self,
         jacobian: &DMatrix<f64>,
@@ -183,8 +186,8 @@ impl CameraFit {
         Some((jacobian.ncols()..all.ncols()).map(|at| covariance[(at, at)].sqrt()).collect())
     }
 
-    /// Derivatives of `rows` residuals by the camera unknowns in units of their priors, and the weights
-    /// of the rows.
+    /// Derivatives of all residuals by the camera unknowns in prior standard deviations, and the weights of
+    /// the residuals in the cost; `rows` is the number of residuals.
     fn jacobian(
         &self,
         rows: usize,
@@ -213,7 +216,7 @@ impl CameraFit {
     }
 }
 
-/// Features with camera errors drawn from the priors; `draw` is the number of the twin.
+/// Features as seen by cameras whose errors are drawn from the priors; `draw` is the number of the twin.
 pub(crate) fn draw_camera_errors(targets: &[TargetValue], features: &[Observed], draw: u64) -> Vec<Observed> {
     let one = |(target, observed): (&TargetValue, &Observed)| match (target.calibration, observed) {
         (Some(calibration), Observed::Value(observation)) => {
@@ -235,16 +238,17 @@ fn weight_rows(matrix: &DMatrix<f64>, weights: &[f64]) -> DMatrix<f64> {
     weighted
 }
 
-/// Weight of a squared residual in the normal equations: the derivative of [`robust_loss`] by that square.
+/// Weight of a squared residual in the normal equations: the derivative of [`robust_loss`] by the squared
+/// residual.
 fn robust_weight(residual: f64) -> f64 {
     math::powi(LOSS_KNEE / residual.abs().max(LOSS_KNEE), 2)
 }
 
-/// A target, its calibration, and the feature of the model.
+/// A target, how it depends on the calibration of its camera, and the feature of the model.
 type TargetObservation<'a> = (&'a TargetValue, TargetCalibration, Observation);
 
-/// Residual of a feature, and its derivatives by the camera numbers `place`, which are in prior standard
-/// deviations.
+/// Residual of a feature, and the derivatives of the residual by the scale and offset `place`, which are
+/// given in prior standard deviations.
 fn linearize_residual(
     (target, calibration, observation): &TargetObservation,
     place: [f64; 2],
@@ -255,7 +259,7 @@ fn linearize_residual(
     let distance = target.distance(value);
     let sd = total_sd(observation, target);
     let per_metre = match target.measure {
-        // a clamped distance has no slope
+        // a clamped distance has zero slope
         _ if distance.abs() >= math::ln(MAX_RATIO) => 0.0,
         ValueComparison::Log => 1.0 / value,
         ValueComparison::Linear { scale } => 1.0 / scale,
@@ -264,9 +268,9 @@ fn linearize_residual(
     (distance / sd, [0, 1].map(|k| slopes[k] * sds[k] * per_metre / sd))
 }
 
-/// Camera numbers, in prior standard deviations, that minimise the cost of the features. Far from the target
-/// the cost grows only logarithmically and may have two minima, so the descent starts from the prior means
-/// and from the least-squares solution.
+/// Scale and offset of a camera, in prior standard deviations, that minimise the cost of the features. Far
+/// from the target the cost grows only logarithmically and may have two minima, so the descent starts from
+/// the prior means and from the least-squares solution.
 fn minimize_camera_cost(pairs: &[TargetObservation]) -> [f64; 2] {
     let cost = |place: &[f64; 2]| camera_cost(pairs, *place, robust_loss);
     let squares = gauss_newton_descent(pairs, [0.0; 2], |r| r * r, |_| 1.0);
@@ -275,7 +279,7 @@ fn minimize_camera_cost(pairs: &[TargetObservation]) -> [f64; 2] {
     if cost(&far) < cost(&near) { far } else { near }
 }
 
-/// Cost of the features of a camera and of the priors of its numbers.
+/// Cost of the features that a camera shows, plus the cost of the priors of its scale and offset.
 fn camera_cost(pairs: &[TargetObservation], place: [f64; 2], cost: fn(f64) -> f64) -> f64 {
     let of = |pair| {
         let residual = linearize_residual(pair, place).0;
@@ -284,7 +288,7 @@ fn camera_cost(pairs: &[TargetObservation], place: [f64; 2], cost: fn(f64) -> f6
     pairs.iter().map(of).sum::<f64>() + place.into_iter().map(cost).sum::<f64>()
 }
 
-/// Weighted Gauss-Newton steps, each halved until the cost falls.
+/// Minimises the total `cost` from `start` by weighted Gauss-Newton steps, each halved until the cost falls.
 fn gauss_newton_descent(
     pairs: &[TargetObservation],
     start: [f64; 2],

@@ -14,11 +14,12 @@ pub struct Observation {
     /// Value of the feature, in its own SI unit; finite.
     #[serde(with = "exact")]
     pub value: f64,
-    /// Standard deviation over the starting states, in the same unit; 0 for a single state.
+    /// Standard deviation of the feature over the starting states, in the unit of the feature; 0 for a single
+    /// state.
     #[serde(with = "exact")]
     pub spread: f64,
-    /// Level of the strongest peak of the band relative to the assigned peak, dB; 0 if the assigned peak is
-    /// the strongest, and for features without peaks.
+    /// Level of the strongest spectral peak of the band relative to the peak that is assigned to the feature,
+    /// dB. It is 0 if the assigned peak is the strongest, and for features without peaks.
     #[serde(with = "exact")]
     pub below_db: f64,
 }
@@ -33,7 +34,8 @@ pub enum Observed {
 }
 
 impl Observed {
-    /// Observation of a single run, without spread; if it is a frequency, that of the strongest peak.
+    /// Observation from a single run, with zero spread. A frequency counts as the frequency of the strongest
+    /// peak.
     #[must_use]
     pub fn from_value(value: f64) -> Self {
         Self::Value(Observation { value, spread: 0.0, below_db: 0.0 })
@@ -47,7 +49,7 @@ impl Observed {
         }
     }
 
-    /// The value, if there is one.
+    /// The value of the feature, if it has one.
     pub(crate) fn value(&self) -> Option<f64> {
         self.observation().map(|observation| observation.value)
     }
@@ -62,8 +64,8 @@ pub struct Evaluation {
     pub values: Vec<f64>,
     /// Cost, finite and not negative.
     pub cost: f64,
-    /// Cost in the first stage: without the features that count in the last stage only, and with deviations
-    /// of at least `FIRST_STAGE_SD_RELATIVE`.
+    /// Cost in the first stage of the search: without the features that count in the last stage only, and
+    /// with relative standard deviations of at least `FIRST_STAGE_SD_RELATIVE`.
     pub global_cost: f64,
     /// Features in the order of the targets; empty when the run failed.
     pub features: Vec<Observed>,
@@ -71,7 +73,8 @@ pub struct Evaluation {
     pub failure: Option<RunFailure>,
 }
 
-/// An evaluation without its costs, because these also depend on the scatter that a search estimates.
+/// An evaluation without costs. The costs also depend on the scatter of the features, which the search
+/// estimates.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EvaluationOutcome {
     /// Point in the unit box, one coordinate per parameter.
@@ -91,7 +94,7 @@ impl From<Evaluation> for EvaluationOutcome {
     }
 }
 
-/// Reason why a run gave no features; failures are counted by reason.
+/// Kind of reason why a run gave no features; failures are counted by kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FailureReason {
     /// The run ended before its stop time.
@@ -104,7 +107,7 @@ pub enum FailureReason {
     NotFinite,
     /// A feature is not a number.
     NotANumber,
-    /// The number of features differs from that of the job.
+    /// The number of features differs from the number in the job.
     FeatureCount,
     /// The model panicked.
     Panic,
@@ -204,7 +207,7 @@ impl RunFailure {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum EvaluationStage {
-    /// Probes for the identifiability, before the search.
+    /// Probes before the search, which test the identifiability of the parameters.
     Gate,
     /// Clouds of points over the whole box.
     Global,
@@ -216,7 +219,7 @@ pub enum EvaluationStage {
     Profile,
     /// Fits to twins of the best model.
     Bootstrap,
-    /// Searches outside the interval of an identified parameter.
+    /// Searches outside the 95 % interval of an identified parameter.
     Elsewhere,
 }
 
@@ -235,7 +238,7 @@ impl EvaluationStage {
     }
 }
 
-/// Values by parameter name.
+/// Maps each parameter name to its value.
 pub(super) fn map_names<T>(names: &[String], values: impl Iterator<Item = T>) -> BTreeMap<String, T> {
     names.iter().cloned().zip(values).collect()
 }

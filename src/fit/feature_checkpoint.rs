@@ -26,7 +26,7 @@ pub struct EvaluationRecord {
     pub outcome: EvaluationOutcome,
 }
 
-/// Bits of the coordinates of a point in the unit box, as a key for look-up.
+/// The coordinates of a point in the unit box as bit patterns, to look up the point.
 pub(crate) fn point_key(unit: &[f64]) -> Vec<u64> {
     unit.iter().map(|u| u.to_bits()).collect()
 }
@@ -41,7 +41,8 @@ impl CheckpointRecord for EvaluationRecord {
         point_key(&self.outcome.unit)
     }
 
-    /// Parameter values are not stored: they follow from the point in the unit box.
+    /// The row of this evaluation in the journal. Parameter values are not stored, because they follow from
+    /// the point in the unit box.
     fn to_row(&self, at: usize) -> EvaluationRow {
         let EvaluationOutcome { unit, features, failure, .. } = &self.outcome;
         EvaluationRow {
@@ -62,7 +63,8 @@ impl CheckpointRecord for EvaluationRecord {
         Ok(Self { stage: row.stage, outcome: row.into_outcome(body) })
     }
 
-    /// Compares the outcomes only, because another search may evaluate the same point in another stage.
+    /// Compares the outcomes but not the stages, because another search may evaluate the same point in
+    /// another stage.
     fn difference(&self, other: &Self) -> Option<[String; 2]> {
         first_difference(&self.outcome, &other.outcome)
     }
@@ -142,7 +144,7 @@ impl FeatureValueRow {
     }
 }
 
-// Header of the journal: the meaning of the numbers in its lines, and the targets.
+// Header of the journal: the meaning of the numbers in the lines that follow, and the targets.
 
 /// The part of the header that is specific to a fit of features.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -162,7 +164,7 @@ pub struct FeatureHeaderBody {
 pub struct HeaderParameter {
     /// Name in the job.
     pub name: String,
-    /// Unit as shown; `1` for a plain number.
+    /// Unit in which the value is shown; `1` for a dimensionless number.
     pub unit: String,
     /// Range of the parameter, which maps coordinates to values, and its prior.
     pub axis: SearchAxis,
@@ -174,7 +176,7 @@ pub struct HeaderParameter {
 pub struct HeaderFeature {
     /// Name in the job.
     pub name: String,
-    /// Unit in files; `1` for a plain number.
+    /// Unit in which files give the value; `1` for a dimensionless number.
     pub unit: String,
     /// Target value and its standard deviation.
     pub target: TargetValue,
@@ -232,7 +234,8 @@ struct FeatureRow {
     unit: String,
     target: ExactNumber,
     sd: ExactNumber,
-    /// Difference that counts as large; absent if values are compared by the logarithm of their ratio.
+    /// Difference of two values that counts as large, in the unit of the feature; absent if values are
+    /// compared by the logarithm of their ratio.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     large_difference: Option<ExactNumber>,
     /// Whether the feature counts in the last stage only.
@@ -250,7 +253,7 @@ struct CameraRow {
     condition: usize,
     scale_sd: ExactNumber,
     offset_sd_m: ExactNumber,
-    /// Noise floor that is added to a size in quadrature; absent for a position.
+    /// Noise floor that is added in quadrature to a feature that is a size; absent for a position.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     floor_m: Option<ExactNumber>,
 }
@@ -342,11 +345,12 @@ fn describe_observed(observed: &Observed) -> String {
 
 // A resumed fit repeats some evaluations of its journal and refuses the journal if they differ.
 
-/// Repeats a sample of the evaluations of the resumed journal and compares every bit.
+/// Repeats a sample of the evaluations in the resumed journal and compares every bit of the results.
 pub(super) fn recheck_sample(objective: &Objective, context: &FitContext, seed: u64) -> Result<(), FitError> {
     let Some((file, journal)) = context.resume else { return Ok(()) };
     let records = journal.records.len();
-    let places = sample_records(records, seed.wrapping_add(records as u64)); // changes as the journal grows
+    // the sample changes as the journal grows
+    let places = sample_records(records, seed.wrapping_add(records as u64));
     let checked: Vec<Result<(), CheckpointError>> =
         places.into_par_iter().map(|place| recheck_record(objective, file, journal, place)).collect();
     Ok(checked.into_iter().collect::<Result<(), _>>()?)

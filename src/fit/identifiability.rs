@@ -1,9 +1,9 @@
-//! Identifiability before the search: which parameters the features can determine at their noise, assessed at
-//! a few points of the box (probes).
+//! Identifiability before the search: which parameters the features can determine, given their noise. It is
+//! assessed at a few points of the search box (probes).
 //!
 //! At each probe the model is differentiated along every parameter by finite differences. A fit is refused
-//! only if the model fails at all probes, if it shows no feature at any of them, or if no parameter changes
-//! any feature. All other findings are notes.
+//! only if the model fails at all probes, if no feature has a value at any probe, or if no parameter changes
+//! any feature. All other findings become notes in the result.
 
 use super::FitError;
 use super::evaluation::{Evaluation, EvaluationStage, Observed, map_names};
@@ -18,8 +18,8 @@ use std::collections::BTreeMap;
 
 /// Number of probes: the middle of the box and points of a Halton sequence around it.
 pub(crate) const PROBE_COUNT: usize = 5;
-/// Fraction of each side of the box, about its middle, in which the probes lie: near its corners the
-/// model rarely runs.
+/// Fraction of each side of the box, centred on the middle, in which the probes are placed. Near the corners
+/// of the box the model rarely runs.
 const INNER_BOX: f64 = 0.7;
 
 /// Result at one probe.
@@ -30,13 +30,14 @@ pub struct Probe {
     /// Failure of the model, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
-    /// Number of features that the model shows.
+    /// Number of features that have a value at this probe.
     pub features_seen: usize,
-    /// Number of informative directions.
+    /// Number of directions in the parameter space that the features determine.
     pub rank: usize,
-    /// Ratio of the largest to the smallest singular value; `None` if it is infinite.
+    /// Condition number of the Jacobian: ratio of the largest to the smallest singular value; `None` if it is
+    /// infinite.
     pub condition: Option<f64>,
-    /// Parameters that the features determine.
+    /// Names of the parameters that the features determine at this probe.
     pub determines: Vec<String>,
 }
 
@@ -45,11 +46,12 @@ pub struct Probe {
 pub struct Identifiability {
     /// The probes.
     pub probes: Vec<Probe>,
-    /// Combinations of parameters that are determined or left undetermined at the probe nearest
-    /// to the targets.
+    /// Combinations of parameters that are determined or left undetermined at the probe whose features are
+    /// nearest to the targets.
     pub combinations: Vec<ParameterCombination>,
-    /// Scatter of each feature of the model between neighbouring points, in its unit: the median over the
-    /// probes. It is added to the deviation of the target, because a search cannot resolve a smaller change.
+    /// Scatter of each feature of the model between neighbouring points, in the unit of the feature: the
+    /// median over the probes. It is added to the standard deviation of the target, because a search cannot
+    /// resolve a smaller change.
     pub scatter: Vec<f64>,
     /// Remarks for the reader, one sentence each.
     pub notes: Vec<String>,
@@ -57,12 +59,13 @@ pub struct Identifiability {
     pub advice: Vec<String>,
 }
 
-/// A probe with its evaluation and linear model.
+/// A probe with the evaluation and the linear model at this point.
 #[derive(Debug, Clone)]
 pub(crate) struct ProbeEvaluation {
     pub centre: Evaluation,
     pub directions: SingularDirections,
-    /// Scatter of each feature at the probe.
+    /// Scatter of each feature of the model between neighbouring points at the probe, in the unit of the
+    /// feature.
     scatter: Vec<Option<f64>>,
 }
 
@@ -130,8 +133,8 @@ fn summarize_probe(probed: &ProbeEvaluation, names: &[String]) -> Probe {
     }
 }
 
-/// Coordinates of probe `at`: the middle of the box, then a Halton sequence (Halton, Numer. Math.
-/// 2 (1960) 84).
+/// Coordinates of probe `at` in the unit box: probe 0 is the middle of the box, the others follow a Halton
+/// sequence (Halton, Numer. Math. 2 (1960) 84).
 fn probe_point(at: usize, dimensions: usize) -> Vec<f64> {
     let coordinate = |axis: usize| {
         let share = if at == 0 { 0.5 } else { radical_inverse(at, nth_prime(axis)) };
@@ -188,7 +191,7 @@ fn median(mut values: Vec<f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// A note for each feature whose scatter in the model exceeds the deviation of its target.
+/// A note for each feature whose scatter in the model exceeds the standard deviation of its target.
 fn rough_notes(targets: &[TargetValue], scatter: &Vec<f64>) -> Vec<String> {
     let rough = targets.iter().zip(scatter).filter(|(target, scatter)| **scatter > target.sd);
     let note = |(target, scatter): (&TargetValue, &f64)| {

@@ -1,6 +1,6 @@
 //! Reads job.toml and checks it completely before anything runs. `docs/fits.md` describes every key.
 
-/// Returns from a check with a refusal of `$key`; the problem is formatted as by [`format!`].
+/// Returns early from a check with an error about `$key`; the problem is formatted as by [`format!`].
 macro_rules! refuse {
     ($key:expr, $($problem:tt)+) => {
         return $crate::toml_file::refuse_key($key, std::fmt::format(format_args!($($problem)+)))
@@ -28,7 +28,7 @@ pub(crate) use settings::{Ensemble, IntervalSettings};
 pub use targets::{FitTarget, TargetSource, TargetStage};
 pub(crate) use traces::{CameraPriorSds, TraceChannel, TraceTarget};
 
-/// Name of a condition, the values that it sets, and whether it is held out.
+/// Name of a condition, the parameter values that it sets, and whether it is held out of the fit.
 type ConditionIdentity<'a> = (&'a str, &'a [(String, f64)], bool);
 
 /// The part of a job on which the cost of a point depends.
@@ -37,7 +37,7 @@ pub(super) struct JobIdentity<'a> {
     conditions: Vec<ConditionIdentity<'a>>,
     camera: Option<Camera>,
     parameters: &'a [FreeParameter],
-    /// Omitted where constants are exact, so that a job without freed constants keeps its fingerprint.
+    /// Omitted if all constants are exact, so that a job without freed constants keeps its fingerprint.
     #[serde(skip_serializing_if = "Constants::is_none")]
     constants: &'a Constants,
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
@@ -116,13 +116,14 @@ impl Job {
         self.parameters.iter().map(|p| p.name.clone()).collect()
     }
 
-    /// Features of the targets, in the same order.
+    /// Features of the targets, in the order of the targets.
     #[must_use]
     pub fn features(&self) -> Vec<Feature> {
         self.targets.iter().map(|aim| aim.feature.clone()).collect()
     }
 
-    /// Paths of the recordings, relative to the job file. They belong to the first conditions.
+    /// Paths of the recordings, relative to the job file. The first recording belongs to the first condition,
+    /// and so on.
     pub fn recordings(&self) -> impl Iterator<Item = &str> {
         self.conditions.iter().filter_map(|condition| condition.recording.as_deref())
     }
@@ -154,7 +155,7 @@ impl Job {
     }
 
     /// Dependence of a target on the uncertain calibration of its camera. `None` for a feature that is not a
-    /// length, for a target that the job gives with its own deviation, and in a job with traces.
+    /// length, for a target whose value the job gives, and in a job with traces.
     pub(crate) fn target_calibration(&self, aim: &FitTarget) -> Option<TargetCalibration> {
         let measured = matches!(aim.source, TargetSource::Measured { .. }) && self.traces.is_empty();
         let condition = aim.feature.condition;
@@ -204,7 +205,7 @@ pub enum JobError {
     Value {
         /// File as named by the user.
         file: String,
-        /// The key, preceded by the name of its entry.
+        /// The invalid key, preceded by the name of the entry that contains it.
         key: String,
         /// Value found, value expected, and advice.
         problem: String,

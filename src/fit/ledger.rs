@@ -1,5 +1,5 @@
-//! Ledger of a run: it makes every evaluation once, in parallel where possible, and records them in an order
-//! that does not depend on the number of threads.
+//! Ledger of a run: it evaluates every point only once, in parallel where possible, and records the
+//! evaluations in an order that does not depend on the number of threads.
 
 use super::evaluation::{Evaluation, EvaluationStage, FailureReason};
 use super::feature_checkpoint::{EvaluationRecord, point_key};
@@ -14,9 +14,9 @@ use std::ops::ControlFlow;
 pub struct FitProgress {
     /// Purpose of the latest evaluations.
     pub stage: EvaluationStage,
-    /// Evaluations so far, replayed ones included.
+    /// Number of evaluations so far, including those replayed from the journal.
     pub evaluations: usize,
-    /// Evaluations that were replayed from the journal.
+    /// Number of evaluations that were replayed from the journal.
     pub replayed: usize,
     /// Lowest cost so far.
     pub best_cost: f64,
@@ -49,7 +49,7 @@ pub struct Ledger<'a> {
     best: Option<Evaluation>,
     limit: usize,
     stop: Option<StopReason>,
-    /// Evaluations that are held back from the journal; `None` when they are written at once.
+    /// Evaluations that are not yet written to the journal; `None` if evaluations are written at once.
     held_lines: Option<Vec<(EvaluationStage, usize)>>,
 }
 
@@ -83,11 +83,11 @@ impl<'a> Ledger<'a> {
         }
     }
 
-    /// Evaluations at `points` of the unit box, in the order of the points. A point that this run has already
-    /// evaluated is not evaluated again.
+    /// Evaluates the model at `points` of the unit box and returns the evaluations in the order of the
+    /// points. A point that this run has already evaluated is not evaluated again.
     ///
     /// # Errors
-    /// [`StopReason`] if some evaluations could not be made; those that were made are kept.
+    /// [`StopReason`] if some points could not be evaluated; the completed evaluations are kept.
     pub(crate) fn evaluate_points(
         &mut self,
         stage: EvaluationStage,
@@ -97,7 +97,8 @@ impl<'a> Ledger<'a> {
             return Err(stop.clone());
         }
         let (new, complete) = self.new_points(points);
-        // recorded in chunks, in the order of the points, so that little is lost if the program is killed
+        // evaluations are recorded in chunks, in the order of the points, so that little is lost if the
+        // program is killed
         for chunk in new.chunks(2 * rayon::current_num_threads()) {
             let (objective, replay) = (self.objective, &self.replay);
             let make = |point: &Vec<f64>| match replay.get(&point_key(point)) {
@@ -119,12 +120,13 @@ impl<'a> Ledger<'a> {
         Ok(points.iter().filter_map(|point| self.find_evaluation(point)).collect())
     }
 
-    /// Holds new lines back until [`Self::release_lines`], so that a refused job leaves no journal behind.
+    /// Delays writing new lines to the journal until [`Self::release_lines`], so that a refused job creates
+    /// no journal.
     pub(crate) fn hold_lines(&mut self) {
         self.held_lines = Some(Vec::new());
     }
 
-    /// Writes `opening`, then the lines that were held back.
+    /// Writes `opening` to the journal, then the lines that were delayed.
     ///
     /// # Errors
     /// The reason why the journal cannot be written.
@@ -161,7 +163,8 @@ impl<'a> Ledger<'a> {
         self.journal.append(&lines).map_err(|problem| self.stop.insert(StopReason::Journal(problem)).clone())
     }
 
-    /// Replaces the objective by one with the same model and features, and updates all costs.
+    /// Replaces the objective by another objective with the same model and features, and recomputes all
+    /// costs.
     pub(crate) fn change_objective(&mut self, objective: &'a Objective<'a>) {
         self.objective = objective;
         let known = self.evaluations.iter_mut().chain(self.replay.values_mut());
@@ -183,7 +186,7 @@ impl<'a> Ledger<'a> {
         &self.evaluations
     }
 
-    /// The evaluation of lowest cost; of several with equal cost, the earliest.
+    /// The evaluation with the lowest cost; if several have this cost, the earliest of them.
     #[must_use]
     pub fn best_evaluation(&self) -> Option<&Evaluation> {
         self.best.as_ref()
@@ -204,7 +207,7 @@ impl<'a> Ledger<'a> {
         self.limit = limit;
     }
 
-    /// Reason other than the budget why nothing more can be evaluated.
+    /// Reason why nothing more can be evaluated, except a used-up budget.
     pub(crate) fn stop_reason(&self) -> Option<&StopReason> {
         self.stop.as_ref()
     }
@@ -249,7 +252,7 @@ impl<'a> Ledger<'a> {
         }
     }
 
-    /// The evaluation that this run made at a point.
+    /// The evaluation that this run has made or replayed at a point, if any.
     pub(crate) fn find_evaluation(&self, point: &[f64]) -> Option<&Evaluation> {
         self.places.get(&point_key(point)).and_then(|at| self.evaluations.get(*at))
     }

@@ -1,9 +1,9 @@
 //! Linear model of the residuals around a point of the unit box.
 //!
-//! Rows of the Jacobian are the features in the order of the targets, then the priors, then the camera
-//! unknowns (`CameraFit`), each in standard deviations; columns are the parameters. Slopes are central
-//! differences with the step `DIFFERENCE_STEP`, which is wide enough to average over the scatter of features
-//! that are measured on sampled traces.
+//! Each row of the Jacobian belongs to one residual, in standard deviations: first the features in the order
+//! of the targets, then the priors, then the camera unknowns (`CameraFit`). Each column belongs to one
+//! parameter. Slopes are central differences with the step `DIFFERENCE_STEP`, which is wide enough to average
+//! over the scatter of features that are measured on sampled traces.
 
 use super::bounds::{Prior, SearchAxis, clamp_unit};
 use super::camera_calibration::{CameraEstimate, CameraFit};
@@ -16,7 +16,8 @@ use portable_math as math;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Step of the differences in the unit box: about 2 % of a parameter whose bounds are one decade apart.
+/// Step of the finite differences in the unit box. For a parameter whose bounds are one decade apart, it is
+/// about 2 % of the value.
 pub(crate) const DIFFERENCE_STEP: f64 = 0.01;
 /// Longest step in the unit box for which the linear model is trusted.
 const MAX_STEP: f64 = 0.2;
@@ -30,8 +31,9 @@ pub(crate) fn difference_points(unit: &[f64]) -> Vec<Vec<f64>> {
     (0..unit.len()).flat_map(|axis| [moved(axis, -DIFFERENCE_STEP), moved(axis, DIFFERENCE_STEP)]).collect()
 }
 
-/// `d distance / d u` of every feature as its camera shows it, one row per feature. `None` where the feature
-/// has a value at fewer than two of the three points.
+/// Derivative of the distance of each feature from its target by each coordinate `u` of the unit box, one row
+/// per feature. The feature is taken as its camera shows it. `None` if the feature has a value at fewer than
+/// two of the three points of the difference.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FeatureSlopes(pub Vec<Vec<Option<f64>>>);
 
@@ -66,9 +68,9 @@ fn feature_slope(target: &TargetValue, below: (f64, f64), above: (f64, f64)) -> 
     (width > 0.0 && change.is_finite()).then(|| change / width)
 }
 
-/// Scatter of each feature about a straight line through neighbouring points, as a standard deviation in its
-/// own unit: the variance of `f(+) + f(-) - 2 f(0)` of independent values is six times that of one value.
-/// `None` where the feature is missing at the centre, or on a side of every pair.
+/// Scatter of each feature about a straight line through neighbouring points, as a standard deviation in the
+/// unit of the feature: the variance of `f(+) + f(-) - 2 f(0)` of independent values is six times that of one
+/// value. `None` where the feature is missing at the centre, or on a side of every pair.
 pub(crate) fn feature_scatter(
     targets: &[TargetValue],
     centre: &Evaluation,
@@ -110,8 +112,8 @@ pub(crate) fn residuals_against(
     features.chain(priors).chain(cameras.prior_residuals().map(Some)).collect()
 }
 
-/// Jacobian `d r / d u` with the camera numbers re-estimated along each step; entries with unknown
-/// slope are zero.
+/// Jacobian `d r / d u` of the residuals `r`, with scales and offsets of the cameras estimated anew along
+/// each step; entries whose slope is unknown are zero.
 pub(crate) fn jacobian(objective: &Objective, centre: &Evaluation, slopes: &FeatureSlopes) -> DMatrix<f64> {
     let (targets, features) = (objective.targets(), &centre.features);
     let cameras = CameraFit::estimate(targets, features);
@@ -119,7 +121,7 @@ pub(crate) fn jacobian(objective: &Objective, centre: &Evaluation, slopes: &Feat
     cameras.project_jacobian(held, targets, features)
 }
 
-/// Estimates of the cameras at a point, with intervals if `slopes` are given.
+/// Estimated scales and offsets of the cameras at a point, with 95 % intervals if `slopes` are given.
 pub(crate) fn camera_estimates(
     objective: &Objective,
     centre: &Evaluation,
@@ -131,7 +133,8 @@ pub(crate) fn camera_estimates(
     cameras.estimates(held.as_ref(), targets, features)
 }
 
-/// Jacobian `d r / d u` with the camera numbers held at their values at the point.
+/// Jacobian `d r / d u` of the residuals `r`, with scales and offsets of the cameras held at their estimates
+/// at the point.
 fn jacobian_with_cameras_held(
     objective: &Objective,
     centre: &Evaluation,
@@ -157,8 +160,8 @@ fn jacobian_with_cameras_held(
     DMatrix::from_fn(rows.len(), columns, |row, column| rows[row][column])
 }
 
-/// Broyden's update of the Jacobian after a step: the linear model then reproduces the change of the
-/// residuals (Math. Comput. 19 (1965) 577).
+/// Broyden's update of the Jacobian after a step: the updated Jacobian reproduces the change of the residuals
+/// over this step (Math. Comput. 19 (1965) 577).
 pub(crate) fn broyden_update(
     jacobian: &mut DMatrix<f64>,
     before: &[Option<f64>],
@@ -180,8 +183,8 @@ pub(crate) fn broyden_update(
 }
 
 /// Damped Gauss-Newton step `d` with `(J^T W J + damping) d = -J^T W r` and the weights `W = min(1, LOSS_KNEE
-/// / |r|)^2` of the cost (Levenberg, Quart. Appl. Math. 2 (1944) 164), shortened to [`MAX_STEP`]. The
-/// coordinate `held` does not change.
+/// / |r|)^2` of the cost (Levenberg, Quart. Appl. Math. 2 (1944) 164), shortened to [`MAX_STEP`]. The step is
+/// zero in the coordinate `held`, if it is given.
 pub(crate) fn damped_step(
     jacobian: &DMatrix<f64>,
     residuals: &[Option<f64>],
@@ -208,28 +211,28 @@ pub(crate) fn damped_step(
     longest.is_finite().then(|| solution.iter().map(|d| d * shorten).collect())
 }
 
-/// The point one step away, clamped to the box.
+/// The point `unit + step`, clamped to the unit box.
 pub(crate) fn step_in_box(unit: &[f64], step: &[f64]) -> Vec<f64> {
     unit.iter().zip(step).map(|(u, d)| clamp_unit(u + d)).collect()
 }
 
-// Rank, condition number, deviations, correlations and combinations from the linear model.
+// Rank, condition number, standard deviations, correlations and parameter combinations from the linear model.
 //
-// The Jacobian `J = d r / d u` is in standard deviations per length of the unit box. A singular direction is
-// informative if its 95 % interval fits into the box. The information matrix `J^T J` is inverted on the
-// informative directions only.
+// The Jacobian `J = d r / d u` is in standard deviations per side length of the unit box. A singular
+// direction is informative if the 95 % interval along it is shorter than the box. The information matrix `J^T
+// J` is inverted on the informative directions only.
 
 /// Half width of a 95 % interval, in standard deviations of a normal variable.
 pub(crate) const Z_95: f64 = 1.96;
 /// Rise in cost at the ends of a 95 % interval (chi-squared with one degree of freedom).
 pub(crate) const CHI_SQUARED_95: f64 = 3.84;
-/// Smallest singular value of an informative direction, per length of the box: its 95 % interval is then as
-/// wide as the box.
+/// Smallest singular value of an informative direction, per length of the unit box. At this value the 95 %
+/// interval along the direction is as wide as the box.
 pub(crate) const MIN_INFORMATIVE: f64 = 2.0 * Z_95;
-/// Fraction of the largest singular value below which a singular value is a rounding error.
+/// A singular value below this fraction of the largest singular value counts as a rounding error.
 pub(crate) const ROUNDING_SHARE: f64 = 1e-9;
-/// A parameter is not determined if its squared projection onto the uninformative directions reaches this
-/// value.
+/// A parameter is not determined if the squared projection of its unit vector onto the uninformative
+/// directions reaches this value.
 pub(crate) const OPEN_SHARE: f64 = 0.01;
 /// Exponents below this fraction of the largest exponent of a combination are left out.
 const MIN_NAMED_EXPONENT: f64 = 0.05;
@@ -237,19 +240,19 @@ const MIN_NAMED_EXPONENT: f64 = 0.05;
 /// Singular directions of a Jacobian in the space of the parameters.
 #[derive(Debug, Clone)]
 pub(crate) struct SingularDirections {
-    /// Singular values with their orthonormal directions, the most informative first.
+    /// Singular values with their orthonormal directions, in descending order of the singular values.
     all: Vec<(f64, Vec<f64>)>,
     /// Number of informative directions.
     pub rank: usize,
 }
 
-/// A product of powers of the parameters that the features determine or leave undetermined.
+/// A product of powers of the parameters; either the features determine it or they leave it undetermined.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ParameterCombination {
-    /// Exponents by parameter name; the largest is 1, and those below 0.05 are left out.
+    /// Exponents by parameter name, scaled so that the largest is 1; exponents below 0.05 are left out.
     pub exponents: BTreeMap<String, f64>,
-    /// Standard deviation of the logarithm of the product; for an undetermined combination, the one that
-    /// the box allows.
+    /// Standard deviation of the logarithm of the product. For an undetermined combination it is limited by
+    /// the size of the search box.
     pub sd_relative: f64,
     /// Whether the features determine the combination.
     pub determined: bool,
@@ -271,7 +274,7 @@ impl SingularDirections {
     /// Singular directions of a Jacobian with one column per parameter.
     pub(crate) fn from_jacobian(jacobian: &DMatrix<f64>) -> Self {
         let columns = jacobian.ncols();
-        // rows of zeros add no information; with them the decomposition yields all directions
+        // with rows of zeros, which add no information, the decomposition yields all directions
         let padded = jacobian.clone().resize_vertically(jacobian.nrows().max(columns), 0.0);
         let svd = padded.svd(false, true);
         let rows = svd.v_t.iter().flat_map(|v_t| v_t.row_iter());
@@ -284,8 +287,8 @@ impl SingularDirections {
         Self { all, rank }
     }
 
-    /// Ratio of the largest to the smallest singular value; infinite if the smallest is zero or
-    /// a rounding error.
+    /// Condition number: ratio of the largest to the smallest singular value; infinite if the smallest is
+    /// zero or a rounding error.
     pub(crate) fn condition_number(&self) -> f64 {
         match (self.all.first(), self.all.last()) {
             (Some((largest, _)), Some((smallest, _))) if *smallest > ROUNDING_SHARE * largest => {
@@ -295,8 +298,8 @@ impl SingularDirections {
         }
     }
 
-    /// Standard deviation of a coordinate from the informative directions, and squared projection of the
-    /// coordinate onto the uninformative ones.
+    /// Standard deviation of a coordinate of the unit box from the informative directions, and squared
+    /// projection of its unit vector onto the uninformative directions.
     pub(crate) fn coordinate_sd(&self, axis: usize) -> (f64, f64) {
         let component = |direction: &Vec<f64>| math::powi(direction.get(axis).copied().unwrap_or(0.0), 2);
         let (known, open) = self.all.split_at(self.rank);
@@ -305,7 +308,7 @@ impl SingularDirections {
         (variance.sqrt(), open.iter().map(|(_, direction)| component(direction)).sum())
     }
 
-    /// Whether the informative directions determine a coordinate.
+    /// Whether the informative directions determine a coordinate of the unit box.
     pub(crate) fn determines(&self, axis: usize) -> bool {
         self.coordinate_sd(axis).1 < OPEN_SHARE
     }
@@ -315,7 +318,7 @@ impl SingularDirections {
         self.all.iter().skip(self.rank).map(|(_, direction)| direction.as_slice()).collect()
     }
 
-    /// Correlation of two estimates; `None` where either is not determined.
+    /// Correlation of the estimates of two parameters; `None` if either parameter is not determined.
     pub(crate) fn correlation(&self, a: usize, b: usize) -> Option<f64> {
         if !(self.determines(a) && self.determines(b)) {
             return None;
@@ -327,8 +330,8 @@ impl SingularDirections {
         Some((covariance / (self.coordinate_sd(a).0 * self.coordinate_sd(b).0)).clamp(-1.0, 1.0))
     }
 
-    /// Products of powers at the point `unit`: the determined ones, the most precise first, then
-    /// the undetermined ones.
+    /// Products of powers of the parameters at the point `unit`: first the determined products, the most
+    /// precise first, then the undetermined products.
     pub(crate) fn combinations(
         &self,
         names: &[String],
@@ -339,8 +342,8 @@ impl SingularDirections {
             axes.iter().zip(unit).map(|(axis, u)| axis.bounds.log_slope(*u).unwrap_or(0.0)).collect();
         let one = |(rank, (value, direction)): (usize, &(f64, Vec<f64>))| {
             let determined = rank < self.rank;
-            // a determined sum of d_i u_i has the exponents d_i / slope_i; along an undetermined direction ln
-            // p_i changes by d_i slope_i
+            // with slope_i = d ln p_i / d u_i, a determined sum of d_i u_i is a product of powers with the
+            // exponents d_i / slope_i; along an undetermined direction d, ln p_i changes by d_i slope_i
             let exponent = |(d, slope): (&f64, &f64)| {
                 let determines = if *slope == 0.0 { 0.0 } else { d / slope };
                 if determined { determines } else { d * slope }
@@ -378,7 +381,8 @@ mod tests {
         ]
     }
 
-    /// Jacobian rows of `r = ln(p^a q^b) / sd` in the unit box, for each `(a, b, sd)`.
+    /// Jacobian with one row for each `(a, b, sd)`: the derivatives of `r = ln(p^a q^b) / sd` by the
+    /// coordinates of the unit box.
     fn rows(of: &[(f64, f64, f64)]) -> DMatrix<f64> {
         let (lp, lq) = (100.0_f64.ln(), 10.0_f64.ln());
         DMatrix::from_fn(of.len(), 2, |row, column| {
@@ -394,7 +398,7 @@ mod tests {
         let combinations = found.combinations(&names(), &axes(), &[0.5, 0.5]);
         assert_eq!(combinations[0].describe(), "p q^0.50");
         assert!(combinations[0].determined && (combinations[0].sd_relative - 0.01).abs() < 1e-12);
-        // along ln q = -2 ln p the product p q^0.5 is constant
+        // in the direction ln q = -2 ln p the product p q^0.5 is constant
         let open = &combinations[1];
         assert!(
             !open.determined && (open.exponents["p"] / open.exponents["q"] + 0.5).abs() < 1e-9,
@@ -404,7 +408,8 @@ mod tests {
 
     #[test]
     fn two_features_determine_both_and_their_correlation_is_that_of_least_squares() {
-        // r1 = ln p / 0.01, r2 = ln(p q) / 0.02: cov = [[1, -1], [-1, 5]] 1e-4
+        // for r1 = ln p / 0.01 and r2 = ln(p q) / 0.02, the covariance of ln p and ln q is [[1, -1], [-1, 5]]
+        // 1e-4
         let found = SingularDirections::from_jacobian(&rows(&[(1.0, 0.0, 0.01), (1.0, 1.0, 0.02)]));
         assert_eq!(found.rank, 2);
         assert!((found.coordinate_sd(0).0 * 100.0_f64.ln() - 0.01).abs() < 1e-12);

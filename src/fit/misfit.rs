@@ -1,9 +1,10 @@
-//! Tests whether the model explains the traces of the recordings. This verdict precedes all other results
+//! Tests whether the model explains the traces of the recordings. This verdict comes before all other results
 //! of a fit.
 //!
 //! The parameters of a wrong model have narrow intervals too. Evidence against a model is a residual above
 //! the noise, a residual that grows with the length of the segments, or a segment that fits worse than noise
-//! allows. In every fit, a camera or a constant that is far from its prior is evidence too.
+//! allows. In addition, in every fit, a camera error or a constant that is far from the mean of its prior is
+//! evidence.
 
 use super::result::NuisanceResult;
 use crate::text::format_trimmed;
@@ -11,18 +12,20 @@ use portable_math as math;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 
-/// Relative standard deviation of the measured noise. Chi2 per degree of freedom has twice this deviation, as
-/// seen in clean recordings of another camera model.
+/// Relative standard deviation of the noise that is measured on a recording. Chi2 per degree of freedom,
+/// which is divided by the square of the noise, has twice this relative standard deviation. The value comes
+/// from clean recordings of another camera model.
 const NOISE_SD_RELATIVE: f64 = 0.04;
 /// Allowed relative growth of chi2 per degree of freedom from the shortest to the longest segments, in
-/// addition to its scatter. A wrong damping makes it grow by 0.05 to 0.13, a right model by less than 0.02.
+/// addition to the scatter of chi2. With a wrong damping the growth is 0.05 to 0.13, with a right model less
+/// than 0.02.
 const MAX_GROWTH: f64 = 0.03;
 /// Half width of a two-sided 95 % interval, in standard deviations of a normal variable.
 const Z_95: f64 = 1.96;
 /// Largest distance of a nuisance parameter from the mean of its prior, in standard deviations. With twenty
-/// nuisance parameters, one in a hundred fits of a right model exceeds it.
+/// nuisance parameters, one in a hundred fits of a right model exceeds this limit.
 const MAX_PRIOR_DISTANCE_SD: f64 = 3.5;
-/// Number of digits of a ratio in a sentence.
+/// Number of significant digits of a ratio in a sentence.
 const DIGITS: usize = 3;
 
 /// How well the model explains the traces.
@@ -34,7 +37,7 @@ pub struct TraceMisfit {
     pub reasons: Vec<String>,
     /// Residuals and noise, one entry per recording and channel.
     pub channels: Vec<ChannelMisfit>,
-    /// Fit of each stage, in the order of the stages: the shortest segments first.
+    /// Misfit of each stage, in the order of the stages: the shortest segments first.
     pub stages: Vec<StageMisfit>,
 }
 
@@ -50,26 +53,28 @@ pub struct ChannelMisfit {
     /// Number of tracked frames that were not compared, such as those before the tip slides for
     /// the first time.
     pub frames_left_out: usize,
-    /// Root mean square of measured minus model, m.
+    /// Root mean square of the residuals (measurement minus model), m.
     pub residual_rms_m: f64,
-    /// Standard deviation of the noise, m.
+    /// Standard deviation of the noise of the channel, m.
     pub noise_m: f64,
-    /// Ratio of the sum of squared residuals, in units of the noise, to the degrees of freedom.
+    /// Sum of the squared residuals in standard deviations of the noise, divided by the number of degrees of
+    /// freedom.
     pub chi2_per_dof: f64,
     /// Autocorrelation of the residuals at a lag of one frame; `None` without neighbouring frames.
     pub autocorrelation_1: Option<f64>,
-    /// Segments with the largest misfit, in descending order.
+    /// Segments with the largest misfit, in descending order of misfit.
     pub worst: Vec<WorstSegment>,
 }
 
 /// A segment with a large misfit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct WorstSegment {
-    /// Time of its first compared frame, s.
+    /// Time of the first compared frame of the segment, s.
     pub start_s: f64,
-    /// Time of the frame after its last compared frame, s.
+    /// Time of the frame after the last compared frame of the segment, s.
     pub end_s: f64,
-    /// Ratio of the sum of squared residuals, in units of the noise, to the degrees of freedom.
+    /// Sum of the squared residuals in standard deviations of the noise, divided by the number of degrees of
+    /// freedom.
     pub chi2_per_dof: f64,
 }
 
@@ -82,10 +87,10 @@ pub struct StageMisfit {
     pub segments: usize,
     /// Number of segments with a misfit that noise does not explain.
     pub bad_segments: usize,
-    /// Degrees of freedom: number of data minus number of unknowns.
+    /// Number of degrees of freedom: number of measured values minus number of unknowns.
     pub dof: usize,
-    /// Ratio of the sum of squared residuals, in units of the noise, to the degrees of freedom; infinite
-    /// (`null` in a file) if a run of the model fails.
+    /// Sum of the squared residuals in standard deviations of the noise, divided by the number of degrees of
+    /// freedom; infinite (`null` in a file) if a run of the model fails.
     #[serde(deserialize_with = "or_infinite")]
     pub chi2_per_dof: f64,
     /// Parameters at the end of the stage, in SI units.
@@ -141,7 +146,7 @@ pub(crate) fn unexplained_headline(reasons: &[String]) -> String {
     format!("The model does not explain the recording: {}", reasons.join("; "))
 }
 
-/// A sentence for each camera or constant that is far from its prior.
+/// A sentence for each camera error or constant that is far from the mean of its prior.
 pub(crate) fn far_from_priors(nuisances: &[NuisanceResult]) -> Vec<String> {
     nuisances.iter().filter_map(far_from_prior).collect()
 }
@@ -159,14 +164,14 @@ fn unseen_channel(channels: &[ChannelMisfit]) -> Option<String> {
     Some(format!("no segment of {channel} in `{recording}` could be started"))
 }
 
-/// Evidence: segments in a wrong state, or with a motion that the model does not have.
+/// Evidence: segments with a wrong starting state, or with a motion that the model cannot produce.
 fn bad_segments(stages: &[StageMisfit]) -> Option<String> {
     let last = stages.last().filter(|stage| stage.bad_segments > 0)?;
     let (bad, all) = (last.bad_segments, last.segments);
     Some(format!("{bad} of {all} segments fit worse than noise ever does"))
 }
 
-/// Evidence: residuals larger than the noise and its uncertainty allow.
+/// Evidence: residuals larger than the noise and the uncertainty of the noise allow.
 fn misfit_above_noise(stages: &[StageMisfit]) -> Option<String> {
     let last = stages.last()?;
     let most = 1.0 + Z_95 * math::hypot(2.0 * NOISE_SD_RELATIVE, last.chi2_sd());
@@ -177,8 +182,8 @@ fn misfit_above_noise(stages: &[StageMisfit]) -> Option<String> {
     })
 }
 
-/// Evidence: a misfit that grows with the segment length, because the error of a wrong model accumulates
-/// in a run.
+/// Evidence: chi2 per degree of freedom grows with the segment length, because the error of a wrong model
+/// accumulates during a run.
 fn misfit_growth(stages: &[StageMisfit]) -> Option<String> {
     let [first, .., last] = stages else { return None };
     let most = first.chi2_per_dof * (1.0 + MAX_GROWTH + Z_95 * math::hypot(first.chi2_sd(), last.chi2_sd()));
@@ -193,7 +198,7 @@ fn misfit_growth(stages: &[StageMisfit]) -> Option<String> {
     })
 }
 
-/// Evidence: a constant or a camera far from its prior, because a wrong model distorts all free numbers.
+/// Evidence: a constant or a camera far from its prior, because a wrong model distorts all estimated numbers.
 fn far_from_prior(found: &NuisanceResult) -> Option<String> {
     let apart = (found.estimate - found.prior) / found.prior_sd;
     (apart.abs() > MAX_PRIOR_DISTANCE_SD).then(|| {

@@ -8,7 +8,7 @@ use crate::recording::Recording;
 use portable_math as math;
 use rayon::prelude::*;
 
-/// Features of a model as a function of its parameters. The objective knows a model only by this trait.
+/// Features of a model as a function of its parameters. The objective uses a model only through this trait.
 pub trait FeaturePredictor: Sync {
     /// The features, one per target in the same order; `values` are the free parameters in job order,
     /// in SI units.
@@ -28,7 +28,7 @@ pub trait FeaturePredictor: Sync {
 /// Random choices of one simulated recording: starting state, noise and lost frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Draw {
-    /// Number of the starting state; 0 is that of the scene itself.
+    /// Number of the starting state; 0 is the starting state of the scene.
     pub member: u64,
     /// Seed of the tracking noise; every evaluation of a search uses 0.
     pub noise: u64,
@@ -46,10 +46,10 @@ pub trait Model: Sync {
     fn record_condition(&self, values: &[f64], condition: usize, draw: Draw)
     -> Result<Recording, RunFailure>;
 
-    /// Simulated recording of a run with another start.
+    /// Simulated recording of a run that starts as `restart` says.
     ///
     /// # Errors
-    /// As [`Self::record_condition`]; also if the model cannot start otherwise.
+    /// As [`Self::record_condition`]; also if the model cannot start in this way.
     fn record_restarted(
         &self,
         values: &[f64],
@@ -67,19 +67,19 @@ pub trait Model: Sync {
         None
     }
 
-    /// Longest time by which the start of a run can be advanced, s.
+    /// Longest time by which a run can start earlier than its scene says, s.
     fn max_lead_s(&self, condition: usize) -> f64 {
         let _ = condition;
         f64::INFINITY
     }
 }
 
-/// A start that differs from that of the scene.
+/// How the start of a run differs from the start in its scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Restart {
     /// The run starts earlier by this time, s; the recording still starts at its original instant.
     Earlier(f64),
-    /// The run starts with angles that are larger by this fraction.
+    /// The starting angles are larger than in the scene by this fraction.
     Moved(f64),
 }
 
@@ -124,7 +124,7 @@ impl<'a> ModelFeatures<'a> {
         Self::new(model, &features, targets.iter().map(|target| target.value).collect(), members)
     }
 
-    /// All features of one draw.
+    /// All features of one simulated measurement, given by `draw`.
     ///
     /// # Errors
     /// [`RunFailure`] of the first condition that fails.
@@ -154,7 +154,7 @@ impl FeaturePredictor for ModelFeatures<'_> {
     }
 
     fn simulate_twin(&self, values: &[f64], draw: u64) -> Result<Vec<Observed>, RunFailure> {
-        // the starting state of a twin is none of those over which the fit averages
+        // the starting state of a twin differs from all states over which the fit averages
         let member = if self.members > 1 { self.members as u64 + draw } else { 0 };
         let read = self.read_features(values, Draw { member, noise: draw, dropouts: true })?;
         Ok(read.into_iter().map(observe_reading).collect())
@@ -170,7 +170,8 @@ fn observe_reading(read: Result<FeatureValue, MissingValue>) -> Observed {
     }
 }
 
-/// Mean and spread of a feature over the starting states; missing if no more than half of the states show it.
+/// Mean and standard deviation of a feature over the starting states; missing if at most half of the states
+/// show the feature.
 fn average_runs(runs: &[Vec<Result<FeatureValue, MissingValue>>], at: usize, feature: &Feature) -> Observed {
     let shown: Vec<&FeatureValue> = runs.iter().filter_map(|run| run.get(at)?.as_ref().ok()).collect();
     if 2 * shown.len() <= runs.len() {
@@ -183,7 +184,7 @@ fn average_runs(runs: &[Vec<Result<FeatureValue, MissingValue>>], at: usize, fea
     let count = shown.len() as f64;
     let below_db = shown.iter().map(|read| read.below_db).sum::<f64>() / count;
     let values = shown.iter().map(|read| read.value);
-    // logarithms are averaged where residuals are logarithms and all values have the same sign
+    // logarithms are averaged if residuals are logarithms and all values have the same sign
     let log = feature.reading.comparison() == ValueComparison::Log
         && (shown.iter().all(|read| read.value > 0.0) || shown.iter().all(|read| read.value < 0.0));
     let taken: Vec<f64> = if log { values.map(|v| math::ln(v.abs())).collect() } else { values.collect() };
@@ -203,8 +204,8 @@ mod tests {
     use crate::recording::channel::Window;
     use crate::recording::{FrameGrid, Traces};
 
-    /// A blade whose deflection is the parameter times a factor that depends on the starting state, plus a
-    /// part that depends on the condition; member 3 fails.
+    /// A model whose deflection is the parameter times a factor that depends on the starting state, plus a
+    /// term that depends on the condition. The run from starting state number 3 fails.
     struct Still;
 
     const FACTORS: [f64; 4] = [1.0, 1.2, 0.8, 1.0];

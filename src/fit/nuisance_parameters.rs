@@ -1,5 +1,5 @@
-//! Constants of the scenes that a trace fit frees within priors, and the common scale of masses and forces,
-//! which no motion reveals.
+//! Constants of the scenes that a trace fit frees within priors, and a check of the common scale of masses
+//! and forces, which the motion does not determine.
 
 use super::job::{Constants, FreeParameter, Job, NuisanceParameter, is_same_quantity};
 use crate::model::parameters::{ModelParameter, ParameterQuantity, ParameterRange, find_parameter};
@@ -12,11 +12,11 @@ const RANGE_SD: f64 = 5.0;
 /// A constant that is freed, with its prior.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FreedConstant {
-    /// Key of the scene, with its table.
+    /// Key of the constant in the scene file, preceded by its table.
     pub name: String,
     /// Value in the scene, in its SI unit.
     pub value: f64,
-    /// Standard deviation of the prior of its logarithm.
+    /// Standard deviation of the prior of the constant's natural logarithm.
     pub sd_relative: f64,
 }
 
@@ -32,13 +32,14 @@ impl FreedConstant {
     }
 }
 
-/// Constants or parameters that cannot be freed as the job asks; the text gives what was found, what was
-/// expected, and advice.
+/// Error: constants or parameters cannot be freed as the job requires. The text says what was found, what was
+/// expected, and what to do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{0}")]
 pub struct NuisanceError(String);
 
-/// Constants that a job frees, in the order of its list or of their names.
+/// Constants that a job frees: in the order of the job's list, or in the order of their names if the job
+/// frees all constants.
 ///
 /// # Errors
 /// [`NuisanceError`] for a listed constant that a scene does not have, or whose values differ between scenes.
@@ -78,8 +79,8 @@ fn free_listed_constant(
     Ok(FreedConstant { name: name.clone(), value, sd_relative: *sd_relative })
 }
 
-/// All constants that are measured to a few percent and have the same value in all scenes, under the names
-/// that the first scene uses.
+/// All constants that are known to a few percent and have the same value in all scenes, with the names that
+/// the first scene uses.
 fn free_all_constants(sd_relative: f64, job: &Job, scenes: &[Scene]) -> Vec<FreedConstant> {
     let Some((scene, others)) = scenes.split_first() else { return Vec::new() };
     let is_set = |name: &str| {
@@ -95,7 +96,7 @@ fn free_all_constants(sd_relative: f64, job: &Job, scenes: &[Scene]) -> Vec<Free
 }
 
 /// Whether a parameter is a constant that is known to a few percent. Lengths and centres of mass count as
-/// exact, friction is estimated, and drive and restitution belong to the experiment.
+/// exact, friction is estimated as a parameter, and drive and restitution belong to the experiment.
 fn is_constant(parameter: &ModelParameter) -> bool {
     use ParameterQuantity as Q;
     let exact = [Q::NeckLength, Q::LipLength, Q::NeckCentre, Q::LipCentre, Q::Restitution];
@@ -108,9 +109,10 @@ fn is_constant(parameter: &ModelParameter) -> bool {
 /// # Errors
 /// [`NuisanceError`] with the names of the parameters.
 pub(crate) fn check_scaling(job: &Job, scenes: &[Scene]) -> Result<(), NuisanceError> {
-    // a fixed value or a prior determines the scale
+    // a fixed value or a prior of any such parameter determines the common scale of masses and forces
     let is_held = |(name, _): (&str, f64)| match find_free_parameter(job, name) {
-        // the form in the job decides: a stiffness that is written as a frequency has no unit of mass
+        // the form in which the job writes the parameter decides: a stiffness that is written as a frequency
+        // has no unit of mass
         Some(free) => has_mass(&free.name) && free.prior.is_some(),
         None => has_mass(name),
     };
@@ -125,7 +127,7 @@ pub(crate) fn check_scaling(job: &Job, scenes: &[Scene]) -> Result<(), NuisanceE
     )))
 }
 
-/// The free parameter for the same quantity as `name`, in whatever form the job writes it.
+/// The free parameter that is the same quantity as `name`, even if the job writes it in another form.
 fn find_free_parameter<'a>(job: &'a Job, name: &str) -> Option<&'a FreeParameter> {
     job.parameters.iter().find(|free| is_same_quantity(&free.name, name))
 }

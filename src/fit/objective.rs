@@ -1,20 +1,23 @@
-//! The cost of a point of the unit box. Every failure of the model becomes a reason and a finite cost.
+//! The cost of a point of the unit box. If the model fails, the evaluation gets the reason for the failure
+//! and a finite cost.
 //!
-//! The cost is twice the negative log-likelihood, up to a constant that makes it zero if all targets are met:
-//! `sum [ rho(r) + 2 ln(s / s0) + (d / 6 dB)^2 ] + sum of the priors`.
+//! The cost is twice the negative log-likelihood, up to a constant. The constant makes the cost zero if the
+//! model reproduces all targets: `sum [ rho(r) + 2 ln(s / s0) + (d / 6 dB)^2 ] + sum of the priors`.
 //!
 //! - The residual of a feature is `r = ln(model / target) / s`, or `(model - target) / s` if its
 //!   sign may change.
-//! - `s^2 = sd^2 + scatter^2 + spread^2` combines the deviation of the target, the scatter of a rough
-//!   model between neighbouring parameters, and the spread over the starting states; `s0` is `s`
-//!   without the spread. The term `2 ln(s / s0)` penalises the spread: without it a fit would prefer
-//!   points with uncertain features.
+//! - `s^2 = sd^2 + scatter^2 + spread^2` combines the standard deviation `sd` of the target, the scatter of
+//!   the model between neighbouring parameter values, and the spread over the starting states; `s0` is `s`
+//!   without the spread. The term `2 ln(s / s0)` penalises the spread: without it a fit would prefer points
+//!   with uncertain features.
 //! - `rho` (`robust_loss`) is `r^2` up to `LOSS_KNEE` and logarithmic above it, so that a missing peak does
-//!   not dominate the cost. A missing feature costs as much as one that is wrong by a factor of `MAX_RATIO`.
-//! - `d` is the level of the strongest peak relative to the assigned peak. This term keeps the cost
-//!   continuous where the assignment changes to another peak.
+//!   not dominate the cost. A missing feature costs as much as a feature that is wrong by a factor of
+//!   `MAX_RATIO`.
+//! - `d` is the level, in dB, of the strongest spectral peak relative to the peak that is assigned to the
+//!   feature. This term keeps the cost continuous where the assignment changes to another peak.
 //!
-//! A failing run costs at least as much as a run without any feature; the longer it lasts, the less it costs.
+//! A failing run costs at least as much as a run in which all features are missing; the later it fails, the
+//! less it costs.
 
 use super::bounds::SearchAxis;
 use super::camera_calibration::CameraFit;
@@ -26,8 +29,8 @@ use crate::text::panic_message;
 use portable_math as math;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Residual, in standard deviations, above which the cost grows logarithmically. Measurement errors stay
-/// below 3, so the limit matters only for a wrong model.
+/// Residual, in standard deviations, above which the cost grows logarithmically. Measurement errors are
+/// rarely above 3 standard deviations, so the limit matters only for a wrong model.
 pub(crate) const LOSS_KNEE: f64 = 3.0;
 
 /// The cost function of a fit: bounds, targets and model.
@@ -82,7 +85,8 @@ impl<'a> Objective<'a> {
         self.add_costs(EvaluationOutcome { unit, values, features, failure })
     }
 
-    /// Adds the costs, which follow from the parameter values and from the features or the failure.
+    /// Adds the costs to an outcome. They follow from the parameter values and from the features or the
+    /// failure.
     pub(crate) fn add_costs(&self, outcome: EvaluationOutcome) -> Evaluation {
         let EvaluationOutcome { unit, values, features, failure } = outcome;
         let priors: f64 = prior_residuals(&self.axes, &values)
@@ -99,7 +103,8 @@ impl<'a> Objective<'a> {
         Evaluation { unit, values, cost, global_cost, features, failure }
     }
 
-    /// The same objective with the given scatter of each feature, in the feature's unit.
+    /// A copy of this objective in which each target has the given scatter of its feature, in the unit of the
+    /// feature.
     pub(crate) fn with_feature_scatter(&self, scatter: &[f64]) -> Self {
         let targets = self.targets.iter().zip(scatter);
         let targets = targets.map(|(target, scatter)| TargetValue { scatter: *scatter, ..target.clone() });
@@ -109,7 +114,7 @@ impl<'a> Objective<'a> {
     /// The features of one simulated measurement of the model at `values`.
     ///
     /// # Errors
-    /// [`RunFailure`], also for a panic and for numbers that are not finite.
+    /// [`RunFailure`] if the model fails or panics, or if a number is not finite.
     pub(crate) fn simulate_twin(&self, values: &[f64], draw: u64) -> Result<Vec<Observed>, RunFailure> {
         catch_panic(|| self.model.simulate_twin(values, draw))
             .and_then(|features| self.check_features(features))
@@ -120,7 +125,7 @@ impl<'a> Objective<'a> {
         CameraFit::estimate(&self.targets, &[]).count_unknowns()
     }
 
-    /// Refuses a wrong number of features, and values that are not finite.
+    /// Returns the features unless their number is wrong or a value is not finite.
     fn check_features(&self, features: Vec<Observed>) -> Result<Vec<Observed>, RunFailure> {
         let (found, expected) = (features.len(), self.targets.len());
         if found != expected {
@@ -140,12 +145,13 @@ impl<'a> Objective<'a> {
     }
 }
 
-/// Residuals of the parameters with a prior, in standard deviations.
+/// Distances of the parameters with a prior from their prior means, in prior standard deviations.
 pub(crate) fn prior_residuals(axes: &[SearchAxis], values: &[f64]) -> impl Iterator<Item = f64> {
     axes.iter().zip(values).filter_map(|(axis, value)| Some(axis.prior.as_ref()?.residual(*value)))
 }
 
-/// Cost of the features and of the priors of their cameras, and the cost if all features were missing.
+/// Two costs: that of the features and of the priors of their cameras, and that of a run in which all
+/// features are missing.
 fn feature_costs(targets: &[TargetValue], features: &[Observed]) -> (f64, f64) {
     let cameras = CameraFit::estimate(targets, features);
     let one = |(at, target): (usize, &TargetValue)| {
@@ -158,7 +164,7 @@ fn feature_costs(targets: &[TargetValue], features: &[Observed]) -> (f64, f64) {
     (shown + cameras.prior_residuals().map(robust_loss).sum::<f64>(), farthest)
 }
 
-/// Targets that count in the first stage, and their features.
+/// Targets that count in the first stage of the search, and the features of these targets.
 fn first_stage_targets(targets: &[TargetValue], features: &[Observed]) -> (Vec<TargetValue>, Vec<Observed>) {
     let kept = targets.iter().enumerate().filter_map(|(at, target)| Some((at, target.first_stage_target()?)));
     let with = |(at, target): (usize, TargetValue)| (target, features.get(at).cloned());
@@ -166,7 +172,7 @@ fn first_stage_targets(targets: &[TargetValue], features: &[Observed]) -> (Vec<T
     (targets, features.into_iter().flatten().collect())
 }
 
-/// Largest residual of a prior; the limit keeps costs finite.
+/// Limit of the residual of a prior, in standard deviations. It keeps costs finite.
 const MAX_PRIOR_RESIDUAL: f64 = 1e6;
 
 /// Ratio of the distance of a feature from its target to [`total_sd`].
@@ -174,13 +180,13 @@ pub(crate) fn residual(observation: &Observation, target: &TargetValue) -> f64 {
     target.distance(observation.value) / total_sd(observation, target)
 }
 
-/// Standard deviation of [`TargetValue::distance`]: that of the target and the spread over the starting
-/// states, added in quadrature.
+/// Standard deviation of [`TargetValue::distance`]: the standard deviation of the target (including scatter)
+/// and the spread over the starting states, added in quadrature.
 pub(crate) fn total_sd(observation: &Observation, target: &TargetValue) -> f64 {
     math::hypot(target.relative_sd(), observation.spread / target.reference_size())
 }
 
-/// Cost of a feature, at most that of a missing one.
+/// Cost of a feature, limited to the cost of a missing feature.
 fn feature_cost(observation: &Observation, target: &TargetValue) -> f64 {
     let assigned = math::powi(observation.below_db / ASSIGN_DB, 2);
     let spread = 2.0 * math::ln(total_sd(observation, target) / target.relative_sd());
@@ -302,7 +308,8 @@ mod tests {
 
     #[test]
     fn a_spread_over_starting_states_counts_as_a_likelihood_says() {
-        // s^2 = 0.01^2 + 0.03^2: the residual shrinks, and the cost rises by 2 ln(s / sd) = ln 10
+        // with the spread, s^2 = 0.01^2 + 0.03^2: the residual shrinks, and the cost rises by 2 ln(s / sd) =
+        // ln 10
         let wide = Observation { value: 80.0 * 0.05_f64.exp(), spread: 2.4, below_db: 0.0 };
         assert!((feature_cost(&wide, &low()) - (0.05_f64.powi(2) / 1e-3 + 10.0_f64.ln())).abs() < 1e-9);
         let useless = Observation { value: 1e-9, spread: 1e9, below_db: 0.0 };

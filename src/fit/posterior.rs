@@ -1,10 +1,10 @@
 //! The posterior density of a job's unknowns, for external samplers and optimisers.
 //!
 //! `ln p(x | data) = ln p(data | x) + ln p(x)`, up to a constant that depends only on the data. Every unknown
-//! has a range and a coordinate: its value or the logarithm of its value. Its prior along the coordinate is
-//! flat, or normal and truncated to the range. The likelihood of a job on features is `-cost / 2` without the
-//! terms of the priors ([`super::objective`]). The likelihood of a job on traces is `-chi^2 / 2`, minimised
-//! over the starting states of the segments (`fit_states_at`).
+//! has a range and a coordinate: its value or the logarithm of its value. The prior density of the coordinate
+//! is flat, or normal and truncated to the range. The likelihood of a job on features is `-cost / 2` without
+//! the terms of the priors ([`super::objective`]). The likelihood of a job on traces is `-chi^2 / 2`,
+//! minimised over the starting states of the segments (`fit_states_at`).
 
 use super::FitError;
 use super::bounds::{BoundsSpacing, Prior, SearchAxis};
@@ -20,16 +20,19 @@ use crate::feature::Feature;
 use portable_math as math;
 use std::f64::consts::{LN_2, SQRT_2, TAU};
 
-/// An unknown with its range and its prior, along a coordinate: its value or the logarithm of its value.
+/// An unknown with its range and its prior. The coordinate of the unknown is its value or the logarithm of
+/// its value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PosteriorParameter {
-    /// Key of the scene, with its table; or name of the recording and key of its camera's error.
+    /// Key of a parameter in the scene file, preceded by its table; or name of a recording and key of a
+    /// camera error.
     pub name: String,
-    /// Smallest and largest value, in its SI unit.
+    /// Smallest and largest value, in the SI unit of the unknown.
     pub bounds: [f64; 2],
     /// Whether the coordinate is the logarithm of the value.
     pub is_log: bool,
-    /// Mean and standard deviation of a normal prior along the coordinate; `None` for a flat prior.
+    /// Mean and standard deviation of a normal prior of the coordinate; `None` if the prior is flat in the
+    /// coordinate.
     pub prior: Option<[f64; 2]>,
 }
 
@@ -46,7 +49,7 @@ enum PosteriorData {
 }
 
 impl Posterior {
-    /// The posterior of a problem on features or on traces, without its held-out targets.
+    /// The posterior of a problem on features or on traces. Held-out targets are ignored.
     ///
     /// # Errors
     /// [`FitError`] if a target cannot be measured, or if the head that drives a model is not tracked.
@@ -69,7 +72,7 @@ impl Posterior {
         Ok(Self { problem, unknowns, data: PosteriorData::Features { features, targets } })
     }
 
-    /// The problem.
+    /// The problem whose unknowns the posterior describes.
     #[must_use]
     pub fn problem(&self) -> &Problem {
         &self.problem
@@ -113,7 +116,8 @@ impl Posterior {
         }
     }
 
-    /// Logarithm of the posterior density, up to a constant; outside the bounds the model is not run.
+    /// Logarithm of the posterior density, up to a constant; minus infinity outside the bounds, where the
+    /// model is not run.
     #[must_use]
     pub fn log_density(&self, values: &[f64]) -> f64 {
         let prior = self.log_prior(values);
@@ -174,7 +178,7 @@ impl PosteriorParameter {
         if self.is_log { math::ln(value) } else { value }
     }
 
-    /// Ends of the range as distances from the mean of the prior, in standard deviations.
+    /// Ends of the range of the coordinate as distances from the mean of its prior, in standard deviations.
     fn standardized_bounds(&self, [mean, sd]: [f64; 2]) -> [f64; 2] {
         self.bounds.map(|end| (self.coordinate(end) - mean) / sd)
     }
@@ -186,7 +190,8 @@ impl PosteriorParameter {
             Some(prior) => {
                 let ends = self.standardized_bounds(prior);
                 let all = normal_probability(ends[0], ends[1]);
-                // the integral starts from the nearer end, so that rounding does not spoil either tail
+                // the probability is integrated from the nearer end of the range, so that rounding errors
+                // stay small in both tails
                 let below = |x: f64| match unit < 0.5 {
                     true => normal_probability(ends[0], x) - unit * all,
                     false => (1.0 - unit) * all - normal_probability(x, ends[1]),
@@ -225,9 +230,9 @@ fn normal_probability(from: f64, to: f64) -> f64 {
     if from > 0.0 { above(from) - above(to) } else { above(-to) - above(-from) }
 }
 
-/// Root of an increasing function by bisection, to rounding accuracy.
+/// Root of the increasing function `of` between `low` and `high`, by bisection to rounding accuracy.
 fn bisect_root(of: impl Fn(f64) -> f64, [mut low, mut high]: [f64; 2]) -> f64 {
-    // more than 38 deviations from the mean the normal density underflows to zero
+    // more than 38 standard deviations from the mean the normal density underflows to zero
     (low, high) = (low.max(-38.0), high.min(38.0));
     let halvings = (f64::MANTISSA_DIGITS as f64 + math::ln((high - low).max(2.0)) / LN_2) as usize;
     for _ in 0..halvings {
@@ -253,7 +258,7 @@ mod tests {
             unknown([0.1, 10.0], true, None),
             unknown([-1.0, 2.0], false, Some([0.5, 0.7])),
             unknown([0.1, 10.0], true, Some([0.3, 0.5])),
-            unknown([5.0, 9.0], false, Some([0.0, 1.0])), // only the tail
+            unknown([5.0, 9.0], false, Some([0.0, 1.0])), // only the tail of the normal distribution
             unknown([-20.0, 20.0], false, Some([0.0, 1.0])),
         ];
         for of in kinds {

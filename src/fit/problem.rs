@@ -27,8 +27,8 @@ use serde::Serialize;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-/// Maximum number of frames of a model run. Each thread holds one run, and a million frames take 0.1 GB, so a
-/// mistyped frame rate must not fill the memory.
+/// Maximum number of frames of a model run. The limit keeps a mistyped frame rate from filling the memory:
+/// each thread stores one run, and a million frames take 0.1 GB.
 const MOST_FRAMES: f64 = 1e6;
 
 /// A recording with its exposure time, which the recording itself does not contain.
@@ -57,7 +57,7 @@ pub enum ProblemError {
         /// Number of conditions of the job.
         expected: usize,
     },
-    /// The number of recordings differs from that of the job.
+    /// The number of recordings differs from the number that the job names.
     #[error("found {found} recordings, expected the {expected} of the job")]
     Recordings {
         /// Number of recordings given.
@@ -76,7 +76,7 @@ pub enum ProblemError {
     /// A trace cannot be fitted to its recording.
     #[error(transparent)]
     Trace(#[from] TraceError),
-    /// Constants or parameters cannot be freed as the job asks.
+    /// Constants or parameters cannot be freed as the job requires.
     #[error(transparent)]
     Constants(#[from] NuisanceError),
 }
@@ -157,7 +157,7 @@ impl Problem {
         &self.model
     }
 
-    /// The recordings by condition; `None` for a condition without a recording.
+    /// The recording of each condition; `None` for a condition without a recording.
     pub(crate) fn recordings(&self) -> &[Option<Recording>] {
         &self.recordings
     }
@@ -249,8 +249,8 @@ impl Problem {
     }
 }
 
-/// The scene of condition `at` with its drive and the values that the condition sets. The scene must accept
-/// both bounds of every free parameter.
+/// The scene of condition `at`, with the drive and the parameter values of this condition. Refuses a scene
+/// that does not accept both bounds of every free parameter.
 fn check_scene(
     job: &Job,
     at: usize,
@@ -307,9 +307,10 @@ fn recording_instrument(job: &Job, measured: Option<&MeasuredRecording>) -> Inst
     let frame_rate_hz = recording.grid().frame_rate_hz;
     let camera = Camera { frame_rate_hz, exposure_s: exposure_s.unwrap_or(0.0) };
     let quality = measure_quality(recording, *exposure_s);
-    // the deflection is missing where either point is lost, and the two points are lost independently
+    // the deflection is missing if tip or head is lost, and the two points are lost independently
     let dropout_fraction = 0.5 * quality.missing_deflection_frames as f64 / quality.frames.max(1) as f64;
-    // the head moves most smoothly, so its noise is measured best
+    // the noise of the head is used for both points: the head moves most smoothly, so its noise is measured
+    // best
     Instrument { camera, noise_m: quality.head_x.noise_m.unwrap_or(0.0), dropout_fraction }
 }
 
@@ -330,8 +331,8 @@ struct RecordingIdentity<'a> {
     synthetic: bool,
 }
 
-// Whole runs with the fitted constants. Where the recorded head drives the model, a run starts in the fitted
-// state of the first good segment.
+// Runs over a whole recording with the fitted constants. If the recorded head drives the model, a run starts
+// in the fitted state of the first good segment.
 
 impl Problem {
     /// The model with the fitted constants and starting states of a result. In a fit of features this is the
@@ -348,7 +349,8 @@ impl Problem {
         Ok(self.model().with_conditions(whole.collect::<Result<_, FitError>>()?))
     }
 
-    /// The scene of condition `at` for a whole run, with the fitted constants, drive and start.
+    /// The scene of condition `at` for a run over the whole recording, with the fitted constants, drive and
+    /// starting state.
     fn whole_scene(&self, at: usize, scene: &Scene, result: &FitResult) -> Result<Scene, FitError> {
         let refused = |why: String| FitError::CannotBeFitted { why };
         let mut scene = scene.clone();
@@ -377,7 +379,7 @@ impl Problem {
         Ok(scene)
     }
 
-    /// Compares whole runs of the fitted model with the components and features of the job.
+    /// Compares runs of the fitted model over whole recordings with the components and features of the job.
     pub(super) fn compare_with_targets(
         &self,
         result: &FitResult,
@@ -436,7 +438,8 @@ mod tests {
         assert_eq!(refused(vec![scene], vec![]), ProblemError::Recordings { found: 0, expected: 1 });
     }
 
-    /// The job with the trace of its recording, with further keys at the top and in the trace.
+    /// A job that fits the trace of its recording, with the further keys `top` at its top and `trace` in its
+    /// trace.
     fn traced_job(top: &str, trace: &str) -> String {
         let parameters =
             JOB.split("[[parameter]]").skip(1).map(|p| p.split("\n[").next().unwrap_or_default());

@@ -2,14 +2,15 @@
 //!
 //! From the best point one walker goes up and another goes down along each parameter. At every place a walker
 //! minimises the cost over the other parameters, first by the linear model and then by damped Gauss-Newton
-//! steps corrected by Broyden's rule. It ends when the cost has risen by more than the threshold or when the
-//! range ends (Venzon and Moolgavkar, Appl. Stat. 37 (1988) 87; Raue et al., Bioinformatics 25 (2009) 1923).
-//! All walkers step together: their evaluations run in parallel, in an order that does not depend on the
-//! number of threads.
+//! steps corrected by Broyden's rule. A walker ends when the cost has risen by more than the threshold or
+//! when it reaches a bound (Venzon and Moolgavkar, Appl. Stat. 37 (1988) 87; Raue et al., Bioinformatics 25
+//! (2009) 1923). All walkers step together: their evaluations run in parallel, in an order that does not
+//! depend on the number of threads.
 //!
-//! The cost of features is rough, and values behind a ridge of the cost may fit equally well. A walker
-//! therefore also tries the best known point near each place, probes the cost behind the crossing that it
-//! finds, and continues from the farthest evaluated point within the threshold.
+//! The cost of features is rough, and values on the far side of a ridge of the cost may fit equally well. A
+//! walker therefore also tries the best known point near each place. When it finds a crossing of the
+//! threshold, it probes the cost beyond the crossing. If another search has evaluated a point farther out
+//! within the threshold, the walker continues from there.
 
 use super::bounds::clamp_unit;
 use super::evaluation::{Evaluation, EvaluationStage};
@@ -24,49 +25,51 @@ use portable_math as math;
 const DAMPINGS: [f64; 2] = [1.0, 3e2];
 /// Number of inner steps at a place. A few suffice, because the linear model starts them near the minimum.
 const INNER_STEPS: usize = 3;
-/// Gain in cost below which the inner minimisation ends: a fiftieth of the threshold.
+/// Decrease of the cost in one inner step below which the inner minimisation ends: a fiftieth of the
+/// threshold.
 const FOLLOWED_GAIN: f64 = 0.08;
-/// Maximum number of places of a walker. With a poor linear model a walker needs about eight places, and each
-/// probe behind a crossing is one more.
+/// Maximum number of places that a walker visits. With a poor linear model a walker needs about eight places,
+/// plus one for each probe beyond a crossing.
 const MAX_PLACES: usize = 20;
-/// Distances of the probes behind a crossing from the best point, divided by the distance of the crossing.
-/// The cost must exceed the threshold there too, so that a ridge as wide as a quarter of the interval does
-/// not end the walk.
+/// Distances of the probes beyond a crossing from the best point, divided by the distance of the crossing
+/// from the best point. The walk ends only if the cost exceeds the threshold at the probes too, so a ridge as
+/// wide as a quarter of the interval does not end it.
 const PROBE_FACTORS: [f64; 2] = [1.25, 1.6];
-/// Largest difference between the coordinates of a place and of a known point that is tried there, in the
-/// unit box.
+/// A known point is tried at a place if its coordinate along the walk differs from the place by at most this
+/// length of the unit box.
 const NEAR_COORDINATE: f64 = 0.01;
-/// Number of times that walkers may continue from a point behind their crossings.
+/// Maximum number of times that walkers continue from a point beyond their crossings.
 const MAX_RESUMPTIONS: usize = 3;
 /// Length of the first step, as a fraction of the distance at which the linear model crosses the threshold.
 const FIRST_STEP_SHARE: f64 = 0.6;
-/// Shortest and longest first step in the unit box.
+/// Smallest and largest length of the first step in the unit box.
 const FIRST_STEP_RANGE: (f64, f64) = (0.003, 0.25);
-/// A step aims at a place where the square root of the rise in cost is this multiple of that of the
-/// threshold, so that the next place brackets the crossing.
+/// A step aims at a place where the square root of the rise in cost is this factor times the square root of
+/// the threshold, so that the crossing is between the two places.
 const OVERSHOOT: f64 = 1.1;
-/// A bracket is narrow enough if the square root of the rise in cost at its outer end is at most this
-/// multiple of that of the threshold.
+/// A bracket of the crossing is narrow enough if the square root of the rise in cost at its outer end is at
+/// most this factor times the square root of the threshold.
 const NARROW_BRACKET: f64 = 1.35;
-/// Distance from a bound, in the unit box, within which a point counts as at the bound: the resolution
-/// of a search.
+/// Largest distance from a bound, in the unit box, at which a point counts as at the bound. It is the
+/// resolution of a search.
 pub(crate) const AT_BOUND: f64 = 1e-3;
-/// Largest factor by which a step may exceed the step before.
+/// Largest ratio of the length of a step to that of the previous step.
 const MAX_STEP_GROWTH: f64 = 3.0;
 
 /// The profile of one parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ProfileLikelihood {
-    /// Coordinates in the unit interval, rising, with the lowest cost at each; includes the best point.
+    /// Coordinates in the unit interval, in ascending order, each with the lowest cost over the other
+    /// parameters; the best point is included.
     pub points: Vec<(f64, f64)>,
-    /// Lower crossing of the threshold; `None` if the range has none, or if another parameter is at its bound
-    /// at the crossing.
+    /// Coordinate below the best point at which the cost crosses the threshold; `None` if there is no
+    /// crossing, or if another parameter is at its bound at the crossing.
     pub lower: Option<f64>,
     pub upper: Option<f64>,
 }
 
-/// Profiles of all parameters from `best`, whose Jacobian is `jacobian`. An interval ends where the cost has
-/// risen by `rise`.
+/// Profiles of all parameters, starting from `best`; `jacobian` is the Jacobian at `best`. An interval ends
+/// where the cost is `rise` above the cost of `best`.
 ///
 /// # Errors
 /// [`StopReason`] when the evaluations are used up or the fit must stop.
@@ -98,8 +101,8 @@ fn walk_to_ends(ledger: &mut Ledger, walkers: &mut [ProfileWalker]) -> Result<()
     Ok(())
 }
 
-/// Lets walkers continue from the farthest points within the threshold that lie behind their crossings;
-/// returns whether any walker does.
+/// Lets each walker continue from the farthest known point within the threshold, if this point lies beyond
+/// its crossing; returns whether any walker continues.
 fn resume_walkers(ledger: &mut Ledger, walkers: &mut [ProfileWalker]) -> Result<bool, StopReason> {
     let farther: Vec<Option<Evaluation>> =
         walkers.iter().map(|walker| walker.farthest_within_threshold(ledger)).collect();
@@ -167,7 +170,7 @@ impl ProfilePoint {
 struct ProfileWalker {
     axis: usize,
     sign: f64,
-    /// Square root of the rise in cost that ends the interval.
+    /// Square root of the rise in cost at which the interval ends.
     most_root: f64,
     start: (f64, f64),
     start_unit: Vec<f64>,
@@ -175,26 +178,27 @@ struct ProfileWalker {
     base: ProfilePoint,
     /// Linear model of the residuals.
     model: DMatrix<f64>,
-    /// Coordinate of the current place; the best point there is in `here`.
+    /// Coordinate of the current place; `here` is the best point found at this place.
     at: f64,
     here: Option<ProfilePoint>,
-    /// Best known point near the current place, moved onto its coordinate.
+    /// Best known point near the current place, with the coordinate along the walk set to that of the place.
     near: Option<Vec<f64>>,
     /// Whether the inner minimisation at the current place has ended.
     followed: bool,
     next_step: f64,
     /// Coordinate of the nearest place where the cost exceeds the threshold, and the square root of the rise
-    /// in cost there.
+    /// in cost at this place.
     outside: Option<(f64, f64)>,
-    /// Crossing found, and number of probes already made behind it.
+    /// Coordinate of the crossing that was found, and number of probes already made beyond it.
     crossing: Option<(f64, usize)>,
     /// Whether another parameter is at its bound at the crossing. If so, the interval is limited by the
     /// bounds, not by the features.
     pinned: bool,
     places: Vec<(f64, f64)>,
-    /// Number of places that the walker may still visit.
+    /// Number of further places that the walker may visit.
     left: usize,
-    /// Result of the walk once it has ended: the crossing, or `Some(None)` if there is none.
+    /// `None` until the walk has ended; then the coordinate of the crossing, or `Some(None)` if there is no
+    /// crossing.
     end: Option<Option<f64>>,
 }
 
@@ -235,7 +239,7 @@ impl ProfileWalker {
         }
     }
 
-    /// Goes to the next place; ends the walk at the end of the range.
+    /// Moves the walker to the next place; ends the walk at the end of the range.
     fn advance(&mut self) {
         if self.end.is_some() {
             return;
@@ -252,7 +256,7 @@ impl ProfileWalker {
         self.base.evaluation.unit.get(self.axis).copied().unwrap_or(self.at)
     }
 
-    /// Points to evaluate next; empty when the minimisation at the place has ended.
+    /// Points to evaluate next; empty if the minimisation at the current place has ended.
     fn proposed_points(&self) -> Vec<Vec<f64>> {
         if self.end.is_some() || self.followed {
             return Vec::new();
@@ -264,7 +268,7 @@ impl ProfileWalker {
         steps.map(|d| step_in_box(&here.evaluation.unit, &d)).collect()
     }
 
-    /// Best known point near the current place, moved onto its coordinate.
+    /// Best known point near the current place, with the coordinate along the walk set to that of the place.
     fn nearest_known_point(&self, ledger: &Ledger) -> Option<Vec<f64>> {
         let near =
             |e: &&Evaluation| e.unit.get(self.axis).is_some_and(|u| (u - self.at).abs() <= NEAR_COORDINATE);
@@ -278,7 +282,7 @@ impl ProfileWalker {
         unit.iter().enumerate().map(|(at, u)| if at == self.axis { self.at } else { *u }).collect()
     }
 
-    /// Farthest evaluated point within the threshold, if it lies behind the crossing.
+    /// Farthest evaluated point within the threshold, if it lies beyond the crossing.
     fn farthest_within_threshold(&self, ledger: &Ledger) -> Option<Evaluation> {
         let crossing = self.end.flatten()?;
         let limit = self.start.1 + math::powi(self.most_root, 2);
@@ -326,7 +330,7 @@ impl ProfileWalker {
         self.here = Some(best);
     }
 
-    /// Records the place and chooses the next.
+    /// Records the current place with its cost and chooses the next place.
     fn finish_place(&mut self) {
         let (None, Some(here)) = (self.end, self.here.take()) else { return };
         self.places.push((self.at, here.evaluation.cost));
@@ -347,7 +351,8 @@ impl ProfileWalker {
         }
     }
 
-    /// Goes to the next probe behind a crossing, or ends at the crossing if all probes exceed the threshold.
+    /// Moves the walker to the next probe beyond a crossing, or ends the walk at the crossing if the cost
+    /// exceeds the threshold at all probes.
     fn probe_behind_crossing(&mut self, crossing: f64, looked: usize) {
         let Some(factor) = PROBE_FACTORS.get(looked) else {
             self.end = Some(Some(crossing));
@@ -357,7 +362,7 @@ impl ProfileWalker {
         self.next_step = (self.start.0 + factor * (crossing - self.start.0) - self.base_coordinate()).abs();
     }
 
-    /// Whether another parameter is at a bound, but was not at a bound at the best point.
+    /// Whether a parameter other than the walker's is at a bound here but not at the best point.
     fn pins_another_parameter(&self, unit: &[f64]) -> bool {
         let bound = |u: &f64| !(AT_BOUND..=1.0 - AT_BOUND).contains(u);
         let mut pairs = unit.iter().zip(&self.start_unit).enumerate();
@@ -395,8 +400,8 @@ impl ProfileWalker {
         self.refine_bracket(base, self.at, root);
     }
 
-    /// Interpolates the crossing between the base (within the threshold) and `place` (above it), or chooses
-    /// the next place between them.
+    /// Interpolates the crossing between the base, where the cost is within the threshold, and `place`, where
+    /// it is above the threshold. If the bracket is too wide, chooses the next place between them instead.
     fn refine_bracket(&mut self, base_root: f64, place: f64, root: f64) {
         let base = self.base_coordinate();
         let share = ((self.most_root - base_root) / (root - base_root)).clamp(0.0, 1.0);

@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FitStatus {
-    /// The search was completed: further steps from the best point gained nothing.
+    /// The search was completed: further steps from the best point did not lower the cost.
     Converged,
     /// The allowed evaluations were used up before the search was completed.
     BudgetExhausted,
@@ -45,24 +45,26 @@ impl FitStatus {
 pub struct ParameterResult {
     /// Best value.
     pub estimate: f64,
-    /// Lower end of the 95 % interval, which covers all intervals below; `None` where it is open.
+    /// Lower end of the 95 % interval, which contains the intervals of all methods; `None` if it is open at
+    /// this end.
     pub lower_95: Option<f64>,
-    /// Upper end of the 95 % interval, which covers all intervals below; `None` where it is open.
+    /// Upper end of the 95 % interval, which contains the intervals of all methods; `None` if it is open at
+    /// this end.
     pub upper_95: Option<f64>,
-    /// Verdict on the interval.
+    /// Verdict: whether the fit identifies the parameter.
     pub verdict: ParameterVerdict,
-    /// Interval by the linear model at the estimates, if it determines the parameter; in a trace fit, the
-    /// interval from curvature, scatter of the segments and profile.
+    /// In a fit of features, the 95 % interval by the linear model at the estimates, if this model determines
+    /// the parameter. In a trace fit, the 95 % interval from curvature, scatter of the segments and profile.
     pub linear_95: Option<[f64; 2]>,
-    /// Lower and upper crossing of the threshold by the profile of the cost; `None` where the profile does
-    /// not cross it within the bounds.
+    /// Values below and above the estimate at which the profile of the cost crosses the threshold; `None` if
+    /// it does not cross it within the bounds.
     pub profile_95: [Option<f64>; 2],
-    /// Interval from refits to twins of the best model.
+    /// 95 % interval from refits to twins (recordings simulated with the best model).
     pub bootstrap_95: Option<[f64; 2]>,
-    /// Values of the parameter, with the cost at each minimised over the other parameters.
+    /// Values of the parameter, each with the lowest cost over the other parameters.
     pub profile: Vec<(f64, f64)>,
-    /// Reasons why the parameter is not identified, one sentence each. A fit of features lists only reasons
-    /// that do not follow from the other numbers of the result.
+    /// Reasons why the parameter is not identified, one sentence each. In a fit of features, only reasons
+    /// that do not follow from the other numbers of the result are listed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub reasons: Vec<String>,
 }
@@ -74,21 +76,21 @@ impl ParameterResult {
     }
 }
 
-/// Nuisance parameter: a number of a camera, or a constant of the scene, that is estimated
-/// with the parameters.
+/// Nuisance parameter: a calibration error of a camera, or a constant of the scene, that is estimated
+/// together with the parameters.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NuisanceResult {
     /// Recording that the camera filmed; `None` for a constant of the scene.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recording: Option<String>,
-    /// Key of the scene, or one of `tilt_rad`, `scale_relative`, `offset_x_m`, `offset_drop_m`, `clock_s` and
-    /// the drifts of a camera.
+    /// Key of the constant in the scene file, or a camera error: `tilt_rad`, `scale_relative`, `offset_x_m`,
+    /// `offset_drop_m`, `clock_s` or a drift.
     pub name: String,
-    /// Mean of its prior.
+    /// Mean of the prior, in the unit that `name` states.
     pub prior: f64,
-    /// Standard deviation of its prior, in the unit of its name.
+    /// Standard deviation of the prior, in the unit that `name` states.
     pub prior_sd: f64,
-    /// Best value, in the unit of its name.
+    /// Estimated value, in the unit that `name` states.
     pub estimate: f64,
     /// Lower end of the 95 % interval; `None` if unknown.
     pub lower_95: Option<f64>,
@@ -96,7 +98,7 @@ pub struct NuisanceResult {
     pub upper_95: Option<f64>,
 }
 
-/// Fitted starting state for a whole run of the model of a trace.
+/// Fitted starting state of the blade for a run of the model over a whole recording.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StartState {
     /// Name of the recording in the job.
@@ -113,35 +115,35 @@ pub struct StartState {
     pub lip_rate_rad_per_s: f64,
 }
 
-/// The second choice among the peaks for a component.
+/// The second choice among the spectral peaks of the model for a component.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RunnerUpPeak {
-    /// Its frequency, Hz.
+    /// Frequency of the peak, Hz.
     pub frequency_hz: f64,
-    /// Level of the strongest peak of the band relative to this peak, dB.
+    /// Level of the strongest peak of the component's band relative to this peak, dB.
     pub below_db: f64,
 }
 
-/// Result of one local search, a step of the waterfall plot.
+/// Result of one local search; it is one step in the waterfall plot of the costs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LocalOptimum {
-    /// Cost at its start.
+    /// Cost at the start of the search.
     pub start_cost: f64,
-    /// Cost at its end.
+    /// Cost at the end of the search.
     pub cost: f64,
-    /// Number of its evaluations.
+    /// Number of evaluations in the search.
     pub evaluations: usize,
-    /// Parameter values at its end.
+    /// Parameter values at the end of the search, in SI units.
     pub values: BTreeMap<String, f64>,
-    /// Failure of the model at its end, if any.
+    /// Failure of the model at the end of the search, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
 }
 
-/// Target and modelled frequency of a component.
+/// Target and model frequency of a component.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ComponentResult {
-    /// Name in the job.
+    /// Name of the component in the job.
     pub name: String,
     /// Measured or published frequency, Hz.
     pub target_hz: f64,
@@ -151,19 +153,19 @@ pub struct ComponentResult {
     pub model_hz: Option<f64>,
     /// `model / target - 1`.
     pub relative_error: Option<f64>,
-    /// Tolerance of the relative error.
+    /// Largest relative error, in absolute value, that passes.
     pub tolerance_relative: f64,
     /// Whether the relative error is within the tolerance.
     pub pass: bool,
-    /// Scatter of the model's frequency between neighbouring points, Hz; it is added to the deviation
-    /// of the target.
+    /// Scatter of the model's frequency between neighbouring parameter values, Hz; it is added to the
+    /// standard deviation of the target.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model_scatter_hz: Option<f64>,
     /// Standard deviation of the model's frequency over its starting states, Hz.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model_spread_hz: Option<f64>,
-    /// Level of the strongest peak of the band relative to the model's peak, dB; 0 if the model's peak
-    /// is the strongest.
+    /// Level of the strongest peak of the band relative to the model's peak that is assigned to the
+    /// component, dB; 0 if the assigned peak is the strongest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub below_db: Option<f64>,
     /// The peak of the model that is the second choice for the component.
@@ -172,17 +174,17 @@ pub struct ComponentResult {
     /// Standard deviation of the frequency over twins of the best model, Hz.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub twin_sd_hz: Option<f64>,
-    /// Reason why the model has no value, if it has none.
+    /// Reason why the model does not show the component, if it does not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub missing: Option<String>,
 }
 
-/// Target and modelled value of a feature other than a component.
+/// Target and model value of a feature other than a component.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct FeatureResult {
-    /// Name in the job.
+    /// Name of the feature in the job.
     pub name: String,
-    /// Kind in the job.
+    /// Kind of the feature in the job.
     pub kind: String,
     /// Unit of target and model.
     pub unit: String,
@@ -197,10 +199,11 @@ pub struct FeatureResult {
     pub model_seen: Option<f64>,
     /// `model_seen / target - 1`, or `model / target - 1` without camera errors.
     pub relative_error: Option<f64>,
-    /// Whether `model_seen`, or else `model`, is within the 95 % interval of the target. For a held-out
-    /// feature the interval includes the calibration errors of its camera.
+    /// Whether `model_seen` (without camera errors: `model`) is within the 95 % interval of the target. For a
+    /// held-out feature the interval includes the calibration errors of the camera.
     pub pass: bool,
-    /// Scatter of the model's value between neighbouring points; it is added to the deviation of the target.
+    /// Scatter of the model's value between neighbouring parameter values; it is added to the standard
+    /// deviation of the target.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model_scatter: Option<f64>,
     /// Standard deviation of the model's value over its starting states.
@@ -209,13 +212,13 @@ pub struct FeatureResult {
     /// Standard deviation of the feature over twins of the best model.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub twin_sd: Option<f64>,
-    /// Reason why the model has no value, if it has none.
+    /// Reason why the model has no value of the feature, if it has none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub missing: Option<String>,
 }
 
 impl FeatureResult {
-    /// Value of the model, with camera errors if they are estimated.
+    /// Value of the model as the camera shows it: with camera errors if they are estimated.
     pub(crate) fn value_seen(&self) -> Option<f64> {
         self.model_seen.or(self.model)
     }
@@ -240,12 +243,12 @@ pub struct FitResult {
     /// How well the model explains the traces; `None` in a fit of features alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub misfit: Option<TraceMisfit>,
-    /// Results of the parameters, by key of the scene with its table.
+    /// Results of the parameters, by key in the scene file preceded by its table.
     pub parameters: BTreeMap<String, ParameterResult>,
-    /// Estimated numbers of cameras and freed constants.
+    /// Estimated calibration errors of cameras and freed constants.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub nuisances: Vec<NuisanceResult>,
-    /// Fitted starting states for whole runs of the models of the traces.
+    /// Fitted starting states for runs of the model over whole recordings, in a trace fit.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub starts: Vec<StartState>,
     /// Components in job order.
@@ -254,16 +257,17 @@ pub struct FitResult {
     pub features: Vec<FeatureResult>,
     /// Predictions for components and features that were held out of the fit.
     pub held_out: Vec<FeatureResult>,
-    /// Number of informative directions in the space of the parameters.
+    /// Number of directions in the parameter space that the fit determines.
     pub rank: usize,
-    /// Ratio of the largest to the smallest singular value of the sensitivities; `None` if it is infinite.
+    /// Condition number of the Jacobian: ratio of the largest to the smallest singular value; `None` if it is
+    /// infinite.
     pub condition: Option<f64>,
     /// Products of powers of the parameters that the features determine or leave undetermined.
     pub combinations: Vec<ParameterCombination>,
     /// Correlations of the estimates by the linear model, for the parameters that it determines.
     pub correlations: BTreeMap<String, BTreeMap<String, f64>>,
-    /// Cost at the estimates: in a fit of features as defined in `fit::objective`, in a trace fit that of the
-    /// segments and priors.
+    /// Cost at the estimates: in a fit of features as defined in `fit::objective`, in a trace fit the cost of
+    /// the segments and priors.
     pub cost: f64,
     /// Rise in cost at the ends of a 95 % interval.
     pub threshold: f64,
@@ -273,24 +277,23 @@ pub struct FitResult {
     pub gate: Identifiability,
     /// Results of the local searches in ascending order of cost.
     pub waterfall: Vec<LocalOptimum>,
-    /// `d ln feature / d ln parameter` at the estimates, by feature and parameter; `None` where it is
-    /// undefined.
+    /// `d ln feature / d ln parameter` at the estimates, by feature and parameter; `None` if it is undefined.
     pub sensitivities: BTreeMap<String, BTreeMap<String, Option<f64>>>,
     /// Evaluations of the model.
     pub evaluations: EvaluationCounts,
-    /// Whether any fitted recording is synthetic.
+    /// Whether any fitted recording was simulated rather than filmed.
     pub synthetic: bool,
     /// Remarks for the reader, one sentence each.
     pub notes: Vec<String>,
     /// Seed of the search.
     pub seed: u64,
-    /// SHA-256 of problem, data and version of the program, in hexadecimal.
+    /// SHA-256 hash of problem, data and version of the program, in hexadecimal.
     pub fingerprint: String,
     /// Version of the program.
     pub version: String,
 }
 
-/// Error of a file that is not a valid result.
+/// Error for a file that is not a valid result.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{file}: not the result of a fit: {problem}; run `wiperlab fit` again")]
 pub struct ResultError {
@@ -301,7 +304,8 @@ pub struct ResultError {
 }
 
 impl FitResult {
-    /// The text of `result.json`. Keys have a fixed order; the last key is the hash of the text.
+    /// The result as the text of `result.json`. Keys have a fixed order; the last key is the hash of the
+    /// text.
     #[must_use]
     pub fn to_json(&self) -> String {
         // serialisation cannot fail: keys are strings, and numbers that are not finite become `null`
@@ -342,7 +346,7 @@ impl FitResult {
     }
 }
 
-// A result carries the hash of its own text, which reveals any accidental change.
+// A result file contains the hash of its own text, which reveals any accidental change.
 
 /// Last key of the file.
 const HASH_KEY: &str = "\n  \"sha256\": \"";
@@ -351,14 +355,14 @@ const HASH_DIGITS: usize = 64;
 const SHORT_HASH_DIGITS: usize = 12;
 
 /// Appends the hash of a pretty-printed JSON object as its last key. The hash is the SHA-256 of the whole
-/// text with zeros in place of its digits.
+/// text in which the digits of the hash are replaced by zeros.
 pub(super) fn append_hash(object: &str) -> String {
     let open = object.trim_end().trim_end_matches('}').trim_end();
     let with = |digits: &str| format!("{open},{HASH_KEY}{digits}\"\n}}\n");
     with(&text_sha256(with(&"0".repeat(HASH_DIGITS))))
 }
 
-/// Checks a text against the hash that it contains.
+/// Checks that a text has the hash that it contains.
 ///
 /// # Errors
 /// A description of the mismatch.

@@ -1,9 +1,9 @@
 //! Checks a stored result against its job, recordings and model with one evaluation of the model.
 //!
 //! The values of the model are computed again from the stored estimates. Targets, relative errors, passes,
-//! the cost and the verdicts are computed again from the stored numbers. Intervals, sensitivities and the
-//! record of the search would need the whole fit; they are only checked for consistency, and the hash of the
-//! file reveals any changed digit.
+//! the cost and the verdicts are computed again from the stored numbers. To recompute intervals,
+//! sensitivities and the record of the search, the whole fit would be needed; they are only checked for
+//! consistency, and the hash of the file reveals any changed digit.
 
 use super::FitError;
 use super::evaluation::{Evaluation, Observation, Observed};
@@ -22,9 +22,9 @@ use super::uncertainty::stored_verdicts;
 use crate::recording::Recording;
 use serde_json::Value;
 
-/// Relative difference between a stored and a recomputed number up to which they count as equal. On a
-/// processor without AVX2 and FMA, the numbers of the committed reports change by up to 4e-11; on the same
-/// machine they are equal. Features are measured to 1e-3 at best.
+/// Largest relative difference between a stored and a recomputed number that count as equal. On a processor
+/// without AVX2 and FMA, the numbers of the committed reports change by up to 4e-11; on the same machine they
+/// do not change. Features are measured to 1e-3 at best.
 const RELATIVE_TOLERANCE: f64 = 1e-6;
 /// Absolute differences below this value are rounding errors of numbers near zero.
 const ABSOLUTE_TOLERANCE: f64 = 1e-12;
@@ -58,7 +58,8 @@ impl Problem {
         Ok(found)
     }
 
-    /// The result, in which every value that follows from the estimates or from other numbers is recomputed.
+    /// A copy of the result in which every value that follows from the estimates or from other stored numbers
+    /// is recomputed.
     fn recompute_result(&self, stored: &FitResult) -> Result<FitResult, FitError> {
         let job = self.job();
         let mut again = stored.clone();
@@ -79,7 +80,8 @@ impl Problem {
         Ok(again)
     }
 
-    /// Recomputes whole runs of the fitted model, and the verdict on the stored residuals.
+    /// Recomputes the runs of the fitted model over whole recordings, and the verdict on the stored
+    /// residuals.
     fn recompute_traces(
         &self,
         stored: &FitResult,
@@ -146,7 +148,8 @@ impl Problem {
 }
 
 impl FitResult {
-    /// Takes model values from `model`, and errors, passes and camera-corrected values from `stored`.
+    /// Takes the model values from `model`, and the relative errors, passes and values with camera errors
+    /// from `stored`.
     fn replace_model_values(&mut self, model: ModelledTargets, stored: ModelledTargets) {
         let component = |(model, stored): (ComponentResult, ComponentResult)| ComponentResult {
             relative_error: stored.relative_error,
@@ -207,8 +210,8 @@ fn evaluation_as_stored(model: &Evaluation, rows: &[StoredFeature]) -> Evaluatio
     Evaluation { features: model.features.iter().zip(rows).map(one).collect(), ..model.clone() }
 }
 
-/// Contradictions of the interval of a parameter. It must contain the estimate and the intervals by the
-/// single methods, and lie within the bounds. An unfinished search has no interval.
+/// Contradictions in the 95 % interval of a parameter. The interval must contain the estimate and the
+/// intervals of all methods, and lie within the bounds. An unfinished search must have no interval.
 fn interval_contradictions(free: &FreeParameter, p: &ParameterResult, status: FitStatus) -> Vec<String> {
     let said = |key: &str, found: f64, expected: String| {
         format!("parameters.{}.{key}: found {found}, expected {expected}", free.name)
@@ -252,7 +255,8 @@ fn outside_own_interval(n: &NuisanceResult) -> Option<String> {
     })
 }
 
-/// Adds every leaf value that differs, with its key.
+/// Adds to `found` a description of every JSON leaf value that differs between `stored` and `again`, with its
+/// key.
 fn collect_differences(key: &str, stored: &Value, again: &Value, found: &mut Vec<String>) {
     match (stored, again) {
         (Value::Object(a), Value::Object(b)) => {

@@ -38,11 +38,11 @@ pub fn job_warnings(job: &Job) -> Vec<String> {
 }
 
 /// Fits the parameters of a job on features. `measured` has one entry per condition, `None` for a condition
-/// without a recording; `model` gives the recordings of the model as a function of the parameters.
+/// without a recording; `model` simulates recordings as a function of the parameters.
 ///
 /// Every new evaluation is written to `journal` as a line and reported to `on_progress`. A new journal starts
 /// with a header; nothing is written before the identifiability is assessed. The result depends only on the
-/// fingerprint and the allowance of the context, not on the number of threads or on interruptions.
+/// fingerprint and the evaluation limit of the context, not on the number of threads or on interruptions.
 ///
 /// # Errors
 /// [`FitError`]. A search that stops early or does not converge is no error; the status of the
@@ -120,7 +120,7 @@ pub fn fit_features(
     Ok(findings.into_result(&ledger, &best_reads))
 }
 
-/// Assesses the identifiability; the assessment is empty if the evaluations ran out.
+/// Assesses the identifiability of the parameters; the assessment is empty if the evaluations are used up.
 fn check_identifiability(
     ledger: &mut Ledger,
     job: &Job,
@@ -133,7 +133,8 @@ fn check_identifiability(
     Ok(Identifiability { advice: advise_measurements(job, model, &nearest, &gate.combinations), ..gate })
 }
 
-/// Adds the doubts that follow from the misfit and from the ends of the other local searches.
+/// Adds the reasons for doubt that follow from the misfit at the best point and from the ends of the other
+/// local searches.
 fn add_reservations(
     mut found: FitUncertainty,
     weighed: Option<&FeatureWeights>,
@@ -147,10 +148,10 @@ fn add_reservations(
             weighed.inflation
         ));
     }
-    // the last descent only polished the best point and is not a search of its own
+    // the last descent only polished the best point and does not count as a separate search
     let others = searched.descents.split_last().map_or(&[][..], |(_, others)| others);
     let ends: Vec<Evaluation> = others.iter().map(|descent| descent.end.clone()).collect();
-    // optima are compared by the stated deviations, without the inflation by the misfit
+    // optima are compared with the stated standard deviations, which the misfit does not inflate
     let plain = ledger.objective().with_feature_scatter(&weighed.roughness);
     found.with_search_doubts(searched.termination == SearchTermination::Converged, &plain, &ends)
 }
@@ -183,14 +184,15 @@ pub(super) fn predict_held_out(
     held.iter().map(predicted).collect()
 }
 
-/// Features of the best model, with the peaks that were not assigned; `None` for a missing feature.
+/// Features of the best model, including the spectral peaks that are not assigned to a component; `None` for
+/// a missing feature.
 pub(super) fn read_best_model(seen: &ModelFeatures, values: &[f64]) -> Vec<Option<FeatureValue>> {
     let read = seen.read_features(values, Draw::default()).unwrap_or_default();
     read.into_iter().map(Result::ok).collect()
 }
 
-/// Number of evaluations for the search: the allowance minus those for the sensitivities, or the whole
-/// allowance if it is too small for both.
+/// Number of evaluations for the search: the allowed number minus the number for the sensitivities, or the
+/// whole allowed number if it is too small for both.
 fn search_allowance(allowed: usize, parameters: usize) -> usize {
     let sensitivities = 2 * parameters;
     if allowed >= 2 * sensitivities { allowed - sensitivities } else { allowed }

@@ -18,17 +18,18 @@ use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
 
-/// Maximum number of evaluations of the right-hand side in a run: a hundred times as many as a reversal
-/// needs. They take a few seconds.
+/// Maximum number of evaluations of the right-hand side in a run: a hundred times the number that a run over
+/// one reversal needs. They take a few seconds.
 const MAX_EVALUATIONS: u64 = 20_000_000;
 
-/// Relative tolerance of the model's runs. Features are measured to 1e-3, and a run has the same transitions
-/// at 1e-6 as at 1e-8.
+/// Relative tolerance of the model's runs. Features are measured to 1e-3, and a run with 1e-6 has the same
+/// transitions between stick and slip as a run with 1e-8.
 const TOLERANCE: f64 = 1e-6;
-/// Angle that scales the spread of the starting states of a blade that starts upright, rad. A blade in use
-/// leans by 0.1 to 1 rad.
+/// Angle whose fraction `spread` is the spread of the starting angles of a blade that starts upright, rad. A
+/// blade in use leans by 0.1 to 1 rad.
 const REFERENCE_LEAN_RAD: f64 = 0.1;
-/// Distance between the seeds of two conditions, so that they never have the same noise.
+/// Difference between the random seeds of successive conditions, so that no two conditions have the same
+/// noise.
 const CONDITION_SEEDS: u64 = 1 << 32;
 
 /// The camera of a recording and the noise of its tracking.
@@ -36,10 +37,11 @@ const CONDITION_SEEDS: u64 = 1 << 32;
 pub struct Instrument {
     /// The camera.
     pub camera: Camera,
-    /// Standard deviation of a tracked coordinate, m. The noise is added to the model too, because it biases
-    /// features such as the time of release or the power in a band.
+    /// Standard deviation of a tracked coordinate, m. The noise is added to simulated recordings too, because
+    /// it biases features such as the time of release or the power in a band.
     pub noise_m: f64,
-    /// Fraction of the frames in which a point is lost; points are lost only in twins.
+    /// Fraction of the frames in which the tracking loses a point. It applies only to twins; in other
+    /// simulated recordings no points are lost.
     pub dropout_fraction: f64,
 }
 
@@ -52,10 +54,10 @@ pub struct ModelCondition {
     pub instrument: Instrument,
 }
 
-/// Spread of the starting states, and largest plausible tilt.
+/// Spread of the starting states, and largest plausible tilt of the links.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PlausibilityLimits {
-    /// Relative spread of the starting states.
+    /// Standard deviation of the starting angles, relative to the angles themselves.
     pub spread: f64,
     /// Largest angle of neck or lip from the vertical, rad; `None` for no limit.
     pub largest_tilt_rad: Option<f64>,
@@ -95,8 +97,8 @@ impl SceneModel {
         scene.map_err(|error| RunFailure::new(FailureReason::Refused, error.to_string(), 0.0))
     }
 
-    /// Recording of a scene by the camera of a condition, at the tolerance of the scene and without tracking
-    /// noise, even if the run ends early; `observer` follows the run.
+    /// Recording of a scene by the camera of a condition, with the solver tolerance of the scene and without
+    /// tracking noise. A run that ends early is recorded up to its end; `observer` follows the run.
     ///
     /// # Errors
     /// [`RunFailure`] if fewer than two frames were recorded.
@@ -120,7 +122,8 @@ impl SceneModel {
         })
     }
 
-    /// Recording of a run from `from_s` on, without tracking noise; the run must reach its stop time.
+    /// Recording of a run from the time `from_s` on, without tracking noise; it fails if the run ends before
+    /// its stop time.
     fn record_completed_run(
         &self,
         scene: &Scene,
@@ -146,7 +149,8 @@ impl SceneModel {
         Ok(seen.recording)
     }
 
-    /// Recording of a run from `from_s` on, with tracking noise; the run must reach its stop time.
+    /// Recording of a run from the time `from_s` on, with tracking noise; it fails if the run ends before its
+    /// stop time.
     fn record_with_noise(
         &self,
         scene: &Scene,
@@ -164,7 +168,8 @@ impl SceneModel {
             .map_err(|error| RunFailure::new(FailureReason::NotFinite, error.to_string(), 1.0))
     }
 
-    /// The scene with the starting state of number `member` of the ensemble; 0 is the scene's own.
+    /// The scene with the starting state of number `member` of the ensemble; 0 is the starting state of the
+    /// scene itself.
     fn draw_start(&self, mut scene: Scene, member: u64) -> Scene {
         if member == 0 || self.plausible.spread == 0.0 {
             return scene;
@@ -236,7 +241,7 @@ impl Model for SceneModel {
     fn max_lead_s(&self, condition: usize) -> f64 {
         match self.conditions.get(condition).map(|condition| &condition.scene) {
             Some(Scene { drive: Drive::Recorded(head), start_s, .. }) => start_s - head.span_s()[0],
-            // the time of a start in the air or in a given pose is fixed
+            // a run that starts in the air or in a given pose cannot start earlier
             Some(Scene { start: StartKind::Airborne(_) | StartKind::State(_), .. }) => 0.0,
             _ => f64::INFINITY,
         }
@@ -265,7 +270,7 @@ fn view_failure(scene: &Scene, error: &TwinViewError) -> RunFailure {
     }
 }
 
-/// Fraction of the run that is completed at a time.
+/// Fraction of the run that is completed at the time `time_s`.
 fn run_progress(scene: &Scene, time_s: f64) -> f64 {
     (time_s - scene.start_s) / (scene.run.stop_s - scene.start_s)
 }
@@ -287,7 +292,7 @@ fn check_tilt(scene: &Scene, tilt: &LargestTilt, largest_rad: f64) -> Result<(),
     let message = format!(
         "a link leans by {found:.1} degrees at {at_s} s, more than the {allowed:.1} that are plausible"
     );
-    // the progress is larger, so the cost is lower, the less the tilt exceeds its limit
+    // the less the tilt exceeds its limit, the larger is the progress and the lower the cost
     let progress = run_progress(scene, scene.run.stop_s) * largest_rad / tilt.largest_rad;
     Err(RunFailure::new(FailureReason::Tilt, message, progress))
 }

@@ -1,9 +1,9 @@
 //! The search in the unit box: CMA-ES populations, then a local search from each of the best distinct points,
-//! then a polish of the best point until it gains nothing more.
+//! then a polish of the best point until the cost no longer falls.
 //!
-//! Covariance matrix adaptation and damped Gauss-Newton steps are implemented here; the simplex is that of
-//! argmin (`simplex.rs`). The ledger keeps budgets, the best point and every failure, so the solvers never
-//! see errors or costs that are not numbers.
+//! Covariance matrix adaptation and damped Gauss-Newton steps are implemented here; the simplex comes from
+//! argmin (`simplex.rs`). The ledger counts the budget, stores the best point and handles every failure, so
+//! the solvers never see errors or costs that are not numbers.
 
 pub(crate) mod costs;
 mod excluded_region_search;
@@ -24,7 +24,8 @@ pub use termination::{
     EXACT_COST, LocalDescent, MIN_WORTHWHILE_GAIN, SIMPLEX_COST_SPREAD, SearchOutcome, SearchTermination,
 };
 
-/// Searches within the budgets of `settings` and at most `limit` evaluations in total.
+/// Searches for the lowest cost within the budgets of `settings` and with at most `limit` evaluations in
+/// total.
 pub fn search_minimum(
     ledger: &mut Ledger,
     dimensions: usize,
@@ -45,7 +46,7 @@ pub fn search_minimum(
     SearchOutcome { termination, descents }
 }
 
-/// Default number of generations without sufficient gain after which a population ends.
+/// Default number of generations without a sufficient decrease of the cost after which a population ends.
 pub const STAGNANT_GENERATIONS: usize = 20;
 
 /// Budgets and stopping rules of a search.
@@ -59,7 +60,7 @@ pub struct SearchSettings {
     pub local_evaluations: usize,
     /// Number of points in a population.
     pub particles: usize,
-    /// Number of generations without sufficient gain after which a population ends.
+    /// Number of generations without a sufficient decrease of the cost after which a population ends.
     pub stagnation_generations: usize,
     /// Number of points from which local searches start.
     pub starts: usize,

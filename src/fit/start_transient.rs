@@ -1,8 +1,9 @@
 //! Checks whether the transient after the start affects the features.
 //!
-//! A scene starts from a guessed state, such as the equilibrium of steady slip. The error of the guess decays
-//! with the slowest mode of blade and head, and biases a feature whose window begins too early. The best
-//! model is therefore run again from another start, and its features are compared with those of the fit.
+//! A scene starts from a guessed state, such as the equilibrium of steady slip. The error of this state
+//! decays with the slowest mode of blade and head. It biases a feature whose time window begins too early.
+//! The best model is therefore run again from another start, and its features are compared with those of the
+//! fit.
 
 use super::evaluation::{Observed, RunFailure};
 use super::job::FitTarget;
@@ -11,18 +12,19 @@ use super::target_value::TargetValue;
 use crate::feature::Feature;
 use crate::recording::Recording;
 
-/// Shift of a feature between two starts, in standard deviations, above which a note is written: a quarter of
-/// the width of a 95 % interval.
+/// Shift of a feature between two starts, in standard deviations of its target, above which a note is
+/// written: a quarter of the width of a 95 % interval.
 const MIN_VISIBLE_SHIFT_SD: f64 = 1.0;
-/// Shift of a feature, in standard deviations, up to which the error of the start counts as decayed.
+/// Shift of a feature between two starts, in standard deviations of its target, up to which the error of the
+/// start counts as decayed.
 const MAX_FORGOTTEN_SHIFT_SD: f64 = 0.3;
-/// Longest time by which a start is advanced, in decay times; after five of them less than 1 % of
-/// an error remains.
+/// Longest time by which a start is moved earlier, in decay times. After five decay times less than 1 % of an
+/// error remains.
 const MAX_LEAD_DECAYS: usize = 5;
-/// Relative change of the starting angles if the start cannot be advanced.
+/// Relative change of the starting angles if the start cannot be moved earlier.
 const ANGLE_CHANGE: f64 = 0.05;
 
-/// A model whose runs start differently.
+/// A model whose runs start differently from the scene.
 struct RestartedModel<'a> {
     model: &'a dyn Model,
     restart: Restart,
@@ -39,7 +41,7 @@ impl Model for RestartedModel<'_> {
     }
 }
 
-/// The features of one condition of the best model.
+/// The features and targets of one condition, with the best model and its parameter values.
 struct ConditionFeatures<'a> {
     model: &'a dyn Model,
     values: &'a [f64],
@@ -56,8 +58,8 @@ impl ConditionFeatures<'_> {
         ModelFeatures::new(model, &self.features, targets, self.members).predict_features(self.values).ok()
     }
 
-    /// The feature with the largest difference between two runs, and that difference in standard deviations
-    /// of the feature. A feature that is missing from a run is skipped.
+    /// The feature with the largest difference between two runs, and this difference in standard deviations
+    /// of the feature's target. A feature that is missing from either run is skipped.
     fn largest_difference(&self, one: &[Observed], other: &[Observed]) -> Option<(&str, f64)> {
         let pairs = self.targets.iter().zip(one).zip(other);
         let differences = pairs.filter_map(|((target, one), other)| {
@@ -68,8 +70,8 @@ impl ConditionFeatures<'_> {
     }
 }
 
-/// A sentence for each condition whose features depend on the start of its scene. `targets` have the standard
-/// deviations at the end of the fit; `names` are the names of the conditions.
+/// A sentence for each condition whose features depend on the start of its scene. `targets` contain the
+/// standard deviations at the end of the fit; `names` are the names of the conditions.
 pub(super) fn start_notes(
     model: &dyn Model,
     names: &[String],
@@ -138,8 +140,8 @@ mod tests {
 
     const SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
 
-    /// Notes on a job at the values of the scene. Its only target is the mean deflection over `window`, with
-    /// a standard deviation of 0.5 %.
+    /// Notes on a job whose best values are those of the scene. The job's only target is the mean deflection
+    /// over `window`, with a standard deviation of 0.5 %.
     fn said(start: &str, window: &str) -> Vec<String> {
         let text = SCENE.replace("time_s = 0.56\nkind = \"steady-slide\"", start);
         assert_ne!(text, SCENE);

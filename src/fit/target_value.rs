@@ -1,14 +1,15 @@
-//! A measured or published value that a fit must meet.
+//! A measured or published value of a feature, which a fit must reproduce.
 
 use crate::feature::{LengthCalibration, ValueComparison};
 use portable_math as math;
 
 /// Ratio of model to target, or of target to model, above which the residual no longer grows. No physical
-/// feature spans two decades, so any value of a feature costs less than a missing feature.
+/// feature varies by more than two decades, so a feature with a value always costs less than a missing
+/// feature.
 pub(crate) const MAX_RATIO: f64 = 100.0;
 
-/// Smallest relative standard deviation in the first stage. Far from the targets all features are many
-/// deviations off, and the most precise ones would otherwise dominate the cost.
+/// Smallest relative standard deviation in the first stage. Far from the targets all residuals are many
+/// standard deviations, and the most precise features would otherwise dominate the cost.
 pub(crate) const FIRST_STAGE_SD_RELATIVE: f64 = 0.05;
 
 /// The target value of a feature, with its standard deviation.
@@ -18,28 +19,28 @@ pub struct TargetValue {
     pub name: String,
     /// Target value, in the feature's own SI unit; not zero if values are compared by logarithms.
     pub value: f64,
-    /// Standard deviation of the target, in the same unit; above zero.
+    /// Standard deviation of the target, in the unit of `value`; above zero.
     pub sd: f64,
-    /// Scatter of the model's value between neighbouring parameter values, in the same unit; 0 if the
+    /// Scatter of the model's value between neighbouring parameter values, in the unit of `value`; 0 if the
     /// model is smooth.
     pub scatter: f64,
     /// Whether model and target are compared by the logarithm of their ratio or by their difference.
     pub measure: ValueComparison,
-    /// Whether the target counts in the last stage only.
+    /// Whether the target counts only in the last stage of the search.
     pub last: bool,
     /// Calibration errors of the camera that measured the target, if the value depends on them.
     pub calibration: Option<TargetCalibration>,
 }
 
 impl TargetValue {
-    /// Standard deviation of a distance, including the scatter of the model, in units of
-    /// [`Self::reference_size`].
+    /// Standard deviation of [`Self::distance`] from the target's standard deviation and the scatter of the
+    /// model, in units of [`Self::reference_size`].
     pub(crate) fn relative_sd(&self) -> f64 {
         math::hypot(self.sd, self.scatter) / self.reference_size()
     }
 
-    /// Distance of `value` from the target in units of [`Self::reference_size`], limited to the logarithm of
-    /// [`MAX_RATIO`] in size.
+    /// Distance of `value` from the target in units of [`Self::reference_size`], with an absolute value of at
+    /// most the logarithm of [`MAX_RATIO`].
     pub(crate) fn distance(&self, value: f64) -> f64 {
         let most = math::ln(MAX_RATIO);
         match self.measure {
@@ -61,15 +62,15 @@ impl TargetValue {
         }
     }
 
-    /// The target in the first stage, with a deviation of at least [`FIRST_STAGE_SD_RELATIVE`]; `None` if it
-    /// counts in the last stage only.
+    /// The target as it counts in the first stage of the search, with a relative standard deviation of at
+    /// least [`FIRST_STAGE_SD_RELATIVE`]; `None` if the target counts in the last stage only.
     pub(super) fn first_stage_target(&self) -> Option<Self> {
         let sd = self.sd.max(FIRST_STAGE_SD_RELATIVE * self.reference_size());
         (!self.last).then(|| Self { sd, ..self.clone() })
     }
 
-    /// Unit of distances, in the feature's own unit: the size of the target, or the difference that
-    /// counts as large.
+    /// Unit of distances, in the feature's own unit: the absolute value of the target or, for differences,
+    /// the difference that counts as large.
     pub(crate) fn reference_size(&self) -> f64 {
         match self.measure {
             ValueComparison::Log => self.value.abs(),
@@ -78,8 +79,8 @@ impl TargetValue {
     }
 }
 
-/// Dependence of a value on the calibration errors of its camera; a position becomes `(1 + scale)
-/// value + offset`.
+/// How a feature depends on the calibration errors of its camera. A position, for example, is shown as `(1 +
+/// scale) value + offset`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TargetCalibration {
     /// Index of the condition to which the camera belongs, from 0.
@@ -88,7 +89,7 @@ pub struct TargetCalibration {
     pub scale_sd: f64,
     /// Standard deviation of the offset, m; 0 if the offset is fixed.
     pub offset_sd_m: f64,
-    /// Kind of length, which decides how scale and offset act on it.
+    /// Kind of the value (such as position or size), which determines how scale and offset change it.
     pub length: LengthCalibration,
 }
 
@@ -104,7 +105,7 @@ impl TargetCalibration {
         }
     }
 
-    /// Derivatives of the shown value by scale and by offset (m).
+    /// Derivatives of the value that the camera shows by the scale and by the offset (m).
     pub(crate) fn derivatives(&self, value: f64, [scale, offset_m]: [f64; 2]) -> [f64; 2] {
         match self.length {
             LengthCalibration::Position => [value, 1.0],
@@ -115,13 +116,13 @@ impl TargetCalibration {
         }
     }
 
-    /// Standard deviation of a value due to the calibration errors, m.
+    /// Standard deviation of the value that the camera shows due to the calibration errors, m.
     pub(crate) fn sd_m(&self, value: f64) -> f64 {
         let [by_scale, by_offset] = self.derivatives(value, [0.0; 2]);
         math::hypot(self.scale_sd * by_scale, self.offset_sd_m * by_offset)
     }
 
-    /// Standard deviations of scale and offset; that of the offset is 0 if the value does not depend on it.
+    /// Standard deviations of scale and offset; the second is 0 if the value does not depend on the offset.
     pub(crate) fn standard_deviations(&self) -> [f64; 2] {
         match self.length {
             LengthCalibration::Position => [self.scale_sd, self.offset_sd_m],

@@ -1,5 +1,5 @@
-//! Targets of a job: given in the job, or measured on its recordings with the deviation that results
-//! from their noise.
+//! Targets of a job: given in the job, or measured on its recordings. A measured target gets the standard
+//! deviation that follows from the noise of the recording.
 
 use super::FitError;
 use super::job::{FitTarget, Job, TargetSource, TargetStage};
@@ -10,18 +10,18 @@ use crate::recording::quality::measure_quality;
 use crate::simulate::twin::{TrackingModel, add_tracking_noise};
 use portable_math as math;
 
-/// Number of copies of a recording with additional noise from which the deviation of a feature is estimated:
-/// a standard deviation of 12 values is accurate to a fifth.
+/// Number of copies of a recording with additional noise from which the standard deviation of a feature is
+/// estimated. A standard deviation from 12 values is accurate to a fifth.
 const NOISE_COPIES: u64 = 12;
-/// Smallest relative deviation of a measured value: neither features of sampled traces nor the model
-/// are more precise.
+/// Smallest relative standard deviation of a measured target: neither features of sampled traces nor the
+/// model are more precise.
 const MIN_SD_RELATIVE: f64 = 1e-3;
 
 /// Targets in the order of the job; `measured` has one entry per condition, `None` for a condition
 /// without a recording.
 ///
-/// A deviation that the job does not state is the scatter of the feature over copies of the recording with
-/// additional tracking noise of the same size.
+/// If the job states no standard deviation, it is the scatter of the feature over copies of the recording to
+/// which tracking noise as large as that of the recording is added.
 ///
 /// # Errors
 /// [`FitError::Recordings`], or [`FitError::NotMeasurable`] with the names of the recording and the feature.
@@ -47,7 +47,8 @@ pub fn measure_targets(job: &Job, measured: &[Option<Recording>]) -> Result<Vec<
     job.targets.iter().zip(read).zip(scatter).map(target).collect()
 }
 
-/// The fitted entries of the job, their target values, and the held-out entries with theirs.
+/// Splits the targets of the job: the fitted entries, the target values of these, and the held-out entries
+/// with their target values.
 pub(super) fn split_held_out(
     job: &Job,
     all: Vec<TargetValue>,
@@ -87,8 +88,8 @@ fn measure_target(
     Ok(TargetValue { name, value, sd, scatter: 0.0, measure, last, calibration: None })
 }
 
-/// Standard deviation of each feature over noisier copies of the recordings; `None` if at most half of the
-/// copies show the feature.
+/// Standard deviation of each feature over copies of the recordings with additional noise; `None` if at most
+/// half of the copies show the feature.
 fn copy_scatter(features: &[Feature], measured: &[Option<Recording>]) -> Vec<Option<f64>> {
     let noise = |m: &Option<Recording>| measure_quality(m.as_ref()?, None).head_x.noise_m;
     let noise_m: Vec<f64> = measured.iter().map(|m| noise(m).unwrap_or(0.0)).collect();

@@ -2,9 +2,10 @@
 //!
 //! A long run of a stick-slip model is so sensitive that the misfit of its trace has tens of minima. If the
 //! model restarts from the recorded state every few milliseconds, the misfit has one minimum. The starting
-//! state of each segment is eliminated (variable projection, Golub and Pereyra 1973), so an outer
-//! Levenberg-Marquardt step moves only the parameters and the unknowns of the cameras. Segments grow longer
-//! from stage to stage; each new stage starts on the motion that the previous one fitted.
+//! state of each segment is eliminated from the least-squares problem (variable projection, Golub and Pereyra
+//! 1973), so an outer Levenberg-Marquardt step moves only the parameters and the unknowns of the cameras.
+//! Segments grow longer from stage to stage; each new stage starts from the motion that the previous stage
+//! has fitted.
 
 mod assessment;
 pub(crate) mod build;

@@ -1,4 +1,5 @@
-//! Journal of a trace fit: one iterate per line, with every bit on which the next iterate depends.
+//! Journal of a trace fit: one iterate per line, stored bit by bit with everything on which the next iterate
+//! depends.
 
 use super::trace::{CameraUnknown, Iterate, SegmentState, TraceUnknown, UnknownKind};
 use crate::checkpoint;
@@ -14,10 +15,10 @@ pub(crate) type TraceHeader = checkpoint::CheckpointHeader<TraceHeaderBody>;
 /// One iterate of one chain.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct IterateRecord {
-    /// Number of its chain: that of a start, counted from 0, or of an
+    /// Number of the chain of this iterate: the number of a start, counted from 0, or of an
     /// [`UncertaintyRun`](super::trace::UncertaintyRun).
     pub start: usize,
-    /// Number of the iterate in its chain, from 0. Each iterate follows from the previous one.
+    /// Number of the iterate in its chain, counted from 0. Each iterate is computed from the previous one.
     pub step: usize,
     pub iterate: Iterate,
 }
@@ -71,7 +72,7 @@ impl CheckpointRecord for IterateRecord {
         Ok(Self { start, step, iterate })
     }
 
-    /// Describes the first number that differs.
+    /// Describes the first number that differs between two records; `None` if they are equal.
     fn difference(&self, other: &Self) -> Option<[String; 2]> {
         let [one, two] = [&self.iterate, &other.iterate];
         if one == two {
@@ -150,7 +151,7 @@ struct SegmentRow {
     start: [ExactNumber; 4],
     shown: [ExactNumber; 4],
     data: usize,
-    /// Absent if the run of the model fails.
+    /// Sum of the squared residuals of the segment; absent if the run of the model fails.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     chi2: Option<ExactNumber>,
 }
@@ -185,18 +186,18 @@ pub(crate) struct TraceHeaderBody {
     pub unknowns: Vec<HeaderCoordinate>,
 }
 
-/// An unknown with the meaning of its coordinate.
+/// An unknown, and how its coordinate maps to its value.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct HeaderCoordinate {
-    /// Key of the scene, or name of the recording and key of its camera's error.
+    /// Key of a parameter in the scene file, or name of a recording and key of a camera error.
     pub name: String,
-    /// Unit of its value.
+    /// Unit of the value of the unknown.
     pub unit: String,
     /// Value that corresponds to a coordinate of 1; absent if the coordinate is the logarithm of the value.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub per_unit: Option<ExactNumber>,
-    /// Range of the coordinate.
+    /// Lower and upper end of the range of the coordinate.
     pub range: [ExactNumber; 2],
     /// Mean and standard deviation of the prior of the coordinate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -231,7 +232,7 @@ impl HeaderCoordinate {
     }
 }
 
-/// Key in files, and unit, of an unknown of a camera.
+/// Key and unit of a camera error in files.
 pub(super) fn camera_unknown_key(what: CameraUnknown) -> [&'static str; 2] {
     match what {
         CameraUnknown::OffsetX => ["offset_x_m", "m"],

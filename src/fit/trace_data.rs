@@ -8,31 +8,32 @@ use crate::simulate::scene::Scene;
 use std::ops::Range;
 
 /// Default segment lengths of the stages, s. The first is short enough for convergence from the middle of the
-/// bounds; the last is the longest for which the fitted motion reliably gives starting states.
+/// bounds; the last is the longest for which the motion fitted with shorter segments reliably gives starting
+/// states.
 pub(crate) const DEFAULT_SEGMENT_S: [f64; 3] = [0.004, 0.008, 0.016];
-/// Frame rate below which a further stage with segments of [`EXTRA_SEGMENT_S`] is added, because short
-/// segments with few frames bias the estimates more.
+/// Frame rate, Hz, below which a further stage with segments of [`EXTRA_SEGMENT_S`] is added, because short
+/// segments with few frames bias the estimates more strongly.
 const SLOW_HZ: f64 = 4_000.0;
 const EXTRA_SEGMENT_S: f64 = 0.032;
-/// Minimum number of frames in a segment: its starting state takes four degrees of freedom.
+/// Minimum number of frames in a segment: its starting state uses up four degrees of freedom.
 pub(crate) const MIN_SEGMENT_FRAMES: usize = 8;
 /// Minimum number of frames in which a fitted channel must be tracked: slightly more than one segment.
 const MIN_TRACKED_FRAMES: usize = 10;
 
-/// A trace of the job, with its channels and frames resolved for its recording.
+/// A trace of the job, with the channels and frames that are fitted on its recording.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct TraceData {
-    /// Index of its condition.
+    /// Index of the condition to which the trace belongs.
     pub condition: usize,
     /// Fitted channels, at least one.
     pub channels: Vec<TraceChannel>,
-    /// Fitted frames.
+    /// Indices of the fitted frames.
     pub frames: Range<usize>,
     /// Standard deviation of a tracked coordinate, m, if the job gives it.
     pub noise_m: Option<f64>,
     /// Source of the head's motion in the model.
     pub head: HeadSource,
-    /// Prior standard deviations of the camera's errors.
+    /// Standard deviations of the priors of the camera's errors.
     pub camera: CameraPriorSds,
 }
 
@@ -40,7 +41,7 @@ pub(crate) struct TraceData {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("trace {number}, `{key}`: {problem}")]
 pub struct TraceError {
-    /// Number of the trace, from 1.
+    /// Number of the trace in the job, counted from 1.
     pub number: usize,
     /// Key of the job that has to be changed.
     pub key: &'static str,
@@ -48,7 +49,7 @@ pub struct TraceError {
     pub problem: String,
 }
 
-/// Key of the job, and description of the problem, for a [`TraceError`].
+/// Key of the job to be changed, and description of the problem, for a [`TraceError`].
 type TraceRefusal = (&'static str, String);
 
 /// The traces of a job matched with their recordings, and the segment length of each stage, s.
@@ -126,8 +127,8 @@ fn fitted_channels(
     Err(("channels", problem))
 }
 
-/// Source of the head's motion: the one that the job names; otherwise the recorded head if it is tracked,
-/// else the scene.
+/// Source of the head's motion: the source that the job names, if it names one. Otherwise it is the recorded
+/// head if the head is tracked, and the scene if not.
 fn head_source(aim: &TraceTarget, recording: &Recording) -> Result<HeadSource, TraceRefusal> {
     match (aim.head, smooth_head_motion(recording)) {
         (Some(HeadSource::Recording), Err(error)) => {
@@ -139,7 +140,7 @@ fn head_source(aim: &TraceTarget, recording: &Recording) -> Result<HeadSource, T
     }
 }
 
-/// Refuses a free parameter of the drive where the recorded head drives the model.
+/// Refuses a job that frees a parameter of the drive although the recorded head drives the model.
 fn check_drive(job: &Job, head: HeadSource) -> Result<(), TraceRefusal> {
     let free = job.parameters.iter().find(|free| free.name.starts_with("drive."));
     let Some(free) = free.filter(|_| head == HeadSource::Recording) else { return Ok(()) };
@@ -165,7 +166,8 @@ fn check_span(scene: &Scene, one: &TraceData, recording: &Recording) -> Result<(
     Err(("drive", problem))
 }
 
-/// The stages whose segments fit into the recording. Stages that the job gives must all be possible.
+/// Segment lengths of the stages whose segments fit into the recording, s. If the job gives the stages, all
+/// of them must fit.
 fn possible_stages(
     aim: &TraceTarget,
     trace: &TraceData,

@@ -1,7 +1,7 @@
 //! Ledger of a trace fit: every iterate is computed once, and written to the journal before it is counted.
 //!
-//! An iterate depends only on the previous one, so a search that was killed continues with the same bits. It
-//! loses only the iterates that were being computed.
+//! An iterate depends only on the previous one, so a search that was killed continues with exactly the same
+//! numbers. Only the iterates that were being computed are lost.
 
 use super::FitError;
 use super::evaluation::EvaluationStage;
@@ -15,17 +15,17 @@ use std::ops::ControlFlow;
 /// Progress of a trace fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct TraceProgress {
-    /// Number of the chain: of a start, or of an [`UncertaintyRun`].
+    /// Number of the chain of the latest iterate: the number of a start, or that of an [`UncertaintyRun`].
     pub start: usize,
     /// Number of iterates of all chains so far, including those from the journal.
     pub iterates: usize,
-    /// Number of iterates from the journal.
+    /// Number of iterates that were taken from the journal.
     pub replayed: usize,
-    /// Index of the stage.
+    /// Index of the stage of the latest iterate.
     pub stage: usize,
     /// Cost of the latest iterate.
     pub cost: f64,
-    /// Number of segments that fit worse than noise explains.
+    /// Number of segments of the latest iterate that fit worse than noise explains.
     pub bad_segments: usize,
     pub segments: usize,
 }
@@ -60,13 +60,13 @@ pub(crate) enum TraceStopReason {
 pub(crate) struct TraceLedger<'a> {
     journal: &'a mut dyn CheckpointSink,
     on_iterate: &'a mut OnIterate<'a>,
-    /// Iterates of the journal that is resumed, by chain and number.
+    /// Iterates of the journal that is resumed, by number of the chain and number within the chain.
     known: HashMap<(usize, usize), Iterate>,
     /// Number of records in the journal.
     lines: usize,
-    /// Header line of a new journal, until it is written.
+    /// Header line of a new journal; `None` once it is written.
     opening: Option<String>,
-    /// Number of iterates of each chain.
+    /// Number of iterates of each chain so far.
     counts: BTreeMap<usize, usize>,
     replayed: usize,
     most: usize,
@@ -74,8 +74,8 @@ pub(crate) struct TraceLedger<'a> {
 }
 
 impl<'a> TraceLedger<'a> {
-    /// A ledger that continues the journal `resume`, or begins a new one with `header`. `most` is the maximum
-    /// number of iterates, including those from the journal.
+    /// A ledger that continues the journal `resume`, or begins a new journal with `header`. `most` is the
+    /// maximum number of iterates, including those from the journal.
     ///
     /// # Errors
     /// [`FitError`] when the journal belongs to another fit.
@@ -165,9 +165,9 @@ impl Checkpoint for TraceLedger<'_> {
     }
 }
 
-/// Recomputes some iterates of a journal, each from the previous one, and compares every bit: a resumed
-/// search must not start from iterates that the model does not reproduce. `next` computes the first iterate
-/// of a chain, or the one that follows a given iterate.
+/// Recomputes a sample of the iterates in a journal, each from the previous iterate, and compares every bit:
+/// a resumed search must not continue from iterates that the model does not reproduce. `next` computes the
+/// first iterate of a chain, or the iterate that follows a given iterate.
 ///
 /// # Errors
 /// [`FitError::Journal`] with the line that differs.
@@ -179,7 +179,7 @@ pub(crate) fn recheck_iterates(
     let records = &journal.records;
     let places: HashMap<(usize, usize), &Iterate> =
         records.iter().map(|step| ((step.start, step.step), &step.iterate)).collect();
-    // a longer journal gives another sample
+    // the sample of recomputed iterates changes as the journal grows
     let seed = journal.header.body.seed.wrapping_add(records.len() as u64);
     for place in sample_records(records.len(), seed) {
         let stored = &records[place];
@@ -187,7 +187,7 @@ pub(crate) fn recheck_iterates(
         let again = match before {
             None => next(stored.start, None),
             Some(Some(before)) => next(stored.start, Some(before)),
-            Some(None) => continue, // (the journal lacks the previous iterate)
+            Some(None) => continue, // (the journal does not contain the previous iterate)
         };
         if let Some(iterate) = again {
             journal.check_recomputed(file, place, &IterateRecord { iterate, ..stored.clone() })?;

@@ -57,7 +57,7 @@ impl Problem {
         let mut ledger = TraceLedger::new(&header, resume, most, journal, on_iterate)?;
         if let Some((file, found)) = resume {
             recheck_iterates(file, found, |chain, before| match before {
-                // the best end, from which this run starts, is not known yet
+                // an uncertainty run starts from the best end, which is not known yet
                 _ if UncertaintyRun::from_chain_number(chain).is_some() => None,
                 None => first_iterate(&model, &settings, &start_point(&model, seed, chain)),
                 Some(before) => next_iterate(&model, &settings, before),
@@ -104,16 +104,16 @@ fn cannot_be_fitted(why: &str) -> FitError {
     FitError::CannotBeFitted { why: why.to_owned() }
 }
 
-/// Reason given for a fit without any iterate.
+/// Reason that is reported if a fit has no iterate.
 const NO_SEGMENT_STARTED: &str = "no segment of the traces could be started: the model runs nowhere within the bounds, or \
                           the tip slides in too few frames; look at the recording with `wiperlab inspect`";
 
 // Result of a trace search.
 
-/// Number of worst segments that are listed per channel.
+/// Number of segments with the largest misfit that are listed per channel.
 const WORST_SEGMENTS: usize = 5;
 
-/// Doubt about a fit with segments of one length: only longer segments would reveal a bias.
+/// Reason to doubt a fit with segments of a single length: only longer segments would reveal a bias.
 const ONE_LENGTH_NOTE: &str = "segments of one length alone were fitted, and whether longer ones agree is not known: give \
                           `segment_s` two lengths at least";
 
@@ -126,7 +126,7 @@ struct TraceFindings<'a, 'l> {
 }
 
 impl TraceFindings<'_, '_> {
-    /// The result without the comparison of whole runs; `None` if no start has an iterate.
+    /// The result without the comparison of runs over whole recordings; `None` if no start has an iterate.
     fn into_result(self) -> Option<FitResult> {
         let job = self.problem.job();
         let best = self.searched.descents.get(self.searched.best)?;
@@ -201,7 +201,7 @@ impl TraceFindings<'_, '_> {
         end: &Iterate,
         misfit: &TraceMisfit,
     ) -> ParameterResult {
-        // the transform of the coordinate may overshoot a bound by a rounding error
+        // the transform from coordinate to value may overshoot a bound by a rounding error
         let estimate = self.model.unknowns.0[at].value(end.point[at]);
         let mut found = ParameterResult {
             estimate: estimate.clamp(free.bounds.lower(), free.bounds.upper()),
@@ -260,7 +260,7 @@ impl TraceFindings<'_, '_> {
         all.map(nuisance).collect()
     }
 
-    /// The starting state of the first good segment of each recording.
+    /// The fitted starting state of the first well-fitted segment of each recording.
     fn start_states(&self, end: &Iterate) -> Vec<StartState> {
         let start = |(film, shoot): (usize, &TraceRecording)| {
             let fits = |s: &&SegmentState| s.recording == film && s.chi2.is_finite() && !s.is_bad();
@@ -284,7 +284,7 @@ impl TraceFindings<'_, '_> {
     fn trace_misfit(&self, best: &TraceDescent, end: &Iterate, nuisances: &[NuisanceResult]) -> TraceMisfit {
         let found = segment_residuals(self.model, end);
         let mut channels: BTreeMap<(usize, bool), Vec<&SegmentResiduals>> = BTreeMap::new();
-        // a recording without residuals also gets an entry for each channel
+        // a recording without residuals also gets an entry for each of its channels
         for (film, trace) in self.problem.traces().iter().enumerate() {
             for channel in &trace.channels {
                 channels.insert((film, *channel == TraceChannel::HeadDrop), Vec::new());
@@ -292,12 +292,12 @@ impl TraceFindings<'_, '_> {
         }
         found.iter().for_each(|r| channels.entry((r.recording, r.is_drop)).or_default().push(r));
         let ((chi2, dof), data) = (chi2_per_dof(end), end.count_data());
-        // degrees of freedom per datum, the same for all data; chi2 is NaN if a run fails
+        // degrees of freedom per measured value, taken as equal for all channels; chi2 is NaN if a run fails
         let share = if chi2.is_nan() || data == 0 { 1.0 } else { dof as f64 / data as f64 };
         let rows = channels.iter();
         let rows = rows.map(|(channel, parts)| self.channel_misfit(*channel, parts, share)).collect();
-        // the run with shorter segments from the best end replaces the stage of the search with segments of
-        // that length
+        // the uncertainty run with shorter segments replaces the stage of the search with segments of the
+        // same length
         let known = self.searched.assessment.as_ref().and_then(|known| known.shorter.as_ref());
         let shorter = |stage: usize| known.filter(|iterate| iterate.stage == stage);
         let stages =
@@ -359,7 +359,7 @@ impl TraceFindings<'_, '_> {
         }
     }
 
-    /// The end of each start, the best first.
+    /// The last iterate of each start, in ascending order of cost.
     fn sorted_optima(&self) -> Vec<LocalOptimum> {
         let stages = self.problem.segment_s().len();
         let optimum = |descent: &TraceDescent| {
@@ -401,9 +401,10 @@ impl TraceFindings<'_, '_> {
     }
 }
 
-/// Verdict on a parameter; a parameter with any doubt is not identified.
+/// Verdict on a parameter. If there is any reason to doubt the parameter, it is not identified.
 pub(super) fn trace_verdict(free: &FreeParameter, found: &ParameterResult) -> ParameterVerdict {
-    /// Distance from a bound, relative to the range, within which a value counts as at the bound.
+    /// Distance from a bound, as a fraction of the parameter's range, within which a value counts as at the
+    /// bound.
     const NEAR: f64 = 1e-6;
     let place = free.bounds.unit_coordinate(found.estimate);
     match (found.lower_95, found.upper_95) {

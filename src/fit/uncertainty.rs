@@ -1,9 +1,9 @@
 //! Uncertainty of the parameters at the best point: intervals, verdicts, correlations and combinations.
 //!
-//! The interval of a parameter covers three others: that of the profile likelihood ([`super::profile`]),
-//! that of refits to twins of the best model ([`super::bootstrap`]), and the range of all evaluated points
-//! whose cost is within the threshold. If there is no profile, the interval of the linear model at the best
-//! point replaces it.
+//! The interval of a parameter contains three others: the interval of the profile likelihood
+//! ([`super::profile`]), the interval from refits to twins (recordings simulated with the best model,
+//! [`super::bootstrap`]), and the range of all evaluated points whose cost is within the threshold. Without a
+//! profile, the interval of the linear model at the best point is used in its place.
 
 mod rivals;
 mod verdicts;
@@ -28,23 +28,23 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use verdicts::{best_excluded_gain, check_best_point, is_at_bound, withdraw_all, withdraw_correlated};
 
-/// Number of times that the assessment may start again from a better point.
+/// Maximum number of times that the assessment starts again from a better point.
 const MAX_RESTARTS: usize = 2;
 
 /// Verdict on a parameter: whether the fit identifies it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ParameterVerdict {
-    /// The features determine it, and its interval lies within the bounds.
+    /// The features determine the parameter, and its interval lies within the bounds.
     Identified,
-    /// Its interval reaches the lower bound, so only an upper limit is known.
+    /// The interval reaches the lower bound, so only an upper limit is known.
     OpenBelow,
-    /// Its interval reaches the upper bound, so only a lower limit is known.
+    /// The interval reaches the upper bound, so only a lower limit is known.
     OpenAbove,
-    /// The features do not determine it, or something else casts doubt on its interval.
+    /// The features do not determine the parameter, or there is another reason to doubt its interval.
     #[default]
     NotIdentified,
-    /// The best value is at a bound, so the optimum may lie outside.
+    /// The best value is at a bound, so the optimum may lie outside the bounds.
     AtBound,
 }
 
@@ -76,24 +76,24 @@ pub(crate) struct FitUncertainty {
     pub best: Evaluation,
     /// Results of the parameters, in job order.
     pub intervals: Vec<ParameterResult>,
-    /// Number of informative directions.
+    /// Number of directions in the parameter space that the features determine.
     pub rank: usize,
-    /// Ratio of the largest to the smallest singular value; infinite if the smallest is zero or
-    /// a rounding error.
+    /// Condition number of the Jacobian: ratio of the largest to the smallest singular value; infinite if the
+    /// smallest is zero or a rounding error.
     pub condition: f64,
-    /// Number of features and priors whose linear change across the search box exceeds the width of their own
-    /// 95 % interval.
+    /// Number of features and priors that, by the linear model, change across the search box by more than the
+    /// width of their 95 % interval.
     pub informative_features: usize,
-    /// `d ln feature / d ln parameter`, features by parameters; `None` if the feature is missing or the
-    /// parameter is zero.
+    /// `d ln feature / d ln parameter`, one row per feature and one column per parameter; `None` if the
+    /// feature is missing or the parameter is zero.
     pub sensitivities: Vec<Vec<Option<f64>>>,
     /// Correlation matrix of the estimates by the linear model; `None` where a parameter is not determined.
     pub correlations: Vec<Vec<Option<f64>>>,
-    /// Combinations of parameters that are determined or left undetermined.
+    /// Combinations of parameters that the features determine or leave undetermined.
     pub combinations: Vec<ParameterCombination>,
     /// Estimated calibration errors of the cameras at the best point.
     pub cameras: Vec<CameraEstimate>,
-    /// Standard deviation of each feature over twins of the best model, in its own unit.
+    /// Standard deviation of each feature over twins of the best model, in the unit of the feature.
     pub twin_sd: Vec<Option<f64>>,
     /// Number of twins that were fitted again.
     pub twins: usize,
@@ -101,7 +101,8 @@ pub(crate) struct FitUncertainty {
     pub notes: Vec<String>,
 }
 
-/// Warns if there are fewer informative features than parameters. `rank` is known only after a search.
+/// Warns if there are fewer informative features than parameters. `rank` is the number of informative
+/// directions; it is `None` before a search.
 pub(crate) fn count_warning(features: usize, rank: Option<usize>, parameters: usize) -> Option<String> {
     let known = rank.map_or(features, |rank| rank.min(features));
     if known >= parameters {
@@ -139,7 +140,7 @@ pub(crate) fn assess_best(
     assess_once(ledger, names, settings)
 }
 
-/// Polishes the best point with at most `evaluations` further evaluations.
+/// Refines the best point by local searches with at most `evaluations` further evaluations.
 fn polish_within(ledger: &mut Ledger, evaluations: usize) {
     let limit = ledger.evaluation_limit();
     ledger.set_limit(limit.min(ledger.run_evaluations().len().saturating_add(evaluations)));
@@ -182,7 +183,7 @@ fn keep_or_note<T>(found: Option<Result<T, StopReason>>, what: &str, notes: &mut
     found.ok()
 }
 
-/// The result for a point whose neighbours could not be evaluated.
+/// The assessment of a best point whose neighbours could not be evaluated, for the reason `why`.
 pub(crate) fn unassessed_point(objective: &Objective, best: &Evaluation, why: &str) -> FitUncertainty {
     let open = |estimate: &f64| ParameterResult { estimate: *estimate, ..ParameterResult::default() };
     FitUncertainty {
@@ -196,8 +197,8 @@ pub(crate) fn unassessed_point(objective: &Objective, best: &Evaluation, why: &s
 }
 
 impl FitUncertainty {
-    /// Withholds all intervals if the search did not converge, or if no other local search reached the best
-    /// point; `ends` are the ends of the other local searches.
+    /// Removes all intervals if the search did not converge or if [`check_best_point`] does not confirm the
+    /// best point; `ends` are the ends of the local searches without the final polish.
     pub(crate) fn with_search_doubts(
         self,
         converged: bool,
@@ -214,7 +215,7 @@ impl FitUncertainty {
         }
     }
 
-    /// Withdraws the verdict of every identified parameter if there is evidence `why` against the model.
+    /// Changes all identified parameters to not identified if there is evidence `why` against the model.
     pub(crate) fn with_model_objection(mut self, why: Option<String>) -> Self {
         if let Some(why) = why {
             let known = self.intervals.iter_mut().filter(|i| i.verdict == ParameterVerdict::Identified);
@@ -236,7 +237,7 @@ impl FitUncertainty {
 const SEARCH_UNFINISHED: &str = "the search was still gaining when its evaluations were used up, or was interrupted: there is a better point, so nothing is called identified; \
     raise local_evaluations in [search], or --max-evaluations, and go on with --resume";
 
-/// Intervals by other methods than the linear model.
+/// Data for the intervals that do not come from the linear model.
 struct IntervalEvidence {
     profiles: Option<Vec<ProfileLikelihood>>,
     twins: Option<Bootstrap>,
@@ -318,7 +319,7 @@ impl LocalAssessment {
         let [below, above] = twins.unwrap_or([unit, unit]);
         let value =
             |u: f64| ledger.objective().axes().get(axis).map_or(f64::NAN, |a| a.bounds.value_at_unit(u));
-        // an interval that reaches a bound is open, because nothing outside the bound was tried
+        // an interval that reaches a bound is open at this end, because no value outside the bound was tried
         let inside = |u: f64| (AT_BOUND..=1.0 - AT_BOUND).contains(&u).then(|| value(u));
         let lower_95 = lower.and_then(|u| inside(u.min(least).min(below)));
         let upper_95 = upper.and_then(|u| inside(u.max(most).max(above)));
@@ -343,7 +344,7 @@ impl LocalAssessment {
 }
 
 /// The verdict on an interval. A parameter that the features do not determine near the best point is not
-/// identified, even if failing runs close its interval.
+/// identified, even if its interval is finite because the model fails outside it.
 fn interval_verdict(unit: f64, lower: Option<f64>, upper: Option<f64>, determined: bool) -> ParameterVerdict {
     match (lower, upper) {
         (None, None) => ParameterVerdict::NotIdentified,
@@ -355,8 +356,8 @@ fn interval_verdict(unit: f64, lower: Option<f64>, upper: Option<f64>, determine
     }
 }
 
-/// Ratio of the 97.5 % quantile of Student's t to that of the normal distribution, to first order in 1 /
-/// `twins` (Abramowitz and Stegun, 26.7.5).
+/// Ratio of the 97.5 % quantile of Student's t with `twins` degrees of freedom to that of the normal
+/// distribution, to first order in 1 / `twins` (Abramowitz and Stegun, 26.7.5).
 fn student_factor(twins: usize) -> f64 {
     1.0 + (Z_95 * Z_95 + 1.0) / (4.0 * twins.max(1) as f64)
 }
@@ -374,7 +375,7 @@ fn log_sensitivities(
     slopes.0.iter().map(row).collect()
 }
 
-/// A note for each parameter with a step of the differences at which the model failed.
+/// A note for each parameter for which the model failed at a step of the finite differences.
 fn failed_step_notes(names: &[String], around: &[Evaluation]) -> Vec<String> {
     let failed = |axis: usize| around.iter().skip(2 * axis).take(2).find_map(|e| e.failure.as_ref());
     let note = |(axis, name): (usize, &String)| {

@@ -17,7 +17,7 @@ const FREE: TargetCalibration = TargetCalibration {
 const SIZE: TargetCalibration =
     TargetCalibration { length: LengthCalibration::Size { floor_m: 0.0 }, ..FREE };
 
-/// A target with the standard deviation `sd_relative` times its value.
+/// A target whose standard deviation is `sd_relative` times its value.
 fn target(value: f64, sd_relative: f64, calibration: Option<TargetCalibration>) -> TargetValue {
     let sd = sd_relative * value.abs();
     let (name, measure) = (value.to_string(), ValueComparison::Log);
@@ -28,7 +28,8 @@ fn observed(values: &[f64]) -> Vec<Observed> {
     values.iter().map(|value| Observed::from_value(*value)).collect()
 }
 
-/// Three positions and a size as a camera with the scale and offset `numbers` shows them.
+/// Targets: three positions and a size as a camera with the scale and offset `numbers` shows them. Features:
+/// their true values.
 fn filmed(numbers: [f64; 2], sd_relative: f64) -> (Vec<TargetValue>, Vec<Observed>) {
     let model = [3e-3, -2e-3, 6e-3, 1e-3];
     let of = [FREE, FREE, FREE, SIZE];
@@ -62,7 +63,8 @@ fn an_offset_of_seven_prior_deviations_is_not_taken_for_missed_features() {
     let (targets, features) = filmed([0.0, 7e-3], 0.01);
     let places: Vec<f64> = CameraFit::estimate(&targets, &features).prior_residuals().collect();
     assert!((places[1] - 7.0).abs() < 0.1, "{places:?}");
-    // with one position alone, the cost has another minimum, at 2.6, where the position is missed
+    // with a single position, the cost has another minimum at an offset of 2.6 prior standard deviations,
+    // where the residual of the position is large
     let alone = [target(12e-3, 0.01, Some(FREE))];
     let places: Vec<f64> = CameraFit::estimate(&alone, &observed(&[5e-3])).prior_residuals().collect();
     assert!((places[1] - 7.0).abs() < 0.1, "{places:?}");
@@ -70,7 +72,8 @@ fn an_offset_of_seven_prior_deviations_is_not_taken_for_missed_features() {
 
 #[test]
 fn a_single_length_is_met_by_what_is_likeliest() {
-    // ln(shown / target) = z_scale 0.005 + ln(1 + z_offset 1e-3 / 5e-3): the offset explains almost all of it
+    // ln(shown / target) = z_scale 0.005 + ln(1 + z_offset 1e-3 / 5e-3): the offset explains almost all of
+    // this deviation
     let targets = [target(5.5e-3, 0.01, Some(FREE))];
     let places: Vec<f64> = CameraFit::estimate(&targets, &observed(&[5e-3])).prior_residuals().collect();
     assert!((places[1] - 0.5).abs() < 0.01 && places[0] > 0.0 && places[0] < 0.02, "{places:?}");
@@ -109,7 +112,7 @@ fn what_a_floor_adds_has_no_scale() {
     assert_eq!(level.apply(2e-6, [0.1, 0.0]), 3e-6, "noise below its floor");
 }
 
-/// Predicts the lengths `p`, `-p q` and `q` and the frequency `p q`, in units of 5 mm.
+/// A model with the lengths `p`, `-p q` and `q`, in units of 5 mm, and the frequency `p q`.
 struct LengthPredictor;
 
 impl FeaturePredictor for LengthPredictor {
@@ -134,7 +137,7 @@ fn objective() -> Objective<'static> {
     Objective::new(axes, targets, &LengthPredictor)
 }
 
-/// An evaluation, the slopes of its features, its residuals and its Jacobian.
+/// The evaluation at the point `unit`, with the slopes of the features, the residuals and the Jacobian there.
 fn local(objective: &Objective, unit: &[f64]) -> (Evaluation, FeatureSlopes, Vec<f64>, DMatrix<f64>) {
     let centre = objective.evaluate(unit);
     let around: Vec<Evaluation> =
@@ -149,7 +152,7 @@ fn local(objective: &Objective, unit: &[f64]) -> (Evaluation, FeatureSlopes, Vec
 #[test]
 fn residuals_give_the_cost_and_the_linear_model_its_slope() {
     let objective = objective();
-    // near the minimum, and where some residuals exceed the knee of the loss
+    // points near the minimum, and points at which some residuals exceed `LOSS_KNEE`
     for unit in [[0.5, 0.5], [0.52, 0.47], [0.6, 0.45]] {
         let (centre, _, rows, model) = local(&objective, &unit);
         assert_eq!((rows.len(), model.nrows()), (6, 6));
@@ -173,7 +176,7 @@ fn residuals_give_the_cost_and_the_linear_model_its_slope() {
 
 #[test]
 fn an_unknown_offset_takes_away_what_it_can_explain() {
-    // near its minimum the cost is a parabola with the curvature of the projected model
+    // near its minimum the cost is a parabola whose curvature follows from the projected Jacobian
     let objective = objective();
     let (_, _, _, model) = local(&objective, &[0.5, 0.5]);
     let cost = |a: f64, b: f64| objective.evaluate(&[0.5 + a, 0.5 + b]).cost;
@@ -191,7 +194,7 @@ fn an_unknown_offset_takes_away_what_it_can_explain() {
 
 #[test]
 fn the_interval_of_an_offset_is_that_of_least_squares() {
-    // one position of a known blade: for the offset alone, 1 / sd^2 = 1 + (1e-3 / 5e-3 / 0.02)^2
+    // if only the offset is unknown and one position is measured, 1 / sd^2 = 1 + (1e-3 / 5e-3 / 0.02)^2
     let alone = TargetCalibration { scale_sd: 0.0, ..FREE };
     let axes = vec![SearchAxis::from(Bounds::new(0.5, 2.0, BoundsSpacing::Log).unwrap()); 2];
     let objective = |targets| Objective::new(axes.clone(), targets, &LengthPredictor);

@@ -93,7 +93,8 @@ fn a_torn_last_line_is_dropped_and_said() {
     assert_eq!(read("j", "{\"journal\":\"fit\"").unwrap(), None);
 }
 
-/// The text with a change in one line and a new checksum, as another program may write it.
+/// The journal `text` with `from` replaced by `to` in one line and with a new checksum, as another program
+/// may write it.
 fn forged(text: &str, from: &str, to: &str) -> String {
     let resealed = |line: &str| {
         let content = line.split_once(",\"sha256\"").unwrap().0;
@@ -165,7 +166,7 @@ fn what_a_power_cut_leaves_behind_the_last_line_is_dropped() {
     assert_eq!(read("j", "\0\0\0\0").unwrap(), None);
     let half_a_letter = [whole.as_bytes(), &[b'{', 0xc3]].concat();
     assert_eq!(read("j", half_a_letter).unwrap().unwrap().end.intact_bytes, whole.len());
-    // zeros followed by complete lines are damage
+    // zero bytes that are followed by complete lines count as damage
     let refused = read("j", text(&[0.25]) + "\0\0\n" + "{}\n").unwrap_err().to_string();
     assert!(refused.starts_with("j:3: found no checksum"), "{refused}");
 }

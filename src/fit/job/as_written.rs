@@ -1,4 +1,5 @@
-//! job.toml as people write it: types and keys only; values are not checked against each other.
+//! The contents of job.toml as written in the file. Only types and keys are checked here, not whether values
+//! are consistent.
 
 use crate::feature::{Keys, define_entry, with_reading_keys};
 use crate::fit::bounds::BoundsSpacing;
@@ -363,7 +364,7 @@ impl Visitor<'_> for ConditionReferenceVisitor {
     }
 
     fn visit_i64<E: Error>(self, value: i64) -> Result<ConditionReference, E> {
-        // no recording has a number below 1; 0 is refused with the list of the numbers that exist
+        // a negative number becomes 0, which is refused later with the list of the numbers that exist
         Ok(ConditionReference::Number(usize::try_from(value).unwrap_or(0)))
     }
 

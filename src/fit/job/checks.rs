@@ -1,4 +1,4 @@
-//! Checks that several tables of a job share.
+//! Checks that are used for several tables of a job.
 
 use crate::toml_file::KeyRefusal;
 use std::collections::HashSet;

@@ -28,15 +28,15 @@ pub struct JobCondition {
     pub name: String,
     /// Path of the recording's folder, relative to the job file; `None` if there are only published numbers.
     pub recording: Option<String>,
-    /// Path of its scene, relative to the job file.
+    /// Path of the scene of the condition, relative to the job file.
     pub scene: String,
     /// Source of the head's motion: the drive of the scene, or the recorded head.
     pub head: HeadSource,
-    /// Parameters whose values replace those of the scene, in SI units.
+    /// Names of parameters, each with the value that replaces that of the scene, in SI units.
     pub set: Vec<(String, f64)>,
-    /// Whether its features are only predicted, never fitted.
+    /// Whether the features of the condition are only predicted, never fitted.
     pub held_out: bool,
-    /// Standard deviations of the calibration of the recording's camera; `None` without a recording.
+    /// Standard deviations of scale and offset of the recording's camera; `None` without a recording.
     pub camera: Option<FeatureCamera>,
 }
 
@@ -111,7 +111,7 @@ fn scene_path(entry: &str, own: Option<&str>, scene: &str) -> Result<String, Key
     check_non_empty(&format!("{entry}, `scene`"), own, "the path of a scene, relative to the job file")
 }
 
-/// Parses the value of a key `drive`.
+/// Parses the value of the key `drive`, `scene` or `recording`.
 pub(super) fn parse_head_source(
     key: impl Fn() -> String,
     word: Option<&str>,
@@ -159,13 +159,14 @@ fn parse_set_number(entry: &str, name: &str, value: &toml::Value, known: &[&str]
     }
 }
 
-/// Whether two names denote the same quantity, in whatever form.
+/// Whether two parameter names denote the same quantity, possibly in different forms such as a stiffness and
+/// its natural frequency.
 pub(crate) fn is_same_quantity(a: &str, b: &str) -> bool {
     let quantity = |name: &str| parameters::find_parameter(name).map(|row| row.quantity);
     a == b || quantity(a).is_some_and(|found| quantity(b) == Some(found))
 }
 
-/// Refuses a condition that sets a parameter that is free.
+/// Refuses a condition that sets the free parameter `free`.
 pub(super) fn check_not_set(conditions: &[JobCondition], free: &str) -> Result<(), KeyRefusal> {
     for JobCondition { name, set, .. } in conditions {
         if let Some((set, _)) = set.iter().find(|(set, _)| is_same_quantity(set, free)) {
@@ -183,7 +184,8 @@ pub(super) fn check_not_set(conditions: &[JobCondition], free: &str) -> Result<(
 /// Default relative standard deviation of the scale, for a scale bar of 20 mm read to a tenth
 /// of a millimetre.
 pub(super) const DEFAULT_SCALE_SD: f64 = 0.005;
-/// Largest relative standard deviation of the scale; above it the picture is not calibrated.
+/// Largest relative standard deviation of the scale; a picture with a less certain scale counts as not
+/// calibrated.
 pub(super) const MAX_SCALE_SD: f64 = 0.1;
 /// Default standard deviation of the position of a marker, m, for a marker placed on its hinge
 /// to a millimetre.
@@ -191,7 +193,7 @@ pub(super) const DEFAULT_OFFSET_SD_M: f64 = 1e-3;
 /// Largest standard deviation of the position of a marker, m: the length of a blade.
 pub(super) const MAX_OFFSET_SD_M: f64 = 0.1;
 
-/// Standard deviations of the calibration of a camera that records features; 0 fixes a number at
+/// Standard deviations of scale and offset of a camera, for a fit of features; 0 fixes the scale or offset at
 /// its nominal value.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FeatureCamera {
@@ -206,7 +208,8 @@ impl FeatureCamera {
     pub(crate) const EXACT: Self = Self { scale_sd: 0.0, offset_sd_m: 0.0 };
 }
 
-/// Checks the camera of the recording `entry`, such as `recording 1`.
+/// Checks the key `camera` of a recording; `entry` names the recording in error messages, such as `recording
+/// 1`.
 pub(super) fn check_feature_camera(
     entry: &str,
     written: Option<&RecordingCamera>,
@@ -251,7 +254,8 @@ pub(super) fn check_feature_camera(
     })
 }
 
-/// Refuses a feature camera in a job with traces, which estimates its cameras per [[trace]].
+/// Refuses a camera of a recording in a job with traces, because such a job describes its cameras in each
+/// [[trace]].
 pub(super) fn check_no_camera_with_traces(written: &as_written::JobFile) -> Result<(), KeyRefusal> {
     let both = (1..).zip(&written.recording).find(|(_, r)| !written.trace.is_empty() && r.camera.is_some());
     match both {
@@ -264,7 +268,7 @@ pub(super) fn check_no_camera_with_traces(written: &as_written::JobFile) -> Resu
     }
 }
 
-/// Checks the standard deviation of a number of a camera, if the job gives it.
+/// Checks that the standard deviation of a camera error, if the job gives it, is from 0 to `most`.
 pub(super) fn check_camera_sd(key: String, found: Option<f64>, most: f64) -> Result<Option<f64>, KeyRefusal> {
     match found {
         Some(sd) if !(0.0..=most).contains(&sd) => refuse!(key, "found {sd}, expected 0 (held) to {most}"),

@@ -11,11 +11,11 @@ use serde::Serialize;
 /// A parameter that the search may change.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FreeParameter {
-    /// Key of the scene, with its table, such as `friction.a`.
+    /// Key in the scene file, preceded by its table, such as `friction.a`.
     pub name: String,
-    /// Its bounds, in its own SI unit.
+    /// Bounds of the parameter, in its SI unit.
     pub bounds: Bounds,
-    /// Its prior, if any.
+    /// Prior of the parameter, if any.
     pub prior: Option<Prior>,
 }
 
@@ -48,7 +48,7 @@ pub(super) fn check_parameters(
 }
 
 /// Refuses two entries that set the same quantity, such as a stiffness and its natural frequency, because the
-/// second would overwrite the first.
+/// second entry would overwrite the first.
 fn check_distinct(table: &str, names: &[&str], article: &str) -> Result<(), KeyRefusal> {
     if let Some(name) = find_repeated(names.iter().copied()) {
         refuse!(format!("{table} `{name}`"), "found twice; remove one of them");
@@ -97,7 +97,8 @@ fn check_prior(
     }
 }
 
-// Constants of the scene that are free within a prior, because a mass or a damping is never known exactly.
+// Constants of the scene that are free within a prior. They are freed because a mass or a damping is never
+// known exactly.
 
 /// Smallest standard deviation of a constant, %; a more precisely known constant must be left fixed.
 const LEAST_PERCENT: f64 = 1e-4;
@@ -108,24 +109,24 @@ const MOST_PERCENT: f64 = 50.0;
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Constants {
-    /// No constants: all of them are exact.
+    /// No constant is free: all constants are exact.
     Exact,
     /// All masses, inertias, stiffnesses and dampings, the preload and the shoulder angle of a scene, except
     /// those that are zero, free parameters, or set by a condition.
     All {
-        /// Relative standard deviation of each.
+        /// Standard deviation of the prior of each constant, relative to the constant.
         sd_relative: f64,
     },
-    /// The constants of a list.
+    /// Only the constants of a list.
     Listed(Vec<NuisanceParameter>),
 }
 
 /// A constant that is free within a prior.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NuisanceParameter {
-    /// Key of the scene, with its table.
+    /// Key in the scene file, preceded by its table.
     pub name: String,
-    /// Standard deviation of its logarithm about the scene's value.
+    /// Standard deviation of the constant's natural logarithm about the logarithm of the scene's value.
     pub sd_relative: f64,
 }
 

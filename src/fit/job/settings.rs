@@ -6,39 +6,42 @@ use crate::fit::trace::MAX_TWINS as MOST_REPLICATES;
 use crate::simulate::twin::Camera;
 use serde::Serialize;
 
-/// Default number of points in a cloud: a few for each of up to six parameters, and a multiple of common
-/// numbers of processor cores.
+/// Default number of points in a cloud: a few points for each of up to six parameters, and a multiple of
+/// common numbers of processor cores.
 pub(super) const PARTICLES: usize = 24;
-/// Default number of local searches: known cases have two or three basins, and several starts may
-/// fall into one.
+/// Default number of local searches: known cases have two or three basins of the cost, and several starts may
+/// be in the same basin.
 pub(super) const STARTS: usize = 6;
-/// Maximum number of local searches; with more, each would get too few of the evaluations that they share.
+/// Maximum number of local searches; with more, each search would get too few of the evaluations, which all
+/// searches share.
 const MOST_STARTS: usize = 64;
-/// Maximum number of evaluations in a stage; it bounds the memory of a run that would take weeks.
+/// Maximum number of evaluations in a stage. It limits the memory; such a run would take weeks.
 const MOST_EVALUATIONS: usize = 10_000_000;
 /// Maximum number of starting states in an ensemble. Eight states reduce the error of a friction coefficient
-/// from 20 % to 1-3 %, and each costs a run.
+/// from 20 % to 1-3 %, and each state needs a run of the model.
 const MOST_MEMBERS: usize = 64;
-/// Default relative spread of the starting state: the error of a state that is guessed from a recording.
+/// Default relative spread of the starting state: the relative error of a state that is guessed from a
+/// recording.
 const SPREAD: f64 = 0.1;
-/// Maximum number of points in a cloud; a thousand fill a box of many parameters.
+/// Maximum number of points in a cloud; a thousand points are enough for many parameters.
 const MOST_PARTICLES: usize = 10_000;
-/// Maximum number of entries of one kind. A page and its figures have room for tens; a job with more entries
-/// than this is a mistake of the program that wrote it.
+/// Maximum number of entries of one kind. A page and its figures have room for tens of entries; a job with
+/// more than a thousand must be a mistake of the program that wrote it.
 const MOST_ENTRIES: usize = 1000;
-/// Default number of fits to twins of the best model: forty give a standard deviation to about a tenth.
+/// Default number of fits to twins of the best model: forty fits give a standard deviation that is accurate
+/// to about a tenth.
 const REPLICATES: usize = 40;
 
 /// Ensemble of starting states over which features are averaged.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Ensemble {
-    /// Number of starting states, at least 1; 1 is the scene's own.
+    /// Number of starting states, at least 1. With 1, only the starting state of the scene is used.
     pub members: usize,
-    /// Relative spread of the starting state, above 0 and at most 1.
+    /// Relative spread of the starting states, above 0 and at most 1.
     pub spread: f64,
 }
 
-/// Methods for the intervals, in addition to the linear model.
+/// Methods by which intervals are computed, in addition to the linear model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct IntervalSettings {
     /// Whether profiles of the cost are computed.
@@ -110,15 +113,16 @@ pub(super) fn check_largest_tilt_rad(written: &as_written::JobFile) -> Result<Op
 
 pub(super) fn check_intervals(written: &as_written::JobFile) -> Result<IntervalSettings, KeyRefusal> {
     let (profile, bootstrap) = written.intervals.as_ref().map_or((None, None), |i| (i.profile, i.bootstrap));
-    // a trace fit has intervals from the scatter of its segments, and a refit costs a tenth of its search
+    // a trace fit already has intervals from the scatter of its segments, and each refit takes a tenth of the
+    // time of the search
     let bootstrap = bootstrap.unwrap_or(if written.trace.is_empty() { REPLICATES } else { 0 });
     let why = "fits to twins of the best model; 0 for none";
     check_count("intervals.bootstrap", bootstrap, 0, MOST_REPLICATES, why)?;
     Ok(IntervalSettings { profile: profile.unwrap_or(true), bootstrap })
 }
 
-/// Checks the budgets of a search on features. A job with traces needs none, because its search
-/// ends by itself.
+/// Checks the budgets of a search on features. A job with traces needs no budgets, because its search ends by
+/// itself.
 pub(super) fn check_search(written: &as_written::JobFile) -> Result<SearchSettings, KeyRefusal> {
     let traced = !written.trace.is_empty();
     if written.search.is_none() && !traced {

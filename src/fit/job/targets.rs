@@ -1,4 +1,4 @@
-//! Components and features of a job: readings and the sources of their targets.
+//! Components and features of a job: how each is computed, and where its target comes from.
 
 use super::as_written::ConditionReference;
 use super::checks::{check_non_empty, find_repeated};
@@ -16,8 +16,8 @@ const LEVEL_SD_RELATIVE: f64 = 0.3;
 /// Default relative tolerance of a component's frequency: the accuracy goal of this program, 2 %.
 pub(super) const TOLERANCE_RELATIVE: f64 = 0.02;
 
-/// Checks components, then features, each in the order of the file; `nyquist_hz` is half the frame rate of
-/// the job's own camera.
+/// Checks components, then features, each in the order of the file. `nyquist_hz` is half the frame rate of
+/// the camera in the job, for conditions without a recording.
 pub(super) fn check_targets(
     written: &as_written::JobFile,
     conditions: &[JobCondition],
@@ -110,8 +110,8 @@ fn check_feature(
     readings.into_iter().map(aim).collect()
 }
 
-/// The kind of a feature; refuses a kind that only a simulated run has, and a frequency, which must
-/// be a component.
+/// The kind of a feature; refuses a kind that exists only for a simulated run, and a frequency, which must be
+/// written as a component.
 fn find_feature_kind(written: &as_written::Feature) -> Result<&'static ReadingKind, KeyRefusal> {
     let name = written.name.as_ref().map_or_else(String::new, |name| format!(" `{name}`"));
     let key = format!("feature{name}, `kind`");
@@ -132,8 +132,8 @@ fn find_feature_kind(written: &as_written::Feature) -> Result<&'static ReadingKi
     }
 }
 
-/// Checks a series. Each of its features has a target of its own, so the targets must be measured
-/// on a recording.
+/// Checks an entry that stands for a series of features. Each feature of the series has a different target,
+/// so the targets must be measured on a recording.
 fn check_series(entry: &JobEntry, written: &as_written::Feature, measured: bool) -> Result<(), KeyRefusal> {
     if !measured {
         refuse!(
@@ -150,7 +150,7 @@ fn check_series(entry: &JobEntry, written: &as_written::Feature, measured: bool)
     Ok(())
 }
 
-/// The keys of an entry that define how its feature is computed.
+/// The keys of an entry that define how the feature of this entry is computed.
 fn reading_entry<'a>(
     entry: &'a JobEntry,
     keys: &'a Keys,
@@ -185,8 +185,8 @@ fn target_source(
     }
 }
 
-/// Source of a measured target. `relative` is its smallest deviation, divided by the target or, if
-/// differences are compared, by the difference that counts as large.
+/// Source of a measured target. `relative` is the smallest standard deviation of the target, divided by the
+/// target or, if differences are compared, by the difference that counts as large.
 fn measured_source(measure: ValueComparison, relative: f64) -> TargetSource {
     match measure {
         ValueComparison::Log => TargetSource::Measured { least_sd: 0.0, least_sd_relative: relative },
@@ -196,8 +196,8 @@ fn measured_source(measure: ValueComparison, relative: f64) -> TargetSource {
     }
 }
 
-/// Default lower limit of the relative standard deviation of a feature; 0 if the noise of the recording alone
-/// determines the deviation.
+/// Default lower limit of the relative standard deviation of a feature; 0 if only the noise of the recording
+/// determines the standard deviation.
 fn default_min_sd_relative(reading: &Reading) -> f64 {
     match reading {
         Reading::Frequency(_) | Reading::CycleFrequency { .. } => FREQUENCY_SD_FLOOR,
@@ -209,11 +209,11 @@ fn default_min_sd_relative(reading: &Reading) -> f64 {
 /// A feature and the source of its target.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FitTarget {
-    /// The feature that is computed on measurement and model.
+    /// The feature, which is computed on recordings of both measurement and model.
     pub feature: Feature,
     /// Source of the target and its standard deviation.
     pub source: TargetSource,
-    /// Tolerance of the relative error of a component; `None` for other features.
+    /// Largest relative error of a component that passes; `None` for other features.
     pub tolerance_relative: Option<f64>,
     /// Whether the target is only predicted, never fitted.
     pub held_out: bool,
@@ -226,11 +226,12 @@ pub struct FitTarget {
 pub enum TargetStage {
     /// All stages.
     Always,
-    /// The last stage only. The cost of spectral levels has many minima and helps only near the right one.
+    /// The last stage only. The cost of spectral levels has many minima, so these targets help only near the
+    /// right minimum.
     Last,
 }
 
-/// Source of a target.
+/// Where the value of a target comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub enum TargetSource {
     /// The target is given in the job, in the unit of the feature.
@@ -241,7 +242,8 @@ pub enum TargetSource {
         sd: f64,
     },
     /// The target is measured on the recording. Its standard deviation is at least `least_sd`, and at least
-    /// `least_sd_relative` times the target; if both are 0, it follows from the noise of the recording.
+    /// `least_sd_relative` times the target; if both are 0, the standard deviation follows from the noise of
+    /// the recording.
     Measured {
         /// Smallest standard deviation, in the unit of the feature.
         least_sd: f64,
@@ -250,11 +252,11 @@ pub enum TargetSource {
     },
 }
 
-/// Smallest standard deviation relative to a target: smaller than that of any camera, but large enough that
-/// squared residuals do not overflow.
+/// Smallest standard deviation relative to a target: smaller than the error of any camera, but large enough
+/// that squared residuals do not overflow.
 const MIN_SD_RELATIVE: f64 = 1e-9;
 
-/// An entry of a job, with its name for error messages.
+/// The name of an entry of a job, for error messages.
 pub(super) struct JobEntry {
     pub(super) what: String,
 }

@@ -160,7 +160,7 @@ fn job(text: &str) -> Result<Job, JobError> {
     Job::parse_with_names("job.toml", text, &KNOWN)
 }
 
-/// The refusal of a good job in which `from` is replaced by `to`.
+/// The error message for the valid job `text` in which `from` is replaced by `to`.
 fn refusal(text: &str, from: &str, to: &str) -> String {
     assert!(text.contains(from), "{from}");
     job(&text.replacen(from, to, 1)).unwrap_err().to_string()

@@ -9,29 +9,31 @@ use crate::toml_file::suggest_key;
 use serde::Serialize;
 use std::f64::consts::PI;
 
-/// Maximum number of stages: segment lengths usually double, and eight stages reach from 4 ms to
-/// half a second.
+/// Maximum number of stages: segment lengths usually double from stage to stage, and eight stages cover 4 ms
+/// to half a second.
 const MOST_STAGES: usize = 8;
 /// Default standard deviation of the camera's tilt, degrees, for a camera levelled with a spirit level.
 const TILT_SD_DEG: f64 = 0.3;
 /// Largest standard deviation of the tilt, degrees; a recording with a larger tilt must be levelled
 /// before the fit.
 const MOST_TILT_SD_DEG: f64 = 10.0;
-/// Largest standard deviation of a marker's drift, m/s; a faster motion must be tracked.
+/// Largest standard deviation of the speed at which a marker drifts, m/s; a faster motion must be tracked
+/// instead.
 const MOST_DRIFT_SD_M_PER_S: f64 = 0.01;
-/// Default standard deviation of the camera's clock against the clock of the drive, s, for a camera
-/// that is started by a trigger. It applies if the scene drives the head; a recorded head has the clock
-/// of the camera.
+/// Default standard deviation of the camera's clock against the clock of the drive, s, for a camera that is
+/// started by a trigger. It applies if the drive of the scene moves the head; a recorded head motion is
+/// already on the clock of the camera.
 const CLOCK_SD_S: f64 = 1e-3;
-/// Largest standard deviation of the clock, s; a larger shift must be removed before the fit.
+/// Largest standard deviation of the camera's clock relative to the clock of the drive, s; a larger shift
+/// must be removed before the fit.
 const MOST_CLOCK_SD_S: f64 = 0.1;
 
 /// A recording whose trace is fitted.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TraceTarget {
-    /// Index of its condition, from 0.
+    /// Index of the condition of this recording, counted from 0.
     pub condition: usize,
-    /// Fitted channels; `None` for `tip-x` and `head-drop` as far as the recording has them.
+    /// Fitted channels; `None` means `tip-x` and `head-drop`, if the recording has them.
     pub channels: Option<Vec<TraceChannel>>,
     /// Segment length of each stage, s, in ascending order; `None` for the default lengths.
     pub segment_s: Option<Vec<f64>>,
@@ -41,7 +43,7 @@ pub struct TraceTarget {
     pub noise_m: Option<f64>,
     /// Source of the head's motion; `None` for the recorded head if it is tracked, else the scene.
     pub head: Option<HeadSource>,
-    /// Prior standard deviations of the unknowns of its camera.
+    /// Standard deviations of the priors of the camera's errors.
     pub camera: CameraPriorSds,
 }
 
@@ -51,7 +53,7 @@ pub struct TraceTarget {
 pub enum TraceChannel {
     /// Position of the tip along the sweep.
     TipX,
-    /// Drop of the head: its distance below the height that it has with an upright blade.
+    /// Drop of the head: distance of the head below its height with an upright blade.
     HeadDrop,
     /// Position of the tip relative to the head, along the sweep.
     Deflection,
@@ -68,7 +70,7 @@ impl TraceChannel {
     }
 }
 
-/// Prior standard deviations of the unknowns of a camera; 0 fixes an unknown at its nominal value.
+/// Standard deviations of the priors of a camera's errors; 0 fixes an error at its nominal value.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CameraPriorSds {
     /// Standard deviation of the angle from the picture's x axis to the glass, rad.
@@ -77,9 +79,9 @@ pub struct CameraPriorSds {
     pub scale_sd: f64,
     /// Standard deviation of the position of either marker relative to the point that it marks, m.
     pub offset_sd_m: f64,
-    /// Standard deviation of the speed at which these positions drift, m/s.
+    /// Standard deviation of the speed at which the positions of the markers drift, m/s.
     pub drift_sd_m_per_s: f64,
-    /// Standard deviation of the camera's clock, s, if the job gives it.
+    /// Standard deviation of the camera's clock relative to the clock of the drive, s, if the job gives it.
     clock_sd_s: Option<f64>,
 }
 

@@ -13,7 +13,8 @@ use std::ops::ControlFlow;
 
 struct CurvedPredictor;
 
-/// A valley along `p` with a ridge across it: along `p` the cost exceeds the threshold and falls again.
+/// A model whose cost has a valley along `p` with a ridge across it: along `p` the cost exceeds the threshold
+/// and then falls again.
 struct RidgedPredictor;
 
 impl FeaturePredictor for RidgedPredictor {
@@ -28,7 +29,8 @@ impl FeaturePredictor for RidgedPredictor {
     }
 }
 
-/// A narrow bent valley `q = p^2`: a profile of one parameter has to move the other parameter far.
+/// A model whose cost has a narrow bent valley `q = p^2`: the profile of one parameter has to move the other
+/// parameter far.
 impl FeaturePredictor for CurvedPredictor {
     fn predict_features(&self, values: &[f64]) -> Result<Vec<Observed>, RunFailure> {
         Ok(vec![Observed::from_value(values[0]), Observed::from_value(values[1] / values[0].powi(2))])
@@ -39,8 +41,8 @@ impl FeaturePredictor for CurvedPredictor {
     }
 }
 
-/// Profiles of two parameters about 1, from two features with the deviations `sds`, and the number of
-/// evaluations. The points `met` are evaluated beforehand.
+/// Profiles of two parameters with the best values 1, from two features with the standard deviations `sds`,
+/// and the number of evaluations. The points `met` are evaluated before the profiles.
 fn walked(model: &dyn FeaturePredictor, sds: [f64; 2], met: &[Vec<f64>]) -> (Vec<ProfileLikelihood>, usize) {
     let target = |sd| TargetValue {
         name: format!("sd {sd}"),
@@ -77,7 +79,7 @@ fn a_ridge_in_the_cost_does_not_end_a_profile() {
     let (found, _) = walked(&RidgedPredictor, [0.5, 0.01], &[]);
     let half = 3.84_f64.sqrt() * 0.5 / length;
     assert!((found[0].upper.unwrap() - 0.5 - half).abs() < 0.03 * half, "{:?}", found[0]);
-    // the walk continues from an evaluated point behind a wide ridge
+    // the walk continues from an evaluated point on the far side of a wide ridge
     let far = vec![0.5 + 0.95 * half, 0.5];
     let (found, _) = walked(&RidgedPredictor, [0.5, 0.01], &[far]);
     assert!((found[0].upper.unwrap() - 0.5 - half).abs() < 0.03 * half, "{:?}", found[0]);
@@ -88,7 +90,7 @@ fn the_floor_of_a_narrow_valley_is_found_in_few_evaluations() {
     let (found, evaluations) = walked(&CurvedPredictor, [0.2, 0.001], &[]);
     let length = 1e4_f64.ln();
     for (profile, slope) in found.iter().zip([1.0, 2.0]) {
-        // along p the rise is (ln p / 0.2)^2; along q it is nearly (ln q / 2 / 0.2)^2
+        // the rise in cost is (ln p / 0.2)^2 along p and nearly (ln q / 2 / 0.2)^2 along q
         for (u, cost) in &profile.points {
             let expected = ((u - 0.5) * length / slope / 0.2).powi(2);
             assert!(

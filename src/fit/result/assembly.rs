@@ -18,7 +18,7 @@ use crate::fit::uncertainty::{CHI_SQUARED_95, FitUncertainty};
 use crate::text::format_short;
 use portable_math as math;
 
-/// Everything from which a result is assembled.
+/// The parts from which a result is assembled.
 pub(in crate::fit) struct FitFindings<'a> {
     pub job: &'a Job,
     /// Fitted entries of the job, in the order of the targets.
@@ -34,7 +34,7 @@ pub(in crate::fit) struct FitFindings<'a> {
 }
 
 impl FitFindings<'_> {
-    /// The result of the fit; `reads` are the features of the best model with their peaks.
+    /// The result of the fit; `reads` are the features of the best model with their spectral peaks.
     pub(in crate::fit) fn into_result(self, ledger: &Ledger, reads: &[Option<FeatureValue>]) -> FitResult {
         let (found, names) = (self.found, self.job.parameter_names());
         let rows = self.targets.iter().zip(&found.sensitivities);
@@ -94,8 +94,9 @@ pub(in crate::fit) struct ModelledTargets {
 }
 
 impl ModelledTargets {
-    /// Compares the best model with the targets. `twin_sd` are the standard deviations over twins, `reads`
-    /// the features of the best model with their peaks; both are in the order of `aims`.
+    /// Compares the best model with the targets. `twin_sd` are the standard deviations of the features over
+    /// twins, and `reads` are the features of the best model with their spectral peaks; both are in the order
+    /// of `aims`.
     pub(in crate::fit) fn compare(
         aims: &[FitTarget],
         targets: &[TargetValue],
@@ -150,7 +151,7 @@ impl ModelledTargets {
     }
 }
 
-/// Result for a target, without any value of the model.
+/// Result for a target, before any value of the model is entered.
 fn unread_result(aim: &FitTarget, target: &TargetValue) -> FeatureResult {
     FeatureResult {
         name: target.name.clone(),
@@ -180,7 +181,8 @@ pub(in crate::fit) fn camera_nuisance_results(job: &Job, found: &[CameraEstimate
     found.iter().map(nuisance).collect()
 }
 
-/// Ratio of the scatter over twins to the deviation of the target above which a note is written.
+/// A note is written if the standard deviation of a feature over twins is above this factor times the
+/// standard deviation of its target.
 const NOISY_TWIN_FACTOR: f64 = 2.0;
 
 fn twin_noise_note(target: &TargetValue, twin_sd: f64) -> Option<String> {

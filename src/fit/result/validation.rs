@@ -1,16 +1,17 @@
-//! Checks that a result belongs to a job; an edited or exchanged file would assign numbers to wrong names.
+//! Checks that a result belongs to a job; otherwise an edited or exchanged file could assign numbers to wrong
+//! names.
 
 use super::{FitResult, ParameterResult, ResultError};
 use crate::fit::job::{FreeParameter, Job};
 use std::collections::BTreeSet;
 
-/// Relative rounding error of an estimate at a bound, caused by a logarithm and its inverse.
+/// Largest relative rounding error of an estimate at a bound, caused by taking a logarithm and its inverse.
 const BOUND_ROUNDING: f64 = 1e-12;
 
 impl FitResult {
-    /// Checks the result against its job: it must have the same parameters, with estimates within their
-    /// bounds and ordered ends of intervals, and the same components and features, without negative
-    /// deviations. `file` is its name in error messages.
+    /// Checks the result against its job: both must have the same parameters, components and features.
+    /// Estimates must be within their bounds, the ends of intervals in ascending order, and standard
+    /// deviations not negative. `file` is its name in error messages.
     ///
     /// # Errors
     /// [`ResultError`] with the first key that does not match.

@@ -1,4 +1,4 @@
-//! Costs for the solvers of a stage, and the slab to which a search may be limited.
+//! Costs for the solvers of a stage, and the part of the unit box (slab) to which a search may be limited.
 
 use crate::fit::evaluation::{Evaluation, EvaluationStage};
 use crate::fit::ledger::{Ledger, StopReason};
@@ -6,7 +6,7 @@ use crate::fit::ledger::{Ledger, StopReason};
 /// Part of the unit box in which one coordinate is limited to a range.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Slab {
-    /// Index of the parameter.
+    /// Index of the parameter whose coordinate is limited.
     pub axis: usize,
     pub lower: f64,
     pub upper: f64,
@@ -18,14 +18,14 @@ impl Slab {
         unit.get(self.axis).is_some_and(|u| (self.lower..=self.upper).contains(u))
     }
 
-    /// The slab, made narrower by `margin` at each end that is not an end of the box.
+    /// The slab, made narrower by `margin` at each end that is inside the unit box.
     pub(crate) fn shrink_by(self, margin: f64) -> Self {
         let lower = if self.lower > 0.0 { self.lower + margin } else { self.lower };
         let upper = if self.upper < 1.0 { self.upper - margin } else { self.upper };
         Self { lower, upper, ..self }
     }
 
-    /// Maps a point of the unit box into the slab.
+    /// Maps a point of the unit box linearly into the slab.
     pub(super) fn map_into(&self, mut unit: Vec<f64>) -> Vec<f64> {
         if let Some(u) = unit.get_mut(self.axis) {
             *u = self.lower + (self.upper - self.lower) * *u;
@@ -34,16 +34,17 @@ impl Slab {
     }
 }
 
-/// Cost of every point after the ledger has stopped. A solver is abandoned before it uses this cost.
+/// Cost that is returned for every point after the ledger has stopped. The solver is abandoned before it uses
+/// this cost.
 pub(super) const STOPPED_COST: f64 = 1e100;
 
 /// Costs of points of the unit box for the solvers of a stage.
 pub(super) struct StageCosts<'l, 'a> {
     pub(super) ledger: &'l mut Ledger<'a>,
     pub(super) stage: EvaluationStage,
-    /// Reason why the ledger makes no more evaluations, once it has stopped.
+    /// Reason why the ledger has stopped; `None` while it still makes evaluations.
     pub(super) stop: Option<StopReason>,
-    /// Slab onto which the points are mapped; `None` for the whole box.
+    /// Slab into which the points are mapped before they are evaluated; `None` for the whole box.
     pub(super) slab: Option<Slab>,
 }
 

@@ -9,16 +9,17 @@ use crate::fit::evaluation::{Evaluation, EvaluationStage};
 use crate::fit::ledger::{Ledger, StopReason};
 use crate::fit::search::costs::Slab;
 
-/// Fraction of the evaluations for the population; the descents get the remaining ones.
+/// Fraction of the evaluations that the population gets; the descents get the rest.
 const POPULATION_SHARE: f64 = 0.6;
-/// Number of descents.
+/// Maximum number of Gauss-Newton descents.
 const DESCENTS: usize = 3;
 
 /// Searches a slab with a population, then with Gauss-Newton descents from the best distinct points, in at
-/// most `share` evaluations. Returns why the search stopped, unless it only used up its share.
+/// most `share` evaluations. Returns the reason if the search was stopped; `None` if it finished or used up
+/// `share`.
 ///
-/// The best point of the slab usually lies next to the known minimum and leads back to it, so descents also
-/// start from other points.
+/// A descent from the best point of the slab usually leads back to the known minimum next to the slab, so
+/// descents also start from other points.
 pub(crate) fn search_excluded_region(
     ledger: &mut Ledger,
     slab: Slab,
@@ -30,7 +31,7 @@ pub(crate) fn search_excluded_region(
         ledger.set_limit(limit.min(made.saturating_add((count * share as f64) as usize)));
     };
     until(ledger, POPULATION_SHARE);
-    // each slab has its own seed, which differs from the seeds of the other populations
+    // the seed differs from slab to slab and from the seeds of the other populations
     let seed = settings.seed.rotate_left(32) ^ (slab.axis as u64 + 1) ^ slab.lower.to_bits();
     let middle = vec![0.5; ledger.objective().axes().len()];
     let costs = StageCosts { slab: Some(slab), ..StageCosts::new(ledger, EvaluationStage::Elsewhere) };
@@ -52,7 +53,7 @@ fn evaluations_in_slab<'l>(ledger: &'l Ledger, slab: Slab) -> impl Iterator<Item
     all.filter(move |e| e.failure.is_none() && slab.contains(&e.unit))
 }
 
-/// The best known point of a slab.
+/// The evaluated point of lowest cost in a slab.
 pub(crate) fn best_in_slab<'l>(ledger: &'l Ledger, slab: Slab) -> Option<&'l Evaluation> {
     evaluations_in_slab(ledger, slab).min_by(|a, b| a.cost.total_cmp(&b.cost))
 }

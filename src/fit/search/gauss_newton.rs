@@ -1,9 +1,9 @@
 //! Damped Gauss-Newton descent. One precise frequency and several imprecise features form a long narrow
-//! valley of the cost, in which simplices are slow.
+//! valley of the cost, in which the Nelder-Mead simplex is slow.
 //!
 //! Each step tries several Levenberg dampings at once. The Jacobian comes from finite differences, is updated
-//! after every step by Broyden's rule, and is computed anew when a step gains nothing. argmin's Gauss-Newton
-//! has neither damping nor bounds and stops at the first failure.
+//! after every step by Broyden's rule, and is computed anew when a step does not lower the cost enough.
+//! argmin's Gauss-Newton has neither damping nor bounds and stops at the first failure.
 
 use super::costs::StageCosts;
 use super::termination::{EXACT_COST, MIN_WORTHWHILE_GAIN};
@@ -14,14 +14,14 @@ use crate::fit::linear_model::{
 };
 use nalgebra::DMatrix;
 
-/// Dampings tried at every step. The first equals a prior as wide as the box and is negligible in any
-/// informative direction; the others approach gradient descent.
+/// Dampings tried at every step. The first acts as a prior as wide as the box and is negligible in any
+/// informative direction; with the largest, the step is nearly one of gradient descent.
 const DAMPINGS: [f64; 4] = [1.0, 3e1, 1e3, 3e4];
-/// Maximum number of steps from one point. A curved valley a hundred times longer than wide
-/// takes about twenty.
+/// Maximum number of steps from one point. About twenty steps are needed in a curved valley that is a hundred
+/// times longer than wide.
 const MAX_STEPS: usize = 60;
 
-/// Descends from `start`. Returns the last point, and why the ledger stopped, if it did.
+/// Descends from `start`. Returns the last point and, if the ledger stopped, the reason.
 pub(super) fn descend_gauss_newton(ledger: &mut Ledger, start: &[f64]) -> (Vec<f64>, Option<StopReason>) {
     let mut costs = StageCosts::new(ledger, EvaluationStage::Local);
     let (unit, cost) = (start.to_vec(), costs.evaluate_point(start.to_vec()));
@@ -35,14 +35,16 @@ pub(super) fn descend_gauss_newton(ledger: &mut Ledger, start: &[f64]) -> (Vec<f
     (steps.unit, None)
 }
 
-/// A descent in the unit box. It ends when a step with a Jacobian from differences gains
+/// A descent in the unit box. It ends when a step with a Jacobian from finite differences lowers the cost by
 /// less than [`MIN_WORTHWHILE_GAIN`].
 struct GaussNewton {
     unit: Vec<f64>,
     cost: f64,
-    /// Jacobian for the next step from Broyden's rule; `None` if it must be computed from differences.
+    /// Jacobian for the next step, updated by Broyden's rule; `None` if it must be computed from finite
+    /// differences.
     model: Option<DMatrix<f64>>,
-    /// Whether the Jacobian comes from differences at the current point rather than from an update.
+    /// Whether the Jacobian was computed from finite differences at the current point rather than updated by
+    /// Broyden's rule.
     fresh: bool,
     stalled: bool,
 }
@@ -73,7 +75,7 @@ impl GaussNewton {
         (self.unit, self.cost) = (point, found);
     }
 
-    /// The Jacobian from differences; if these cannot be evaluated, the descent stalls.
+    /// The Jacobian from finite differences; if these cannot be evaluated, the descent is marked as stalled.
     fn measure_jacobian(&mut self, costs: &mut StageCosts) -> DMatrix<f64> {
         costs.evaluate_points(&difference_points(&self.unit));
         let ledger = &*costs.ledger;

@@ -12,7 +12,7 @@ use super::termination::{
 use crate::fit::evaluation::{Evaluation, EvaluationStage};
 use crate::fit::ledger::{Ledger, StopReason};
 
-/// Number of best descents that are refined with a population.
+/// Number of descents, the best first, whose ends are refined with a population.
 const REFINED_ENDS: usize = 3;
 
 /// Descends from each start, refines the best ends with populations, then polishes the best point of all.
@@ -57,8 +57,8 @@ pub(super) fn search_locally(
     ended
 }
 
-/// Runs a local search within its share of the evaluations, unless the best point is an exact fit. Returns
-/// the reason if the whole search must stop.
+/// Runs a local search with at most `share` evaluations, unless the best point is already an exact fit.
+/// Returns the reason if the whole search must stop.
 fn search_within_share(
     ledger: &mut Ledger,
     limit: usize,
@@ -107,7 +107,8 @@ fn descend_from(ledger: &mut Ledger, start: Evaluation) -> (LocalDescent, Option
     (LocalDescent { start, end, evaluations: ledger.run_evaluations().len() - made }, stop)
 }
 
-/// Polishes the best point by a descent and simplices, until a simplex of each size in turn gains nothing.
+/// Polishes the best point by Gauss-Newton descents and simplices, until simplices of all sizes, one after
+/// the other, no longer lower the cost.
 pub(crate) fn polish_best(ledger: &mut Ledger) -> SearchTermination {
     let mut barren = 0;
     while let Some(edge) = SIMPLEX_EDGES.get(barren).filter(|_| !is_exact_fit(ledger)) {
@@ -133,7 +134,8 @@ fn is_exact_fit(ledger: &Ledger) -> bool {
     ledger.best_evaluation().is_some_and(|best| best.cost <= EXACT_COST)
 }
 
-/// The best points by the cost of the global stage that lie apart from each other, best first.
+/// The points of lowest cost in the global stage that are not close to each other, in ascending order of
+/// cost.
 pub(super) fn distinct_best_points<'e>(
     known: impl IntoIterator<Item = &'e Evaluation>,
     most: usize,

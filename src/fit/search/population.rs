@@ -1,9 +1,9 @@
 //! Populations of points in the unit box: covariance matrix adaptation (CMA-ES).
 //!
 //! Hansen and Ostermeier, Evol. Comput. 9 (2001) 159; formulas and defaults of Hansen, arXiv:1604.00772,
-//! without negative weights. A population learns the shape of a valley and is not trapped by ripples on
-//! its floor. A point outside the unit box is evaluated at its mirror image inside. argmin does not
-//! provide this method.
+//! without negative weights. A population adapts to the shape of a valley of the cost and is not trapped by
+//! ripples on the floor of the valley. A point outside the unit box is evaluated at its mirror image inside
+//! the box. argmin does not provide this method.
 
 use super::SearchSettings;
 use super::costs::StageCosts;
@@ -16,11 +16,11 @@ use portable_math::{self as math, StandardNormal};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Smallest relative gain in cost that counts as progress of a population.
+/// Smallest relative decrease of the cost that counts as progress of a population.
 const STAGNANT_GAIN: f64 = 1e-3;
 
 /// Runs populations until the evaluations of the stage are used up. The first population starts in the middle
-/// of the box, the others at random points. Returns why the ledger stopped, if it did.
+/// of the box, the others at random points. Returns the reason if the ledger stopped.
 pub(super) fn search_with_populations(
     ledger: &mut Ledger,
     dimensions: usize,
@@ -36,7 +36,7 @@ pub(super) fn search_with_populations(
             return stop;
         }
         middle = (0..dimensions).map(|_| generator.random()).collect();
-        // a population whose points are all known makes no evaluation, and the loop would not end
+        // if all points of a population are known, it makes no evaluation, and the loop would never end
         if ledger.remaining_evaluations() == used {
             break;
         }
@@ -45,7 +45,8 @@ pub(super) fn search_with_populations(
     None
 }
 
-/// Evolves one population until it converges or stagnates. Returns why the ledger stopped, if it did.
+/// Evolves one population around the point `middle` until it converges or stagnates. Returns the reason if
+/// the ledger stopped.
 pub(super) fn evolve_population(
     mut costs: StageCosts,
     middle: Vec<f64>,
@@ -62,17 +63,18 @@ pub(super) fn evolve_population(
     costs.stop
 }
 
-/// Length of a population's longest axis in the unit box, at the start and at convergence.
+/// Length of the longest principal axis of a population in the unit box, at the start and at convergence.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PopulationExtent {
     first: f64,
     last: f64,
 }
 
-/// Extent for the whole box: three initial lengths reach every corner. At the final length, damped
-/// Gauss-Newton steps are more efficient.
+/// Extent of a population for the whole unit box: three initial lengths from the middle reach every corner.
+/// Below the final length, damped Gauss-Newton steps are more efficient.
 pub(super) const WIDE_EXTENT: PopulationExtent = PopulationExtent { first: 0.3, last: 0.01 };
-/// Extent for the neighbourhood of a point at which ripples trap the Gauss-Newton steps.
+/// Extent of a population for the neighbourhood of a point at which ripples of the cost trap Gauss-Newton
+/// steps.
 pub(super) const NEAR_EXTENT: PopulationExtent = PopulationExtent { first: 0.06, last: 0.003 };
 
 /// State of a population between generations.
@@ -84,7 +86,7 @@ struct CmaEs {
     mean: DVector<f64>,
     length: f64,
     shape: DMatrix<f64>,
-    /// Principal axes of the shape as columns, scaled by their lengths.
+    /// Principal axes of the distribution as columns, each scaled by its length.
     axes: DMatrix<f64>,
     path_length: DVector<f64>,
     path_shape: DVector<f64>,
@@ -96,9 +98,9 @@ struct CmaEs {
 /// A step from the mean of the population, in units of `length`.
 #[derive(Debug, Clone)]
 struct PopulationStep {
-    /// Standard normal coordinates along the principal axes.
+    /// Coordinates of the step along the principal axes; they are standard normal variables.
     along: DVector<f64>,
-    /// The same step in coordinates of the box.
+    /// The step in coordinates of the unit box.
     inside: DVector<f64>,
 }
 
@@ -110,7 +112,7 @@ struct AdaptationRates {
     path: f64,
     rank_one: f64,
     rank_mu: f64,
-    /// Expected length of a vector of standard normal variables.
+    /// Expected length of a vector with one standard normal variable per parameter.
     expected: f64,
 }
 
@@ -129,7 +131,7 @@ impl AdaptationRates {
 }
 
 impl CmaEs {
-    /// A population of `points` points (at least 4) around a point of the unit box.
+    /// A population of `points` points (at least 4) around the point `mean` of the unit box.
     fn new(mean: Vec<f64>, points: usize, extent: PopulationExtent, generator: Xoshiro256PlusPlus) -> Self {
         let (n, points) = (mean.len(), points.max(4));
         let raw = |rank| math::ln((points as f64 + 1.0) / 2.0) - math::ln(rank as f64 + 1.0);
@@ -164,13 +166,13 @@ impl CmaEs {
         self.least_cost = order.first().map_or(self.least_cost, |at| self.least_cost.min(costs[*at]));
     }
 
-    /// Whether the longest axis has shrunk to its last length.
+    /// Whether the longest principal axis has shrunk to the length at convergence.
     fn has_converged(&self) -> bool {
         let longest = self.axes.column_iter().map(|column| column.norm()).fold(0.0, f64::max);
         self.length * longest < self.last || !self.length.is_finite()
     }
 
-    /// The point of the unit box to which a step leads.
+    /// The point of the unit box that a step from the mean reaches.
     fn point_of(&self, step: &PopulationStep) -> Vec<f64> {
         (&self.mean + &step.inside * self.length).iter().map(|u| reflect_into_unit(*u)).collect()
     }
@@ -184,14 +186,16 @@ impl CmaEs {
         (0..self.points).map(|_| draw()).collect()
     }
 
-    /// Adapts the distribution to the steps of a generation, which are ordered from best to worst.
+    /// Adapts the distribution to the steps of a generation; `ranked` contains these steps from lowest to
+    /// highest cost.
     fn update_distribution(&mut self, ranked: &[PopulationStep]) {
         let (n, rates) = (self.mean.len(), &self.rates);
         self.generation += 1;
         let sum = |of: fn(&PopulationStep) -> &DVector<f64>| {
             self.weights.iter().zip(ranked).fold(DVector::zeros(n), |sum, (w, step)| sum + of(step) * *w)
         };
-        // C^(-1/2) times the mean step is the mean step along the axes, rotated to the coordinates of the box
+        // C^(-1/2) times the mean step (C: covariance) is the mean step along the principal axes, rotated to
+        // the coordinates of the box
         let (along, step) = (sum(|step| &step.along), sum(|step| &step.inside));
         self.mean += &step * self.length;
         let turned = self.rotate_to_box(&along);
@@ -217,8 +221,8 @@ impl CmaEs {
         self.decompose_shape();
     }
 
-    /// Rotates coordinates along the axes to the coordinates of the box, without scaling by the lengths of
-    /// the axes.
+    /// Rotates coordinates along the principal axes to coordinates of the unit box, without scaling by the
+    /// lengths of the axes.
     fn rotate_to_box(&self, along: &DVector<f64>) -> DVector<f64> {
         let mut turned = DVector::zeros(along.len());
         for (column, z) in self.axes.column_iter().zip(along.iter()) {
@@ -238,7 +242,7 @@ impl CmaEs {
     }
 }
 
-/// Mirrors a coordinate into the unit interval.
+/// Reflects a coordinate at 0 and 1 until it is in the unit interval.
 fn reflect_into_unit(u: f64) -> f64 {
     let folded = u.rem_euclid(2.0);
     clamp_unit(if folded > 1.0 { 2.0 - folded } else { folded })
@@ -264,7 +268,7 @@ mod tests {
 
     #[test]
     fn a_narrow_turned_valley_is_learnt() {
-        // a hundred times longer than wide, with its long axis along (1, 1, 1)
+        // a valley of the cost that is a hundred times longer than wide, with its long axis along (1, 1, 1)
         let minimum = [0.3, 0.35, 0.4];
         let cost = |p: &[f64]| {
             let d: Vec<f64> = p.iter().zip(minimum).map(|(a, b)| a - b).collect();

@@ -1,8 +1,8 @@
 //! Nelder-Mead simplices, with the solver of argmin.
 //!
-//! argmin's loop can neither stop with the ledger nor count steps without a gain, so the loop is written
-//! here. The solver has no bounds, so it works on the real line ([`line_to_unit`]). It panics if one of its
-//! first costs is an error, so costs are never errors.
+//! argmin's loop can neither stop when the ledger stops nor count steps that do not lower the cost, so the
+//! loop is written here. The solver has no bounds, so it works on the real line ([`line_to_unit`]). It panics
+//! if one of its first costs is an error, so costs are never errors.
 
 use super::costs::StageCosts;
 use super::stagnation::StagnationCounter;
@@ -14,12 +14,12 @@ use argmin::core::{CostFunction, Error, IterState, Problem, Solver, State};
 use argmin::solver::neldermead::NelderMead;
 use std::cell::RefCell;
 
-/// Number of steps without a lower cost, per vertex, after which a simplex ends.
+/// Number of steps per vertex that do not lower the cost, after which a simplex ends.
 const STAGNANT_STEPS: usize = 20;
 
 type SimplexState = IterState<Vec<f64>, (), (), (), (), f64>;
 
-/// Costs as a function on the real line.
+/// Costs as a function of unbounded coordinates on the real line.
 struct UnboundedCost<'l, 'a>(RefCell<StageCosts<'l, 'a>>);
 
 impl CostFunction for UnboundedCost<'_, '_> {
@@ -31,8 +31,8 @@ impl CostFunction for UnboundedCost<'_, '_> {
     }
 }
 
-/// Runs one simplex from `start` with edges of length `edge` in the unit box, until it has shrunk
-/// or gains nothing.
+/// Runs one simplex from `start` with edges of length `edge` in the unit box, until it has shrunk or no
+/// longer lowers the cost.
 pub(super) fn run_simplex(ledger: &mut Ledger, start: &[f64], edge: f64) -> SearchTermination {
     let vertices = initial_simplex(start, edge);
     let steps = ledger.remaining_evaluations().saturating_mul(2).saturating_add(vertices.len());
@@ -43,7 +43,7 @@ pub(super) fn run_simplex(ledger: &mut Ledger, start: &[f64], edge: f64) -> Sear
     stop.map_or(SearchTermination::Converged, SearchTermination::Stopped)
 }
 
-/// Steps a simplex to its end. Returns why the ledger stopped, if it did.
+/// Steps a simplex until it ends. Returns the reason if the ledger stopped.
 fn step_simplex(costs: StageCosts, vertices: Vec<Vec<f64>>, steps: usize) -> Option<StopReason> {
     let mut patience = StagnationCounter::new(STAGNANT_STEPS * vertices.len(), 0.0);
     let mut solver = NelderMead::new(vertices).with_sd_tolerance(SIMPLEX_COST_SPREAD).ok()?;
@@ -67,7 +67,8 @@ fn has_shrunk(solver: &mut NelderMead<Vec<f64>, f64>, state: &SimplexState) -> b
     <NelderMead<_, _> as Solver<UnboundedCost, SimplexState>>::terminate(solver, state).terminated()
 }
 
-/// Vertices on the real line: `start`, and for each coordinate of the box a point one `edge` further inwards.
+/// Vertices of a simplex, mapped from the unit box to the real line: `start`, and for each coordinate a point
+/// that is `edge` further towards the middle of the box.
 fn initial_simplex(start: &[f64], edge: f64) -> Vec<Vec<f64>> {
     let mut vertices = vec![start.to_vec(); start.len() + 1];
     for (axis, vertex) in vertices.iter_mut().skip(1).enumerate() {

@@ -1,6 +1,6 @@
 //! Detection of a solver that no longer makes progress.
 
-/// Counts steps without progress.
+/// Counts the successive steps without progress.
 pub(super) struct StagnationCounter {
     allowed: usize,
     gain: f64,
@@ -9,8 +9,8 @@ pub(super) struct StagnationCounter {
 }
 
 impl StagnationCounter {
-    /// A counter that reports stagnation after more than `allowed` steps in a row that each lower the cost by
-    /// less than the fraction `gain`.
+    /// A counter that reports stagnation after more than `allowed` successive steps that together lower the
+    /// cost by less than the fraction `gain`.
     pub(super) fn new(allowed: usize, gain: f64) -> Self {
         Self { allowed, gain, mark: f64::MAX, waited: 0 }
     }

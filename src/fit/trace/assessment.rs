@@ -12,8 +12,8 @@ use nalgebra::DMatrix;
 use portable_math as math;
 use std::collections::BTreeSet;
 
-/// Smallest eigenvalue of the scaled information matrix that counts as determined; a smaller one
-/// is rounding error.
+/// Smallest eigenvalue of the scaled information matrix whose direction counts as determined. Smaller
+/// eigenvalues are rounding errors.
 const MIN_EIGENVALUE: f64 = 1e-10;
 
 /// Estimate of an unknown at the end of a search.
@@ -21,22 +21,25 @@ const MIN_EIGENVALUE: f64 = 1e-10;
 pub struct UnknownEstimate {
     /// Parameter of the scene, or error of a camera.
     pub kind: UnknownKind,
-    /// Estimate, in its SI unit.
+    /// Estimated value, in the SI unit of the unknown.
     pub value: f64,
-    /// Ends of the 95 % interval from curvature, scatter of the segments, profile and bias, in its SI unit.
+    /// Ends of the 95 % interval, in the SI unit of the unknown. The interval combines curvature, scatter of
+    /// the segments, profile and bias.
     pub ends_95: [f64; 2],
-    /// Standard deviation of its coordinate, including the bias.
+    /// Standard deviation of the unknown's coordinate, including the bias.
     pub sd: f64,
-    /// Ends of the 95 % interval from refitted twins alone, in its SI unit; `None` with too few twins.
+    /// Ends of the 95 % interval from the refits to simulated recordings (twins) only, in the SI unit of the
+    /// unknown; `None` if there are too few twins.
     pub twins_95: Option<[f64; 2]>,
-    /// Part of the variance of the estimate's coordinate that comes from errors of the recorded heads.
+    /// Part of the variance of the unknown's coordinate that comes from errors of the recorded head
+    /// positions.
     by_heads: f64,
-    /// Whether the estimate lies at an end of its range.
+    /// Whether the estimate is at an end of the range of the unknown.
     pub at_bound: bool,
 }
 
 impl UnknownEstimate {
-    /// Ends of the interval that covers both 95 % intervals, in its SI unit.
+    /// Ends of the smallest interval that contains `ends_95` and `twins_95`, in the SI unit of the unknown.
     #[must_use]
     pub fn widest_95(&self) -> [f64; 2] {
         let [low, high] = self.ends_95;
@@ -44,26 +47,27 @@ impl UnknownEstimate {
     }
 }
 
-/// Estimates at the best end, with their intervals and the doubts about them.
+/// Estimates at the best end of a search, with their intervals and reasons to doubt them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TraceAssessment {
     /// One estimate per unknown, in the order of the unknowns.
     pub estimates: Vec<UnknownEstimate>,
     /// Correlation matrix of the estimates.
     pub correlation: DMatrix<f64>,
-    /// Number of parameter combinations that are determined.
+    /// Number of independent combinations of parameters that the recordings or priors determine.
     pub rank: usize,
-    /// Last iterate of the run with the segments of the previous stage, which starts at the best end.
+    /// Last iterate of the fit with the shorter segments of the previous stage, which starts at the best end;
+    /// `None` if there is no such fit.
     pub shorter: Option<Iterate>,
     /// Number of refitted twins.
     pub twins: usize,
-    /// Doubts that apply to every parameter.
+    /// Reasons to doubt the estimates of all parameters.
     pub doubts: Vec<String>,
 }
 
 impl TraceAssessment {
-    /// Adds the intervals from the scatter of refitted twins around the best end. All twins share the
-    /// recorded head, so the variance due to its errors is added to the scatter.
+    /// Adds the intervals from the scatter of refitted twins around the best end. All twins use the same
+    /// recorded head motion, so the variance due to errors of this motion is added to the scatter.
     fn add_twins(&mut self, model: &TraceModel, end: &Iterate, refits: &[&[f64]]) {
         self.twins = refits.len();
         if refits.len() < MIN_TWINS {
@@ -79,7 +83,8 @@ impl TraceAssessment {
     }
 }
 
-/// Assesses the end of the best descent. `runs` are its uncertainty runs, each with its last iterate.
+/// Assesses the end of the descent with index `best`. `runs` are the uncertainty runs from this end, each
+/// with its last iterate.
 pub(super) fn assess_end(
     end: &SearchEnd<'_>,
     descents: &[TraceDescent],
@@ -121,7 +126,7 @@ pub(super) fn assess_end(
     known
 }
 
-/// Whether unknown `i` lies at an end of its range.
+/// Whether unknown `i` is at an end of its range.
 fn is_at_bound(model: &TraceModel, end: &Iterate, i: usize) -> bool {
     let [low, high] = model.unknowns.0[i].range;
     let near = 1e-6 * (high - low);
@@ -140,7 +145,7 @@ fn count_determined(model: &TraceModel, information: &DMatrix<f64>) -> usize {
     scaled.symmetric_eigenvalues().iter().filter(|value| **value > MIN_EIGENVALUE).count() + priors.len()
 }
 
-/// All doubts that apply to every parameter, except the one about the lengths of the segments.
+/// All reasons to doubt every parameter, except the comparison of segment lengths.
 fn shared_doubts(at: &SearchEnd<'_>, descents: &[TraceDescent], best: usize, rank: usize) -> Vec<String> {
     let SearchEnd { model, settings, at: end, sd, .. } = at;
     let mut doubts = Vec::new();
@@ -183,18 +188,20 @@ fn shared_doubts(at: &SearchEnd<'_>, descents: &[TraceDescent], best: usize, ran
     doubts
 }
 
-// Agreement of the two longest segment lengths, and of starts that fit equally well.
+// Agreement of the fits with the two longest segment lengths, and of the starts that fit equally well.
 
-/// Largest plausible difference between the estimates of two segment lengths, in standard deviations.
+/// Largest plausible difference between the estimates with two segment lengths, in standard deviations of
+/// this difference.
 const LENGTHS_AGREE_SD: f64 = 3.0;
 
-/// Compares the best end with the end of the run with shorter segments; `sd` are the standard
+/// Compares the estimates at the best end with those of the fit with shorter segments; `sd` are the standard
 /// deviations at `end`.
 ///
 /// Returns the bias of every unknown, in its coordinate: the difference of the two estimates, from which
-/// twice its standard deviation is subtracted in quadrature. The bias falls with the segment length, so this
-/// difference is an upper limit of the bias at `end`. Also returns the doubt about the parameter that differs
-/// most, if it differs too much: one wrong parameter casts doubt on all.
+/// twice the standard deviation of this difference is subtracted in quadrature. The bias falls with the
+/// segment length, so this difference is an upper limit of the bias at `end`. Also returns a reason for doubt
+/// that names the parameter with the largest difference, if this difference is implausible: one wrong
+/// parameter casts doubt on all.
 fn compare_segment_lengths(
     model: &TraceModel,
     end: &Iterate,
@@ -215,10 +222,10 @@ fn compare_segment_lengths(
     Some((bias, disagreement))
 }
 
-/// Number of starts that end at another point and cost nearly as little as the best end. The difference is
-/// below the scatter of the cost of a true model between recordings.
+/// Number of starts that end at a different point from the best end with nearly the same cost: the costs
+/// differ by less than the cost of a correct model scatters from recording to recording.
 fn count_rivals(end: &Iterate, descents: &[TraceDescent], sd: &[f64]) -> usize {
-    /// Largest difference of the costs, in standard deviations of chi2.
+    /// Largest cost difference that counts as nearly the same, in standard deviations of chi2.
     const NEARLY: f64 = 2.0;
     let (widening, dof) = chi2_per_dof(end);
     let limit = end.cost + NEARLY * widening.max(1.0) * (2.0 * dof as f64).sqrt();

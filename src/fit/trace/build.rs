@@ -1,4 +1,5 @@
-//! Builds the model of a trace fit from a job and its recordings, and fits its states at given parameters.
+//! Builds the model of a trace fit from a job and its recordings, and fits the starting states of its
+//! segments at given parameter values.
 
 use crate::fit::bounds::{BoundsSpacing, Prior};
 use crate::fit::job::{FreeParameter, HeadSource, TraceChannel};
@@ -22,8 +23,8 @@ use portable_math as math;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// The segments of the last stage with their best starting states at a point; `None` if a scene refuses the
-/// point. The result depends only on the point.
+/// The segments of the last stage at the coordinates `point`, with starting states that minimise chi2; `None`
+/// if a scene refuses the parameter values. The result does not depend on earlier calls.
 pub(crate) fn fit_states_at(model: &TraceModel, segment_s: &[f64], point: &[f64]) -> Option<Iterate> {
     let last = TraceSearchSettings { segment_s: segment_s.last().copied().into_iter().collect(), twins: 0 };
     refit_plain(model, first_iterate(model, &last, point)?)
@@ -104,8 +105,9 @@ fn build_recording(source: &TraceSource<'_>) -> Result<TraceRecording, HeadMotio
     Ok(TraceRecording { scene, observation: film })
 }
 
-/// Noise of a channel: that of the job, otherwise the measured noise minus the part that tip and head have in
-/// common. If the noise cannot be measured, it is white, with the scatter between frames.
+/// Noise of a channel: the value in the job, if it gives one. Otherwise it is the measured noise without the
+/// part that tip and head have in common. If the measurement fails, it is white noise with the scatter from
+/// frame to frame.
 fn channel_noise(
     traced: &TraceData,
     recording: &Recording,
@@ -123,8 +125,8 @@ fn channel_noise(
         let measured = measure_quality(recording, None);
         return white(measured.head_x.noise_m.or(measured.tip_x.noise_m).unwrap_or(MIN_NOISE_M));
     };
-    // The factor for the remaining noise assumes that both points have equal noise of their own. A large
-    // common share contradicts this assumption, and then nothing is subtracted.
+    // The factor for the remaining noise assumes that, apart from the common noise, tip and head have equal
+    // noise. If the common share is large, this assumption is wrong, and nothing is subtracted.
     let left = shared
         .filter(|shared| shared.share + 2.0 * shared.sd < MAX_SHARED_NOISE)
         .map_or(1.0, |shared| (1.0 - shared.share * shared.share).sqrt());
@@ -132,10 +134,11 @@ fn channel_noise(
     AutoregressiveNoise::new(sd_m, noise.coefficients().to_vec()).unwrap_or_else(|_| white(sd_m))
 }
 
-/// Common share of the noise above which the two points cannot have equal noise of their own.
+/// Largest share of common noise in the noise of tip or head. Above it, the remaining noise of the two points
+/// cannot be equal.
 const MAX_SHARED_NOISE: f64 = 0.9;
 
-/// Smallest noise, m: the rounding of simulated traces without noise.
+/// Smallest standard deviation of the noise, m: the rounding error of simulated traces without noise.
 const MIN_NOISE_M: f64 = 1e-9;
 
 fn parameter_unknown(free: &FreeParameter) -> TraceUnknown {

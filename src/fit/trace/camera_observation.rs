@@ -16,9 +16,9 @@ pub struct ObservationSettings {
     pub head_drop: bool,
     /// Exposure time of a frame, s.
     pub exposure_s: f64,
-    /// Noise of the tip's x and of the head's y, m.
+    /// Noise of the tip's position along the sweep and of the head's drop, m.
     pub noise: [AutoregressiveNoise; 2],
-    /// First fitted frame, and the frame after the last fitted one.
+    /// Index of the first fitted frame, and of the frame after the last fitted frame.
     pub frames: [usize; 2],
 }
 
@@ -32,21 +32,23 @@ pub struct CameraObservation {
     pub tip_x_m: Vec<Option<f64>>,
     /// Drop of the head, m; `None` where the head is lost or not fitted.
     pub drop_m: Vec<Option<f64>>,
-    /// Position of the head in every frame according to the drive, m.
+    /// Position of the head along the sweep in every frame, as given by the drive, m.
     pub head_m: Vec<f64>,
-    /// Whether the recorded head drives the model; `head_m` is then in lengths of the picture. If the scene
-    /// drives the model, `head_m` is in true lengths.
+    /// Whether the recorded head drives the model. If so, `head_m` is in lengths as measured in the picture,
+    /// which include its scale error; otherwise it is in true lengths.
     pub own_head: bool,
     /// The smooth curve from which `head_m` is taken; `None` if the scene drives the model.
     pub own_curve: Option<Arc<HeadSpline>>,
-    /// Mean of `head_m` over the fitted frames, m; a tilt turns the picture about it.
+    /// Mean of `head_m` over the fitted frames, m. A tilt of the camera rotates the picture about this
+    /// position.
     pub centre_m: f64,
     pub settings: ObservationSettings,
 }
 
 impl CameraObservation {
-    /// Data of a recording. `drive` moves the head of its model. `shared` is the noise of the tip's x and of
-    /// the head's y, m, that tip and head have in common; it is subtracted.
+    /// Data of a recording. `drive` moves the head in the model of the recording. `shared` is the noise in
+    /// each frame, m, that tip and head have in common, along the sweep and in height; it is subtracted from
+    /// the tip's position and from the head's height.
     pub(crate) fn new(
         recording: &Recording,
         drive: &Drive,
@@ -84,9 +86,9 @@ impl CameraObservation {
     /// Initial guesses of the offsets of position and drop, m. They assume that a blade leans equally far to
     /// both sides and that its head is highest when the blade is upright.
     pub(super) fn guess_offsets_m(&self, tilt_rad: f64) -> [f64; 2] {
-        /// Fraction of the frames that is ignored at either end of a distribution.
+        /// Fraction of the frames that is ignored at either end of the sorted leans.
         const TAIL: f64 = 0.1;
-        /// Fraction of the frames in which the blade is nearly upright.
+        /// Fraction of the frames with the smallest drops, in which the blade is nearly upright.
         const UPRIGHT: f64 = 0.005;
         let [first, last] = self.settings.frames;
         let sorted = |mut values: Vec<f64>| {
@@ -100,7 +102,8 @@ impl CameraObservation {
         let level = |i: usize| Some(self.drop_m[i]? + tilt_rad * (self.head_m[i] - self.centre_m));
         let drops = sorted((first..last).filter_map(level).collect());
         let [low, high] = [at(&leans, TAIL), at(&leans, 1.0 - TAIL)];
-        // (an offset that exceeds the lean hides that the blade changes sides)
+        // (if the offset is larger than the lean, the leans all have one sign although the blade changes
+        // sides)
         let both_sides = (low < 0.0 && high > 0.0) || self.reverses();
         let middle = if both_sides { 0.5 * (low + high) } else { 0.0 };
         let upright =
@@ -108,9 +111,10 @@ impl CameraObservation {
         [middle, if both_sides { upright } else { 0.0 }]
     }
 
-    /// Whether the head reverses within the fitted frames, so that the blade leans to both sides.
+    /// Whether the head reverses its motion within the fitted frames, so that the blade leans to both sides.
     fn reverses(&self) -> bool {
-        /// Smallest `beyond`, as a fraction of the head's travel, that tilts the blade to the other side.
+        /// Smallest value of `beyond`, as a fraction of the head's travel, that makes the blade lean to the
+        /// other side.
         const LEAST: f64 = 0.05;
         let [first, last] = self.settings.frames;
         let heads = &self.head_m[first..last];
@@ -128,18 +132,19 @@ impl CameraObservation {
         self.times_s[frame] - 0.5 * (self.times_s[first] + self.times_s[last - 1])
     }
 
-    /// Time by which a run starts before its first frame, s: half the exposure time.
+    /// Time from the start of a run to the middle of its first frame's exposure, s: half the exposure time.
     pub(crate) fn lead_s(&self) -> f64 {
         0.5 * self.settings.exposure_s
     }
 
-    /// Number of data in the frames from `first` up to but not including `last`.
+    /// Number of measured values in the frames from `first` up to but not including `last`.
     pub(super) fn count_data(&self, first: usize, last: usize) -> usize {
         let present = |column: &[Option<f64>]| column[first..last].iter().flatten().count();
         present(&self.tip_x_m) + present(&self.drop_m)
     }
 
-    /// Frames of a segment that have data of the tip, and those that have data of the drop.
+    /// Indices of the frames of a segment in which the tip is measured, and of those in which the drop is
+    /// measured.
     pub(super) fn data_frames(&self, [first, last]: [usize; 2]) -> [Vec<usize>; 2] {
         [&self.tip_x_m, &self.drop_m].map(|column| (first..last).filter(|&i| column[i].is_some()).collect())
     }
@@ -187,7 +192,7 @@ enum ChannelWhitening {
 }
 
 impl SegmentWhitening {
-    /// Whitens a column that holds the tip's frames, then the drop's.
+    /// Whitens a column of residuals, m: first those of the tip, frame by frame, then those of the drop.
     pub(super) fn whiten_column(&self, column: &mut [f64]) {
         let (tip, drop) = column.split_at_mut(self.tips);
         for (map, part) in self.maps.iter().zip([tip, drop]) {

@@ -5,9 +5,11 @@ use std::ops::ControlFlow;
 
 /// Store for the iterates of a search: a journal, or `()`, which stores nothing.
 pub trait Checkpoint {
-    /// The stored iterate of a chain at a place in the chain, both counted from 0.
+    /// The stored iterate with number `place` in the chain with number `chain`, both counted from 0; `None`
+    /// if it is not stored.
     fn find_iterate(&mut self, chain: usize, place: usize) -> Option<Iterate>;
-    /// Stores a new iterate of a chain; `Break` ends the search.
+    /// Stores a new iterate with number `place` in the chain with number `chain`; returns `Break` to end the
+    /// search.
     fn store_iterate(&mut self, chain: usize, place: usize, iterate: &Iterate) -> ControlFlow<()>;
 }
 
@@ -26,7 +28,7 @@ impl Checkpoint for () {
 pub struct TraceSearchSettings {
     /// Length of the segments in each stage, s, in ascending order.
     pub segment_s: Vec<f64>,
-    /// Number of twins of the best end that are fitted.
+    /// Number of simulated recordings of the best model (twins) that are fitted.
     pub twins: usize,
 }
 
@@ -39,13 +41,15 @@ pub struct SegmentState {
     pub first: usize,
     /// Frame after the last frame of the segment.
     pub last: usize,
-    /// Angles of neck and lip, rad, and their rates, rad/s, at the start.
+    /// Fitted angles of neck and lip, rad, and their rates, rad/s, at the start of the segment.
     pub start: [f64; 4],
-    /// The same angles and rates, as estimated from the recording alone.
+    /// Angles of neck and lip, rad, and their rates, rad/s, at the start of the segment, as estimated
+    /// directly from the tracked positions.
     pub shown: [f64; 4],
-    /// Number of data.
+    /// Number of measured values in the segment.
     pub data: usize,
-    /// Sum of squared residuals; infinite if the run of the model fails.
+    /// Sum of the squared residuals in standard deviations of the noise; infinite if the run of the model
+    /// fails.
     pub chi2: f64,
 }
 
@@ -54,12 +58,12 @@ impl SegmentState {
         LinkState::from(self.start)
     }
 
-    /// First frame, and the frame after the last one.
+    /// Index of the first frame, and of the frame after the last frame of the segment.
     pub(super) fn frames(&self) -> [usize; 2] {
         [self.first, self.last]
     }
 
-    /// Whether the misfit is larger than noise explains.
+    /// Whether chi2 of the segment is larger than noise explains.
     pub(crate) fn is_bad(&self) -> bool {
         self.chi2 >= 2.0 * self.data as f64
     }
@@ -70,7 +74,7 @@ impl SegmentState {
 pub struct Iterate {
     /// Index of the stage.
     pub stage: usize,
-    /// Number of the step within the stage, from 0.
+    /// Number of the step within the stage, counted from 0.
     pub number: usize,
     /// Number of times that this stage was repeated with new segment boundaries.
     pub cuts: usize,
@@ -80,18 +84,18 @@ pub struct Iterate {
     pub plain: bool,
     /// Whether the stage has converged.
     pub settled: bool,
-    /// Damping of the next step, as a fraction of the diagonal of the normal equations.
+    /// Damping of the next step, as a fraction of the diagonal of the normal matrix.
     pub damping: f64,
-    /// Coordinates of the unknowns.
+    /// Coordinate of each unknown.
     pub point: Vec<f64>,
     /// Segments of all recordings.
     pub segments: Vec<SegmentState>,
-    /// Cost of the segments and the priors.
+    /// Cost: the sum over the segments plus the cost of the priors.
     pub cost: f64,
 }
 
 impl Iterate {
-    /// Number of data of all segments.
+    /// Number of measured values in all segments.
     pub(crate) fn count_data(&self) -> usize {
         self.segments.iter().map(|segment| segment.data).sum()
     }

@@ -1,4 +1,4 @@
-//! Fit of the starting state of a segment with everything else held fixed.
+//! Fits the starting state of each segment while the parameters and the camera errors are held fixed.
 
 use super::checkpoint::SegmentState;
 use super::segment_simulation::{LinkState, RecordingModel, STATE_STEPS};
@@ -6,27 +6,27 @@ use nalgebra::{DMatrix, DVector, Matrix4};
 use rayon::prelude::*;
 use std::borrow::Cow;
 
-/// Condition on which a bad segment is restarted, and the states from which it is restarted.
+/// Which segments are fitted again from other starting states, and from which states.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum RescuePolicy {
     Never,
     /// Restarts a segment whose chi2 exceeds this multiple of its number of data: from the recorded state,
-    /// from this state with changed rates, and from the end of the previous segment.
+    /// from the recorded state with changed angular velocities, and from the end of the previous segment.
     Beyond(f64),
-    /// Restarts a segment whose chi2 exceeds what noise explains, also from states along the two least
-    /// determined directions.
+    /// Restarts a segment whose chi2 is larger than noise explains, from the states of [`Self::Beyond`] and
+    /// from states along the two least determined directions.
     Thorough,
 }
 
-/// Largest fraction of bad segments for which [`RescuePolicy::Beyond`] acts. If more segments are bad, the
-/// fault lies in the unknowns rather than in the states.
+/// [`RescuePolicy::Beyond`] restarts segments only if at most this fraction of all segments is bad. If more
+/// segments are bad, the parameters are wrong rather than the starting states.
 const MAX_RESCUED_SHARE: f64 = 0.4;
 
-/// The fit of a state ends when chi2 falls by less than this fraction of chi2 or of the number of residuals,
-/// whichever is smaller.
+/// The fit of a starting state ends when a step lowers chi2 by less than this factor times the smaller of
+/// chi2 and the number of residuals.
 const MIN_CHI2_GAIN: f64 = 1e-3;
 
-/// A starting state with its residuals and, where needed, their derivatives.
+/// A starting state with the residuals of its segment and, where needed, their derivatives by the state.
 struct StateTrial {
     state: LinkState,
     residuals: DVector<f64>,
@@ -39,7 +39,7 @@ impl StateTrial {
         Some(Self { state, residuals: linear.residuals, jacobian: Some(linear.by_state) })
     }
 
-    /// A trial without derivatives, which takes a third of the time of one with derivatives.
+    /// A trial without derivatives. It takes a third of the time of a trial with derivatives.
     fn without_jacobian(point: &RecordingModel<'_>, frames: [usize; 2], state: LinkState) -> Option<Self> {
         Some(Self { state, residuals: point.differentiable_residuals(frames, &state)?, jacobian: None })
     }
@@ -48,7 +48,7 @@ impl StateTrial {
         self.residuals.norm_squared()
     }
 
-    /// Smallest gain that justifies another step.
+    /// Smallest decrease of chi2 after which another step is tried.
     fn least_gain(&self) -> f64 {
         MIN_CHI2_GAIN * self.cost().min(self.residuals.len() as f64)
     }
@@ -73,7 +73,8 @@ pub(super) fn refine_state(point: &RecordingModel<'_>, segment: &mut SegmentStat
     (segment.start, segment.chi2, segment.data) = (at.state.into(), at.cost(), at.residuals.len());
 }
 
-/// The first step that lowers the cost; the damping rises from trial to trial.
+/// The state after the first trial step that lowers chi2, or `None` if no trial does. The damping rises from
+/// trial to trial.
 fn lower_cost_step(
     point: &RecordingModel<'_>,
     frames: [usize; 2],
@@ -98,8 +99,8 @@ fn lower_cost_step(
             let step = c.solve(&slope);
             let state = LinkState::from_fn(|i, _| at.state[i] - step[i]);
             is_small = 2.0 * slope.dot(&step) - step.dot(&(&normal * &step)) < at.least_gain();
-            // derivatives are needed for a further step, which is unlikely after the last, a small or a
-            // repeated step
+            // derivatives are computed only if another step is likely to follow: not after the last allowed
+            // step, a step of small expected gain, or a step with raised damping
             let ends = is_last || is_small || trial > 0;
             let build = if ends { StateTrial::without_jacobian } else { StateTrial::with_jacobian };
             build(point, frames, state)
@@ -117,10 +118,10 @@ fn lower_cost_step(
     None
 }
 
-/// Computes chi2 of the segments after a step of the unknowns, and refines the states of segments
-/// that fit worse.
+/// Computes chi2 of the segments after a step of the unknowns, and refits the starting states of the segments
+/// whose chi2 has risen.
 pub(super) fn update_states(points: &[RecordingModel<'_>], segments: &mut [SegmentState], most: usize) {
-    /// Rise of chi2 above which the state of a segment is refined, in standard deviations of chi2.
+    /// Rise of a segment's chi2 above which its starting state is refitted, in standard deviations of chi2.
     const RISE_SD: f64 = 0.05;
     segments.par_iter_mut().for_each(|segment| {
         let point = &points[segment.recording];
@@ -184,7 +185,7 @@ pub(super) fn rescue_states(
     });
 }
 
-/// Refines a segment from another state, and keeps the result if it lowers chi2.
+/// Fits the starting state of a segment again from `state`, and keeps the result if it lowers chi2.
 fn try_state(point: &RecordingModel<'_>, segment: &mut SegmentState, state: &LinkState, most: usize) {
     let mut tried = SegmentState { start: (*state).into(), ..segment.clone() };
     refine_state(point, &mut tried, most);
@@ -193,7 +194,8 @@ fn try_state(point: &RecordingModel<'_>, segment: &mut SegmentState, state: &Lin
     }
 }
 
-/// For every segment, the state at the end of the previous segment; `None` if the two are not adjacent.
+/// For every segment, the state at the end of the previous segment; `None` if the two segments are not
+/// adjacent or the run of the previous segment fails.
 fn previous_end_states(points: &[RecordingModel<'_>], segments: &[SegmentState]) -> Vec<Option<LinkState>> {
     let end = |s: &SegmentState| {
         s.chi2.is_finite().then(|| points[s.recording].end_state(s.frames(), &s.start_state()))?
@@ -208,8 +210,8 @@ fn previous_end_states(points: &[RecordingModel<'_>], segments: &[SegmentState])
     (0..segments.len()).map(from).collect()
 }
 
-/// Refines every segment from the end of the previous segment as well. The motion is continuous, so this
-/// finds states in other valleys of chi2.
+/// Fits every starting state again from the state at the end of the previous segment, and keeps the result if
+/// it lowers chi2. The motion is continuous, so this can find a better minimum of chi2.
 pub(super) fn join_states(points: &[RecordingModel<'_>], segments: &mut [SegmentState], most: usize) {
     let follows = previous_end_states(points, segments);
     segments.par_iter_mut().zip(follows).for_each(|(segment, follows)| {
@@ -225,7 +227,8 @@ fn rescue_candidates(
     follows: Option<LinkState>,
     rescue: RescuePolicy,
 ) -> Vec<LinkState> {
-    /// Changes of the recorded rates of neck and lip that are tried, rad/s.
+    /// Changes of the angular velocities of neck and lip that are tried, relative to the recorded state,
+    /// rad/s.
     const RATES: [[f64; 2]; 4] = [[60.0, 0.0], [-60.0, 0.0], [0.0, 120.0], [0.0, -120.0]];
     let seen = LinkState::from(segment.shown);
     let mut states = vec![seen];
@@ -237,7 +240,8 @@ fn rescue_candidates(
     states
 }
 
-/// States at 3, 10 and 30 standard deviations in both senses of the two least determined directions.
+/// States 3, 10 and 30 standard deviations away from the segment's start state, both forwards and backwards
+/// along each of the two least determined directions.
 fn weakest_direction_states(point: &RecordingModel<'_>, segment: &SegmentState) -> Option<Vec<LinkState>> {
     let state = segment.start_state();
     let jacobian = point.linearize_state(segment.frames(), &state)?.by_state;

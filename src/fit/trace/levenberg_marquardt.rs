@@ -1,5 +1,5 @@
 //! The search as a chain of iterates. Each iterate is a pure function of the previous one, so a search that
-//! resumes from a journal continues with the same bits.
+//! resumes from a journal continues with exactly the same numbers.
 
 use super::checkpoint::{Iterate, SegmentState, TraceSearchSettings};
 use super::initial_states::{RescuePolicy, fit_states, join_states, rescue_states, update_states};
@@ -11,9 +11,9 @@ use super::segmentation::{SegmentBoundary, segment_boundaries};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Maximum number of outer steps in a phase.
+/// Maximum number of outer steps (steps of the unknowns) in a phase.
 pub(super) const MAX_STEPS: usize = 40;
-/// Maximum number of steps of the starting state of a segment after an outer step.
+/// Maximum number of steps in the fit of a segment's starting state after each outer step.
 pub(super) const MAX_STATE_STEPS: usize = 8;
 const FIRST_DAMPING: f64 = 1e-3;
 
@@ -28,7 +28,8 @@ fn total_cost(model: &TraceModel, point: &[f64], segments: &[SegmentState], plai
     segments_cost(segments, plain) + model.unknowns.prior_cost(point)
 }
 
-/// The iterate with its starting states fitted in at most `most` steps; `None` if a scene refuses its point.
+/// The iterate with its starting states fitted in at most `most` steps; `None` if a scene refuses the
+/// iterate's point.
 pub(super) fn refit(
     model: &TraceModel,
     mut at: Iterate,
@@ -41,8 +42,8 @@ pub(super) fn refit(
     Some(at)
 }
 
-/// The iterate with plain cost and with its starting states fitted as well as possible; `None` if a scene
-/// refuses its point.
+/// The iterate with plain chi2 as cost and with its starting states fitted as well as possible; `None` if a
+/// scene refuses the iterate's point.
 pub(super) fn refit_plain(model: &TraceModel, mut at: Iterate) -> Option<Iterate> {
     let points = recording_models(model, &at.point)?;
     fit_states(&points, &mut at.segments, MAX_STATE_STEPS, RescuePolicy::Thorough);
@@ -60,7 +61,7 @@ pub fn next_iterate(model: &TraceModel, settings: &TraceSearchSettings, before: 
     }
     let bad = before.count_bad_segments();
     let stage = before.stage + 1;
-    // (if many segments are bad, the fault lies in the unknowns rather than in the states)
+    // (if many segments are bad, the parameters are wrong rather than the starting states)
     if bad > 0
         && 4 * bad <= before.segments.len()
         && let Some(rescued) = rescue_segments(model, before)
@@ -77,10 +78,11 @@ pub fn next_iterate(model: &TraceModel, settings: &TraceSearchSettings, before: 
     resegment(model, settings, before)
 }
 
-/// The iterate with its bad segments restarted from other states, if that lowers the cost.
+/// The iterate after bad segments were restarted from other starting states; `None` if this lowers the cost
+/// too little.
 fn rescue_segments(model: &TraceModel, before: &Iterate) -> Option<Iterate> {
     const MOST_TIMES: usize = 3;
-    /// Fall of the cost above which the stage continues.
+    /// Smallest decrease of the cost by the restarts for which the stage continues.
     const LEAST_GAIN: f64 = 1.0;
     if before.rescues == MOST_TIMES {
         return None;
@@ -91,8 +93,8 @@ fn rescue_segments(model: &TraceModel, before: &Iterate) -> Option<Iterate> {
         .filter(|next| next.cost < before.cost - LEAST_GAIN)
 }
 
-/// Repeats the last stage if its end moves the segment boundaries, so that the result does not depend on the
-/// path of the search. `None` if the boundaries stay.
+/// Repeats the last stage if the parameters and camera errors at its end give other segment boundaries, so
+/// that the result does not depend on the path of the search. `None` if the boundaries do not change.
 fn resegment(model: &TraceModel, settings: &TraceSearchSettings, before: &Iterate) -> Option<Iterate> {
     const MOST_CUTS: usize = 3;
     let points = recording_models(model, &before.point)?;
@@ -109,8 +111,8 @@ fn resegment(model: &TraceModel, settings: &TraceSearchSettings, before: &Iterat
     Some(Iterate { cuts: before.cuts + 1, plain: before.plain, cost, ..again })
 }
 
-/// The first iterate of a stage: new segments that start on the fitted motion of the segments `before`.
-/// `None` if a scene refuses the point.
+/// The first iterate of a stage: new segments whose starting states lie on the fitted motion of the segments
+/// `before`. `None` if a scene refuses the point.
 pub(super) fn start_stage(
     model: &TraceModel,
     settings: &TraceSearchSettings,
@@ -161,8 +163,8 @@ fn cut_recording(at: &RecordingModel<'_>, film: usize, length_s: f64) -> Vec<Seg
     starts.iter().zip(lasts).map(segment).collect()
 }
 
-/// State on the fitted motion of an old segment at the start of a new one; `None` if the old
-/// segment fits badly.
+/// State of the blade at the start of a new segment, on the fitted motion of an old segment; `None` if the
+/// old segment fits badly.
 fn carry_state_over(
     point: &RecordingModel<'_>,
     before: &[SegmentState],
@@ -181,8 +183,8 @@ fn carry_state_over(
     point.end_state([old.first, segment.first], &old.start_state())
 }
 
-/// One outer step. If no step of the unknowns lowers the cost, only the starting states are fitted; if that
-/// gains nothing either, the iterate is settled.
+/// One outer step. If no step of the unknowns lowers the cost, only the starting states are fitted; if this
+/// does not lower the cost either, the iterate is settled.
 pub(super) fn outer_step(model: &TraceModel, before: &Iterate) -> Iterate {
     const TRIALS: usize = 6;
     let number = before.number + 1;
@@ -192,10 +194,11 @@ pub(super) fn outer_step(model: &TraceModel, before: &Iterate) -> Iterate {
         return stay();
     };
     let mut damping = before.damping;
-    // The plain phase ends when a step is below a hundredth of a standard deviation. The robust phase only
-    // prepares the plain phase and may end earlier.
+    // The plain phase (cost chi2) ends when a step changes every unknown by less than a hundredth of a
+    // standard deviation. The robust phase only prepares the plain phase and may end earlier.
     let (least_gain, least_move) = if before.plain { (1e-4, 1e-2) } else { (1e-2, 0.3) };
-    // a misfit that no model can remove raises both thresholds
+    // both thresholds scale with the misfit per datum, because a large remaining misfit also makes the
+    // estimates less certain
     let unit = (before.cost / before.count_data().max(1) as f64).max(1.0);
     let (least_gain, least_move) = (least_gain * unit, least_move * unit.sqrt());
     for _ in 0..TRIALS {
@@ -217,7 +220,8 @@ pub(super) fn outer_step(model: &TraceModel, before: &Iterate) -> Iterate {
     }
 }
 
-/// Largest change of a coordinate, in its standard deviations with all other coordinates fixed.
+/// Largest change of any coordinate between `from` and `to`, in standard deviations of that coordinate with
+/// all other coordinates fixed.
 fn step_in_sds(normal: &DMatrix<f64>, from: &[f64], to: &[f64]) -> f64 {
     (0..from.len()).map(|i| ((to[i] - from[i]) * normal[(i, i)].sqrt()).abs()).fold(0.0, f64::max)
 }

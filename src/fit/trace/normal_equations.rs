@@ -8,19 +8,19 @@ use nalgebra::{DMatrix, DVector};
 use portable_math as math;
 use rayon::prelude::*;
 
-/// Chi2 per datum at which a segment has half its weight, so that segments in a wrong state do not
-/// dominate the cost.
+/// Chi2 per datum at which the weight of a segment falls to one half. Thus segments with a wrong starting
+/// state do not dominate the cost.
 const ROBUST_CHI2: f64 = 10.0;
 
-/// Weight of a segment: the derivative of its robust cost by chi2.
+/// Weight of a segment: the derivative of the segment's robust cost by its chi2.
 fn segment_weight(segment: &SegmentState, plain: bool) -> f64 {
     if plain { 1.0 } else { 1.0 / (1.0 + segment.chi2 / (segment.data.max(1) as f64 * ROBUST_CHI2)) }
 }
 
-/// Cost of all segments: the sum of `n c ln(1 + chi2 / (n c))` with `n` data and `c` = [`ROBUST_CHI2`], or of
-/// chi2 in the plain phase.
+/// Cost of all segments: in the robust phase the sum over the segments of `n c ln(1 + chi2 / (n c))`, with
+/// `n` measured values in a segment and `c` = [`ROBUST_CHI2`]; in the plain phase the sum of chi2.
 pub(super) fn segments_cost(segments: &[SegmentState], plain: bool) -> f64 {
-    /// Chi2 per datum of a segment whose run fails.
+    /// Chi2 per datum that is assigned to a segment whose run fails.
     const FAILED: f64 = 1e6;
     let one = |segment: &SegmentState| {
         let data = segment.data.max(segment.last - segment.first) as f64;
@@ -80,8 +80,8 @@ pub(super) fn damped_step(
     at: &NormalEquations,
     damping: f64,
 ) -> Option<Vec<f64>> {
-    /// Largest change of a parameter's coordinate in one step; a logarithmic parameter changes by a
-    /// factor of 1.6.
+    /// Largest change of a parameter's coordinate in one step: a factor of 1.6 in the value of a logarithmic
+    /// parameter, half of the range of a linear parameter.
     const LONGEST: f64 = 0.5;
     let mut damped = at.matrix.clone();
     for i in 0..z.len() {
@@ -96,14 +96,14 @@ pub(super) fn damped_step(
     Some(model.unknowns.clamp_to_ranges(&moved))
 }
 
-/// The segments with their starting states moved along with the unknowns; each state moves by
-/// a limited amount.
+/// The segments after the step `moved` of the unknowns. Each starting state takes the step that the linear
+/// model gives for it, limited in length.
 pub(super) fn carry_states(
     segments: &[SegmentState],
     at: &NormalEquations,
     moved: &DVector<f64>,
 ) -> Vec<SegmentState> {
-    /// Largest changes of an angle, rad, and of a rate, rad/s, in one step.
+    /// Largest changes of an angle (rad) and of a rate (rad/s) of a starting state in one step.
     const ANGLE: f64 = 0.05;
     const RATE: f64 = 200.0;
     let mut segments = segments.to_vec();
@@ -118,21 +118,21 @@ pub(super) fn carry_states(
     segments
 }
 
-/// Covariance of the unknowns' coordinates, from the curvature of the cost and as a sandwich estimate
-/// over the segments.
+/// Covariance of the coordinates of the unknowns, estimated in two ways: from the curvature of the cost, and
+/// as a sandwich estimate from the scatter between segments.
 #[derive(Debug, Clone)]
 pub(crate) struct TraceCovariance {
     /// Information matrix of the recordings and the priors.
     pub information: DMatrix<f64>,
-    /// Inverse of the information, plus `heads`.
+    /// Inverse of the information matrix, plus `heads`.
     pub curvature: DMatrix<f64>,
-    /// Sandwich estimate from the scatter of the slopes of the segments, plus `heads`.
+    /// Sandwich estimate from the scatter of the cost gradients of the segments, plus `heads`.
     pub sandwich: DMatrix<f64>,
-    /// Covariance due to errors of the recorded heads.
+    /// Covariance due to errors of the recorded head positions.
     pub heads: DMatrix<f64>,
 }
 
-/// Covariance at an iterate; `None` where the information is singular.
+/// Covariance of the unknowns at an iterate; `None` if the information matrix is singular.
 pub(crate) fn trace_covariance(model: &TraceModel, at: &Iterate) -> Option<TraceCovariance> {
     let found = normal_equations(model, &at.point, &at.segments, true)?;
     let curvature = found.matrix.clone().cholesky()?.inverse();
@@ -151,8 +151,8 @@ pub(crate) fn trace_covariance(model: &TraceModel, at: &Iterate) -> Option<Trace
     Some(TraceCovariance { information: found.matrix, curvature: curvature + &heads, sandwich, heads })
 }
 
-/// Covariance of the slopes of the cost due to errors of the recorded heads. The curve of a head is smooth,
-/// so its error spans many segments and does not average out like noise.
+/// Covariance of the cost gradient due to errors of the recorded head positions. The fitted curve of a head
+/// position is smooth, so its error extends over many segments and does not average out like noise.
 fn head_curve_covariance(model: &TraceModel, at: &Iterate) -> Option<DMatrix<f64>> {
     let points = recording_models(model, &at.point)?;
     let n = at.point.len();
@@ -178,8 +178,8 @@ fn head_curve_covariance(model: &TraceModel, at: &Iterate) -> Option<DMatrix<f64
     Some(total)
 }
 
-/// Derivatives of the slope of a segment's cost by the coefficients of the head's curve: the index of the
-/// first coefficient with an effect, and one column per coefficient.
+/// Derivatives of the gradient of a segment's cost by the coefficients of the curve of the recorded head: the
+/// index of the first coefficient with an effect, and one column per coefficient.
 fn head_curve_slopes(point: &RecordingModel<'_>, segment: &SegmentState) -> Option<(usize, DMatrix<f64>)> {
     let (from, columns) = point.observation.head_curve_derivatives(segment.frames())?;
     let mut linear = point.linearize(segment.frames(), &segment.start_state())?;

@@ -1,4 +1,4 @@
-//! The search of a trace fit: chains of iterates from several starts, and the assessment of the best end.
+//! The search of a trace fit: it iterates from several starting points and assesses the best result.
 
 use super::assessment::{TraceAssessment, assess_end};
 use super::checkpoint::{Checkpoint, Iterate, TraceSearchSettings, chi2_per_dof};
@@ -14,12 +14,12 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use std::cmp::Reverse;
 
 const MIN_STARTS: usize = 2;
-/// Minimum number of starts if the frame rate undersamples the fastest mode, because other parameter values
-/// may then give the same frames.
+/// Minimum number of starts if the frame rate undersamples the fastest mode, because several sets of
+/// parameter values may then fit the frames equally well.
 const MIN_STARTS_SLOW: usize = 4;
 
-/// A start is abandoned if the cost of its first stage exceeds the lowest one so far by this factor: the
-/// start is then in another valley.
+/// A start is abandoned if its cost after the first stage exceeds this factor times the lowest cost of any
+/// earlier start after its first stage. Such a start leads to a different, worse minimum.
 const GIVE_UP_FACTOR: f64 = 3.0;
 
 /// Outcome of a trace search.
@@ -29,15 +29,15 @@ pub struct TraceSearchOutcome {
     pub descents: Vec<TraceDescent>,
     /// Index of the descent with the best end.
     pub best: usize,
-    /// Whether the checkpoint asked to stop.
+    /// Whether the search ended early because the checkpoint requested a stop.
     pub stopped: bool,
     /// Intervals of the estimates at the best end, and reasons to doubt them; `None` if the search was
     /// stopped, or if the covariance at the best end does not exist.
     pub assessment: Option<TraceAssessment>,
 }
 
-/// Searches from the middle of the ranges, then from seeded points until two starts agree; then assesses
-/// the best end.
+/// Searches from the middle of the ranges, then from random points given by `seed`, until two searches end at
+/// the same point. Then assesses the best end point.
 pub fn search_trace(
     model: &TraceModel,
     settings: &TraceSearchSettings,
@@ -71,11 +71,11 @@ pub fn search_trace(
 }
 
 /// First point of a start, in the coordinates of the unknowns. Start 0 is in the middle of every range, the
-/// others are at seeded points; an unknown with a prior always starts at its own `start`.
+/// others are at random points given by `seed`. An unknown with a prior always starts at its own `start`.
 #[must_use]
 pub fn start_point(model: &TraceModel, seed: u64, start: usize) -> Vec<f64> {
-    /// Fraction of a range at either end in which no search starts. Later starts lie nearer to the middle,
-    /// because points near wide bounds often lead nowhere.
+    /// Fraction of each range, at either end, in which no search starts; one entry per start. Later starts
+    /// are nearer to the middle, because searches that start near the ends of a wide range often fail.
     const EDGES: [f64; MAX_STARTS] = [0.1, 0.1, 0.1, 0.3, 0.3, 0.3];
     let edge = EDGES[start.min(MAX_STARTS - 1)];
     let mut generator = Xoshiro256PlusPlus::seed_from_u64(seed ^ ((start as u64) << 32));
@@ -87,7 +87,8 @@ pub fn start_point(model: &TraceModel, seed: u64, start: usize) -> Vec<f64> {
     model.unknowns.0.iter().map(place).collect()
 }
 
-/// Whether there are enough starts, and another start ends at the same point as the best one.
+/// Whether no further start is needed: the minimum number of starts is reached, and another start ends at the
+/// same point as the best start.
 fn has_enough_starts(model: &TraceModel, descents: &[TraceDescent]) -> bool {
     let best = best_descent(descents);
     let Some(end) = descents[best].last_iterate() else { return false };
@@ -102,8 +103,8 @@ fn has_enough_starts(model: &TraceModel, descents: &[TraceDescent]) -> bool {
     other_ends(descents, best).any(|other| other.plain == end.plain && is_same_end(end, other, &sd))
 }
 
-/// Frame rate and frequency of the blade's fastest mode, Hz, if the mode has fewer than two
-/// frames per period.
+/// Frame rate and frequency of the blade's fastest mode, both in Hz, if there are fewer than two frames per
+/// period of this mode; otherwise `None`.
 #[must_use]
 pub fn undersampled_mode(model: &TraceModel, at: &Iterate) -> Option<[f64; 2]> {
     let one = |point: RecordingModel<'_>| {
@@ -115,8 +116,8 @@ pub fn undersampled_mode(model: &TraceModel, at: &Iterate) -> Option<[f64; 2]> {
     recording_models(model, &at.point)?.into_iter().find_map(one)
 }
 
-/// Index of the best descent: one that reached the latest stage; among these, one with plain cost; among
-/// these, the one of lowest cost.
+/// Index of the best descent: descents that reached the latest stage come first; among them, those that end
+/// with the plain chi2 as cost; among those, the descent with the lowest cost.
 fn best_descent(descents: &[TraceDescent]) -> usize {
     let rank = |descent: &TraceDescent| match descent.last_iterate() {
         Some(end) => (Reverse(end.stage), !end.plain, end.cost),
@@ -135,8 +136,8 @@ pub(super) fn other_ends(descents: &[TraceDescent], best: usize) -> impl Iterato
     others.filter_map(|(_, descent)| descent.last_iterate())
 }
 
-/// Whether two ends belong to the same stage and agree in every coordinate; `sd` are the standard deviations
-/// of the coordinates.
+/// Whether two ends belong to the same stage and differ in every coordinate by at most [`SAME_END_SD`]
+/// standard deviations; `sd` are the standard deviations of the coordinates.
 pub(super) fn is_same_end(end: &Iterate, other: &Iterate, sd: &[f64]) -> bool {
     let mut pairs = end.point.iter().zip(&other.point).zip(sd);
     other.stage == end.stage && pairs.all(|((a, b), sd)| (a - b).abs() <= SAME_END_SD * sd)
@@ -144,13 +145,14 @@ pub(super) fn is_same_end(end: &Iterate, other: &Iterate, sd: &[f64]) -> bool {
 
 // Search from one start.
 
-/// Largest difference of two ends that count as the same, in standard deviations of each unknown.
+/// Largest difference in any unknown between two end points that count as the same point, in standard
+/// deviations of that unknown.
 pub(crate) const SAME_END_SD: f64 = 1.0;
 
 /// Result of the search from one start.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TraceDescent {
-    /// Number of its start, from 0.
+    /// Number of the start from which the descent began, counted from 0.
     pub start: usize,
     /// Last iterate of each stage that was reached, in the order of the stages.
     pub stages: Vec<Iterate>,
@@ -162,7 +164,8 @@ impl TraceDescent {
     }
 }
 
-/// Follows the chain of a start to its end. The flag is true if the checkpoint asked to stop.
+/// Computes the iterates of one start until its search ends. The returned flag is true if the checkpoint
+/// requested a stop.
 ///
 /// The start is abandoned if its first stage ends with a cost above `limit`.
 fn descend_from_start(

@@ -17,42 +17,43 @@ use std::cell::RefCell;
 /// Angles, rad, and rates, rad/s, of neck and lip.
 pub(super) type LinkState = Vector4<f64>;
 
-/// Units in which the four numbers of a starting state are scaled: small changes of the angles, rad,
-/// and rates, rad/s.
+/// Scales of the four numbers of a starting state: small changes of the two angles (rad) and of the two rates
+/// (rad/s).
 pub(super) const STATE_STEPS: [f64; 4] = [3e-5, 3e-5, 0.1, 0.1];
 /// Number of values in a starting state.
 const STATES: usize = 4;
-/// Tolerance of the run of a segment: its error is a thousandth of the noise of a pixel.
+/// Integration tolerance of the run of a segment. The resulting error is a thousandth of the tracking noise.
 const TOLERANCE: f64 = 1e-8;
-/// Relative accuracy of the derivatives, which is enough for a step of the search.
+/// Relative accuracy of the derivatives of a run; it is sufficient for a step of the search.
 const ACCURACY: f64 = 1e-5;
 /// Maximum number of evaluations of the right-hand side in the run of a segment.
 const MOST_EVALUATIONS: u64 = 400_000;
-/// Channels that are averaged over the shutter of every frame.
+/// Channels that are averaged over the exposure of every frame.
 const CHANNELS: [Channel; 3] = [Channel::TipX, Channel::HeadX, Channel::HeadDrop];
 
 thread_local! {
-    /// Workspace of this thread's runs.
+    /// Workspace for the runs of the current thread.
     static RUNNER: RefCell<TangentRunner> = RefCell::new(TangentRunner::with_accuracy(ACCURACY));
 }
 
-/// A run over one segment as the camera records it.
+/// The run of the model over one segment, as the camera would record it.
 struct SegmentObservation {
-    /// Index of the first frame.
+    /// Index of the first frame of the segment.
     first: usize,
-    /// Number of directions of the derivatives.
+    /// Number of directions along which the run is differentiated.
     directions: usize,
-    /// Means of tip, head and drop over the shutter, m, one row per frame.
+    /// Means over the exposure of each frame, m: positions of tip and head along the sweep and drop of the
+    /// head, one row per frame.
     means: Vec<[f64; 3]>,
     /// Derivatives of the means, ordered by frame, then channel, then direction.
     slopes: Vec<f64>,
     /// State at the end of the run.
     end: Option<LinkState>,
-    /// Whether the derivatives are known up to the end.
+    /// Whether the derivatives are known up to the end of the run.
     is_known: bool,
 }
 
-/// Averages a run over the shutter of every frame.
+/// Averages a run over the exposure of every frame.
 struct ShutterAverage<'a> {
     times_s: &'a [f64],
     clock_s: f64,
@@ -115,7 +116,7 @@ pub(super) struct RecordingModel<'a> {
     none: TangentSeeds,
     states: TangentSeeds,
     all: TangentSeeds,
-    /// Effect of each unknown.
+    /// Effect of each unknown on the residuals, in the order of the unknowns.
     effects: Vec<UnknownEffect>,
 }
 
@@ -123,10 +124,12 @@ pub(super) struct RecordingModel<'a> {
 enum UnknownEffect {
     /// No effect, because the unknown belongs to another recording.
     Nowhere,
-    /// Effect on the run: index of the direction, and derivative of the direction by the coordinate.
+    /// The unknown changes the run: index of the direction along which the run is differentiated, and
+    /// derivative, by the coordinate of the unknown, of the quantity that varies along this direction.
     Run(usize, f64),
-    /// Effect on the picture: quantity, derivative of its value by the coordinate and, for a scale that also
-    /// changes the run, the direction and its derivative by the value.
+    /// The unknown changes the picture: kind of camera error, and derivative of its value by the coordinate
+    /// of the unknown. For a scale error that also changes the run: index of the direction of the run, and
+    /// derivative, by the scale error, of the quantity that varies along this direction.
     Picture(CameraUnknown, f64, Option<(usize, f64)>),
 }
 
@@ -178,7 +181,8 @@ impl<'a> RecordingModel<'a> {
         Some(Self { observation: film, camera: view, scene, none, states, all, effects })
     }
 
-    /// The state after the last of `frames`, where the next segment starts; `None` if the run ends early.
+    /// The state of the blade at the start of the next segment, right after the frames `frames`; `None` if
+    /// the run ends early.
     pub(super) fn end_state(&self, frames: [usize; 2], state: &LinkState) -> Option<LinkState> {
         self.simulate_segment(frames, state, &self.none)?.end
     }
@@ -197,7 +201,7 @@ impl<'a> RecordingModel<'a> {
         scene.start = StartKind::State(Pose { theta, phi, theta_rate, phi_rate });
         scene.run.stop_s = match film.times_s.get(last) {
             Some(next) => next - clock_s - lead,
-            // slightly longer than to the end of the last exposure
+            // the run ends slightly after the end of the last exposure
             None => film.times_s[last - 1] - clock_s + lead + 1e-9,
         };
         let (means, slopes) = (vec![[0.0; 3]; count], vec![0.0; count * CHANNELS.len() * directions]);
@@ -217,12 +221,12 @@ impl<'a> RecordingModel<'a> {
         (whole && shot.end.is_some() && (shot.is_known || seeds.is_empty())).then_some(shot)
     }
 
-    /// Residuals whitened to unit variance: the tip's frames, then the drop's.
+    /// Residuals whitened to unit variance: first those of the tip, frame by frame, then those of the drop.
     pub(super) fn whitened_residuals(&self, frames: [usize; 2], state: &LinkState) -> Option<DVector<f64>> {
         self.whiten_residuals(frames, &self.simulate_segment(frames, state, &self.none)?)
     }
 
-    /// Residuals whitened to unit variance; `None` where [`Self::linearize_state`] has no derivatives.
+    /// Residuals whitened to unit variance; `None` if [`Self::linearize_state`] has no derivatives.
     pub(super) fn differentiable_residuals(
         &self,
         frames: [usize; 2],
@@ -238,12 +242,12 @@ impl<'a> RecordingModel<'a> {
         Some(residuals).filter(|r| r.iter().all(|x| x.is_finite()))
     }
 
-    /// Whitened residuals with their derivatives by the starting state alone; `by_unknown` is empty.
+    /// Whitened residuals with their derivatives by the starting state only; `by_unknown` is empty.
     pub(super) fn linearize_state(&self, frames: [usize; 2], state: &LinkState) -> Option<LinearizedSegment> {
         self.linearize_by(frames, state, &self.states, &[])
     }
 
-    /// Whitened residuals with all derivatives.
+    /// Whitened residuals with their derivatives by the starting state and by all unknowns.
     pub(super) fn linearize(&self, frames: [usize; 2], state: &LinkState) -> Option<LinearizedSegment> {
         self.linearize_by(frames, state, &self.all, &self.effects)
     }
@@ -283,7 +287,8 @@ impl<'a> RecordingModel<'a> {
         finite.then_some(LinearizedSegment { residuals, by_state, by_unknown })
     }
 
-    /// Tip and drop in the picture, m, from the true means of tip, head and drop.
+    /// Position of the tip and drop of the head as the picture shows them, m, from the true means of tip,
+    /// head and drop.
     fn project_to_picture(&self, frame: usize, [tip, head, drop]: [f64; 3]) -> [f64; 2] {
         let (film, view) = (self.observation, &self.camera);
         let scale = 1.0 + view.scale;
@@ -296,7 +301,7 @@ impl<'a> RecordingModel<'a> {
         ]
     }
 
-    /// Model minus measured, m: the tip's frames, then the drop's.
+    /// Model minus measurement, m: first for the tip, frame by frame, then for the drop.
     fn model_minus_measured(&self, shot: &SegmentObservation) -> DVector<f64> {
         let mut found =
             DVector::zeros(self.observation.count_data(shot.first, shot.first + shot.means.len()));
@@ -307,7 +312,7 @@ impl<'a> RecordingModel<'a> {
         found
     }
 
-    /// Adds values of tip and drop, given frame by frame, to a column with one entry per datum.
+    /// Adds values of tip and drop, given for every frame, to a column with one entry per measured value.
     fn add_to_column(
         &self,
         shot: &SegmentObservation,
@@ -331,7 +336,7 @@ impl<'a> RecordingModel<'a> {
         }
     }
 
-    /// Adds the derivative by a direction of the run, multiplied by `slope`, to a column.
+    /// Adds the derivative of the residuals by a direction of the run, multiplied by `slope`, to a column.
     fn add_run_derivative(
         &self,
         shot: &SegmentObservation,
@@ -349,7 +354,7 @@ impl<'a> RecordingModel<'a> {
         });
     }
 
-    /// Adds the derivative by a quantity of the camera, multiplied by `slope`, to a column.
+    /// Adds the derivative of the residuals by a camera error, multiplied by `slope`, to a column.
     fn add_picture_derivative(
         &self,
         shot: &SegmentObservation,
@@ -389,9 +394,10 @@ pub struct SegmentResiduals {
     pub is_drop: bool,
     /// Frames with data, in rising order.
     pub frames: Vec<usize>,
-    /// Model minus measured, m.
+    /// Model minus measurement in each of these frames, m.
     pub residual_m: Vec<f64>,
-    /// Whitened residuals: in standard deviations of the noise and without its correlation.
+    /// Whitened residuals: in standard deviations of the noise, with the correlation of the noise between
+    /// frames removed.
     pub whitened: Vec<f64>,
 }
 

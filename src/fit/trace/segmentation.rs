@@ -8,13 +8,13 @@ use crate::simulate::scene::Scene;
 use nalgebra::{DMatrix, DVector};
 use portable_math as math;
 
-/// Smallest angle between neck and lip, rad, at which the two coordinates of the tip determine both angles;
-/// those of a nearly straight blade do not.
+/// Smallest angle between neck and lip, rad, at which the two coordinates of the tip determine both angles.
+/// In a nearly straight blade they do not.
 const MIN_BEND_RAD: f64 = 0.15;
-/// Smallest speed of the tip over the glass that counts as sliding, m/s. In stick the state has only three
-/// degrees of freedom.
+/// Smallest speed of the tip over the glass that counts as sliding, m/s. While the tip sticks, the state has
+/// only three degrees of freedom.
 const MIN_SPEED_M_PER_S: f64 = 0.05;
-/// Half width of the window in which rates are fitted, s: a third of a stick-slip cycle.
+/// Half width of the window of frames to which rates are fitted, s: a third of a stick-slip cycle.
 const HALF_WIDTH_S: f64 = 3.5e-4;
 
 /// A frame at which a segment may begin, with the state of the blade there.
@@ -24,9 +24,9 @@ pub(super) struct SegmentBoundary {
     pub state: LinkState,
 }
 
-/// Boundaries at distances of about `length_s`. Each boundary is the frame nearest to its nominal
-/// position at which the tip slides and the blade is bent. (The fastest frame nearby would often be one
-/// with large noise.)
+/// Boundaries of segments at distances of about `length_s`. Of the frames in which the tip slides and the
+/// blade is bent, the frame nearest to the nominal position is chosen. (The frame with the fastest tip would
+/// often be a frame with large noise.)
 pub(super) fn segment_boundaries(
     scene: &Scene,
     film: &CameraObservation,
@@ -35,7 +35,7 @@ pub(super) fn segment_boundaries(
 ) -> Vec<SegmentBoundary> {
     let [from, to] = film.settings.frames;
     let step = ((length_s * film.rate_hz).round() as usize).max(4);
-    // rates from one-sided windows are poor
+    // rates from one-sided windows are inaccurate
     let inner = half_width_frames(film)..film.times_s.len().saturating_sub(half_width_frames(film));
     let usable = |frame: usize| -> Option<SegmentBoundary> {
         inner.contains(&frame).then_some(())?;
@@ -64,8 +64,8 @@ pub(super) fn segment_boundaries(
     found
 }
 
-/// State at the opening of a frame's shutter, from parabolas through the neighbouring frames, and speed of
-/// the tip over the glass, m/s.
+/// State of the blade when the shutter opens for a frame, from parabolas fitted to the neighbouring frames,
+/// and speed of the tip over the glass, m/s.
 fn recorded_state(
     scene: &Scene,
     film: &CameraObservation,
@@ -94,7 +94,7 @@ fn recorded_state(
             LinkState::new(theta, phi, theta_rate, phi_rate)
         }
         None => {
-            /// Relative change of the lean for the numerical derivative along the static poses.
+            /// Relative step of the lean for the numerical derivative of the static pose by the lean.
             const NEXT: f64 = 0.02;
             let [theta, phi] = equilibrium_angles(linkage, lean)?;
             let [theta_next, phi_next] = equilibrium_angles(linkage, lean * (1.0 + NEXT))?;
@@ -110,8 +110,8 @@ fn half_width_frames(film: &CameraObservation) -> usize {
     ((HALF_WIDTH_S * film.rate_hz).round() as usize).max(1)
 }
 
-/// Value and slope, per second, of the parabola (or line) through the neighbouring frames at the opening of
-/// a frame's shutter.
+/// Value and slope (per second), when the shutter opens for a frame, of the parabola (or line) fitted to the
+/// neighbouring frames.
 fn fit_parabola(
     film: &CameraObservation,
     frame: usize,
@@ -135,7 +135,8 @@ fn fit_parabola(
 /// Angles of neck and lip, with the lip trailing, for which the tip is at the distance `lean` from the head
 /// along the sweep and the head has dropped by `drop`; `None` if the tip is out of reach.
 fn link_angles(linkage: &Linkage, lean: f64, drop: f64) -> Option<[f64; 2]> {
-    /// Largest accepted cosine, because noise may make a straight blade appear too long.
+    /// Largest accepted value of the cosine of an angle. It exceeds 1 because noise may make a straight blade
+    /// appear too long.
     const REACH: f64 = 1.02;
     let (l1, l2) = (linkage.l1_m, linkage.l2_m);
     let height = l1 + l2 - drop;
@@ -158,10 +159,10 @@ fn link_rates(linkage: &Linkage, [theta, phi]: [f64; 2], lean_rate: f64, drop_ra
     ]
 }
 
-/// Angles of a static equilibrium, with any friction that it requires, for which the tip is at the distance
-/// `lean` from the head. They are used where the drop is not tracked.
+/// Angles of neck and lip of a blade at rest, with whatever friction force equilibrium requires, for which
+/// the tip is at the distance `lean` from the head along the sweep. They are used if the drop is not tracked.
 fn equilibrium_angles(linkage: &Linkage, lean: f64) -> Option<[f64; 2]> {
-    /// Largest neck angle that is searched, rad, and number of angles.
+    /// Largest neck angle of the search, rad, and number of angles that are tried.
     const LARGEST_RAD: f64 = 0.7;
     const POINTS: usize = 140;
     let side = 1f64.copysign(lean);
@@ -187,7 +188,7 @@ fn equilibrium_angles(linkage: &Linkage, lean: f64) -> Option<[f64; 2]> {
     Some([low, phi_of(low)?])
 }
 
-/// Residual moment on the neck of a blade at rest whose lip is balanced by friction.
+/// Unbalanced moment on the neck of a blade at rest, if the friction at the tip balances the lip.
 fn neck_moment(linkage: &Linkage, theta: f64, phi: f64) -> f64 {
     let (l1, l2) = (linkage.l1_m, linkage.l2_m);
     let drop = l1 * (1.0 - math::cos(theta)) + l2 * (1.0 - math::cos(phi));

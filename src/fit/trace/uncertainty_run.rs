@@ -1,5 +1,6 @@
-//! Runs from the best end of a search that measure uncertainty: a fit with shorter segments, fits with each
-//! parameter shifted to either side (profile), and fits to twins (parametric bootstrap).
+//! Fits that start from the best end of a search to determine the uncertainty: a fit with shorter segments,
+//! fits with each parameter shifted to either side (profile), and fits to simulated recordings (twins;
+//! parametric bootstrap).
 
 use super::checkpoint::{Checkpoint, Iterate, TraceSearchSettings, chi2_per_dof};
 use super::initial_states::RescuePolicy;
@@ -31,17 +32,17 @@ pub(crate) enum UncertaintyRun {
     Twin(usize),
     /// A fit with the segments of the previous stage.
     Shorter,
-    /// A fit with one unknown pinned away from its estimate.
+    /// A fit in which one unknown is held at a fixed distance from its estimate.
     Side {
         /// Index of the unknown.
         unknown: usize,
-        /// Whether it is pinned above the estimate.
+        /// Whether the unknown is held above its estimate.
         above: bool,
     },
 }
 
 impl UncertaintyRun {
-    /// Number of its chain; the chains of the starts have lower numbers.
+    /// Number of the chain of this run; the chains of the starts have lower numbers.
     pub(crate) fn chain_number(self) -> usize {
         MAX_STARTS
             + match self {
@@ -51,7 +52,7 @@ impl UncertaintyRun {
             }
     }
 
-    /// The run of the chain with this number; `None` for a start.
+    /// The run whose chain has the number `chain`; `None` if it is the chain of a start.
     pub(crate) fn from_chain_number(chain: usize) -> Option<Self> {
         let number = chain.checked_sub(MAX_STARTS)?;
         Some(match number.checked_sub(MAX_TWINS) {
@@ -66,7 +67,7 @@ impl UncertaintyRun {
     }
 
     /// Whether the chain of this run ends with the iterate `last`. A few steps suffice, because a run begins
-    /// near its end, where the linear model nearly holds.
+    /// near its minimum, where the linear model is accurate.
     fn is_complete(self, last: &Iterate) -> bool {
         let max_steps = match self {
             Self::Twin(_) => 4,
@@ -86,15 +87,16 @@ pub(crate) struct SearchEnd<'a> {
     pub seed: u64,
     pub at: &'a Iterate,
     pub covariance: TraceCovariance,
-    /// Factor on variances, at least 1: chi2 per degree of freedom, because the noise may be
-    /// larger than measured.
+    /// Factor on all variances: chi2 per degree of freedom, but at least 1. The noise may be larger than
+    /// measured.
     pub widening: f64,
-    /// Standard deviation of each coordinate: the larger of those from curvature and sandwich estimate.
+    /// Standard deviation of each coordinate: the larger of the estimates from curvature and from the
+    /// sandwich formula.
     pub sd: Vec<f64>,
 }
 
 impl<'a> SearchEnd<'a> {
-    /// `None` where the information is singular.
+    /// `None` if the information matrix is singular.
     pub(crate) fn new(
         model: &'a TraceModel,
         settings: &'a TraceSearchSettings,
@@ -108,8 +110,8 @@ impl<'a> SearchEnd<'a> {
         Some(Self { model, settings, seed, at, covariance, widening, sd })
     }
 
-    /// The runs from this end; none if the search did not reach its plain phase, for example because
-    /// of bad segments.
+    /// The uncertainty runs from this end. The list is empty if the search did not reach its plain phase, for
+    /// example because of bad segments.
     pub(super) fn uncertainty_runs(&self) -> Vec<UncertaintyRun> {
         if !self.at.plain {
             return Vec::new();
@@ -120,13 +122,14 @@ impl<'a> SearchEnd<'a> {
         shorter.into_iter().chain(sides).chain((0..self.settings.twins).map(UncertaintyRun::Twin)).collect()
     }
 
-    /// Distance from the estimate, in the coordinate, at which an unknown is pinned.
+    /// Distance from the estimate, in the coordinate of the unknown, at which the unknown is held.
     fn profile_offset(&self, unknown: usize, above: bool) -> f64 {
         let far = Z_95 * self.sd.get(unknown).copied().unwrap_or_default();
         if above { far } else { -far }
     }
 
-    /// The first iterate of a run, or the one that follows `before`; `None` at the end of the run.
+    /// The first iterate of a run or, if `before` is given, the iterate that follows it; `None` at the end of
+    /// the run.
     pub(crate) fn next_iterate(&self, run: UncertaintyRun, before: Option<&Iterate>) -> Option<Iterate> {
         if before.is_some_and(|before| run.is_complete(before)) {
             return None;
@@ -194,7 +197,7 @@ impl<'a> RunProgress<'a> {
 }
 
 /// Follows runs to their ends, several at once. Returns the last iterate of each run, in order; an entry is
-/// `None` if the scene refuses the first point of the run. Returns `None` if the checkpoint asks to stop.
+/// `None` if the scene refuses the first point of that run. Returns `None` if the checkpoint requests a stop.
 pub(super) fn follow_runs(
     end: &SearchEnd<'_>,
     runs: &[UncertaintyRun],
@@ -228,16 +231,18 @@ pub(super) fn follow_runs(
     Some(ends)
 }
 
-// Profile of the cost: one point on either side of every parameter, with all other unknowns refitted.
+// Profile of the cost: one point on either side of every parameter's estimate, with all other unknowns
+// refitted.
 
-/// Ratio of the standard deviation of the pinning prior to that of the estimate.
+/// Standard deviation of the prior that holds an unknown in place, divided by the standard deviation of its
+/// estimate.
 const PIN_SD: f64 = 1e-3;
-/// Largest factor by which the profile widens an interval.
+/// Largest factor by which the profile may widen an interval.
 const MAX_STRETCH: f64 = 3.0;
 
-/// Distances below and above each estimate, in its coordinate, at which the cost reaches the 95 % threshold.
-/// A distance is at least 1.96 standard deviations, and equal to this for an unknown without side runs.
-/// `sides` gives the last iterate of a run.
+/// Distances below and above each estimate, in the coordinate of the unknown, at which the cost reaches the
+/// 95 % threshold. Each distance is at least 1.96 standard deviations; it has this value if the unknown has
+/// no side runs. `sides` gives the last iterate of a run.
 pub(super) fn profile_distances<'s>(
     end: &SearchEnd<'_>,
     sides: impl Fn(UncertaintyRun) -> Option<&'s Iterate>,
@@ -255,13 +260,13 @@ pub(super) fn profile_distances<'s>(
     (0..end.at.point.len()).map(one).collect()
 }
 
-/// Mean and standard deviation of the prior that pins unknown `i`.
+/// Mean and standard deviation of the prior that holds unknown `i` in place.
 fn pin_prior(end: &SearchEnd<'_>, i: usize, moved: f64) -> [f64; 2] {
     [end.at.point[i] + moved, PIN_SD * end.covariance.curvature[(i, i)].sqrt()]
 }
 
-/// The model with unknown `i` pinned away from its estimate, and the minimum that the linear model
-/// predicts for it.
+/// The model with unknown `i` held at the distance `moved` from its estimate, and the point at which the
+/// linear model predicts the minimum.
 fn pin_unknown(end: &SearchEnd<'_>, i: usize, moved: f64) -> (TraceModel, Vec<f64>) {
     let covariance = &end.covariance.curvature;
     let mut pinned = end.model.clone();
@@ -274,8 +279,7 @@ fn pin_unknown(end: &SearchEnd<'_>, i: usize, moved: f64) -> (TraceModel, Vec<f6
     (pinned, point)
 }
 
-/// Cost of an iterate with unknown `i` pinned, without the term of the pinning prior, minus the cost of the
-/// best end.
+/// Rise in cost above the best end when unknown `i` is held in place; the prior that holds it is not counted.
 fn cost_rise(end: &SearchEnd<'_>, i: usize, moved: f64, at: &Iterate) -> f64 {
     let [pinned_at, sd] = pin_prior(end, i, moved);
     let prior = end.model.unknowns.0[i].prior;
@@ -283,15 +287,15 @@ fn cost_rise(end: &SearchEnd<'_>, i: usize, moved: f64, at: &Iterate) -> f64 {
     at.cost - math::powi((at.point[i] - pinned_at) / sd, 2) + own - end.at.cost
 }
 
-// Parametric bootstrap (Efron and Tibshirani, An Introduction to the Bootstrap, 1993, chapter 6): the model
-// at the best end with new noise, refitted from this end.
+// Parametric bootstrap (Efron and Tibshirani, An Introduction to the Bootstrap, 1993, chapter 6): recordings
+// are simulated at the best end with new noise and fitted again from this end.
 
-/// Number of steps of the starting state of a segment before the first outer step.
+/// Number of steps in the fit of each starting state to a twin before the first outer step.
 const TWIN_STATE_STEPS: usize = 3;
-/// Number of frames after which correlated noise no longer depends on its first values.
+/// Number of frames after which simulated correlated noise no longer depends on its first values.
 const NOISE_WARM_UP_FRAMES: usize = 400;
 
-/// The model with the data of twin number `draw`, simulated at the end of a search.
+/// The model with the data of twin number `draw`: a recording simulated at the end of a search.
 fn simulate_twin(end: &SearchEnd<'_>, draw: usize) -> TraceModel {
     let SearchEnd { model, at, .. } = end;
     let mut generator = Xoshiro256PlusPlus::seed_from_u64(end.seed ^ ((draw as u64 + 1) << 40));
@@ -311,14 +315,14 @@ fn simulate_twin(end: &SearchEnd<'_>, draw: usize) -> TraceModel {
             column[frame] = column[frame].map(|measured| measured + residual_m + drawn);
         }
     }
-    // the mean of a prior is a measurement too, so it also scatters
+    // the mean of a prior is also a measured value, so a twin draws it at random too
     for [mean, sd] in twin.unknowns.0.iter_mut().filter_map(|unknown| unknown.prior.as_mut()) {
         *mean += *sd * generator.sample::<f64, _>(StandardNormal);
     }
     twin
 }
 
-/// Simulated noise in every frame, m.
+/// Simulated tracking noise in every frame, m.
 fn draw_noise(noise: &AutoregressiveNoise, frames: usize, generator: &mut Xoshiro256PlusPlus) -> Vec<f64> {
     let mut values: Vec<f64> = Vec::with_capacity(NOISE_WARM_UP_FRAMES + frames);
     for _ in 0..NOISE_WARM_UP_FRAMES + frames {

@@ -1,5 +1,5 @@
 //! Unknowns of a trace fit, without the starting states: parameters of the scene and errors of the cameras.
-//! Each has a coordinate of order one.
+//! Each has a dimensionless coordinate whose size is of the order of 1.
 
 use crate::simulate::scene::Scene;
 use portable_math as math;
@@ -11,11 +11,11 @@ pub enum CameraUnknown {
     OffsetX,
     /// Offset of the drop, m: the measured drop of an upright blade.
     OffsetDrop,
-    /// Rate of change of [`Self::OffsetX`], m/s; the offset itself applies at the middle of
-    /// the fitted frames.
+    /// Rate of change of [`Self::OffsetX`], m/s; `OffsetX` itself is the offset at the middle of the fitted
+    /// frames.
     DriftX,
-    /// Rate of change of [`Self::OffsetDrop`], m/s; the offset itself applies at the middle of
-    /// the fitted frames.
+    /// Rate of change of [`Self::OffsetDrop`], m/s; `OffsetDrop` itself is the offset at the middle of the
+    /// fitted frames.
     DriftDrop,
     /// Relative error of the scale: a metre appears as `1 + scale` metres.
     Scale,
@@ -26,7 +26,8 @@ pub enum CameraUnknown {
 }
 
 impl CameraUnknown {
-    /// Error that corresponds to a coordinate of 1, in its SI unit: a typical size of the error.
+    /// Camera error that corresponds to a coordinate of 1, in the SI unit of the error. It is a typical size
+    /// of this error.
     pub(super) fn coordinate_unit(self) -> f64 {
         match self {
             Self::OffsetX | Self::OffsetDrop | Self::DriftX | Self::DriftDrop => 1e-4,
@@ -42,9 +43,10 @@ pub enum UnknownKind {
     /// A parameter that all scenes share. Its coordinate is the logarithm of its value or, with linear
     /// bounds, the value divided by the width of the bounds.
     Parameter {
-        /// Name in the table of parameters.
+        /// Name of the parameter in the table of parameters.
         name: String,
-        /// Value that corresponds to a coordinate of 1; `None` if the coordinate is the logarithm.
+        /// Value that corresponds to a coordinate of 1; `None` if the coordinate is the logarithm of the
+        /// value.
         unit: Option<f64>,
     },
     /// An error of the camera of one recording.
@@ -55,13 +57,13 @@ pub enum UnknownKind {
     },
 }
 
-/// An unknown with its range and its prior, both in its coordinate.
+/// An unknown with its range and its prior; both refer to the coordinate of the unknown, not to its value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TraceUnknown {
     pub kind: UnknownKind,
     /// Lower and upper end of the range, in the coordinate.
     pub range: [f64; 2],
-    /// Mean and standard deviation of its normal prior, in the coordinate.
+    /// Mean and standard deviation of the normal prior of the coordinate, if there is one.
     pub prior: Option<[f64; 2]>,
     /// Coordinate at which a search starts.
     pub start: f64,
@@ -76,12 +78,12 @@ impl TraceUnknown {
         }
     }
 
-    /// The value at a coordinate, in its SI unit.
+    /// The value at a coordinate, in the SI unit of the unknown.
     pub(crate) fn value(&self, coordinate: f64) -> f64 {
         self.unit().map_or_else(|| math::exp(coordinate), |unit| coordinate * unit)
     }
 
-    /// The coordinate of a value, which is in its SI unit.
+    /// The coordinate of a value that is given in the SI unit of the unknown.
     pub(crate) fn coordinate(&self, value: f64) -> f64 {
         self.unit().map_or_else(|| math::ln(value), |unit| value / unit)
     }
@@ -91,7 +93,8 @@ impl TraceUnknown {
         self.unit().unwrap_or_else(|| math::exp(coordinate))
     }
 
-    /// Distance from the mean of the prior, in standard deviations, and its derivative by the coordinate.
+    /// Distance of a coordinate from the mean of the prior, in standard deviations, and derivative of this
+    /// distance by the coordinate; `None` without a prior.
     pub(super) fn prior_residual(&self, coordinate: f64) -> Option<[f64; 2]> {
         self.prior.map(|[mean, sd]| [(coordinate - mean) / sd, 1.0 / sd])
     }
@@ -114,7 +117,7 @@ pub(crate) struct CameraParameters {
 }
 
 impl CameraParameters {
-    /// Offsets of position and drop, m, at the time `after_s` relative to the middle of the fitted frames.
+    /// Offsets of position and drop, m, at the time `after_s` (s) after the middle of the fitted frames.
     pub(crate) fn offsets_m(&self, after_s: f64) -> [f64; 2] {
         [
             self.offset_x_m + self.drift_x_m_per_s * after_s,
@@ -142,7 +145,7 @@ impl TraceUnknowns {
         }
     }
 
-    /// Errors of the camera of a recording at a point; those that are not estimated are 0.
+    /// Errors of the camera of a recording at a point; errors that are not estimated are 0.
     pub(crate) fn camera_at(&self, film: usize, point: &[f64]) -> CameraParameters {
         let value = |what| {
             let kind = UnknownKind::Camera { film, what };
@@ -174,7 +177,7 @@ impl TraceUnknowns {
         Some(scene)
     }
 
-    /// Cost of the priors at a point.
+    /// Cost of the priors at a point: the sum of their squared residuals.
     pub(super) fn prior_cost(&self, point: &[f64]) -> f64 {
         let residuals = self.0.iter().zip(point).filter_map(|(unknown, z)| unknown.prior_residual(*z));
         residuals.map(|[residual, _]| residual * residual).sum()

@@ -3,24 +3,26 @@
 use super::segment_simulation::{LinearizedSegment, LinkState};
 use nalgebra::{DMatrix, DVector};
 
-/// Smallest singular value of the scaled state columns that is kept, relative to the largest.
+/// Smallest singular value of the scaled Jacobian columns of the starting state that is kept, relative to the
+/// largest singular value.
 const MIN_SINGULAR: f64 = 1e-4;
 
-/// Normal equations of one segment for the unknowns, and the step of its starting state as a function of
-/// them.
+/// Normal equations of one segment for the unknowns, and the step of the starting state as a linear function
+/// of the step of the unknowns.
 #[derive(Debug, Clone)]
 pub(super) struct ProjectedSegment {
     /// `J^T J` of the Jacobian `J` from which the state has been projected out.
     pub matrix: DMatrix<f64>,
     /// `J^T r` with the residuals `r`.
     pub slope: DVector<f64>,
-    /// Minus the step of the state with the unknowns held fixed.
+    /// Minus the step of the starting state while the unknowns are held fixed.
     pub move_held: LinkState,
-    /// Minus the derivative of the step of the state by the unknowns.
+    /// Minus the derivative of the step of the starting state by the step of the unknowns.
     pub move_by_unknown: DMatrix<f64>,
 }
 
-/// Projects the columns of the state out of residuals and Jacobian; `None` if the decomposition fails.
+/// Projects the Jacobian columns of the starting state out of the residuals and of the other columns; `None`
+/// if the decomposition fails.
 pub(super) fn project_out_state(linear: &LinearizedSegment) -> Option<ProjectedSegment> {
     let LinearizedSegment { residuals, by_state, by_unknown } = linear;
     let scales: [f64; 4] = std::array::from_fn(|i| by_state.column(i).norm().max(1e-12));

@@ -2,7 +2,7 @@ use super::*;
 use crate::checkpoint::read_checkpoint;
 use crate::fit::trace_checkpoint::tests::{header, iterate};
 
-/// Number of iterates in a whole search.
+/// Number of iterates in each chain of a complete search.
 const STEPS: usize = 6;
 const STARTS: usize = 2;
 
@@ -11,7 +11,8 @@ fn next(before: Option<&Iterate>) -> Option<Iterate> {
     (step < STEPS).then(|| iterate(step))
 }
 
-/// Result of a search: reason why it stopped, number of iterates that it counts, and number that it computed.
+/// Result of a search: reason why it stopped, number of iterates that the ledger counts, and number of
+/// iterates that were computed.
 #[derive(Debug, PartialEq)]
 struct SearchTally {
     stopped: Option<TraceStopReason>,
@@ -19,7 +20,7 @@ struct SearchTally {
     made: usize,
 }
 
-/// Two searches that continue `journal`, in the same way as the engine.
+/// Runs the searches of two starts that continue `journal`, in the same way as the real search.
 fn searched(journal: &mut String, most: usize, asked_to_stop_at: usize) -> SearchTally {
     let before = journal.clone();
     let found = read_checkpoint::<IterateRecord>("j", &before).unwrap();

@@ -1,9 +1,10 @@
-//! Searches the whole range of every identified parameter for other values that fit as well.
+//! Searches the whole range of every identified parameter for other values that fit equally well (rival
+//! values).
 //!
 //! Slopes and profiles describe the cost near the best point. The cost of a dozen features of one run has
-//! many minima: a neck of twice the stiffness may give the same two frequencies. For each identified
-//! parameter, one search therefore runs below its interval and another one above it, with seeds that differ
-//! from that of the first search.
+//! many minima: for example, a neck of twice the stiffness may give the same two frequencies. Therefore, for
+//! each identified parameter, one search runs below its interval and another above it. Their seeds differ
+//! from the seed of the first search.
 
 use super::{FitUncertainty, MAX_RESTARTS, ParameterVerdict, assess_best, polish_within};
 use crate::fit::job::IntervalSettings;
@@ -13,21 +14,23 @@ use crate::fit::search::{MIN_WORTHWHILE_GAIN, SearchSettings, Slab};
 use crate::fit::search::{best_in_slab, search_excluded_region};
 use crate::text::format_number;
 
-/// Smallest distance of a rival value from the best value, in half widths of the interval. A parabolic cost
-/// has risen by 15 there.
+/// Smallest distance of a rival value from the best value, in half widths of the 95 % interval. At this
+/// distance a parabolic cost has risen by 15.
 const DISTANCE_FACTOR: f64 = 2.0;
 /// Rise in cost above which a rival value is excluded: the 99.9 % quantile of chi-squared with one degree of
-/// freedom. It is larger than the 3.84 of an interval, because a search rarely reaches the exact minimum of
-/// another valley of a rough cost.
+/// freedom. It is larger than the rise of 3.84 at the ends of a 95 % interval, because a search rarely
+/// reaches the exact minimum of another valley of a rough cost.
 const MIN_RIVAL_RISE: f64 = 10.8;
-/// Width of the narrowest range that is searched, in the unit box; profiles cover narrower ranges.
+/// Width of the narrowest range that is searched, in the unit box; narrower ranges are covered by the
+/// profiles.
 const MIN_SLAB_WIDTH: f64 = 0.02;
-/// Width of a gap that splits an interval in two, as a fraction of the interval.
+/// Smallest width of a gap that splits an interval in two, as a fraction of the width of the interval.
 const MIN_GAP_SHARE: f64 = 0.5;
-/// Number of evaluations of all these searches together, as a fraction of the budget of the first search.
+/// Number of evaluations of all searches for rival values together, as a fraction of the budget of the first
+/// search.
 const EVALUATION_SHARE: f64 = 0.5;
 
-/// Withdraws the verdict of each identified parameter that has a rival value. If a search finds a better
+/// Changes each identified parameter that has a rival value to not identified. If a search finds a better
 /// point, that point is polished and assessed instead.
 pub(crate) fn confirm_identified(
     ledger: &mut Ledger,
@@ -50,7 +53,8 @@ pub(crate) fn confirm_identified(
     withdraw_rivalled(found, ledger, names, false)
 }
 
-/// Whether any point within the threshold lies outside the interval of an identified parameter.
+/// Whether any evaluated point with a cost within the threshold is outside the interval of an identified
+/// parameter.
 fn has_point_outside(found: &FitUncertainty, ledger: &Ledger) -> bool {
     let limit = found.best.cost + CHI_SQUARED_95;
     excluded_slabs(found, ledger, 1.0).into_iter().any(|slab| {
@@ -58,8 +62,8 @@ fn has_point_outside(found: &FitUncertainty, ledger: &Ledger) -> bool {
     })
 }
 
-/// For each identified parameter, the values below and above the best one that are farther from it than
-/// `times` the distance of the end of the interval on that side.
+/// For each identified parameter, two ranges: values below and above the best value that are farther from it
+/// than `times` the distance of the interval's end on the same side.
 fn excluded_slabs(found: &FitUncertainty, ledger: &Ledger, times: f64) -> Vec<Slab> {
     let axes = ledger.objective().axes().iter().zip(&found.best.unit).zip(&found.intervals);
     let sides =
@@ -75,7 +79,7 @@ fn excluded_slabs(found: &FitUncertainty, ledger: &Ledger, times: f64) -> Vec<Sl
     both.filter(|slab| slab.upper - slab.lower > MIN_SLAB_WIDTH).collect()
 }
 
-/// Searches all slabs; returns whether every search was completed.
+/// Searches all slabs (ranges of one parameter); returns whether every search was completed.
 fn search_slabs(ledger: &mut Ledger, slabs: &[Slab], settings: &SearchSettings) -> bool {
     let budget = EVALUATION_SHARE * (settings.global_evaluations + settings.local_evaluations) as f64;
     let share = (budget / slabs.len().max(1) as f64) as usize;
@@ -119,8 +123,8 @@ fn withdraw_rivalled(
     found
 }
 
-/// Withdraws the verdict of a parameter whose interval is split: good values lie on both sides of a wide gap
-/// in which the profile exceeds the threshold.
+/// Changes an identified parameter to not identified if its interval is split: values with a cost within the
+/// threshold lie on both sides of a wide gap in which the profile exceeds the threshold.
 fn withdraw_split_interval(found: &mut FitUncertainty, ledger: &Ledger, names: &[String], axis: usize) {
     let (interval, bounds) = (&mut found.intervals[axis], ledger.objective().axes()[axis].bounds);
     let ends = interval.lower_95.zip(interval.upper_95);

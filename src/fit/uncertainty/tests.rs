@@ -13,7 +13,8 @@ use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::ops::ControlFlow;
 
-/// Features of two parameters; the features of twins scatter normally with the given standard deviations.
+/// A model with two parameters; in twins, the logarithms of its features scatter normally with the standard
+/// deviations `sds`.
 struct FakePredictor<'a> {
     features: fn(f64, f64) -> Result<Vec<f64>, RunFailure>,
     sds: &'a [f64],
@@ -40,8 +41,8 @@ const BOTH: IntervalSettings = IntervalSettings { profile: true, bootstrap: 400 
 
 type Features = fn(f64, f64) -> Result<Vec<f64>, RunFailure>;
 
-/// Assessment of two logarithmic parameters from 0.1 to 10. Every target is 1 with the given standard
-/// deviation; the search ended at `unit`.
+/// Assessment of two parameters, each on a logarithmic scale from 0.1 to 10. Every target is 1 with the
+/// standard deviation in `sds`; the search ended at the point `unit`.
 fn at(features: Features, sds: &[f64], unit: [f64; 2], settings: IntervalSettings) -> FitUncertainty {
     with(features, sds, &[unit], settings)
 }
@@ -80,7 +81,8 @@ fn intervals_of_powers_are_exact_by_the_linear_model_and_by_profiles() {
         for (interval, sd_ln) in found.intervals.iter().zip([0.01 / 2.0, 0.02 / 4.0]) {
             assert_eq!(interval.verdict, ParameterVerdict::Identified);
             let half = CHI_SQUARED_95.sqrt() * sd_ln;
-            // a crossing is interpolated linearly in the root of the rise, which is exact here
+            // a crossing is interpolated linearly in the square root of the rise in cost, which is exact for
+            // this parabolic cost
             assert!(
                 ln_ends(interval)
                     .iter()
@@ -98,8 +100,8 @@ fn intervals_of_powers_are_exact_by_the_linear_model_and_by_profiles() {
 
 #[test]
 fn a_profile_lets_the_other_parameter_follow() {
-    // ln p and ln(p q) are known to 0.02 and 0.01, so q alone is known to sqrt(0.02^2 + 0.01^2); a cut at
-    // fixed p would give 0.01
+    // ln p and ln(p q) are known to 0.02 and 0.01, so ln q is known to sqrt(0.02^2 + 0.01^2); without
+    // variation of p it would be 0.01
     let found = at(|p, q| Ok(vec![p, p * q]), &[0.02, 0.01], [0.5, 0.5], PROFILE);
     let half = CHI_SQUARED_95.sqrt() * 0.02_f64.hypot(0.01);
     let [lower, upper] = ln_ends(&found.intervals[1]);
@@ -125,15 +127,15 @@ fn a_bound_that_excludes_a_better_value_leaves_nothing_identified() {
     assert_eq!(excluding.intervals[1].verdict, ParameterVerdict::NotIdentified);
     let said = "nothing is called identified (q): p is at its bound, and a value beyond the bound would";
     assert!(excluding.notes[0].starts_with(said), "{:?}", excluding.notes);
-    // here the optimum lies exactly at the bound
+    // in this case the optimum is exactly at the bound
     let met = at(|p, q| Ok(vec![10.0 * p, q]), &[0.02, 0.01], [0.0, 0.5], PROFILE);
     assert_eq!(met.intervals[1].verdict, ParameterVerdict::Identified);
 }
 
 #[test]
 fn a_profile_is_not_symmetric_where_the_model_is_not() {
-    // p^3 / 2 + p / 2 meets its target at p = 1: the profile crosses where the feature has changed by 1.96
-    // deviations, not where a parabola would
+    // p^3 / 2 + p / 2 reaches its target at p = 1. The profile crosses the threshold where this feature has
+    // changed by 1.96 standard deviations, not where a parabolic cost would cross it
     let found = at(|p, q| Ok(vec![p.powi(3) / 2.0 + p / 2.0, q]), &[0.3, 0.01], [0.5, 0.5], PROFILE);
     let rise = CHI_SQUARED_95.sqrt() * 0.3;
     let [lower, upper] = [found.intervals[0].lower_95.unwrap(), found.intervals[0].upper_95.unwrap()];
@@ -149,7 +151,7 @@ fn twins_scatter_as_the_deviations_say() {
     let found = at(|p, q| Ok(vec![p, p * q]), &[0.02, 0.01], [0.5, 0.5], BOTH);
     for (interval, sd) in found.intervals.iter().zip([0.02, 0.02_f64.hypot(0.01)]) {
         let [lower, upper] = interval.bootstrap_95.unwrap().map(f64::ln);
-        // 400 twins give a standard deviation to 3.5 %; three times that is allowed
+        // 400 twins give a standard deviation that is accurate to 3.5 %; three times this error is allowed
         assert!(((upper - lower) / 2.0 / (Z_95 * sd) - 1.0).abs() < 0.11, "{lower} {upper} {sd}");
     }
     assert_eq!(found.twins, 400);
@@ -158,7 +160,7 @@ fn twins_scatter_as_the_deviations_say() {
 
 #[test]
 fn an_interval_reaches_to_every_point_that_is_as_good() {
-    // p^2 has its target at the middle of the box; a point far away in q costs almost nothing
+    // p^2 reaches its target in the middle of the box; a point at a very different q has almost zero cost
     let features: Features = |p, q| Ok(vec![p * p, if (5.0..7.0).contains(&q) { 1.001 } else { q }]);
     let found = |tried: &[[f64; 2]], settings| {
         with(features, &[0.01, 0.01], &[&[[0.5, 0.5]], tried].concat(), settings).intervals[1].clone()
@@ -218,7 +220,7 @@ fn an_insensitive_parameter_alone_is_not_identified() {
 
 #[test]
 fn a_parameter_that_only_stops_mattering_on_one_side_is_open_there() {
-    // above q = 1 nothing changes: the linear model alone would close the interval
+    // above q = 1 no feature changes; by the linear model alone the interval would have an upper end
     let features: Features = |p, q| Ok(vec![p, q.min(1.0)]);
     let found = at(features, &[0.01, 0.01], [0.5, 0.5], PROFILE);
     assert_eq!(found.intervals[1].verdict, ParameterVerdict::OpenAbove, "{:?}", found.intervals[1]);
@@ -255,7 +257,8 @@ fn intervals_that_reach_a_bound_are_open_and_a_best_point_at_one_says_so() {
 
 #[test]
 fn an_interval_that_ends_where_another_parameter_meets_its_bound_is_open() {
-    // only p q is known: p can rise by as much as q can fall, and q is 10^0.2 times its lower bound
+    // the only feature is p q: p can rise by the factor by which q can fall, and q is 10^0.2 times its lower
+    // bound
     let features: Features = |p, q| Ok(vec![p * q / 0.1_f64 / 10.0_f64.powf(0.2)]);
     let found = at(features, &[0.01], [0.5, 0.1], PROFILE);
     let profile = &found.intervals[0].profile;
@@ -265,7 +268,7 @@ fn an_interval_that_ends_where_another_parameter_meets_its_bound_is_open() {
 
 #[test]
 fn where_the_model_ends_nothing_is_identified() {
-    // only p q is known, and the blade does not run for p above 3 or below 1/3
+    // the only feature is p q, and the model fails for p above 3 or below 1/3
     let features: Features = |p, q| {
         if p.ln().abs() > 1.1 {
             Err(RunFailure::new(FailureReason::Ended(crate::simulate::RunStatus::ContactLost), "", 0.5))
@@ -281,7 +284,7 @@ fn where_the_model_ends_nothing_is_identified() {
 
 #[test]
 fn a_better_point_on_the_way_is_followed() {
-    // the search ended in a side valley, and the profile of q leaves it
+    // the search ended in a side valley of the cost, and the profile of q leads out of it
     let features: Features = |p, q| Ok(vec![p, q * (1.0 + 0.3 * (-((q - 1.6) / 0.2).powi(2)).exp())]);
     let found = at(features, &[0.01, 0.2], [0.5, 0.62], PROFILE);
     assert!((found.best.values[1] - 1.0).abs() < 0.02, "{:?}", found.best.values);
@@ -303,7 +306,7 @@ fn a_misfit_that_one_search_alone_came_to_identifies_nothing() {
     let axes = vec![SearchAxis::from(Bounds::new(0.1, 10.0, BoundsSpacing::Log).unwrap()); 2];
     let objective = Objective::new(axes, (0..3).map(target).collect(), &fake);
     let best = objective.evaluate(&[0.5, 0.5 - 0.025 / 100.0_f64.ln()]);
-    // a sum of squares of 12.5 with one degree of freedom; one sum in a thousand exceeds 10.8
+    // the sum of squares is 12.5 with one degree of freedom; by chance, one in a thousand exceeds 10.8
     assert!(
         check_best_point(&objective, &best, &[best.cost, best.cost + 4.0])
             .unwrap_err()
@@ -343,7 +346,8 @@ fn a_misfit_widens_the_deviations() {
     let best = vec![0.5, 0.5 - 0.025 / 100.0_f64.ln()];
     ledger.evaluate_points(EvaluationStage::Local, &[best]).unwrap();
     let found = weigh_features(&mut ledger).unwrap();
-    // two features differ by 5 deviations, 2.5 each from their mean, with one degree of freedom
+    // two features differ by 5 standard deviations, so each is 2.5 from their mean; there is one degree of
+    // freedom
     assert!((found.inflation - 12.5_f64.sqrt()).abs() < 1e-6);
     assert!(
         found.scatter.iter().all(|scatter| (scatter.hypot(0.01) / 0.01 - 12.5_f64.sqrt()).abs() < 1e-6),
@@ -353,7 +357,7 @@ fn a_misfit_widens_the_deviations() {
 
 #[test]
 fn a_feature_that_is_not_smooth_counts_for_less() {
-    // the first feature jumps between 2 % above and 2 % below p; its deviation is 1 %
+    // the first feature jumps between 2 % above and 2 % below p; the standard deviation of its target is 1 %
     let features: Features =
         |p, q| Ok(vec![p * if (p.ln() * 43.0).rem_euclid(2.0) < 1.0 { 1.02 } else { 0.98 }, q]);
     let fake = FakePredictor { features, sds: &[0.01; 2] };
@@ -396,7 +400,7 @@ fn a_model_that_fails_on_one_side_is_differenced_on_the_other() {
     assert!((1.0..1.01).contains(&upper), "what fails is outside: {upper}");
 }
 
-/// Like [`at`], with the searches for rival values.
+/// Like [`at`], followed by the searches for rival values.
 fn confirmed_at(features: Features, sds: &[f64], unit: [f64; 2]) -> FitUncertainty {
     let axes = vec![SearchAxis::from(Bounds::new(0.1, 10.0, BoundsSpacing::Log).unwrap()); 2];
     let target = |(i, sd): (usize, &f64)| TargetValue {
@@ -428,7 +432,8 @@ fn confirmed_at(features: Features, sds: &[f64], unit: [f64; 2]) -> FitUncertain
 
 #[test]
 fn a_value_that_fits_as_well_at_twice_the_estimate_bars_identified() {
-    // q = 1 and q = 2 give the same features, and the slopes at either say that q is known to a percent
+    // q = 1 and q = 2 give the same features, and the slopes at each of them imply that q is known to a
+    // percent
     let folded: Features = |p, q| Ok(vec![p, 1.0 + (q - 1.0) * (q - 2.0) / 3.0]);
     let near = at(folded, &[0.01, 0.01], [0.5, 0.5], PROFILE);
     assert_eq!(near.intervals[1].verdict, ParameterVerdict::Identified);
@@ -451,7 +456,8 @@ fn what_nothing_elsewhere_meets_stays_identified() {
 
 #[test]
 fn a_better_point_elsewhere_is_assessed_instead() {
-    // the side valley at q = 1 misses by two deviations a target that the valley at q = 5 meets
+    // at q = 5 the model reaches the second target; in the side valley at q = 1 it misses it by two standard
+    // deviations
     let valleys: Features = |p, q| {
         let side = (q.ln() / 0.02).powi(2);
         let deep = ((q / 5.0).ln() / 0.02).powi(2);

@@ -1,4 +1,5 @@
-//! Verdicts: effect of parameters at their bounds, weights of the features, and trust in the best point.
+//! Verdicts on parameters: effect of parameters at their bounds, weights of the features, and check of the
+//! best point.
 
 use super::{ParameterResult, ParameterVerdict, interval_verdict};
 use crate::fit::evaluation::{Evaluation, EvaluationStage};
@@ -15,9 +16,10 @@ use crate::fit::target_value::TargetValue;
 use nalgebra::DMatrix;
 use portable_math as math;
 
-/// Smallest correlation with which a parameter at its bound makes another estimate unreliable. An optimum `k`
-/// deviations outside the bound shifts the other estimate by `k` times the correlation, in deviations of that
-/// estimate. At this correlation, ten deviations shift it by the half width of its 95 % interval.
+/// Smallest correlation with which a parameter at its bound makes another estimate unreliable. If the optimum
+/// is `k` standard deviations outside the bound, the other estimate shifts by `k` times the correlation, in
+/// its own standard deviations. At this correlation, `k` = 10 gives a shift of half the width of the 95 %
+/// interval.
 const MIN_CORRELATION: f64 = 0.2;
 
 /// Whether a coordinate of the unit box is at an end of the box.
@@ -25,7 +27,8 @@ pub(super) fn is_at_bound(unit: f64) -> bool {
     !(AT_BOUND..=1.0 - AT_BOUND).contains(&unit)
 }
 
-/// The parameter at its bound that is most strongly correlated with an estimate, and that correlation.
+/// Index of the parameter at a bound that is most strongly correlated with parameter `axis`, and the
+/// correlation; `None` if no correlation reaches [`MIN_CORRELATION`].
 pub(super) fn strongest_bound_correlation(
     axis: usize,
     unit: &[f64],
@@ -37,8 +40,8 @@ pub(super) fn strongest_bound_correlation(
         .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
 }
 
-/// Among the parameters at a bound, the one whose optimum outside the bound would lower the cost most, and
-/// this decrease by the linear model; `None` if no decrease exceeds [`MIN_WORTHWHILE_GAIN`].
+/// Index of the parameter at a bound whose optimum outside the bound would lower the cost most, and the
+/// decrease of the cost by the linear model; `None` if no decrease exceeds [`MIN_WORTHWHILE_GAIN`].
 pub(super) fn best_excluded_gain(
     unit: &[f64],
     jacobian: &DMatrix<f64>,
@@ -55,7 +58,8 @@ pub(super) fn best_excluded_gain(
     gains.filter(|(_, gain)| *gain > MIN_WORTHWHILE_GAIN).max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Withdraws all verdicts because a bound excludes a better value; returns a note if any was withdrawn.
+/// Changes all identified parameters to not identified, because the bound of parameter `held` excludes a
+/// better value; returns a note if any verdict changed.
 pub(super) fn withdraw_all(
     intervals: &mut [ParameterResult],
     names: &[String],
@@ -76,8 +80,8 @@ pub(super) fn withdraw_all(
     ))
 }
 
-/// Withdraws the verdicts of parameters that are correlated with a parameter at its bound; returns one
-/// note for each.
+/// Changes identified parameters that are correlated with a parameter at a bound to not identified; returns
+/// one note for each changed verdict.
 pub(super) fn withdraw_correlated(
     intervals: &mut [ParameterResult],
     names: &[String],
@@ -101,19 +105,22 @@ pub(super) fn withdraw_correlated(
     notes
 }
 
-/// Weights of the features at the best point, as additional scatter.
+/// Weights of the features at the best point, expressed as additional scatter.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FeatureWeights {
-    /// Scatter of each feature, in its unit, that accounts for the misfit and for the roughness of the model.
+    /// Scatter of each feature, in the unit of the feature, that accounts for the misfit and for the
+    /// roughness of the model.
     pub scatter: Vec<f64>,
-    /// Factor on all deviations that accounts for the misfit (Birge, Phys. Rev. 40 (1932) 207); at least 1.
+    /// Factor on all standard deviations that accounts for the misfit (Birge, Phys. Rev. 40 (1932) 207); at
+    /// least 1.
     pub inflation: f64,
-    /// Scatter of each feature, in its unit, that accounts for the roughness of the model alone.
+    /// Scatter of each feature, in the unit of the feature, that accounts only for the roughness of the
+    /// model.
     pub roughness: Vec<f64>,
 }
 
-/// Weighs the features at the best point of the ledger; `None` if the model failed there or the neighbours of
-/// the point cannot be evaluated.
+/// Determines the weights of the features at the best point of the ledger; `None` if the model failed at this
+/// point or its neighbours cannot be evaluated.
 pub(crate) fn weigh_features(ledger: &mut Ledger) -> Option<FeatureWeights> {
     let best = ledger.best_evaluation().filter(|best| best.failure.is_none())?.clone();
     let targets = ledger.objective().targets();
@@ -134,12 +141,12 @@ pub(crate) fn weigh_features(ledger: &mut Ledger) -> Option<FeatureWeights> {
     })
 }
 
-/// Checks the best point: a second local search must reach it, unless its cost is practically zero. If there
-/// was only one local search, it is enough that the features are met within their deviations. `costs` are
-/// those of the local searches without the final polish.
+/// Checks the best point: at least two local searches must reach its cost, unless this cost is practically
+/// zero. After a single local search, it is sufficient that the residuals are as small as their standard
+/// deviations allow. `costs` are the costs at which the local searches end, without the final polish.
 ///
 /// # Errors
-/// The note on a best point that is not confirmed.
+/// The note that the best point is not confirmed.
 pub(super) fn check_best_point(
     objective: &Objective,
     best: &Evaluation,
@@ -163,25 +170,26 @@ pub(super) fn check_best_point(
     ))
 }
 
-/// The 99.9 % quantile of the standard normal distribution, for the cube root of chi-squared (Wilson and
-/// Hilferty, Proc. Natl. Acad. Sci. 17 (1931) 684).
+/// The 99.9 % quantile of the standard normal distribution. It gives that of chi-squared, whose cube root is
+/// nearly normal (Wilson and Hilferty, Proc. Natl. Acad. Sci. 17 (1931) 684).
 const CHI2_TAIL_SD: f64 = 3.09;
 
-/// Sum of the squares of the residuals, and its number of degrees of freedom.
+/// Sum of the squared residuals, and the number of degrees of freedom of this sum.
 fn squared_misfit(objective: &Objective, best: &Evaluation) -> (f64, f64) {
     let squares: Vec<f64> = residuals(objective, best).into_iter().flatten().map(|r| r * r).collect();
     let unknowns = best.unit.len() + objective.count_camera_unknowns();
     (squares.iter().sum(), squares.len() as f64 - unknowns as f64)
 }
 
-/// Factor on the deviations that makes the misfit per degree of freedom 1; at least 1.
+/// Factor on the standard deviations that makes the sum of squared residuals per degree of freedom 1; at
+/// least 1.
 fn birge_factor(objective: &Objective, best: &Evaluation) -> f64 {
     let (misfit, freedom) = squared_misfit(objective, best);
     if freedom > 0.0 { (misfit / freedom).sqrt().max(1.0) } else { 1.0 }
 }
 
 /// Verdicts that follow from the numbers of a stored result of a fit of features, one per parameter in job
-/// order. A parameter that the result lacks is not identified.
+/// order. A parameter that is missing from the result is not identified.
 pub(in crate::fit) fn stored_verdicts(job: &Job, result: &FitResult) -> Vec<ParameterVerdict> {
     let names = job.parameter_names();
     let found = |axis: usize| result.parameters.get(&names[axis]);

@@ -1,10 +1,10 @@
-//! Tests of the cameras of features.
+//! Tests of the key `camera` of a recording in a fit of features.
 
 use super::*;
 use crate::feature::LengthCalibration;
 use crate::fit::target_value::TargetCalibration;
 
-/// The job with this text in its recording.
+/// A job with the text `camera` in the table of its recording.
 fn with(camera: &str) -> Job {
     super::job(&MEASURED.replacen(
         "path = \"../../data/x\"\n",

@@ -1,4 +1,4 @@
-//! Tests of the refusal of wrong conditions, tables and kinds.
+//! Tests that jobs with wrong conditions, tables or kinds of features are refused.
 
 use super::*;
 use crate::checkpoint::fingerprint;
@@ -120,7 +120,7 @@ fn something_has_to_be_fitted() {
     );
 }
 
-/// The refusal of a feature with these lines, without `kind`, `sd_relative` and `recording`.
+/// The error message for the job `MEASURED` with one more feature, which consists of these lines only.
 fn refused_feature(lines: &str) -> String {
     refusal(
         MEASURED,
@@ -236,7 +236,7 @@ fn the_problem_is_what_decides_a_cost_and_nothing_else() {
         ("bootstrap = 0", "bootstrap = 9"),
         ("profile = false", "profile = true"),
         ("local_evaluations = 0", "local_evaluations = 9"),
-        // the data count, not their place
+        // the fingerprint covers the contents of the recordings elsewhere, so paths do not change it
         ("data/x", "data/z"),
         ("t.toml", "u.toml"),
     ]) {
