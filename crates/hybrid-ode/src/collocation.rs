@@ -12,7 +12,7 @@
 //! equations are eliminated block by block in the order of time, without exchange of rows, because a later
 //! node has little effect on an earlier one.
 
-#![allow(clippy::needless_range_loop)] // indices are those of the equations
+#![allow(clippy::needless_range_loop)] // the indices are those of the formulas
 
 use portable_math as math;
 use std::array::from_fn;
@@ -27,33 +27,33 @@ pub const LEAST_NODES: usize = 3;
 /// One value per node.
 pub type NodeArray<T> = [T; MOST_NODES];
 
-/// The nodes of a step and the integrals of their polynomials.
+/// The nodes of a step and the integrals of their Lagrange polynomials `l_j`.
 #[derive(Debug, Clone)]
 pub struct CollocationRule {
     /// Number of nodes.
     pub nodes: usize,
-    /// Nodes on [0, 1].
+    /// Positions of the nodes on [0, 1].
     pub positions: NodeArray<f64>,
-    /// Weights of the integral over [0, 1].
+    /// Quadrature weights of the nodes for the integral over [0, 1].
     pub weights: NodeArray<f64>,
     /// Coefficients `(2 m + 1) b_j P_m(2 c_j - 1)` of `l_j` in Legendre polynomials, by node `j` and degree
-    /// `m`.
+    /// `m`; `c_j` is the position and `b_j` the weight of the node.
     legendre: NodeArray<NodeArray<f64>>,
     /// Integral (`once`) and double integral (`twice`) of each `l_j` from 0 to each node.
     once: NodeArray<NodeArray<f64>>,
     twice: NodeArray<NodeArray<f64>>,
 }
 
-/// Rules by number of nodes.
+/// The collocation rules, indexed by their number of nodes.
 static RULES: LazyLock<Vec<CollocationRule>> =
     LazyLock::new(|| (0..=MOST_NODES).map(CollocationRule::new).collect());
 
-/// The rule with this number of nodes, at most [`MOST_NODES`].
+/// The collocation rule with this number of nodes, at most [`MOST_NODES`].
 pub fn collocation_rule(nodes: usize) -> &'static CollocationRule {
     &RULES[nodes]
 }
 
-/// A number, or a vector with one number per lane.
+/// A number, or a SIMD vector with one number per lane.
 pub trait LaneNumber: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
     /// A value with `x` in every lane.
     fn splat(x: f64) -> Self;
@@ -114,7 +114,7 @@ impl CollocationRule {
             once[m] = (p[m + 1] - p[m - 1]).scale_by(0.5 * RECIPROCALS[2 * m + 1]);
         }
         for m in 1..self.nodes {
-            // (the highest degree needs the integral of the next degree, which `once` does not contain)
+            // (for the highest degree, the integral of the next degree is not in `once`)
             let next = if m + 1 < self.nodes {
                 once[m + 1]
             } else {
@@ -124,7 +124,7 @@ impl CollocationRule {
         }
     }
 
-    /// Integrals of each `l_j` from the integrals of each Legendre polynomial.
+    /// Integrals of each `l_j`, computed from the integrals of each Legendre polynomial.
     pub fn to_nodal(&self, by_degree: &NodeArray<f64>) -> NodeArray<f64> {
         let mut sums = [0.0; MOST_NODES];
         for (sum, legendre) in sums.iter_mut().zip(&self.legendre[..self.nodes]) {
@@ -136,7 +136,7 @@ impl CollocationRule {
     }
 }
 
-/// Node `j` of `nodes` on [0, 1] and its weight, by Newton's method.
+/// Node `j` of the Gauss-Legendre rule with `nodes` nodes on [0, 1], and its weight, by Newton's method.
 fn gauss_node(nodes: usize, j: usize) -> (f64, f64) {
     /// More iterations than Newton's method needs from Tricomi's starting value.
     const ROUNDS: usize = 12;
@@ -184,11 +184,11 @@ pub type SquareMatrix<const D: usize> = [[f64; D]; D];
 /// Matrices of `D` equations at the nodes of a step.
 #[derive(Debug, Clone, Copy)]
 pub struct CollocationEquations<const D: usize> {
-    /// Factors of the second derivative.
+    /// Matrix `M` at each node, the factors of the second derivative.
     pub mass: NodeArray<SquareMatrix<D>>,
-    /// Factors of the first derivative.
+    /// Matrix `D` at each node, the factors of the first derivative.
     pub damping: NodeArray<SquareMatrix<D>>,
-    /// Factors of the unknowns.
+    /// Matrix `K` at each node, the factors of the unknowns themselves.
     pub stiffness: NodeArray<SquareMatrix<D>>,
 }
 
@@ -199,12 +199,13 @@ impl<const D: usize> Default for CollocationEquations<D> {
     }
 }
 
-/// The equations of a step, factored.
+/// The collocation equations of a step as block LU factors.
 #[derive(Debug, Clone)]
 pub struct CollocationStep<const D: usize> {
     rule: &'static CollocationRule,
     length: f64,
-    /// Factors: multipliers left of the diagonal, inverses on it, the eliminated matrix right of it.
+    /// Block LU factors: multipliers left of the diagonal, inverse pivots on it, the eliminated matrix right
+    /// of it.
     blocks: NodeArray<NodeArray<SquareMatrix<D>>>,
 }
 
@@ -252,8 +253,8 @@ impl<const D: usize> CollocationStep<D> {
         }
     }
 
-    /// Replaces the right-hand sides at the nodes, which include the terms of the starting values, by the
-    /// accelerations at the nodes.
+    /// Replaces the right-hand sides at the nodes by the accelerations at the nodes. The right-hand sides
+    /// must include the terms that follow from the starting values.
     #[inline(always)]
     pub fn solve<R: LaneNumber>(&self, rows: &mut [[R; D]]) {
         let nodes = self.rule.nodes;

@@ -6,7 +6,8 @@ use portable_math as math;
 
 /// Exponent of the step control: the error estimate of a step is of order 8, `err ~ h^8`.
 pub(crate) const ERROR_EXPONENT: f64 = 1.0 / 8.0;
-/// Number of right-hand sides of a step, without the first, which is the last one of the previous step.
+/// Number of right-hand sides of a step. The first stage is not counted, because it is the last one of the
+/// previous step.
 pub(crate) const EVALUATIONS_PER_STEP: u64 = 12;
 /// Number of additional right-hand sides for the dense output.
 pub(crate) const EVALUATIONS_FOR_DENSE: u64 = 3;
@@ -152,7 +153,7 @@ impl<const N: usize> DenseOutput<N> for StepOutput<N> {
 // 7. Source: E. Hairer, S. P. Nørsett, G. Wanner, "Solving Ordinary Differential Equations I", 2nd ed.,
 // Springer 1993, section II.5, and the authors' code DOP853. Stages count from 0.
 
-/// Joins the lines of a table.
+/// Joins the lines of a table into one array.
 const fn join_lines<T: Copy, const M: usize>(lines: &[&[T]]) -> [T; M] {
     let mut out = [lines[0][0]; M];
     let (mut line, mut column, mut i) = (0, 0, 0);
@@ -169,114 +170,114 @@ const fn join_lines<T: Copy, const M: usize>(lines: &[&[T]]) -> [T; M] {
 /// One row of coefficients: (stage, coefficient) for the nonzero entries.
 pub(crate) type TableauRow<const M: usize> = [(usize, f64); M];
 
-/// Nodes `c` of the 16 stages; stage 12 is the derivative at the end of the step, 13 to 15 serve the dense
-/// output.
+/// Nodes `c` of the 16 stages. Stage 12 is the derivative at the end of the step; stages 13 to 15 are for the
+/// dense output only.
 pub(crate) const C: [f64; 16] = join_lines(&[
     &[0.0, 0.05260015195876773, 0.0789002279381516, 0.1183503419072274, 0.2816496580927726],
     &[0.3333333333333333, 0.25, 0.3076923076923077, 0.6512820512820513, 0.6, 0.8571428571428571, 1.0],
     &[1.0, 0.1, 0.2, 0.7777777777777778],
 ]);
-/// Row of stage 1.
+/// Coefficients `a` of stage 1.
 pub(crate) const A1: TableauRow<1> = [(0, 0.05260015195876773)];
-/// Row of stage 2.
+/// Coefficients `a` of stage 2.
 pub(crate) const A2: TableauRow<2> = [(0, 0.0197250569845379), (1, 0.0591751709536137)];
-/// Row of stage 3.
+/// Coefficients `a` of stage 3.
 pub(crate) const A3: TableauRow<2> = [(0, 0.02958758547680685), (2, 0.08876275643042054)];
-/// Row of stage 4.
+/// Coefficients `a` of stage 4.
 pub(crate) const A4: TableauRow<3> =
     [(0, 0.2413651341592667), (2, -0.8845494793282861), (3, 0.924834003261792)];
-/// Row of stage 5.
+/// Coefficients `a` of stage 5.
 pub(crate) const A5: TableauRow<3> =
     [(0, 0.037037037037037035), (3, 0.17082860872947386), (4, 0.12546768756682242)];
-/// Row of stage 6.
+/// Coefficients `a` of stage 6.
 pub(crate) const A6: TableauRow<4> =
     [(0, 0.037109375), (3, 0.17025221101954405), (4, 0.06021653898045596), (5, -0.017578125)];
-/// Row of stage 7.
+/// Coefficients `a` of stage 7.
 pub(crate) const A7: TableauRow<5> = join_lines(&[
     &[(0, 0.03709200011850479), (3, 0.17038392571223998), (4, 0.10726203044637328)],
     &[(5, -0.015319437748624402), (6, 0.008273789163814023)],
 ]);
-/// Row of stage 8.
+/// Coefficients `a` of stage 8.
 pub(crate) const A8: TableauRow<6> = join_lines(&[
     &[(0, 0.6241109587160757), (3, -3.3608926294469414), (4, -0.868219346841726)],
     &[(5, 27.59209969944671), (6, 20.154067550477894), (7, -43.48988418106996)],
 ]);
-/// Row of stage 9.
+/// Coefficients `a` of stage 9.
 pub(crate) const A9: TableauRow<7> = join_lines(&[
     &[(0, 0.47766253643826434), (3, -2.4881146199716677), (4, -0.590290826836843)],
     &[(5, 21.230051448181193), (6, 15.279233632882423), (7, -33.28821096898486)],
     &[(8, -0.020331201708508627)],
 ]);
-/// Row of stage 10.
+/// Coefficients `a` of stage 10.
 pub(crate) const A10: TableauRow<8> = join_lines(&[
     &[(0, -0.9371424300859873), (3, 5.186372428844064), (4, 1.0914373489967295)],
     &[(5, -8.149787010746927), (6, -18.52006565999696), (7, 22.739487099350505)],
     &[(8, 2.4936055526796523), (9, -3.0467644718982196)],
 ]);
-/// Row of stage 11.
+/// Coefficients `a` of stage 11.
 pub(crate) const A11: TableauRow<9> = join_lines(&[
     &[(0, 2.273310147516538), (3, -10.53449546673725), (4, -2.0008720582248625), (5, -17.9589318631188)],
     &[(6, 27.94888452941996), (7, -2.8589982771350235), (8, -8.87285693353063), (9, 12.360567175794303)],
     &[(10, 0.6433927460157636)],
 ]);
-/// Row of stage 12: the weights `b` of the order 8 solution.
+/// Coefficients `a` of stage 12, which are the weights `b` of the order 8 solution.
 pub(crate) const A12: TableauRow<8> = join_lines(&[
     &[(0, 0.054293734116568765), (5, 4.450312892752409), (6, 1.8915178993145003)],
     &[(7, -5.801203960010585), (8, 0.3111643669578199), (9, -0.1521609496625161)],
     &[(10, 0.20136540080403034), (11, 0.04471061572777259)],
 ]);
-/// Row of stage 13.
+/// Coefficients `a` of stage 13.
 pub(crate) const A13: TableauRow<8> = join_lines(&[
     &[(0, 0.056167502283047954), (6, 0.25350021021662483), (7, -0.2462390374708025)],
     &[(8, -0.12419142326381637), (9, 0.15329179827876568), (10, 0.00820105229563469)],
     &[(11, 0.007567897660545699), (12, -0.008298)],
 ]);
-/// Row of stage 14.
+/// Coefficients `a` of stage 14.
 pub(crate) const A14: TableauRow<8> = join_lines(&[
     &[(0, 0.03183464816350214), (5, 0.028300909672366776), (6, 0.053541988307438566)],
     &[(7, -0.05492374857139099), (10, -0.00010834732869724932), (11, 0.0003825710908356584)],
     &[(12, -0.00034046500868740456), (13, 0.1413124436746325)],
 ]);
-/// Row of stage 15.
+/// Coefficients `a` of stage 15.
 pub(crate) const A15: TableauRow<8> = join_lines(&[
     &[(0, -0.42889630158379194), (5, -4.697621415361164), (6, 7.683421196062599), (7, 4.06898981839711)],
     &[(8, 0.3567271874552811), (12, -0.0013990241651590145), (13, 2.9475147891527724)],
     &[(14, -9.15095847217987)],
 ]);
-/// Weights of the order 3 error estimate.
+/// Weights of the stages in the order 3 error estimate.
 pub(crate) const E3: TableauRow<8> = join_lines(&[
     &[(0, -0.18980075407240762), (5, 4.450312892752409), (6, 1.8915178993145003)],
     &[(7, -5.801203960010585), (8, -0.4226823213237919), (9, -0.1521609496625161)],
     &[(10, 0.20136540080403034), (11, 0.02265179219836082)],
 ]);
-/// Weights of the order 5 error estimate.
+/// Weights of the stages in the order 5 error estimate.
 pub(crate) const E5: TableauRow<8> = join_lines(&[
     &[(0, 0.01312004499419488), (5, -1.2251564463762044), (6, -0.4957589496572502)],
     &[(7, 1.6643771824549864), (8, -0.35032884874997366), (9, 0.3341791187130175)],
     &[(10, 0.08192320648511571), (11, -0.022355307863886294)],
 ]);
-/// Weights of coefficient 3 of the dense output.
+/// Weights of the stages in coefficient 3 of the dense output.
 pub(crate) const D3: TableauRow<12> = join_lines(&[
     &[(0, -8.428938276109013), (5, 0.5667149535193777), (6, -3.0689499459498917), (7, 2.38466765651207)],
     &[(8, 2.117034582445028), (9, -0.871391583777973), (10, 2.2404374302607883)],
     &[(11, 0.6315787787694688), (12, -0.08899033645133331), (13, 18.148505520854727)],
     &[(14, -9.194632392478356), (15, -4.436036387594894)],
 ]);
-/// Weights of coefficient 4 of the dense output.
+/// Weights of the stages in coefficient 4 of the dense output.
 pub(crate) const D4: TableauRow<12> = join_lines(&[
     &[(0, 10.427508642579134), (5, 242.28349177525817), (6, 165.20045171727028)],
     &[(7, -374.5467547226902), (8, -22.113666853125306), (9, 7.733432668472264)],
     &[(10, -30.674084731089398), (11, -9.332130526430229), (12, 15.697238121770845)],
     &[(13, -31.139403219565178), (14, -9.35292435884448), (15, 35.81684148639408)],
 ]);
-/// Weights of coefficient 5 of the dense output.
+/// Weights of the stages in coefficient 5 of the dense output.
 pub(crate) const D5: TableauRow<12> = join_lines(&[
     &[(0, 19.985053242002433), (5, -387.0373087493518), (6, -189.17813819516758)],
     &[(7, 527.8081592054236), (8, -11.57390253995963), (9, 6.8812326946963), (10, -1.0006050966910838)],
     &[(11, 0.7777137798053443), (12, -2.778205752353508), (13, -60.19669523126412)],
     &[(14, 84.32040550667716), (15, 11.99229113618279)],
 ]);
-/// Weights of coefficient 6 of the dense output.
+/// Weights of the stages in coefficient 6 of the dense output.
 pub(crate) const D6: TableauRow<12> = join_lines(&[
     &[(0, -25.69393346270375), (5, -154.18974869023643), (6, -231.5293791760455)],
     &[(7, 357.6391179106141), (8, 93.40532418362432), (9, -37.45832313645163), (10, 104.0996495089623)],
@@ -288,7 +289,7 @@ pub(crate) const D6: TableauRow<12> = join_lines(&[
 mod tests {
     use super::*;
 
-    /// Row sums equal the nodes (Hairer, Nørsett, Wanner, equation II.1.9).
+    /// The coefficients of every stage add up to its node (Hairer, Nørsett, Wanner, equation II.1.9).
     #[test]
     fn every_row_sums_to_its_node() {
         let sums: [f64; 15] = [
@@ -330,7 +331,7 @@ mod tests {
         assert!((ninth - 1.0 / 9.0).abs() > 1e-7, "the method is not of order 9: {ninth}");
     }
 
-    /// The error estimates vanish for a constant derivative.
+    /// The weights of each error estimate add up to zero, so the estimates vanish for a constant derivative.
     #[test]
     fn the_error_weights_sum_to_zero() {
         assert!(sum(&E3).abs() < 1e-14 && sum(&E5).abs() < 1e-14);
@@ -344,7 +345,7 @@ mod tests {
         [y[1], -y[0]]
     }
 
-    /// Phase of the oscillation at the start; neither the even nor the odd derivatives vanish there.
+    /// Phase of the oscillation at the start, rad; neither the even nor the odd derivatives vanish there.
     const PHASE: f64 = 0.7;
 
     fn exact(t: f64) -> [f64; 2] {
@@ -361,7 +362,7 @@ mod tests {
         (y[0] - exact(8.0)[0]).hypot(y[1] - exact(8.0)[1])
     }
 
-    /// Largest error of the dense output within one step.
+    /// Largest error of the dense output within one step of length `h`.
     fn dense_error(h: f64) -> f64 {
         let start = exact(0.0);
         let mut stages = StepStages::take_step(rotation, 0.0, &start, &rotation(0.0, &start), h);
@@ -372,8 +373,8 @@ mod tests {
             .fold(0.0, f64::max)
     }
 
-    /// The global error falls as `h^8`. The error of the dense output within one step does so too, which
-    /// makes it of order 7.
+    /// The global error is proportional to `h^8`. The error of the dense output within one step is also
+    /// proportional to `h^8`, so the dense output is of order 7.
     #[test]
     fn the_method_is_of_order_eight_and_its_dense_output_of_order_seven() {
         let order = (global_error(16) / global_error(32)).log2();

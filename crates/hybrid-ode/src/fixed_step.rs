@@ -1,5 +1,6 @@
 //! The classical Runge-Kutta method of order 4 in steps of fixed length, for comparisons. It has no error
-//! control and evaluates the guards only at the end of each step, so it misses two roots within one step.
+//! control. It evaluates the guards only at the end of each step, so it misses a pair of roots within one
+//! step.
 
 use super::slack_variable::{SlackVariable, StatePoint};
 use super::{
@@ -9,9 +10,11 @@ use super::{
 /// How the end of a phase is located once a guard is found below zero at the end of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum FixedStepLocator {
-    /// The end of the step: the error is of order 1 in the step length, whatever the order of the method.
+    /// The end of the step: the error of the time is of order 1 in the step length, whatever the order of the
+    /// method.
     StepEnd,
-    /// The zero of the guard, reached by integration in a slack variable: the error is of order 4.
+    /// The zero of the guard, reached by integration in a slack variable: the error of the time is of order
+    /// 4.
     #[default]
     Slack,
 }
@@ -73,13 +76,14 @@ pub fn integrate_fixed<const N: usize, const G: usize, P: HybridPhase<N, G>, A: 
     run.phase_end(PhaseEndCause::Stop)
 }
 
-/// A last step shorter than this fraction of a full step is joined to the step before it.
+/// If the last step would be shorter than this fraction of a full step, the step before it is lengthened
+/// instead.
 const SHORTEST_LAST_STEP: f64 = 1e-6;
-/// Maximum number of halvings of a step in search of a point from which a guard falls steadily; 2^-50 of a
-/// step is below the rounding error of the time.
+/// Maximum number of halvings of a step in search of a point from which a guard falls steadily to zero; 2^-50
+/// of a step is below the rounding error of the time.
 const MOST_HALVINGS: usize = 50;
 
-/// Number of right-hand sides of [`runge_kutta_4_step`], without the first.
+/// Number of right-hand sides that [`runge_kutta_4_step`] evaluates; the derivative at the start is given.
 pub(super) const RUNGE_KUTTA_4_EVALUATIONS: u64 = 3;
 
 /// One classical Runge-Kutta step; `k1` is the derivative at its start.
@@ -123,7 +127,7 @@ impl<const N: usize, const G: usize, P: HybridPhase<N, G>> FixedRun<'_, N, G, P>
         PhaseEnd { t: self.t, y: self.y, cause, first_step: self.steps.step_s }
     }
 
-    /// The end of a step to the time `to`; `None` if the time does not advance or a value is not finite.
+    /// The end of a step to the time `to`; `None` if the time would not advance or a value is not finite.
     fn take_step(&mut self, to: f64) -> Option<TrialStep<N, G>> {
         if to.partial_cmp(&self.t) != Some(std::cmp::Ordering::Greater) {
             return None;
@@ -152,8 +156,8 @@ impl<const N: usize, const G: usize, P: HybridPhase<N, G>> FixedRun<'_, N, G, P>
 
     /// Index of the guard that ends the phase within the step, and the point where it falls to zero.
     fn find_event(&mut self, ahead: &TrialStep<N, G>) -> Option<(usize, StatePoint<N>)> {
-        // (a guard that starts slightly below zero, because its zero was located with an error, and then
-        // rises has not fallen)
+        // (a guard may start slightly below zero, because its zero was located with an error; if it then
+        // rises, it has not fallen)
         let (before, after) = (self.guards, ahead.guards);
         let fallen = |g: &usize| after[*g] <= 0.0 && (before[*g] > 0.0 || after[*g] <= before[*g]);
         let share = |g: usize| before[g].max(0.0) / (before[g].max(0.0) - after[g]).max(f64::MIN_POSITIVE);
@@ -166,7 +170,8 @@ impl<const N: usize, const G: usize, P: HybridPhase<N, G>> FixedRun<'_, N, G, P>
         zeros.min_by(|a, b| a.1.t.total_cmp(&b.1.t))
     }
 
-    /// Point where a guard falls to zero that is positive at the start of the step and not at its end.
+    /// Point where a guard falls to zero; the guard is positive at the start of the step and zero or negative
+    /// at its end.
     fn locate_zero(&mut self, guard: usize, ahead: &TrialStep<N, G>) -> StatePoint<N> {
         let (mut low, mut high) = (self.current_point(), ahead.at);
         for _ in 0..MOST_HALVINGS {
@@ -203,7 +208,7 @@ impl<const N: usize, const G: usize, P: HybridPhase<N, G>> FixedRun<'_, N, G, P>
     }
 }
 
-/// Cubic polynomial through the states and derivatives at both ends of a step, of order 3.
+/// Cubic polynomial through the states and derivatives at both ends of a step; its order is 3.
 struct HermiteOutput<const N: usize> {
     start: StatePoint<N>,
     start_flow: [f64; N],

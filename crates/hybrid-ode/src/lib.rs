@@ -2,15 +2,15 @@
 //! series ([`taylor`]), Runge-Kutta of order 8 with dense output ([`integrate`]) and steps of fixed length
 //! ([`fixed_step`]). [`collocation`] solves linear equations along a solution.
 //!
-//! A *phase* is a smooth right-hand side with inequalities, its *guards*, that hold while it lasts.
-//! Integration ends at the stop time or where the first guard falls to zero. If a guard starts at zero (a
-//! body that has just been released), the start of the phase states the order of that zero, so that it is not
-//! reported as an event and does not hide the next zero.
+//! A *phase* is a smooth right-hand side with *guards*, functions that stay positive while the phase lasts.
+//! Integration ends at the stop time or where the first guard falls to zero. A guard may start at zero, for
+//! example if a body has just been released. [`PhaseStart::zero_order`] then states the order of that zero,
+//! so that it is not reported as an event and does not hide the next zero.
 //!
 //! # A ball that falls and bounces
 //!
-//! The guard is the height. From 1 m the ball lands after `sqrt(2/g)`; each later flight starts at a simple
-//! zero of the guard and lasts `2 v/g`.
+//! The guard is the height. From 1 m the ball lands after `sqrt(2/g)`. Each later flight, with the starting
+//! speed `v`, starts at a simple zero of the guard and lasts `2 v/g`.
 //!
 //! ```
 //! use hybrid_ode::{HybridPhase, PhaseEndCause, PhaseStart, WorkCounters, integrate};
@@ -42,7 +42,7 @@
 //! assert!((second.t - landing.t - 2.0 * speed / G).abs() < 1e-9);
 //! ```
 
-#![cfg_attr(not(test), warn(clippy::disallowed_methods))] // tests may use them
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))] // tests may call them
 
 pub mod collocation;
 mod dop853;
@@ -61,9 +61,9 @@ use std::ops::ControlFlow;
 pub trait HybridPhase<const N: usize, const G: usize> {
     /// Right-hand side `dy/dt`.
     fn derivative(&self, t: f64, y: &[f64; N]) -> [f64; N];
-    /// The guards, positive while the phase lasts; infinity for a guard that does not apply.
+    /// The guards, which are positive while the phase lasts; infinity for a guard that does not apply.
     fn guards(&self, t: f64, y: &[f64; N]) -> [f64; G];
-    /// Magnitude of each state below which the tolerance is absolute.
+    /// Magnitude of each state below which its error tolerance is absolute instead of relative.
     fn scale(&self) -> [f64; N];
 }
 
@@ -74,8 +74,8 @@ pub struct PhaseStart<const N: usize, const G: usize> {
     pub t: f64,
     /// State.
     pub y: [f64; N],
-    /// Order of each guard's zero at the start: 0 where the guard is positive, 1 for a simple zero, 2 for a
-    /// double one.
+    /// Order of each guard's zero at the start: 0 if the guard is positive there, 1 for a simple zero, 2 for
+    /// a double zero.
     pub zero_order: [u8; G],
     /// First step to try, s; `None` estimates one.
     pub step: Option<f64>,
@@ -103,14 +103,14 @@ pub struct PhaseEnd<const N: usize> {
     pub y: [f64; N],
     /// Cause of the end.
     pub cause: PhaseEndCause,
-    /// Suggested first step of the next phase of this kind, s.
+    /// Suggested first step of the next phase with similar equations, s.
     pub first_step: f64,
 }
 
 /// Work counters, cumulative over phases.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct WorkCounters {
-    /// Evaluations of the right-hand side; guards on the dense output are not included.
+    /// Evaluations of the right-hand side. Evaluations of the dense output for the guards do not count.
     pub rhs_evaluations: u64,
     /// Evaluations of the guards.
     pub guard_evaluations: u64,
@@ -118,7 +118,7 @@ pub struct WorkCounters {
     pub steps: u64,
     /// Rejected steps.
     pub rejected_steps: u64,
-    /// The phase ends when it has evaluated more right-hand sides than this; `None` for no limit.
+    /// The phase ends when more right-hand sides than this have been evaluated; `None` for no limit.
     pub most_rhs_evaluations: Option<u64>,
 }
 
@@ -134,7 +134,7 @@ impl WorkCounters {
 pub struct AcceptedStep<'a, const N: usize> {
     /// Start of the step, s.
     pub start: f64,
-    /// End of the step or of its part before the event, s.
+    /// End of the step, s; if an event occurs inside the step, the time of the event.
     pub end: f64,
     /// State at `end`.
     pub y_end: &'a [f64; N],

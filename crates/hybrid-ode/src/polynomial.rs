@@ -1,9 +1,10 @@
 //! Truncated power series about the start of a step, and the search for the first zero of a series.
 //!
 //! On a step of length `h` a series with coefficients `g_k` is the polynomial `sum g_k h^k s^k`, `s` in [0,
-//! 1]. It lies in the convex hull of its Bernstein coefficients. It therefore has no root if all of them are
-//! positive, and exactly one if they change sign once; otherwise the interval is halved by de Casteljau's
-//! algorithm. No root inside a step is missed, not even one of a close pair.
+//! 1]. The polynomial lies in the convex hull of its Bernstein coefficients. It therefore has no root if all
+//! coefficients are positive, and exactly one root if the coefficients change sign once. Otherwise the
+//! interval is halved by de Casteljau's algorithm. No root inside a step is missed, not even one of a close
+//! pair.
 
 /// Highest order of an expansion; at higher orders rounding, not truncation, limits the accuracy.
 pub(crate) const MOST_ORDER: usize = 20;
@@ -14,18 +15,18 @@ pub const TERMS: usize = MOST_ORDER + 1;
 /// use are unspecified.
 pub(crate) type TaylorSeries = [f64; TERMS];
 
-/// Number of halvings after which two roots that are still not separated count as a touch, which is no root:
-/// 2^-30 of a step is below every tolerance.
+/// Maximum number of halvings. Two roots that are still not separated then count as one point where the guard
+/// touches zero, which is no root: 2^-30 of a step is below every tolerance.
 const MOST_HALVINGS: u32 = 30;
-/// Terms below this fraction of the sum are rounding errors and do not decide whether a guard starts at a
-/// zero.
+/// Terms below this fraction of the sum of all absolute terms are rounding errors. They do not decide whether
+/// a guard starts at a zero.
 const NOISE: f64 = 1e-14;
 /// A part of the step on which no Bernstein coefficient exceeds this fraction of the sum of all terms counts
 /// as zero throughout: the signs of its coefficients are rounding errors, and halving it further would take a
 /// billion steps.
 const FLAT: f64 = 4.0 * f64::EPSILON;
 
-/// First fall of a guard on a step.
+/// First fall of a guard to zero within a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum GuardFall {
     Nowhere,
@@ -38,8 +39,8 @@ pub(crate) enum GuardFall {
 /// First fall of a guard to zero on `[0, h]`.
 ///
 /// `zero_order` is the multiplicity of the guard's zero at the start, 0 if the guard is positive there. If
-/// the guard starts at a zero, the first coefficient above rounding decides: if it is positive the zero is
-/// divided out, if it is negative the guard falls at once.
+/// the guard starts at a zero, the first coefficient above rounding error decides: if it is positive, the
+/// zero is divided out before the search; if it is negative, the guard falls at once.
 pub(crate) fn first_fall(guard: &TaylorSeries, order: usize, zero_order: usize, h: f64) -> GuardFall {
     if guard[0] == f64::INFINITY {
         return GuardFall::Nowhere;
@@ -69,12 +70,13 @@ pub(crate) fn first_fall(guard: &TaylorSeries, order: usize, zero_order: usize, 
     }
 }
 
-/// Quick test for no root: whether the first few terms, in the Bernstein basis, exceed the sum of all others.
+/// Quick test that excludes a root: whether all Bernstein coefficients of the first few terms exceed the sum
+/// of the absolute values of the other terms.
 fn is_root_free(c: &[f64]) -> bool {
-    /// Degree of the part that is evaluated in the Bernstein basis; the higher terms shrink faster with the
-    /// step.
+    /// Degree of the polynomial of the first few terms, which is written in the Bernstein basis. Higher terms
+    /// decrease faster with the step length.
     const HEAD: usize = 4;
-    /// Reciprocals of the binomial coefficients of that degree.
+    /// Reciprocals of the binomial coefficients of degree `HEAD`.
     const SHARES: [f64; HEAD + 1] = [1.0, 1.0 / 4.0, 1.0 / 6.0, 1.0 / 4.0, 1.0];
     let Some((head, tail)) = c.split_first_chunk::<{ HEAD + 1 }>() else { return false };
     let others: f64 = tail.iter().map(|c| c.abs()).sum();
@@ -87,7 +89,7 @@ fn is_root_free(c: &[f64]) -> bool {
     b.iter().all(|&b| b > others)
 }
 
-/// First root in (0, 1] of the polynomial with these coefficients, of which the first is positive.
+/// First root in (0, 1] of the polynomial with these coefficients, whose first coefficient is positive.
 fn first_root(c: &[f64]) -> Option<f64> {
     let mut b = [0.0; TERMS];
     let degree = c.len() - 1;
@@ -105,7 +107,7 @@ fn first_root(c: &[f64]) -> Option<f64> {
     first_crossing(&RootSearch { c, flat }, &mut b, 0.0, 1.0, 0)
 }
 
-/// A polynomial and the size below which its values are rounding errors.
+/// A polynomial, and the absolute value at or below which its Bernstein coefficients are rounding errors.
 struct RootSearch<'a> {
     c: &'a [f64],
     flat: f64,
@@ -142,7 +144,8 @@ fn first_crossing(search: &RootSearch, b: &mut [f64; TERMS], low: f64, high: f64
 }
 
 /// The single root between `low`, where the polynomial is positive, and `high`, where it is not, by Newton's
-/// method. Steps outside the bracket are replaced by false position, slow ones by bisection.
+/// method from a starting value by false position. A step that leaves the bracket or does not converge fast
+/// is replaced by bisection.
 fn single_root(c: &[f64], mut low: f64, mut high: f64, at_low: f64, at_high: f64) -> f64 {
     /// More rounds than Newton's method and bisection together need in double precision.
     const ROUNDS: usize = 80;
@@ -161,7 +164,7 @@ fn single_root(c: &[f64], mut low: f64, mut high: f64, at_low: f64, at_high: f64
         }
         let step = -value / slope;
         let newton = x + step;
-        // a step longer than half the previous one does not converge
+        // a step longer than half the previous step does not converge fast
         let converges = newton > low && newton < high && 2.0 * step.abs() < before;
         let next = if converges { newton } else { 0.5 * (low + high) };
         before = (next - x).abs();
@@ -223,7 +226,7 @@ mod tests {
             assert_eq!(fall(1.0, &roots, order, 1.0), GuardFall::Nowhere);
             roots.push(0.01);
             assert_falls(fall(-1.0, &roots, order, 1.0), 0.01, 1e-16);
-            // if the zero is not announced, the first coefficient above rounding reveals it
+            // without a given `zero_order`, the first coefficient above rounding shows it
             assert_falls(fall(-1.0, &roots, 0, 1.0), 0.01, 1e-16);
         }
     }

@@ -1,9 +1,9 @@
 //! First zero of a guard inside a step. No root of the interpolating polynomial is missed, not even one of a
 //! close pair.
 //!
-//! A guard is sampled on the dense output at equispaced fractions of the step and written in the Bernstein
-//! basis. If all coefficients are positive there is no root, because the polynomial lies in their convex
-//! hull. Otherwise the interval is halved by de Casteljau's algorithm.
+//! A guard is sampled on the dense output at equispaced fractions of the step, and the polynomial through the
+//! samples is written in the Bernstein basis. If all coefficients are positive there is no root, because the
+//! polynomial lies in their convex hull. Otherwise the interval is halved by de Casteljau's algorithm.
 
 use portable_math as math;
 
@@ -12,8 +12,8 @@ pub(crate) const COARSE_SAMPLES: usize = 5;
 /// Number of samples of the full search, at the fractions 0, 1/8, ..., 1 of the step.
 pub(crate) const FINE_SAMPLES: usize = 9;
 
-/// Number of halvings after which two roots that are still not separated count as a touch, which is no root:
-/// 2^-30 of a step is below every tolerance.
+/// Maximum number of halvings. Two roots that are still not separated then count as one point where the guard
+/// touches zero, which is no root: 2^-30 of a step is below every tolerance.
 const MOST_HALVINGS: u32 = 30;
 /// A part of the step on which no Bernstein coefficient exceeds this fraction of the largest one counts as
 /// zero throughout: the signs of its coefficients are rounding errors, and halving it further would take a
@@ -24,14 +24,15 @@ const COARSE_TO_BERNSTEIN: [[f64; COARSE_SAMPLES]; COARSE_SAMPLES] = bernstein_f
 const FINE_TO_BERNSTEIN: [[f64; FINE_SAMPLES]; FINE_SAMPLES] = bernstein_from_samples(0);
 const INNER_TO_BERNSTEIN: [[f64; FINE_SAMPLES - 1]; FINE_SAMPLES - 1] = bernstein_from_samples(1);
 
-/// Whether a guard stays above zero, judged from its coarse samples and one check sample at the fraction 7/8.
-/// The smallest Bernstein coefficient must exceed the interpolation error at the check sample, with a margin.
+/// Whether a guard stays above zero, judged from its coarse samples and one check sample at the fraction 7/8
+/// of the step. The smallest Bernstein coefficient must exceed the interpolation error at the check sample,
+/// times a safety factor.
 #[inline]
 pub(crate) fn is_root_free(samples: &[f64; COARSE_SAMPLES], check: f64) -> bool {
     /// Safety factor: the check sample shows the interpolation error at one place; elsewhere it may be
     /// larger.
     const MARGIN: f64 = 8.0;
-    /// Lagrange weights of the five coarse nodes at fraction 7/8.
+    /// Weights of the five coarse samples in Lagrange interpolation at the fraction 7/8.
     const AT_CHECK: [f64; COARSE_SAMPLES] =
         [-5.0 / 128.0, 7.0 / 32.0, -35.0 / 64.0, 35.0 / 32.0, 35.0 / 128.0];
     let predicted: f64 = samples.iter().zip(AT_CHECK).map(|(s, w)| s * w).sum();
@@ -44,9 +45,9 @@ pub(crate) fn first_root(samples: &[f64; FINE_SAMPLES]) -> Option<f64> {
     find_first_root(multiply_matrix(&FINE_TO_BERNSTEIN, samples))
 }
 
-/// First fraction of the step at which a guard falls to zero that starts at a zero of multiplicity `order`
-/// and grows. The samples, except the first, are divided by `fraction^order`, which removes the zero at the
-/// start, and the quotient is searched.
+/// First fraction of the step at which a guard falls to zero after it has started at a zero of multiplicity
+/// `order` and risen. The samples, except the first, are divided by `fraction^order`, which removes the zero
+/// at the start, and the first root of the quotient is found.
 pub(crate) fn first_root_after_zero(samples: &[f64; FINE_SAMPLES], order: i32) -> Option<f64> {
     let mut quotient = [0.0; FINE_SAMPLES - 1];
     for (i, q) in quotient.iter_mut().enumerate() {
@@ -65,9 +66,8 @@ fn multiply_matrix<const M: usize>(matrix: &[[f64; M]; M], x: &[f64; M]) -> [f64
     out
 }
 
-/// First root of the polynomial with these Bernstein coefficients. A guard that does not apply (its samples
-/// are infinite, so that coefficients are infinite or NaN) has no root, nor has a guard that is zero
-/// throughout.
+/// First root of the polynomial with these Bernstein coefficients. There is none for a guard that does not
+/// apply (its samples are infinite, so that coefficients are infinite or NaN) or that is zero throughout.
 fn find_first_root<const M: usize>(b: [f64; M]) -> Option<f64> {
     let largest = b.iter().fold(0.0, |a: f64, c| a.max(c.abs()));
     if largest == 0.0 || !b.iter().all(|c| c.is_finite()) {
@@ -97,8 +97,8 @@ fn first_crossing<const M: usize>(b: [f64; M], flat: f64, low: f64, high: f64, d
         .or_else(|| first_crossing(right, flat, middle, high, depth + 1))
 }
 
-/// The single root in [0, 1] of a polynomial that is positive at 0 and not at 1, by the Illinois variant of
-/// false position, with bisection every third round.
+/// The single root in [0, 1] of a polynomial that is positive at 0 and zero or negative at 1, by the Illinois
+/// variant of false position, with bisection every third round.
 fn single_root<const M: usize>(b: &[f64; M]) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     let (mut at_low, mut at_high) = (b[0], b[M - 1]);
@@ -143,8 +143,9 @@ fn subdivide<const M: usize>(b: [f64; M]) -> ([f64; M], [f64; M]) {
     (left, right)
 }
 
-/// Inverse of the collocation matrix of the Bernstein basis of degree `M - 1` at the nodes `i / (M - 1 +
-/// first)`, `i` from `first` on. `first` is 1 for the quotient of a guard, which has no sample at 0.
+/// Matrix that converts samples to Bernstein coefficients of degree `M - 1`: the inverse of the collocation
+/// matrix at the nodes `i / (M - 1 + first)`, `i` from `first` on. `first` is 1 for the quotient of a guard,
+/// which has no sample at 0.
 const fn bernstein_from_samples<const M: usize>(first: usize) -> [[f64; M]; M] {
     let mut nodes = [0.0; M];
     let mut i = 0;
@@ -258,7 +259,8 @@ mod tests {
         assert_eq!(first_root_after_zero(&sample(|x| -x), 1), Some(0.0));
     }
 
-    /// Without their own tests, both guards would be halved a billion times, and this test would not end.
+    /// Without tests for these two cases, the interval would be halved a billion times, and this test would
+    /// not end.
     #[test]
     fn a_guard_that_does_not_apply_or_is_flat_ends_the_search() {
         assert_eq!(first_root_after_zero(&[f64::INFINITY; FINE_SAMPLES], 1), None);

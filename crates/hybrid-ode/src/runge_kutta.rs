@@ -1,6 +1,6 @@
 //! Integration by the Dormand-Prince 8(5,3) method with error control, up to the first guard that falls to
-//! zero. Roots are isolated with nine samples of the dense output; a step of the method itself, of full
-//! order, gives the state at a root.
+//! zero. Roots of the guards are isolated with nine samples of the dense output. The state at a root follows
+//! from a step of the method itself, which is of full order.
 
 use super::dop853::{ERROR_EXPONENT, EVALUATIONS_FOR_DENSE, EVALUATIONS_PER_STEP, StepOutput, StepStages};
 use super::fixed_step::{RUNGE_KUTTA_4_EVALUATIONS, runge_kutta_4_step};
@@ -18,16 +18,16 @@ pub enum EventLocator {
     #[default]
     Bracket,
     /// The step is rejected, and the state is integrated in a slack variable that falls to zero with the
-    /// guard. If the guard rises before it falls, the start is moved towards the zero until the guard falls
-    /// there.
+    /// guard. If the guard rises before it falls, the integration starts closer to the zero, where the guard
+    /// falls.
     Slack,
 }
 
 /// Integrates `phase` from `start` until `stop` or until a guard falls to zero; `observe` is called with
 /// every accepted step.
 ///
-/// `relative` is the tolerated error of a step relative to each state, or to its [`HybridPhase::scale`] where
-/// that is larger.
+/// `relative` is the tolerated error of a step, relative to each state or, if that is larger, to its
+/// [`HybridPhase::scale`].
 pub fn integrate<const N: usize, const G: usize, P: HybridPhase<N, G>, A: ObserverReply>(
     phase: &P,
     start: PhaseStart<N, G>,
@@ -86,18 +86,19 @@ pub fn integrate_with_locator<const N: usize, const G: usize, P: HybridPhase<N, 
     }
 }
 
-/// Largest and smallest factor by which the step size changes (Hairer's code), and the fraction of the
-/// predicted step that is taken.
+/// Largest and smallest factor by which the step size changes (Hairer's code), and the safety factor by which
+/// the predicted step is multiplied.
 const GROWTH: (f64, f64, f64) = (6.0, 1.0 / 3.0, 0.9);
-/// Influence of the last step's error on the step size (the beta of Hairer's code, section IV.2).
+/// Exponent of the last step's error in the formula for the step size (the beta of Hairer's code, section
+/// IV.2).
 const STABILISATION: f64 = 0.04;
-/// Lower limit of the error in the step size control, so that one lucky step does not make the next one too
-/// long.
+/// Lower limit of the error in the step size control, so that one step with a very small error does not make
+/// the next step too long.
 const NEGLIGIBLE: f64 = 1e-4;
-/// Shortest first step to try, in units of the rounding error of the time; error control shortens it where
-/// necessary.
+/// Smallest estimate of the first step, in units of the rounding error of the time; error control shortens
+/// the step where necessary.
 const SHORTEST_START: f64 = 1e3;
-/// Factor by which a step is shortened that leaves the domain of the right-hand side or of the guards.
+/// Factor by which a step is multiplied if it leaves the domain of the right-hand side or of the guards.
 const OUT_OF_DOMAIN: f64 = 0.1;
 /// A step is lengthened by up to this factor to end at the stop time, so that no tiny step remains.
 const STRETCH: f64 = 1.01;
@@ -105,9 +106,9 @@ const STRETCH: f64 = 1.01;
 /// ignored.
 const SLIVER_STEP: f64 = 64.0;
 /// Largest value of a guard at its located zero, as a fraction of its largest sample. If the value is larger,
-/// the polynomial through the samples has a root that the guard does not have, and a shorter step is taken.
+/// the polynomial through the samples has a root where the guard has none, and a shorter step is taken.
 const MOST_GUARD_REMAINDER: f64 = 1e-3;
-/// Step length, in units of the rounding error of the time, below which shortening a step reveals nothing
+/// Step length, in units of the rounding error of the time, at or below which a shorter step reveals nothing
 /// more about a guard: over this length, a guard that starts at a double zero changes by less than the
 /// rounding error of the state.
 const SHORTEST_TELLING_STEP: f64 = 1e8;
@@ -170,7 +171,8 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> AdaptiveRun<'a, N
         std::array::from_fn(|i| self.relative * scale[i].max(self.y[i].abs()).max(y[i].abs()))
     }
 
-    /// Hairer's first step (section II.4), from the sizes of the state and of its first two derivatives.
+    /// First step to try by Hairer's method (section II.4), from the sizes of the state and its first two
+    /// derivatives.
     fn estimate_first_step(&mut self) -> f64 {
         let tolerated = self.tolerated_error(&self.y);
         let norm = |v: &[f64; N]| {
@@ -191,14 +193,15 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> AdaptiveRun<'a, N
         (100.0 * h0).min(h1).max(shortest)
     }
 
-    /// Tries steps until one meets the tolerance; `None` when even the shortest representable step does not.
+    /// Tries steps until the error of one is within the tolerance; `None` if even the shortest possible step
+    /// fails.
     fn find_accepted_step(&mut self, stop: f64) -> Option<StepStages<N>> {
         let (most, least, safety) = GROWTH;
         let mut rejected = false;
         loop {
             let remaining = stop - self.t;
             let h = if self.h * STRETCH >= remaining { remaining } else { self.h };
-            // (a NaN step is not resolved either)
+            // (a NaN step counts as too short, too)
             let resolved = self.h > 4.0 * f64::EPSILON * self.t.abs();
             if !resolved || self.t + h <= self.t {
                 return None;
@@ -208,7 +211,7 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> AdaptiveRun<'a, N
             self.work.rhs_evaluations += EVALUATIONS_PER_STEP;
             let error = stages.error_norm(&self.tolerated_error(&stages.y_end));
             if error <= 1.0 {
-                // (a step that was cut at the stop time says little about the next one)
+                // (a step that was cut at the stop time says little about the next step)
                 let wanted = safety
                     * math::powf(error.max(NEGLIGIBLE), STABILISATION * 0.2 - ERROR_EXPONENT)
                     * math::powf(self.last_error, STABILISATION);
@@ -238,7 +241,7 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> AdaptiveRun<'a, N
         self.t
     }
 
-    /// Whether a step is so short that a guard which starts at a zero stays zero to rounding.
+    /// Whether a step is so short that a guard which starts at zero stays zero to within rounding errors.
     fn is_sliver(&self, stages: &StepStages<N>) -> bool {
         stages.h <= SLIVER_STEP * f64::EPSILON * stages.t.abs()
     }
@@ -272,7 +275,7 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> AdaptiveRun<'a, N
         let left = self.phase.guards(t, &y)[guard].abs();
         self.work.guard_evaluations += 1;
         let largest = sampled.samples.iter().fold(0.0, |most: f64, s| most.max(s[guard].abs()));
-        // (a guard that has fallen before the start of the step needs no check)
+        // (an event at the start of the step needs no check)
         if t > stages.t && left > MOST_GUARD_REMAINDER * largest {
             if stages.h <= SHORTEST_TELLING_STEP * f64::EPSILON * t.abs() {
                 return EventLocation::Nowhere; // the value of the guard is rounding error
@@ -283,9 +286,9 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> AdaptiveRun<'a, N
         EventLocation::At { guard, t, y }
     }
 
-    /// Time and state at the event, by the slack variable. The descent begins at the start of the step, or
-    /// nearer to the zero if the guard rises before it falls; `None` if the guard turns too close to its
-    /// zero.
+    /// Time and state at the event, by integration in the slack variable. This descent begins at the start of
+    /// the step, or closer to the zero if the guard rises before it falls. `None` if the guard turns too
+    /// close to its zero.
     fn land_by_slack(
         &mut self,
         stages: &StepStages<N>,
@@ -319,13 +322,13 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> AdaptiveRun<'a, N
     /// Time and state at the event, to the order of the method: the step is repeated up to the root of the
     /// dense output, then Newton's iteration moves the time to the zero of the guard by short steps.
     fn refine_event(&mut self, stages: &StepStages<N>, guard: usize, fraction: f64) -> (f64, [f64; N]) {
-        /// Maximum number of corrections; one is usual, because the dense output's root is accurate to its
-        /// order.
+        /// Maximum number of corrections; one is usual, because the root of the dense output is accurate to
+        /// the order of that output.
         const ROUNDS: usize = 4;
         /// Fraction of the step above which a correction is dropped, because the guard only grazes zero.
         const GRAZING: f64 = 1e-3;
         /// Span over which the slope of the guard is measured, as a fraction of the step. The relative error
-        /// of a correction is about as large.
+        /// of a correction is about equal to this fraction.
         const PROBE: f64 = 1e-6;
         if fraction * stages.h <= 4.0 * f64::EPSILON * stages.t.abs() {
             return (stages.t, stages.y);
@@ -358,7 +361,7 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> AdaptiveRun<'a, N
     }
 }
 
-/// Guards sampled along a step, coarsely first.
+/// Samples of the guards along a step, first at a few points, then at all points.
 struct GuardSamples<'a, const N: usize, const G: usize, P> {
     phase: &'a P,
     t: f64,
@@ -378,8 +381,8 @@ impl<const N: usize, const G: usize, P: HybridPhase<N, G>> GuardSamples<'_, N, G
         }
     }
 
-    /// Whether each guard may reach zero: a guard that starts at zero, or one that the quick test does not
-    /// exclude.
+    /// Whether each guard may reach zero within the step. This is so for a guard that starts at zero and for
+    /// a guard that the quick test does not exclude.
     fn find_suspects(&mut self, zero_order: &[u8; G]) -> [bool; G] {
         self.sample_at([2, 4, 6, 7]);
         std::array::from_fn(|g| {
@@ -434,8 +437,8 @@ mod tests {
     #[test]
     fn a_guard_armed_at_a_double_zero_falls_a_period_later() {
         let mut work = WorkCounters::default();
-        // 1 - x starts at a double zero and touches zero again after one period, 2 pi; 5 - t ends the phase
-        // before
+        // the guard 1 - x starts at a double zero and touches zero again after one period, 2 pi; the guard 5
+        // - t ends the phase before that
         struct Released;
         impl HybridPhase<2, 2> for Released {
             fn derivative(&self, _: f64, y: &[f64; 2]) -> [f64; 2] {

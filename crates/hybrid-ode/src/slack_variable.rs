@@ -1,13 +1,13 @@
-//! Location of a guard's zero by a slack variable. The inequality `G >= 0` is written as the equality `G =
-//! s^2/2`, so that the guard falls to zero where `s` does, and `s` becomes the independent variable,
+//! Location of a guard's zero by a slack variable `s`. The inequality `G >= 0` is written as the equality `G
+//! = s^2/2`, so that `s` falls to zero together with the guard. `s` becomes the independent variable:
 //!
 //! ```text
 //! dt/ds = s/G'      dy/ds = F s/G'      from s = sqrt(2 G) to s = 0
 //! ```
 //!
-//! with `F` the right-hand side and `G'` the guard's rate along the flow (Hénon's method, Physica D 5, 1982,
-//! applied to `sqrt(2 G)`). Both slopes stay finite where the guard falls to a double zero. A state past the
-//! zero has no real `s`; there `G = -s^2/2` leads back.
+//! `F` is the right-hand side and `G'` the rate of the guard along the flow (Hénon's method, Physica D 5,
+//! 1982, applied to `sqrt(2 G)`). Both slopes stay finite where the guard falls to a double zero. Past the
+//! zero, `G` is negative and has no real `s`; the equality `G = -s^2/2` then leads back to the zero.
 
 use super::{HybridPhase, WorkCounters};
 
@@ -18,26 +18,28 @@ pub(super) struct StatePoint<const N: usize> {
     pub y: [f64; N],
 }
 
-/// Number of steps in `s` of the first descent. A descent determines only the time. The state then follows
-/// from a step of the integration method, and further descents remove the remaining value of the guard.
+/// Number of steps of the first descent, which is the integration in `s` down to `s = 0`. A descent
+/// determines only the time of the zero. The state then follows from a step of the integration method, and
+/// further descents remove the remaining value of the guard.
 const FIRST_STEPS: u32 = 4;
-/// Maximum number of further descents; two or three are usual. Close to a double zero, up to a sixth of the
-/// way to the zero may remain after a descent.
+/// Maximum number of further descents (integrations in `s` to zero); two or three are usual. Close to a
+/// double zero, up to a sixth of the time to the zero may remain after a descent.
 const MOST_DESCENTS: usize = 40;
-/// If a descent is shorter than this fraction of the way from the start to the zero, its own result for the
-/// state is accurate enough for any method.
+/// If a descent covers less than this fraction of the time from the start to the zero, the state that it
+/// gives is accurate enough for any integration method.
 const SHORT: f64 = 1e-3;
-/// Largest fraction of its length by which a short descent misses the zero. If that distance is below the
-/// rounding error of the time, the zero is reached.
+/// Largest error of the time after a short descent, as a fraction of the time that the descent covers. The
+/// zero is reached once this error is below the rounding error of the time.
 const MOST_REMAINDER: f64 = 1e-4;
-/// Span of the central difference for the rate of the guard, as a fraction of the step. The relative error of
-/// the rate, about 1e-10, shifts the end of a descent; the next descent removes this shift.
+/// Half width of the central difference for the rate of the guard, as a fraction of the step. The relative
+/// error of the rate, about 1e-10, shifts the end of a descent; the next descent removes this shift.
 const PROBE: f64 = 1e-5;
-/// Smallest rate of fall at the start of a descent, relative to the mean rate down to the zero; near a
-/// maximum of the guard the slopes in `s` have a pole. The relative rate is 1 for a linear fall and 2 for the
-/// fall to a double zero.
+/// Smallest rate at which the guard falls at the start of a descent, relative to its mean rate down to the
+/// zero; near a maximum of the guard the slopes in `s` have a pole. The relative rate is 1 for a linear fall
+/// and 2 for the fall to a double zero.
 const LEAST_FALL: f64 = 0.5;
-/// Number of halvings of the way to the zero after which the guard counts as only grazing zero.
+/// Maximum number of times that the start of a descent is moved half of the way to the zero; after that, the
+/// guard counts as only grazing zero.
 pub(super) const MOST_HALVINGS: usize = 30;
 
 /// One guard of a phase, near its zero inside a step.
@@ -54,20 +56,21 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> SlackVariable<'a,
         Self { phase, guard, probe_s: PROBE * step_s, work }
     }
 
-    /// Counts right-hand sides of the method's own steps.
+    /// Counts right-hand sides that a step of the integration method has evaluated.
     pub(super) fn count_evaluations(&mut self, evaluations: u64) {
         self.work.rhs_evaluations += evaluations;
     }
 
-    /// Value of the guard at a point.
+    /// Value of the guard at a given time and state.
     pub(super) fn guard_value(&mut self, at: &StatePoint<N>) -> f64 {
         self.work.guard_evaluations += 1;
         self.phase.guards(at.t, &at.y)[self.guard]
     }
 
-    /// Rate of change of the guard, in its unit per second, by a central difference along the flow.
+    /// Rate of change of the guard along the solution, in the unit of the guard per second, by a central
+    /// difference.
     fn guard_rate(&mut self, at: &StatePoint<N>, flow: &[f64; N]) -> f64 {
-        let probe = (at.t + self.probe_s) - at.t; // the rounded change of time
+        let probe = (at.t + self.probe_s) - at.t; // the change of time after rounding
         let mut along = |share: f64| {
             let y = std::array::from_fn(|i| at.y[i] + share * flow[i]);
             self.guard_value(&StatePoint { t: at.t + share, y })
@@ -75,17 +78,17 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> SlackVariable<'a,
         (along(probe) - along(-probe)) / (2.0 * probe)
     }
 
-    /// Whether a descent may start at `at`, a time `ahead_s` before the zero: the guard must fall there at
-    /// `LEAST_FALL` times its mean rate or faster.
+    /// Whether a descent may start at `at`, a time `ahead_s` before the zero: the guard must fall there at no
+    /// less than `LEAST_FALL` times its mean rate.
     pub(super) fn can_descend(&mut self, at: &StatePoint<N>, ahead_s: f64) -> bool {
         let value = self.guard_value(at);
         let flow = self.derivative(at);
         value > 0.0 && -self.guard_rate(at, &flow) * ahead_s >= LEAST_FALL * value
     }
 
-    /// Point where the guard is zero, starting from a point where it falls. `advance` returns the state at a
-    /// given time by the method's own step from that point, which costs `cost` right-hand sides. `None` if
-    /// the guard turns before it reaches zero.
+    /// Point where the guard is zero, starting from a point `from` where it falls. `advance` returns the
+    /// state at a given time by one step of the integration method from `from`; such a step costs `cost`
+    /// right-hand sides. `None` if the guard turns before it reaches zero.
     pub(super) fn land_on_zero(
         &mut self,
         from: &StatePoint<N>,
@@ -109,7 +112,7 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> SlackVariable<'a,
         None
     }
 
-    /// Brings `s` to zero in equal steps of the classical Runge-Kutta method.
+    /// Integrates in `s` down to zero in equal steps of the classical Runge-Kutta method.
     fn descend_to_zero(&mut self, from: &StatePoint<N>, steps: u32) -> Option<StatePoint<N>> {
         let value = self.guard_value(from);
         let (side, start) = (value.signum(), (2.0 * value.abs()).sqrt());
@@ -134,7 +137,8 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> SlackVariable<'a,
         Some(at)
     }
 
-    /// `(dt/ds, dy/ds)`; `side_s` is `s` with the sign of the guard. `None` if the guard does not fall.
+    /// The slopes `(dt/ds, dy/ds)`; `side_s` is `s` with the sign of the guard. `None` if the guard does not
+    /// fall.
     fn slope_by_slack(&mut self, at: &StatePoint<N>, side_s: f64) -> Option<StatePoint<N>> {
         let flow = self.derivative(at);
         let rate = self.guard_rate(at, &flow);

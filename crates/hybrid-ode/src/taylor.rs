@@ -1,9 +1,9 @@
-//! Integration by Taylor series, whose coefficients follow from one another by recurrence, order by order.
+//! Integration by Taylor series, whose coefficients are computed by recurrence, from low to high order.
 //!
 //! The step length follows from the last coefficients (Jorba and Zou 2005, *Experimental Mathematics* 14,
 //! section 3.2), so no step is rejected and no step size is carried over from one phase to the next. The
-//! polynomials of the guards are as accurate as those of the states, so events on them are found with
-//! certainty, and the state at an event needs no further step.
+//! polynomials of the guards are as accurate as those of the states. No zero of these polynomials is missed,
+//! and the state at an event needs no further step.
 
 use super::polynomial::{GuardFall, MOST_ORDER, TERMS, TaylorSeries, first_fall};
 use super::{
@@ -11,14 +11,14 @@ use super::{
 };
 use portable_math as math;
 
-/// A phase whose Taylor coefficients follow by recurrence.
+/// A phase whose Taylor coefficients can be computed by recurrence.
 pub trait TaylorPhase<const N: usize, const G: usize>: HybridPhase<N, G> {
-    /// Working data of the recurrences; one tape serves all steps of a phase.
+    /// Working data of the recurrences; all steps of a phase use the same tape.
     type Tape: Default;
 
     /// Writes the coefficients of states and guards about `(t, y)` up to `out.order`. Coefficient `k` is the
-    /// derivative `k` of the solution of [`HybridPhase::derivative`], or of [`HybridPhase::guards`] along it,
-    /// divided by `k!`.
+    /// `k`-th time derivative divided by `k!`, for the states along the solution of
+    /// [`HybridPhase::derivative`] and for [`HybridPhase::guards`] along the same solution.
     fn expand_series(&self, t: f64, y: &[f64; N], tape: &mut Self::Tape, out: &mut TaylorExpansion<N, G>);
 }
 
@@ -27,14 +27,14 @@ pub trait TaylorPhase<const N: usize, const G: usize>: HybridPhase<N, G> {
 pub struct TaylorExpansion<const N: usize, const G: usize> {
     /// Start of the step, s.
     pub t: f64,
-    /// Highest power in use.
+    /// Highest power of the series that is used.
     pub order: usize,
     /// Coefficients of the states, one row per power.
     pub states: [[f64; N]; TERMS],
     /// Coefficients of the guards, one row per power; the first is infinity for a guard that does not apply.
     pub guards: [[f64; G]; TERMS],
-    /// Convergence check of further quantities that follow from the states: sizes of their last coefficient
-    /// but one and of their last coefficient, divided by their scale.
+    /// Absolute values of the last two coefficients, the last but one first, of further quantities that
+    /// follow from the states, divided by the scale of these quantities. They limit the step length, too.
     pub followers: [f64; 2],
     /// Series of the exponent `x >= 0`, if the equations contain a term in `exp(-x)` that may vary much over
     /// a step.
@@ -61,8 +61,8 @@ impl<const N: usize, const G: usize> TaylorExpansion<N, G> {
         sum
     }
 
-    /// Longest step over which the last two terms of every state stay within the tolerance. The error is of
-    /// the next order and therefore smaller.
+    /// Longest step over which the last two terms of the series of every state stay within the tolerance. The
+    /// error is of the next order and therefore smaller.
     #[inline]
     fn step_length(&self, scale: &[f64; N], relative: f64) -> f64 {
         let largest = |k: usize, follower: f64| {
@@ -75,9 +75,9 @@ impl<const N: usize, const G: usize> TaylorExpansion<N, G> {
         if last < before { last } else { before }
     }
 
-    /// Step length, at most `h`, over which the terms of the exponential fall. An exponential that is too
-    /// small to show in the last coefficients, but grows by many powers of ten within the step, would
-    /// otherwise be missed: the coefficients of `exp(x)` rise up to the order `x`.
+    /// Step length, at most `h`, over which the terms of the exponential's series decrease. An exponential
+    /// that is too small to show in the last coefficients, but grows by many powers of ten within the step,
+    /// would otherwise be missed: the terms of `exp(x)` increase up to the order `x`.
     #[inline]
     fn limit_by_exponential(&self, h: f64) -> f64 {
         /// Largest change of the exponent over the step, as a fraction of the order: at the end of the series
@@ -88,7 +88,7 @@ impl<const N: usize, const G: usize> TaylorExpansion<N, G> {
         let Some(exponent) = &self.exponent else { return h };
         let varies = h * exponent[1..=self.order].iter().rev().fold(0.0, |sum, c| sum * h + c.abs());
         let most = (SHARE * self.order as f64).max(exponent[0] - NEGLIGIBLE);
-        // (the sum of the terms grows at least in proportion to the length)
+        // (the change grows at least in proportion to the step length)
         if varies > most { h * most / varies } else { h }
     }
 
@@ -106,7 +106,7 @@ impl<const N: usize, const G: usize> TaylorExpansion<N, G> {
         }
         let mut first: Option<(usize, f64)> = None;
         for g in 0..G {
-            // a first term that outweighs all others together (infinity included) has no root
+            // a guard whose first term exceeds the sum of all others (or is infinite) has no root
             if self.guards[0][g] > rest[g] && zero_order[g] == 0 {
                 continue;
             }
@@ -121,7 +121,7 @@ impl<const N: usize, const G: usize> TaylorExpansion<N, G> {
     }
 }
 
-/// Memory for the expansion of steps, reused for all phases of a kind.
+/// Memory for the expansion of steps, reused for all phases with the same equations.
 #[derive(Debug, Clone, Default)]
 pub struct TaylorWorkspace<T, const N: usize, const G: usize> {
     /// Data of the recurrences in the last step.
@@ -129,7 +129,7 @@ pub struct TaylorWorkspace<T, const N: usize, const G: usize> {
     expansion: TaylorExpansion<N, G>,
 }
 
-/// A guard is NaN somewhere in the step.
+/// Error: a guard is NaN somewhere in the step.
 struct UndefinedGuard;
 
 impl<const N: usize, const G: usize> DenseOutput<N> for TaylorExpansion<N, G> {
@@ -138,27 +138,27 @@ impl<const N: usize, const G: usize> DenseOutput<N> for TaylorExpansion<N, G> {
     }
 }
 
-/// Order of the series for a tolerance. The order of least work is `1 - ln(relative)/2` if the terms fall
-/// geometrically (Jorba and Zou 2005, section 3.1); a few more are added, because the coefficients of
-/// oscillations fall faster. The optimum is flat: for an oscillation, adding 2 to 6 takes the same time.
+/// Order of the series for a tolerance. The order of least work is `1 - ln(relative)/2` if the terms decrease
+/// geometrically (Jorba and Zou 2005, section 3.1). A few orders more are used, because the coefficients of
+/// oscillations decrease faster. The optimum is flat: for an oscillation, adding 2 to 6 takes the same time.
 pub(crate) fn order_for_tolerance(relative: f64) -> usize {
     const MORE: f64 = 3.0;
-    /// Smallest order; a lower one would derive the step length from too few coefficients.
+    /// Smallest order; a lower order would derive the step length from too few coefficients.
     const LEAST_ORDER: usize = 6;
     ((1.0 + MORE - 0.5 * math::ln(relative)).ceil() as usize).clamp(LEAST_ORDER, MOST_ORDER)
 }
 
-/// Fraction of the tolerance that a step may use. The errors of thousands of steps add up, and an unstable
-/// motion amplifies them: after hundreds of events, the error of the worst event is 10 to 50 times the error
-/// of a step. With this fraction, the error of the worst event is about the tolerance.
+/// Fraction of the tolerance that a single step may use. The errors of thousands of steps add up, and an
+/// unstable motion amplifies them: after hundreds of events, the error of the worst event is 10 to 50 times
+/// the error of a step. With this fraction, the error of the worst event is about the tolerance.
 const STEP_SHARE: f64 = 0.02;
 
 /// A step is lengthened by up to this factor to end at the stop time, so that no tiny step remains.
 const STRETCH: f64 = 1.01;
 
-/// Integrates `phase` from `start` until `stop` or until a guard falls to zero, under the contract of
-/// [`integrate`](super::integrate). `observe` is called with every step and the tape of its recurrences. The
-/// coefficients of all states at one order count as one right-hand side.
+/// Integrates `phase` from `start` until `stop` or until a guard falls to zero, with the tolerance `relative`
+/// as in [`integrate`](super::integrate). `observe` is called with every step and the tape of its
+/// recurrences. The coefficients of all states at one order count as one right-hand side.
 pub fn integrate_taylor<const N: usize, const G: usize, P: TaylorPhase<N, G>, A: ObserverReply>(
     phase: &P,
     start: PhaseStart<N, G>,
@@ -188,7 +188,7 @@ pub fn integrate_taylor<const N: usize, const G: usize, P: TaylorPhase<N, G>, A:
         let (remaining, wanted) = (stop - t, expansion.step_length(&scale, relative));
         let limit = if wanted * STRETCH >= remaining { remaining } else { wanted };
         let h = expansion.limit_by_exponential(limit);
-        // (a NaN step is not resolved either)
+        // (a NaN step counts as too short, too)
         let resolved = wanted > 4.0 * f64::EPSILON * t.abs();
         let advances = resolved && t + h > t;
         let event = if advances { expansion.find_event(&zero_order, h) } else { Err(UndefinedGuard) };
@@ -208,9 +208,9 @@ pub fn integrate_taylor<const N: usize, const G: usize, P: TaylorPhase<N, G>, A:
     }
 }
 
-/// Corrects the root of a guard's series to the root of the guard itself, evaluated on the polynomials of the
-/// states. A guard that contains a force follows from second derivatives, so its series ends one order before
-/// those of the states.
+/// Corrects the root of a guard's series to the root of the guard itself, which is evaluated on the
+/// polynomials of the states. The correction is needed for a guard that contains a force: it follows from
+/// second derivatives, so its series ends one order before those of the states.
 fn correct_root<const N: usize, const G: usize, P: TaylorPhase<N, G>>(
     phase: &P,
     expansion: &TaylorExpansion<N, G>,

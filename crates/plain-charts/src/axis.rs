@@ -21,13 +21,13 @@ pub struct ChartAxis {
     pub label: String,
     /// Linear or logarithmic.
     pub scale: AxisScale,
-    /// Ends; `None` to take them from the data.
+    /// Low and high end, in axis units; `None` to fit them to the data.
     pub range: Option<(f64, f64)>,
     /// Positions and names of the ticks of a categorical axis; empty for a numerical axis.
     pub categories: Vec<(f64, String)>,
 }
 
-/// Label of every time axis; a time axis is recognised by it.
+/// Label of every time axis. A linear axis with this label is treated as a time axis.
 const TIME_LABEL: &str = "time, s";
 
 impl ChartAxis {
@@ -36,7 +36,7 @@ impl ChartAxis {
         Self { label: label.into(), scale: AxisScale::Linear, ..Self::default() }
     }
 
-    /// A linear time axis, s; panels with a time axis share a cursor on a page.
+    /// A linear time axis, s; all panels of a web page with a time axis share one cursor.
     pub fn time() -> Self {
         Self::linear(TIME_LABEL)
     }
@@ -59,18 +59,18 @@ impl ChartAxis {
         Self { categories, ..Self::linear(label).with_range(-0.5, end) }
     }
 
-    /// The same axis with fixed ends.
+    /// This axis with its ends fixed at `low` and `high`.
     pub fn with_range(self, low: f64, high: f64) -> Self {
         self.with_ends(Some((low, high)))
     }
 
-    /// The same axis with fixed ends, or fitted to the data for `None`.
+    /// This axis with its ends fixed, or fitted to the data for `None`.
     pub fn with_ends(self, range: Option<(f64, f64)>) -> Self {
         Self { range, ..self }
     }
 }
 
-/// A tick and its label; minor ticks have none.
+/// A tick and its label; a minor tick has no label.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Tick {
     pub value: f64,
@@ -78,37 +78,38 @@ pub(super) struct Tick {
 }
 
 impl Tick {
-    /// Length, canvas units; minor ticks are half as long.
+    /// Length of the tick mark, canvas units; minor ticks are half as long.
     pub(crate) fn length(&self) -> f64 {
         if self.label.is_some() { TICK_MM * UNITS_PER_MM } else { TICK_MM / 2.0 * UNITS_PER_MM }
     }
 }
 
-/// An axis with known ends, mapped to the canvas.
+/// An axis with known ends and a mapping of values to canvas coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct CanvasAxis {
     pub scale: AxisScale,
     pub low: f64,
     pub high: f64,
-    /// Canvas coordinates of the ends.
+    /// Canvas coordinates of the low end (`from`) and of the high end (`to`).
     pub from: f64,
     pub to: f64,
 }
 
-/// Margin beyond the data on a linear axis, fraction of their range.
+/// Margin beyond the data at each end of a linear axis, as a fraction of the range of the data.
 const LINEAR_ROOM: f64 = 0.05;
-/// Smallest margin relative to the values; a smaller variation is rounding error, and tick labels could not
-/// show it.
+/// Smallest margin at each end of a linear axis, as a fraction of the largest absolute value. Smaller
+/// differences between values are rounding errors, which tick labels could not show.
 const MIN_RELATIVE_SPAN: f64 = 1e-4;
-/// Margin of an axis whose data are all zero.
+/// Margin at each end of a linear axis whose data are all zero, in axis units.
 const SINGLE_VALUE_ROOM: f64 = 1.0;
-/// Margin on a logarithmic axis, as a factor.
+/// Factor by which a logarithmic axis extends below and above the data.
 const LOG_ROOM: f64 = 1.4;
-/// Maximum number of decades of a logarithmic axis that fits the data; lower values are rounding errors.
+/// Maximum number of decades below the largest value on a logarithmic axis that fits the data; smaller values
+/// are rounding errors.
 const MOST_DECADES: i32 = 6;
 
-/// Largest distance of a point from the low end, in lengths of the axis. Points farther away are moved to
-/// this distance, so that clipping a line cannot overflow.
+/// Largest distance of a point from the low end, in axis lengths. Points farther away are moved to this
+/// distance, so that clipping a line cannot overflow.
 const FARTHEST_POSITION: f64 = 1e6;
 
 /// Ends of an axis: the given ones, or those of the data with a margin. They are finite, ordered and
@@ -138,7 +139,8 @@ pub fn value_span(values: impl Iterator<Item = f64>) -> (f64, f64) {
 }
 
 impl CanvasAxis {
-    /// Canvas coordinate of a value; `None` for a value without a place on the axis.
+    /// Canvas coordinate of a value; `None` if the value is not finite, or is zero or less on a logarithmic
+    /// axis.
     pub(crate) fn canvas_position(&self, value: f64) -> Option<f64> {
         let share = match self.scale {
             AxisScale::Linear => (value - self.low) / (self.high - self.low),
@@ -164,7 +166,7 @@ impl CanvasAxis {
         }
     }
 
-    /// Ticks at distances of about `apart` canvas units or more.
+    /// Ticks whose labelled ones are about `apart` canvas units or more apart.
     pub(crate) fn ticks(&self, apart: f64) -> Vec<Tick> {
         let most = ((self.to - self.from).abs() / apart).clamp(2.0, 12.0) as usize;
         let length = (self.to - self.from).abs();
@@ -181,8 +183,8 @@ impl CanvasAxis {
 /// Smallest distance of minor ticks, canvas units, at which they are distinct in print.
 const MIN_MINOR_TICK_SPACING: f64 = 1.0 * UNITS_PER_MM;
 
-/// Appends minor ticks to those of a linear axis if there is room: four between neighbours, or three if the
-/// step is 2 times a power of ten.
+/// Adds minor ticks to the labelled ticks of a linear axis if there is room: four between two neighbouring
+/// labelled ticks, or three if their distance is 2 times a power of ten.
 fn add_minor_ticks(mut ticks: Vec<Tick>, axis: &CanvasAxis, length: f64) -> Vec<Tick> {
     let [first, second, ..] = ticks.as_slice() else { return ticks };
     let (start, step) = (first.value, second.value - first.value);
@@ -205,7 +207,8 @@ pub(super) fn category_ticks(axis: &ChartAxis, shown: impl Fn(&str) -> String) -
     axis.categories.iter().map(|(value, name)| Tick { value: *value, label: Some(shown(name)) }).collect()
 }
 
-/// Factor by which ticks may be closer than requested before the next coarser step is chosen.
+/// Smallest tick distance relative to the requested distance; if a step gives less, the next coarser step is
+/// chosen.
 const TICK_SPACING_SLACK: f64 = 0.8;
 
 /// Ticks at the multiples of a step of 1, 2 or 5 times a power of ten.
@@ -239,13 +242,14 @@ fn linear_ticks(low: f64, high: f64, most: usize) -> Vec<Tick> {
     (first as i64..=last as i64).map(|k| Tick { value: value(k), label: Some(label(value(k))) }).collect()
 }
 
-/// Lists of the multiples to label in each decade, each with the smallest distance between two of its
-/// multiples, in decades. The first list that fits is used.
+/// Lists of multiples of a power of ten that may be labelled in every decade. Each list is followed by its
+/// smallest distance between neighbouring multiples, in decades. The first list whose labels fit is used.
 const LOG_LABEL_MULTIPLES: [(&[i32], f64); 2] = [(&[1, 2, 3, 5, 7], 0.154), (&[1, 2, 5], 0.301)];
 
 /// Ticks at the powers of ten and their multiples, some of them labelled. `room` is the ratio of the length
-/// of a decade to the smallest distance of labels. An axis with fewer than two powers of ten always labels 2
-/// and 5; if fewer than two of all these labels lie on it, it has the ticks of a linear axis.
+/// of a decade to the smallest allowed distance between labels. If the axis contains fewer than two powers of
+/// ten, at least 1, 2 and 5 times each power are labelled; if fewer than two of these values lie on the axis,
+/// it has the ticks of a linear axis.
 fn log_ticks(low: f64, high: f64, most: usize, room: f64) -> Vec<Tick> {
     let decades = (math::log10(low).floor() as i32)..=(math::log10(high).ceil() as i32);
     let inside = |v: &f64| *v >= low * (1.0 - 1e-9) && *v <= high * (1.0 + 1e-9);
@@ -270,7 +274,7 @@ fn log_ticks(low: f64, high: f64, most: usize, room: f64) -> Vec<Tick> {
     decades.clone().flat_map(|e| (1..10).filter_map(move |m| tick(m, e))).collect()
 }
 
-/// The label of `m 10^e`: plain digits if they are few, otherwise a power of ten.
+/// The label of `m 10^e`: plain digits for `e` from -3 to 4, otherwise a power of ten.
 fn log_label(m: i32, e: i32) -> String {
     match e {
         0..=4 => format!("{m}{}", "0".repeat(e as usize)),

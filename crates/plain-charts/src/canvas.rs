@@ -1,4 +1,5 @@
-//! Canvas in whole units: lines, rectangles, polygons, circles and text, drawn with plotters.
+//! A drawing surface in whole canvas units: lines, rectangles, polygons, circles and text, drawn with
+//! `plotters`.
 
 use super::compact_svg::CompactSvg;
 use super::path::{CanvasArea, CanvasPoint};
@@ -9,7 +10,7 @@ use plotters::prelude::{DrawingBackend, IntoFont, RGBColor};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color as _, FontStyle, FontTransform, ShapeStyle, TextStyle};
 
-/// Point of a text that is placed at its position.
+/// Point of the box around a text that is placed at the given position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum TextAnchor {
     /// Middle of the left edge.
@@ -23,7 +24,7 @@ pub(super) enum TextAnchor {
     Centre,
 }
 
-/// Look of a text.
+/// Size, anchor and style of a text.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Lettering {
     pub size_mm: f64,
@@ -38,21 +39,21 @@ impl Lettering {
     }
 }
 
-/// The canvas; positions are in its units, y downwards.
+/// A drawing surface. Positions are in canvas units from the upper left corner, y downwards.
 pub(super) struct Canvas {
     back: CompactSvg,
 }
 
-// Drawing into a string cannot fail, so the results of the back end are dropped below.
+// Drawing into a string cannot fail, so the results of the back end are ignored below.
 impl Canvas {
-    /// The SVG elements that `draw` makes on a canvas of this size.
+    /// The SVG elements that `draw` makes on a canvas of this size, in canvas units.
     pub(crate) fn render_elements(size: (u32, u32), draw: impl FnOnce(&mut Canvas)) -> String {
         let mut canvas = Canvas { back: CompactSvg::new(size) };
         draw(&mut canvas);
         canvas.back.into_elements()
     }
 
-    /// Draws inside a group with attributes; `None` for no group.
+    /// Calls `draw` inside an SVG group with these attributes, or outside any group for `None`.
     pub(crate) fn draw_group(&mut self, attributes: Option<&str>, draw: impl FnOnce(&mut Canvas)) {
         match attributes {
             None => draw(self),
@@ -73,7 +74,7 @@ impl Canvas {
         let _ = self.back.draw_path(whole, &plotters_colour(colour).stroke_width(width));
     }
 
-    /// Draws a PNG in `area`, clipped to `within`.
+    /// Draws a PNG image that fills `area` and is clipped to `within`.
     pub(crate) fn draw_png(&mut self, area: &CanvasArea, within: &CanvasArea, png: &[u8]) {
         self.back.append_png(area, within, png);
     }

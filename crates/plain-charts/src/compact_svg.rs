@@ -1,5 +1,5 @@
-//! A plotters back end that writes compact SVG: consecutive lines, rectangles or dots of one look become one
-//! path, while the back end of plotters writes one element for each.
+//! A back end for the crate `plotters` that writes compact SVG: consecutive lines, rectangles or dots of the
+//! same style are merged into one path. The SVG back end of `plotters` itself writes one element for each.
 
 use super::path::CanvasArea;
 use super::style::format_hex;
@@ -13,14 +13,14 @@ use plotters_backend::{
 use std::convert::Infallible;
 use std::fmt::Write;
 
-/// Result of drawing; writing into a string cannot fail.
+/// Result of a drawing call; it never fails, because writing into a string cannot fail.
 type DrawResult = Result<(), DrawingErrorKind<Infallible>>;
 
-/// The elements drawn so far.
+/// The SVG elements drawn so far.
 pub(super) struct CompactSvg {
     size: (u32, u32),
     elements: String,
-    /// Look of the open path, which the next shape of the same look continues.
+    /// Style attributes of the open path; the next shape with the same attributes is appended to this path.
     open: Option<String>,
 }
 
@@ -29,7 +29,7 @@ impl CompactSvg {
         Self { size, elements: String::new(), open: None }
     }
 
-    /// The elements, one per line.
+    /// The SVG elements as text, one per line.
     pub(crate) fn into_elements(mut self) -> String {
         self.close_path();
         self.elements
@@ -51,7 +51,7 @@ impl CompactSvg {
         Ok(())
     }
 
-    /// Opens a group with attributes.
+    /// Opens an SVG group with the given attributes.
     pub(crate) fn open_group(&mut self, attributes: &str) {
         self.close_path();
         self.elements.push_str(&format!("<g {attributes}>\n"));
@@ -63,7 +63,7 @@ impl CompactSvg {
         self.elements.push_str("</g>\n");
     }
 
-    /// Appends a PNG as an element with base64 data, clipped to `within`.
+    /// Appends a PNG image that fills `area` and is clipped to `within`, with its bytes as base64 text.
     pub(crate) fn append_png(&mut self, area: &CanvasArea, within: &CanvasArea, png: &[u8]) {
         let (x, y) = (area.left - within.left, area.top - within.top);
         let _ = self.append_element(&format!(
@@ -87,13 +87,13 @@ impl CompactSvg {
     }
 }
 
-/// Fill colour, and opacity if it is not 1.
+/// SVG attributes of a fill: colour, and opacity if it is not 1.
 fn fill_attributes(colour: BackendColor) -> String {
     let opacity = if colour.alpha < 1.0 { format!("opacity=\"{}\" ", colour.alpha) } else { String::new() };
     format!("{opacity}fill=\"{}\"", format_hex(colour.rgb))
 }
 
-/// Path data: the start in canvas units, then relative steps.
+/// SVG path data of a line: its first point in canvas units, then the steps from point to point.
 fn relative_path_data(points: impl IntoIterator<Item = BackendCoord>) -> String {
     let mut points = points.into_iter();
     let Some(mut last) = points.next() else { return String::new() };

@@ -11,25 +11,27 @@ use super::text::text_width;
 use portable_math as math;
 use std::collections::BTreeMap;
 
-/// Minimum number of columns and of rows of a map that has contours.
+/// Minimum number of columns and minimum number of rows of a heat map that has contours.
 const MIN_GRID_SIZE: usize = 4;
 /// Approximate maximum number of contours of a map.
 const MOST_LEVELS: f64 = 6.0;
-/// Largest range of the corner values of a cell, as a fraction of the colour range; a larger range is a jump,
-/// which contours do not cross. For a plane on the coarsest map, four by four, the fraction is one third.
+/// Largest range of the four corner values of a cell, as a fraction of the colour range. A larger range is a
+/// jump, which contours do not cross. For a plane on the coarsest map, four by four, the fraction is one
+/// third.
 const MAX_CELL_SPREAD: f64 = 0.35;
-/// Largest ratio of the number of cells with a jump to that of all other cells; above it a map is not smooth.
+/// Largest ratio of the number of cells with a jump to the number of cells without one. Above this ratio a
+/// map is not smooth and has no contours.
 const MOST_JUMPS: f64 = 0.15;
-/// Width of a line, canvas units.
+/// Width of a contour line, canvas units.
 const CONTOUR_WIDTH: u32 = 3;
-/// Shortest line that is drawn, and shortest that is labelled, mm.
+/// Lengths, mm, of the shortest contour line that is drawn and of the shortest that is labelled.
 const MIN_CONTOUR_MM: f64 = 2.5;
 const MIN_LABELLED_MM: f64 = 10.0;
-/// Smallest distance of a label from another label and from a symbol, mm.
+/// Smallest distances, mm, of a contour label from another contour label and from a symbol.
 const LABELS_APART_MM: f64 = 8.0;
 const SYMBOL_APART_MM: f64 = 4.0;
 
-/// A side of a cell: column and row of its start, and whether it is vertical.
+/// A side of a grid cell: column and row of the grid point where it starts, and whether it is vertical.
 type GridEdge = (usize, usize, bool);
 
 /// Draws the contours of the heat map of a panel if they are requested.
@@ -63,7 +65,8 @@ pub(super) fn draw_contours(canvas: &mut Canvas, placed: &PanelLayout) {
     }
 }
 
-/// The point of a long line that lies farthest from other labels, with room for a label and clear of symbols.
+/// Position of a contour label: the point of a long contour line that is farthest from other labels. The
+/// label must fit inside the axes and keep clear of symbols.
 fn find_label_position(
     lines: &[Vec<CanvasPoint>],
     area: &CanvasArea,
@@ -81,7 +84,7 @@ fn find_label_position(
         of.iter().map(|q| math::hypot(p.0 - q.0, p.1 - q.1)).fold(f64::INFINITY, f64::min)
     };
     let long = lines.iter().filter(|line| polyline_length(line) >= MIN_LABELLED_MM * UNITS_PER_MM);
-    // from the middle of each line towards its ends, so that the middle wins among equally good points
+    // order: from the middle of each line towards its ends, so that the middle wins among equally good points
     let points = long.flat_map(|line| {
         let (before, after) = line.split_at(line.len() / 2);
         after.iter().chain(before.iter().rev()).copied()
@@ -99,7 +102,8 @@ fn polyline_length(line: &[CanvasPoint]) -> f64 {
     line.windows(2).map(|pair| math::hypot(pair[1].0 - pair[0].0, pair[1].1 - pair[0].1)).sum()
 }
 
-/// Canvas positions of the cell centres, and the squares between four centres that contours may cross.
+/// Canvas positions of the cell centres of a heat map, and the squares between four neighbouring centres that
+/// contours may cross.
 struct ContourGrid<'a> {
     heat: &'a HeatMap,
     x: Vec<f64>,
@@ -108,7 +112,7 @@ struct ContourGrid<'a> {
 }
 
 impl<'a> ContourGrid<'a> {
-    /// `None` if the map is too coarse or not smooth.
+    /// `None` if the heat map is too coarse or not smooth.
     fn new(heat: &'a HeatMap, placed: &PanelLayout, ends: (f64, f64)) -> Option<Self> {
         let places = |values: &[f64], axis: &CanvasAxis| {
             values.iter().map(|value| axis.canvas_position(*value)).collect::<Option<Vec<f64>>>()
@@ -141,8 +145,8 @@ impl<'a> ContourGrid<'a> {
     }
 
     /// The contour lines of a level, with linear interpolation between cell centres (marching squares, the
-    /// two-dimensional case of Lorensen and Cline, 1987). At a saddle the mean of the corners decides which
-    /// sides are joined.
+    /// two-dimensional case of Lorensen and Cline, 1987). At a saddle, the mean of the four corner values
+    /// decides which sides are joined.
     fn contour_lines(&self, level: f64) -> Vec<Vec<CanvasPoint>> {
         let mut next: BTreeMap<GridEdge, Vec<GridEdge>> = BTreeMap::new();
         for (i, j) in self.smooth.iter().copied() {
@@ -171,7 +175,7 @@ impl<'a> ContourGrid<'a> {
         join_edges(next).into_iter().map(crossings).collect()
     }
 
-    /// The point of a side at which the interpolated value equals the level.
+    /// The point on a side of a square at which the interpolated value equals the level, canvas coordinates.
     fn edge_crossing(&self, (i, j, upwards): GridEdge, level: f64) -> Option<CanvasPoint> {
         let (k, l) = if upwards { (i, j + 1) } else { (i + 1, j) };
         let (from, to) = (self.value(i, j)?, self.value(k, l)?);
@@ -181,7 +185,7 @@ impl<'a> ContourGrid<'a> {
     }
 }
 
-/// Joins connected sides into lines: first the open lines, each from one end, then the closed ones.
+/// Joins connected sides into contour lines: first the open lines, each from one end, then the closed lines.
 fn join_edges(mut next: BTreeMap<GridEdge, Vec<GridEdge>>) -> Vec<Vec<GridEdge>> {
     let mut lines = Vec::new();
     let ends: Vec<GridEdge> =
@@ -262,7 +266,7 @@ mod tests {
 
     #[test]
     fn no_line_follows_a_jump_or_crosses_a_gap() {
-        // a cliff between x = 3 and 4 on a slope along y
+        // a jump by 100 between x = 3 and 4, on a slope along y
         let cliff = |x: f64, y: f64| Some(y + if x > 3.5 { 100.0 } else { 0.0 });
         assert!(lines(cliff, 10, 50.0).unwrap().is_empty());
         assert_eq!(lines(|x, y| Some(x).filter(|_| y != 5.0), 10, 4.5).unwrap().len(), 2);

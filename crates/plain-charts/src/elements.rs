@@ -7,7 +7,7 @@ use super::style::{Colour, Mark};
 /// Points with one style and one entry in the legend.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Series {
-    /// Entry in the legend; equal entries of several panels appear once. Empty for none.
+    /// Text in the legend; equal entries of several panels appear once. Empty for no entry.
     pub label: String,
     /// Colour.
     pub colour: Colour,
@@ -53,18 +53,18 @@ pub enum ErrorBar {
     Vertical { x: f64, from: f64, to: f64 },
 }
 
-/// A picture, drawn to the scale of the axes.
+/// A picture whose edges are given in axis units.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Raster {
     /// The picture as PNG bytes.
     pub png: Vec<u8>,
-    /// Its left and right edge, in units of the x axis.
+    /// Left and right edge of the picture, in units of the x axis.
     pub x: [f64; 2],
-    /// Its lower and upper edge, in units of the y axis.
+    /// Lower and upper edge of the picture, in units of the y axis.
     pub y: [f64; 2],
 }
 
-/// The surface between two curves.
+/// A filled area between a lower and an upper curve.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Ribbon {
     /// Entry in the legend; empty for none.
@@ -98,7 +98,7 @@ pub struct ShadedSpan {
     pub from: f64,
     /// End, in units of the x axis.
     pub to: f64,
-    /// Whether the span is framed, on top of everything else, instead of shaded.
+    /// Whether the span is drawn as a frame on top of everything else instead of as shading.
     pub outlined: bool,
 }
 
@@ -141,7 +141,7 @@ impl VerticalLine {
 pub struct TopLabel {
     /// Label.
     pub label: String,
-    /// Position of its middle, in units of the x axis.
+    /// Position of the middle of the label, in units of the x axis.
     pub at: f64,
 }
 
@@ -152,7 +152,7 @@ pub struct TextAnnotation {
     pub text: String,
     /// Colour.
     pub colour: Colour,
-    /// Position of its middle, in the units of the axes.
+    /// Position of the middle of the text, in the units of the axes.
     pub at: (f64, f64),
 }
 
@@ -163,19 +163,19 @@ impl TextAnnotation {
     }
 }
 
-/// Cells with one pattern and one entry in the legend.
+/// Hatched cells with one pattern and one entry in the legend.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Hatch {
     /// Entry in the legend; empty for none.
     pub label: String,
     /// Pattern of the cells.
     pub pattern: HatchPattern,
-    /// Start and end on the x axis, then on the y axis, in axis units; clipped to the axes. Infinite values
-    /// on the y axis stand for its ends.
+    /// For each cell: start and end on the x axis, then start and end on the y axis, in axis units. Cells are
+    /// clipped to the axes; an infinite y value means the end of the y axis.
     pub cells: Vec<[f64; 4]>,
 }
 
-/// A pattern of thin lines over the grey of cells without a value.
+/// A pattern of thin lines, drawn over the grey of cells without a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[allow(missing_docs)]
 pub enum HatchPattern {
@@ -205,14 +205,14 @@ pub struct Panel {
     pub height_mm: f64,
     /// Lines and symbols, later ones on top.
     pub series: Vec<Series>,
-    /// Entry `i` is the full data of `series[i]` if its points are thinned; shown when a reader enlarges a
-    /// part on a screen. Missing entries count as `None`.
+    /// Entry `i` is the full data of `series[i]` if the points of that series are thinned. A web page draws
+    /// the full data when a reader enlarges a part. Missing entries count as `None`.
     pub sampled_series: Vec<Option<SampledSeries>>,
     /// Shaded intervals, under the lines.
     pub shaded_spans: Vec<ShadedSpan>,
     /// Vertical lines.
     pub vertical_lines: Vec<VerticalLine>,
-    /// Surfaces between curves, under the lines.
+    /// Filled areas between curves, under the lines.
     pub ribbons: Vec<Ribbon>,
     /// Labels above the panel.
     pub top_labels: Vec<TopLabel>,
@@ -224,14 +224,15 @@ pub struct Panel {
     pub hatches: Vec<Hatch>,
     /// Text inside the axes, over everything else.
     pub annotations: Vec<TextAnnotation>,
-    /// Whether both axes have the same scale, as in a drawing; the shorter range is widened.
+    /// Whether both axes have the same length per unit, as in a drawing; the range of one axis is then
+    /// widened.
     pub equal_aspect: bool,
     /// Whether frame, grid and ticks are left out, as in a drawing.
     pub bare: bool,
 }
 
 impl Panel {
-    /// A panel that holds only series.
+    /// A panel with series only.
     pub fn new(x: ChartAxis, y: ChartAxis, height_mm: f64, series: impl IntoIterator<Item = Series>) -> Self {
         Self { x, y, height_mm, series: series.into_iter().collect(), ..Self::default() }
     }

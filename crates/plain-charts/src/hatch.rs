@@ -13,12 +13,12 @@ const HATCH_GREY: Rgb = (0x66, 0x66, 0x66);
 /// the file size.
 const HATCH_SPACING: f64 = 1.3 * UNITS_PER_MM;
 const MOST_STROKES: usize = 1200;
-/// Largest gap over which strokes of one line, or areas of one row, are joined, canvas units.
+/// Largest gap, canvas units, across which two strokes of one line, or two areas of one row, are joined.
 const TOUCHING_DISTANCE: f64 = 1.5;
 const STROKE_WIDTH: u32 = 3;
 
 impl HatchPattern {
-    /// Directions of the lines, with y pointing down.
+    /// Unit vectors along the lines of the pattern, with y pointing down.
     fn directions(self) -> &'static [CanvasPoint] {
         const D: f64 = std::f64::consts::FRAC_1_SQRT_2;
         match self {
@@ -85,7 +85,7 @@ pub(super) fn draw_hatch_sample(canvas: &mut Canvas, area: &CanvasArea, pattern:
     canvas.draw_line(&area.outline(), FRAME, 2);
 }
 
-/// Draws the lines of a pattern inside the areas; lines continue from one area into the next.
+/// Draws the lines of a pattern inside the areas; a line continues from one area into a touching area.
 fn draw_strokes(canvas: &mut Canvas, areas: &[CanvasArea], pattern: HatchPattern) {
     for direction in pattern.directions() {
         let mut spacing = HATCH_SPACING;

@@ -24,14 +24,14 @@ pub struct HeatMap {
     pub y: Vec<f64>,
     /// One list per column, one value per row; `None` for a missing value.
     pub values: Vec<Vec<Option<f64>>>,
-    /// Values of the first and the last colour; `None` takes them from the data. A value outside this range
-    /// has the colour of the nearer end.
+    /// Values of the first and the last colour of the colour map; `None` takes them from the data. A value
+    /// outside this range has the colour of the nearer end.
     pub range: Option<(f64, f64)>,
     /// Colours.
     pub colour_map: ColourMap,
-    /// Whether contours at round values are drawn; only on fine and smooth maps.
+    /// Whether contours at round values are drawn; coarse or noisy maps have no contours in either case.
     pub contours: bool,
-    /// Whether the colour bar is left out, for example beside a map on the same scale.
+    /// Whether the colour bar is left out, for example because a neighbouring map has the same one.
     pub without_bar: bool,
 }
 
@@ -45,7 +45,7 @@ impl HeatMap {
         self.value_range().is_some()
     }
 
-    /// Values of the first and the last colour.
+    /// Values of the first and the last colour; `None` if no value is finite.
     pub(super) fn value_range(&self) -> Option<(f64, f64)> {
         let given = self.range.filter(|(low, high)| low.is_finite() && high.is_finite() && low < high);
         let (low, high) = given.unwrap_or_else(|| axis::value_span(self.finite_values()));
@@ -56,7 +56,7 @@ impl HeatMap {
         }
     }
 
-    /// Largest value of a block of cells.
+    /// Largest finite value in a block of cells; `None` if the block has no finite value.
     pub(super) fn max_in_block(&self, columns: &Range<usize>, rows: &Range<usize>) -> Option<f64> {
         let columns = self.values.get(columns.clone()).unwrap_or_default();
         let cells = columns.iter().flat_map(|column| column.get(rows.clone()).unwrap_or_default());
@@ -64,8 +64,9 @@ impl HeatMap {
     }
 }
 
-/// Edges of cells from their centres: halfway between neighbours on the axis scale, and half a spacing beyond
-/// the first and the last centre. A single cell is unbounded; centres that do not ascend have no edges.
+/// Edges of cells from their centres: halfway between neighbouring centres on the scale of the axis, and half
+/// a spacing beyond the first and the last centre. The edges of a single cell are infinite; the list is empty
+/// if the centres do not ascend.
 #[must_use]
 pub fn cell_edges(middles: &[f64], scale: AxisScale) -> Vec<f64> {
     let [first, second, ..] = middles else {
@@ -83,12 +84,12 @@ pub fn cell_edges(middles: &[f64], scale: AxisScale) -> Vec<f64> {
     std::iter::once(beyond(*first, *second)).chain(inner).chain([end]).collect()
 }
 
-/// Position of a value between the first and the last colour, 0 to 1.
+/// Position of a value in the range of the colours: 0 at the first colour, 1 at the last.
 pub(super) fn colour_fraction((low, high): (f64, f64), value: f64) -> f64 {
     ((value - low) / (high - low)).clamp(0.0, 1.0)
 }
 
-/// The colour at a point in axis units; `None` outside the map or without a value.
+/// The colour at a point in axis units; `None` outside the map or in a cell without a value.
 pub(super) fn colour_at(heat: &HeatMap, (x, y): (AxisScale, AxisScale), at: (f64, f64)) -> Option<Rgb> {
     let holder = |middles: &[f64], scale: AxisScale, at: f64| {
         cell_edges(middles, scale).partition_point(|edge| *edge <= at).checked_sub(1)
@@ -98,19 +99,21 @@ pub(super) fn colour_at(heat: &HeatMap, (x, y): (AxisScale, AxisScale), at: (f64
     Some(sample_colour_map(heat.colour_map, colour_fraction(heat.value_range()?, value)))
 }
 
-// Cells as vectors: runs of one colour along a row are thick lines over a background of the commonest colour.
+// Cells as vector graphics: each run of one colour along a row is a thick line over a background of the most
+// common colour.
 
-/// Maximum numbers of columns, rows and colours, from fine to coarse; the next entry is used if a map takes
-/// more bytes than [`MAX_CELL_BYTES`]. Finer cells are merged into one with their largest value, which keeps
-/// thin lines.
+/// Maximum numbers of columns, rows and colours, from fine to coarse. The first entry is used with which a
+/// map takes at most [`MAX_CELL_BYTES`]. Finer cells are merged into one with their largest value, so that
+/// thin lines stay visible.
 const CELL_RESOLUTIONS: [(usize, usize, u32); 6] =
     [(480, 240, 96), (320, 180, 64), (240, 135, 48), (200, 110, 32), (160, 90, 24), (120, 68, 16)];
 const MAX_CELL_BYTES: usize = 150_000;
-/// Length and thickness by which a line exceeds its cells, canvas units, so that no background shows between
-/// lines.
+/// Amount, canvas units, by which a line is longer and thicker than its cells, so that no background shows
+/// between lines.
 const CELL_OVERLAP: i64 = 2;
 
-/// A row or column of the drawing: its ends on the canvas, ascending, and the range of cells that it covers.
+/// A row or column of the drawing: its two ends on the canvas, ascending, and the indices of the heat map's
+/// cells that it covers.
 type CellBlock = (i64, i64, Option<Range<usize>>);
 
 /// The cells of a heat map over the axes, as SVG; `None` without values.
@@ -132,8 +135,8 @@ pub(super) fn heat_cells_svg(
     svg
 }
 
-/// The cells along an axis; `most` equal steps if there are more cells, or if a cell is too narrow to be
-/// drawn.
+/// The cells along an axis, one per block. If there are more than `most` cells, or if a cell is too narrow to
+/// be drawn, the axis is divided into `most` equal blocks instead.
 fn cell_blocks(middles: &[f64], axis: &CanvasAxis, most: usize) -> Vec<CellBlock> {
     let edges = cell_edges(middles, axis.scale);
     let (from, to) = (axis.from.min(axis.to), axis.from.max(axis.to));
@@ -179,8 +182,8 @@ fn resample_cells(middles: &[f64], edges: &[f64], axis: &CanvasAxis, count: usiz
     (0..count).map(|k| (ends(k).0, ends(k).1, of(k))).collect()
 }
 
-/// The rows as SVG, with one line for each run of one colour; all lines of one colour and thickness are one
-/// path.
+/// The rows as SVG, with one line for each run of one colour. All lines of the same colour and thickness form
+/// one path.
 fn cell_rows_svg(
     (heat, ends): (&HeatMap, (f64, f64)),
     columns: &[CellBlock],
@@ -208,7 +211,7 @@ fn cell_rows_svg(
             let end = start + run.len();
             if run[0] != ground {
                 let (from, to) = (columns[start].0, (columns[end - 1].1 + CELL_OVERLAP).min(right));
-                // the middle may lie at half a unit
+                // the middle of a row may lie half way between two units
                 let middle = format_half(top + bottom);
                 let line = lines.entry((run[0], bottom - top)).or_default();
                 let _ = write!(line, "M{from} {middle}h{}", to - from); // (writing into a string cannot fail)
@@ -233,14 +236,14 @@ fn format_half(twice: i64) -> String {
     if twice % 2 == 0 { (twice / 2).to_string() } else { format!("{}.5", twice / 2) }
 }
 
-/// The commonest level, the lowest of equally common ones.
+/// The most common level; of equally common levels the lowest.
 fn most_common_level(levels: impl Iterator<Item = Option<u32>>) -> Option<u32> {
     let mut counts: BTreeMap<Option<u32>, usize> = BTreeMap::new();
     levels.for_each(|level| *counts.entry(level).or_default() += 1);
     counts.into_iter().max_by(|a, b| a.1.cmp(&b.1).then(b.0.cmp(&a.0))).and_then(|(level, _)| level)
 }
 
-/// Left, top, right and bottom of the blocks.
+/// Left, top, right and bottom edge of the area that the blocks cover, canvas units.
 fn blocks_extent(columns: &[CellBlock], rows: &[CellBlock]) -> (i64, i64, i64, i64) {
     let least = |blocks: &[CellBlock]| blocks.iter().map(|b| b.0).min().unwrap_or(0);
     let most = |blocks: &[CellBlock]| blocks.iter().map(|b| b.1).max().unwrap_or(0);
@@ -249,32 +252,32 @@ fn blocks_extent(columns: &[CellBlock], rows: &[CellBlock]) -> (i64, i64, i64, i
 
 // Colour bar.
 
-/// Distance of the bar from the axes, its width, and the height of a pointed end, mm.
+/// Distance of the colour bar from the axes, width of the bar, and height of a pointed end, mm.
 const BAR_GAP_MM: f64 = 2.5;
 const BAR_MM: f64 = 3.0;
 const POINT_MM: f64 = 2.0;
 
-/// The axis of the colour bar, between two positions.
+/// The linear axis of the colour bar: its low end is at the position `from`, its high end at `to`.
 fn colour_bar_axis(ends: (f64, f64), from: f64, to: f64) -> CanvasAxis {
     CanvasAxis { scale: AxisScale::Linear, low: ends.0, high: ends.1, from, to }
 }
 
-/// Width that the colour bar needs beside the axes, mm.
+/// Width that the colour bar needs next to the axes, mm.
 pub(super) fn colour_bar_width_mm(heat: &HeatMap, height_mm: f64) -> f64 {
     let Some(ends) = heat.value_range().filter(|_| !heat.without_bar) else { return 0.0 };
     let label_mm = widest_bar_label_mm(&colour_bar_axis(ends, 0.0, height_mm), Y_TICKS_MM);
     BAR_GAP_MM + BAR_MM + TICK_MM + 0.6 + label_mm + LINE_MM
 }
 
-/// Width of the widest label of a bar with this tick distance, mm.
+/// Width of the widest label of a colour bar with this tick distance, mm.
 fn widest_bar_label_mm(scale: &CanvasAxis, apart: f64) -> f64 {
-    /// Ratio of the width of digits and signs to that of the mean letter.
+    /// Ratio of the width of digits and signs to the mean width of letters.
     const DIGITS: f64 = 1.2;
     let labels = scale.ticks(apart).into_iter().filter_map(|t| t.label);
     labels.map(|l| DIGITS * text_width(&l, TEXT_MM)).fold(0.0, f64::max)
 }
 
-/// Draws the colour bar with ticks and label; an end is pointed if there are values beyond it.
+/// Draws the colour bar with ticks and label; an end of the bar is pointed if the map has values beyond it.
 pub(super) fn draw_colour_bar(canvas: &mut Canvas, heat: &HeatMap, axes: &CanvasArea) {
     let Some((low, high)) = heat.value_range() else { return };
     let left = axes.right + BAR_GAP_MM * UNITS_PER_MM;
@@ -310,7 +313,8 @@ pub(super) fn draw_colour_bar(canvas: &mut Canvas, heat: &HeatMap, axes: &Canvas
     canvas.draw_text(&label, (label_x, (axes.top + axes.bottom) / 2.0), upwards);
 }
 
-/// Draws the colours from bottom to top; every stripe reaches to the top, so that there are no gaps.
+/// Draws the colours of the bar from bottom to top as stripes. Every stripe reaches to the top and is covered
+/// by the next ones, so that there are no gaps.
 fn draw_gradient(canvas: &mut Canvas, area: &CanvasArea, map: ColourMap) {
     const STRIPES: u32 = 64;
     for stripe in 0..STRIPES {

@@ -1,5 +1,5 @@
-//! Layout of a figure: heading, legend, panels and the labels above them. Lengths in mm; panels in canvas
-//! units.
+//! Layout of a figure: heading, legend, panels and the labels above the panels. Lengths are in mm, the areas
+//! of panels in canvas units.
 
 mod labels;
 mod panel_layout;
@@ -18,7 +18,7 @@ pub(super) use panel_layout::{PanelLayout, SMALL_LINE_MM, widest_label_mm};
 /// Height of a row of labels above a panel, mm.
 const LABEL_ROW_MM: f64 = SMALL_MM + 0.6;
 
-/// Panel letters; figures with a single panel or with more than these have none.
+/// Panel letters; figures with a single panel, or with more panels than letters, have none.
 const PANEL_LETTERS: &str = "abcdefghijklmnopqrstuvwxyz";
 const MAX_LETTERED_PANELS: usize = PANEL_LETTERS.len();
 
@@ -44,7 +44,7 @@ impl<'a> FigureLayout<'a> {
                 .collect();
             let rows: Vec<_> =
                 row.iter().zip(&mapped).map(|(panel, x)| assign_label_rows(panel, x)).collect();
-            // in lower rows, a letter has room beside the ticks of the panel above it
+            // below the first row, a letter fits next to the ticks of the panel above
             let alone = lettered && index == 0;
             let over = |(panel, rows): (&Panel, &Vec<Option<usize>>)| {
                 let title = panel.title.lines().count().max(usize::from(alone));
@@ -68,18 +68,18 @@ impl<'a> FigureLayout<'a> {
     }
 }
 
-// Lowering of panels so that a figure fits on a page.
+// Reduction of panel heights so that a figure fits on a page.
 
 /// Smallest height of axes, mm: room for two labelled ticks and for equal margins beyond them.
 const MIN_AXES_HEIGHT_MM: f64 = 16.0;
 /// Smallest height per name along a y axis, mm: a line of text and a gap.
 const MIN_CATEGORY_HEIGHT_MM: f64 = 3.0;
-/// Maximum number of rounds until the heights settle: labels of lowered panels wrap to more lines, which take
-/// up height again.
+/// Maximum number of rounds in which heights are reduced. One round may not be enough, because labels of
+/// lower panels wrap to more lines and need height again.
 const MAX_HEIGHT_ROUNDS: usize = 4;
 
-/// Lowers all panels by the same fraction of their spare height until the figure is at most `most_mm` high.
-/// Letters keep their size, so a figure with very many panels may remain higher.
+/// Reduces the heights of all panels by the same fraction of their spare height until the figure is at most
+/// `most_mm` high. Text keeps its size, so a figure with very many panels may remain higher.
 pub(super) fn limit_height(mut figure: Figure, most_mm: f64) -> Figure {
     for _ in 0..MAX_HEIGHT_ROUNDS {
         let over_mm = FigureLayout::new(&figure).height - most_mm;
@@ -94,7 +94,7 @@ pub(super) fn limit_height(mut figure: Figure, most_mm: f64) -> Figure {
     figure
 }
 
-/// Height by which a panel can be lowered, mm.
+/// Height by which a panel can be reduced, mm.
 fn spare_height_mm(panel: &Panel) -> f64 {
     let least_mm = MIN_AXES_HEIGHT_MM.max(panel.y.categories.len() as f64 * MIN_CATEGORY_HEIGHT_MM);
     (panel.height_mm - least_mm).max(0.0)
@@ -102,11 +102,11 @@ fn spare_height_mm(panel: &Panel) -> f64 {
 
 // Panels side by side.
 
-/// Smallest width of axes in a row of panels, and of a panel without axes, mm.
+/// Smallest width, mm, of the axes of a panel in a row, and of a panel without axes.
 const MIN_PANEL_WIDTH_MM: f64 = 30.0;
 const MIN_BARE_WIDTH_MM: f64 = 18.0;
 
-/// Number of panels side by side, and their margins.
+/// Number of panels side by side, and the margins of each column of panels.
 pub(crate) struct PanelColumns {
     pub count: usize,
     /// Left and right margins of the axes of each column, mm.
@@ -142,7 +142,7 @@ impl PanelColumns {
         figure.width_mm / self.count as f64 - left - right
     }
 
-    /// The x axis of a panel in a column.
+    /// The x axis of a panel in a column, mapped to the canvas.
     pub(crate) fn x_axis(
         &self,
         figure: &Figure,
@@ -175,7 +175,7 @@ fn left_margin(panel: &Panel, column_mm: f64) -> f64 {
         + 1.0
 }
 
-/// Right margin, mm: half of the last x label, or the colour bar.
+/// Right margin, mm: half the width of the last label of the x axis, or the colour bar.
 fn right_margin(panel: &Panel) -> f64 {
     if panel.bare {
         return EDGE_MM / 2.0;
@@ -209,9 +209,9 @@ fn lines_of_text(text: &str, letter_mm: f64, width_mm: f64) -> Vec<String> {
     if text.is_empty() { Vec::new() } else { wrap_lines(text, letter_mm, width_mm) }
 }
 
-// Data that set the ends of axes.
+// Data from which the ends of the axes follow.
 
-/// y values of the points with x from `low` to `high`, and of all rows of the heat map.
+/// y values of points, error bars and ribbons with x from `low` to `high`, and of all rows of the heat map.
 pub(super) fn visible_y_values(panel: &Panel, low: f64, high: f64) -> impl Iterator<Item = f64> {
     let points = panel.series.iter().flat_map(|s| s.points.iter().flatten());
     let bars = panel.series.iter().flat_map(|s| &s.error_bars).flat_map(|bar| match bar {
@@ -225,7 +225,7 @@ pub(super) fn visible_y_values(panel: &Panel, low: f64, high: f64) -> impl Itera
     shown.chain(panel.heat_map.iter().flat_map(|h| h.y.iter().copied()))
 }
 
-/// Ends of the x axis of every panel; stacked panels with equal axes share them.
+/// Ends of the x axis of every panel; stacked panels with equal x axes have the same ends.
 pub(super) fn x_ranges(panels: &[Panel], columns: usize) -> Vec<(f64, f64)> {
     let values = |p: &'_ Panel| {
         let points = p.series.iter().flat_map(|s| s.points.iter().flatten().map(|(x, _)| *x));

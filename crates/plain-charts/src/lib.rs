@@ -1,13 +1,13 @@
 //! Charts as SVG: stacked panels with axes, lines, symbols, shaded intervals and heat maps; no physics.
 //!
 //! Positions are whole canvas units, four per pixel of 1/96 inch; a `viewBox` scales them to millimetres.
-//! This crate handles axes, layout, gaps, clipping and thinning itself, because plotters clamps points to its
-//! range and draws a NaN as a spike. A canvas draws with the shapes and fonts of plotters on the back end
-//! `compact_svg`.
+//! This crate computes axes, layout, gaps, clipping and thinning itself, because the crate `plotters` clamps
+//! points to its range and draws a NaN as a spike. `plotters` provides only shapes and fonts; the back end
+//! `compact_svg` writes them as SVG.
 //!
-//! The modules from the bottom up: `style`, `path`, `axis`, `text`; the parts of a figure (`elements`,
-//! `heat_map`, `figure`); `layout`; `canvas` on `compact_svg`; the drawing of contours, hatches, series and
-//! panels.
+//! The modules, from the basic ones to those that use them: `style`, `path`, `axis`, `text`; the parts of a
+//! figure (`elements`, `heat_map`, `figure`); `layout`; `canvas` on `compact_svg`; the drawing of contours,
+//! hatches, series and panels.
 //!
 //! # A figure of two panels
 //!
@@ -31,7 +31,7 @@
 //! assert!(svg.starts_with("<svg") && svg.contains("velocity, m/s"));
 //! ```
 
-#![cfg_attr(not(test), warn(clippy::disallowed_methods))] // tests may use them
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))] // tests may call them
 
 mod axis;
 mod canvas;

@@ -1,10 +1,11 @@
-//! Numbers with a given number of digits, a true minus sign, and a power of ten instead of many zeros.
+//! Formatting of numbers: with a given number of digits, a true minus sign, and a power of ten instead of
+//! many zeros.
 
 use portable_math as math;
 
 /// Sign for a missing value.
 pub const DASH: &str = "\u{2013}";
-/// Powers of ten for which a number is written in plain digits.
+/// Exponents of ten for which a number is written in plain digits.
 const PLAIN_POWERS: std::ops::RangeInclusive<i32> = -3..=4;
 const MINUS: &str = "\u{2212}";
 const TIMES_TEN: &str = "\u{b7}10";
@@ -50,7 +51,7 @@ pub fn format_digits(value: f64, count: usize) -> String {
     format_significant(value, count, |plain| plain)
 }
 
-/// As [`format_digits`], but plain digits have no trailing zeros after the decimal point.
+/// As [`format_digits`], but without trailing zeros after the decimal point unless a power of ten follows.
 pub fn format_trimmed(value: f64, count: usize) -> String {
     format_significant(value, count, trim_zeros)
 }
@@ -134,11 +135,11 @@ pub fn to_ascii(printed: &str) -> String {
 
 // A value with its standard deviation.
 
-/// Maximum number of decimals, more than the accuracy of any measurement here; a smaller deviation is rounded
-/// up to 1 in the last decimal.
+/// Maximum number of decimals of a value with a standard deviation; no measurement here is more accurate. A
+/// standard deviation below the last decimal is shown as 1 in that decimal.
 const MOST_DECIMALS: i32 = 6;
-/// Range of powers of ten in which a value and its deviation are both written in plain digits; the power of
-/// the larger of the two decides.
+/// Exponents of ten for which a value and its standard deviation are both written in plain digits. The
+/// exponent is that of the larger of the two.
 const PLAIN_POWERS_WITH_SD: std::ops::RangeInclusive<i32> = -4..=6;
 
 /// A value with one digit of its standard deviation, in units of the last digit shown: `78.40(3)` for 78.40
@@ -169,7 +170,7 @@ fn format_digits_with_sd(value: f64, sd: f64) -> String {
     format!("{}({last:.0})", typeset(&format!("{value:.*}", decimals as usize)))
 }
 
-/// Power of ten of the first digit after rounding to it: 0.096 rounds to 0.1.
+/// Exponent of ten of the first significant digit of `sd` after rounding to one digit: 0.096 rounds to 0.1.
 fn power_of_first_digit(sd: f64) -> i32 {
     let power = math::log10(sd).floor() as i32;
     if (sd / math::powi(10.0, power)).round() >= 10.0 { power + 1 } else { power }

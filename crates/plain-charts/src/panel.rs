@@ -65,7 +65,7 @@ fn draw_outline(canvas: &mut Canvas, area: &CanvasArea, colour: Rgb) {
     canvas.draw_line(&area.outline(), colour, OUTLINE);
 }
 
-/// Draws a panel; a `live` panel has groups that the script of a page can move.
+/// Draws a panel. The parts of a `live` panel are in SVG groups that the script of a web page can move.
 pub(super) fn draw_panel(canvas: &mut Canvas, placed: &PanelLayout, live: bool) {
     let plot = panel_attributes(placed).filter(|_| live);
     let is_live = plot.is_some();
@@ -134,7 +134,8 @@ fn draw_over_axes(canvas: &mut Canvas, placed: &PanelLayout, live: bool) {
     panel.annotations.iter().for_each(|text| draw_annotation(canvas, placed, text));
 }
 
-/// Draws text inside the axes; over a heat map in dark or light, whichever has more contrast.
+/// Draws text inside the axes. Over a heat map, the text is near black or near white, whichever has more
+/// contrast.
 fn draw_annotation(canvas: &mut Canvas, placed: &PanelLayout, text: &TextAnnotation) {
     let Some(at) = placed.canvas_point(text.at).filter(|at| placed.area.contains(*at)) else { return };
     let colour = mean_heat_colour(placed, text, at.0).map_or(text.colour.rgb(), readable_on);
@@ -143,8 +144,8 @@ fn draw_annotation(canvas: &mut Canvas, placed: &PanelLayout, text: &TextAnnotat
 
 /// Mean colour of the heat map under a text with its centre at `middle`; `None` without a heat map.
 fn mean_heat_colour(placed: &PanelLayout, text: &TextAnnotation, middle: f64) -> Option<Rgb> {
-    /// Number of sampled points on either side of the centre, and the fraction of the half width that they
-    /// cover.
+    /// Number of sampled points on either side of the centre of the text, and the fraction of the text's half
+    /// width that they cover.
     const PLACES: i32 = 3;
     const COVERED: f64 = 0.8;
     let heat = placed.panel.heat_map.as_ref()?;
@@ -169,7 +170,7 @@ fn draw_vertical_lines(canvas: &mut Canvas, placed: &PanelLayout) {
     }
 }
 
-/// Canvas position of a vertical line; `None` for a line outside the axes.
+/// Canvas coordinate x of a vertical line; `None` for a line outside the axes.
 fn visible_position(placed: &PanelLayout, rule: &VerticalLine) -> Option<f64> {
     placed.x.canvas_position(rule.at).filter(|x| *x >= placed.area.left && *x <= placed.area.right)
 }
@@ -187,7 +188,7 @@ fn draw_top_labels(canvas: &mut Canvas, placed: &PanelLayout) {
     }
 }
 
-/// Draws a label above the panel if it has a row.
+/// Draws a label above the panel, if a row was found for it.
 fn draw_top_label(
     canvas: &mut Canvas,
     placed: &PanelLayout,
@@ -207,7 +208,7 @@ fn label_row_y(placed: &PanelLayout, row: usize) -> f64 {
     placed.area.top - (0.6 + row as f64 * (SMALL_MM + 0.6)) * UNITS_PER_MM
 }
 
-/// Draws the lines of the panel's title, the last one lowest.
+/// Draws the lines of the panel's title, the last line next to the panel.
 fn draw_title(canvas: &mut Canvas, placed: &PanelLayout) {
     let look = Lettering { bold: true, ..Lettering::plain(SMALL_MM, TextAnchor::Left) };
     let beside = if placed.panel.bare && placed.letter.is_some() { LETTER_WIDTH } else { 0.0 };
@@ -243,7 +244,7 @@ fn draw_axes(canvas: &mut Canvas, placed: &PanelLayout, live: bool) {
     }
 }
 
-/// Draws the label of a y axis, the first line outermost.
+/// Draws the label of a y axis; its first line is farthest from the axis.
 fn draw_y_label(canvas: &mut Canvas, placed: &PanelLayout) {
     let (area, lines) = (&placed.area, y_label_lines(placed.panel));
     let widest = widest_label_mm(&placed.y_ticks());
@@ -299,11 +300,11 @@ fn draw_y_tick(canvas: &mut Canvas, placed: &PanelLayout, tick: &Tick, grid: boo
 const WATERMARK: &str = "synthetic";
 /// Grey of the watermark, with a contrast of 5.7 to 1 on white.
 const WATERMARK_GREY: Rgb = (0x66, 0x66, 0x66);
-/// Distance of a letter from the axes below it, and of the watermark from the frame, mm.
+/// Distance of a panel letter from the axes below it, and of the watermark from the frame, mm.
 const LETTER_GAP_MM: f64 = 0.6;
 const WATERMARK_INSET_MM: f64 = 0.8;
 
-/// Width of the letter before the title of a panel without axes, canvas units.
+/// Width that the panel letter takes before the title of a panel without axes, canvas units.
 pub(super) const LETTER_WIDTH: f64 = 4.4 * UNITS_PER_MM;
 
 /// Draws the letter of each panel above its upper left corner.
@@ -320,8 +321,8 @@ pub(super) fn draw_panel_letters(canvas: &mut Canvas, panels: &[PanelLayout]) {
     }
 }
 
-/// Draws the watermark in the corner of a panel that has no text and the fewest lines, or else above the
-/// axes.
+/// Draws the watermark in the corner of the axes that has no text and the fewest lines. If every corner has
+/// text, it is drawn above the axes.
 pub(super) fn draw_watermark(canvas: &mut Canvas, placed: &PanelLayout) {
     let width = text_width(WATERMARK, SMALL_MM) * WIDE_LETTER / super::text::LETTER * UNITS_PER_MM;
     let (height, inside) = (SMALL_MM * 1.2 * UNITS_PER_MM, WATERMARK_INSET_MM * UNITS_PER_MM);
@@ -332,7 +333,7 @@ pub(super) fn draw_watermark(canvas: &mut Canvas, placed: &PanelLayout) {
         CanvasArea { left, top, right: left + width, bottom: top + height }
     };
     let corners = [(true, false), (false, false), (true, true), (false, true)].map(|(r, b)| corner(r, b));
-    // above the axes if every corner holds a text
+    // place above the axes, for the case that every corner has text
     let over = CanvasArea { top: area.top - inside - height, bottom: area.top - inside, ..corners[0] };
     let full = |corner: &CanvasArea| count_texts_in(placed, corner) > 0;
     let free =
@@ -376,13 +377,14 @@ fn count_lines_in(placed: &PanelLayout, area: &CanvasArea) -> usize {
     of_series.sum()
 }
 
-// Attributes for the script of a page: axes and series of time panels.
+// SVG attributes that the script of a web page reads: axes and series of panels with a time axis.
 
-/// Group of everything inside the axes, which moves with their ends.
+/// Class of the group of everything inside the axes. The script moves the group when the ends of the axes
+/// change.
 pub(super) const WITHIN_AXES_CLASS: &str = "class=\"within\"";
-/// Group of the ticks of the time axis.
+/// Class of the group of the ticks of the time axis.
 pub(super) const TICKS_CLASS: &str = "class=\"ticks\"";
-/// Group of the labels above the axes, whose positions are times.
+/// Class of the group of the labels above the axes, whose positions are times.
 pub(super) const OVER_AXES_CLASS: &str = "class=\"over\"";
 
 /// Attributes of the group of a time panel: canvas edges and ends of its axes, and the label of the y axis;
@@ -418,11 +420,12 @@ pub(super) fn series_attributes(index: usize, series: &Series, placed: &PanelLay
     format!("class=\"series\" data-label=\"{label}\"{detail}")
 }
 
-/// Number of steps of the y axis to which values are rounded, enough for an enlarged curve on a screen.
+/// Number of equal steps of the range of the y axis. Values are rounded to such a step, which is fine enough
+/// for an enlarged curve on a screen.
 const VALUE_STEPS: f64 = 1e4;
 
-/// Attributes with the full data: start and step of the grid, offset and unit of the values, and each value
-/// as the difference from the previous one; a dash for a missing value.
+/// SVG attributes with the full data: start and step of the sampling on the x axis, offset and unit of the
+/// values, and each value as the difference from the previous one. A dash marks a missing value.
 fn sample_attributes(detail: &SampledSeries, placed: &PanelLayout) -> String {
     let (low, one) = (placed.y.low, (placed.y.high - placed.y.low) / VALUE_STEPS);
     let mut before = 0_i64;

@@ -31,7 +31,7 @@ impl CanvasArea {
         ]
     }
 
-    /// The part of a segment inside the area (Liang and Barsky).
+    /// The part of the segment from `a` to `b` inside the area (Liang and Barsky); `None` if it lies outside.
     pub(crate) fn clip(&self, a: CanvasPoint, b: CanvasPoint) -> Option<(CanvasPoint, CanvasPoint)> {
         let (dx, dy) = (b.0 - a.0, b.1 - a.1);
         let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
@@ -54,7 +54,7 @@ impl CanvasArea {
     }
 }
 
-/// The runs of points between gaps.
+/// Splits points at gaps (`None`) into runs.
 pub(super) fn split_at_gaps(points: impl Iterator<Item = Option<CanvasPoint>>) -> Vec<Vec<CanvasPoint>> {
     let mut runs = vec![Vec::new()];
     for point in points {
@@ -89,7 +89,7 @@ pub(super) fn thin_points(run: &[CanvasPoint], width: f64) -> Vec<CanvasPoint> {
     kept
 }
 
-/// The pieces of a run inside an area.
+/// The pieces of a run that lie inside an area; a run is a line through consecutive points.
 pub(super) fn clip_line(run: &[CanvasPoint], area: &CanvasArea) -> Vec<Vec<CanvasPoint>> {
     let mut pieces: Vec<Vec<CanvasPoint>> = Vec::new();
     for pair in run.windows(2) {
@@ -113,8 +113,9 @@ pub(super) fn clip_polygon(corners: &[CanvasPoint], area: &CanvasArea) -> Vec<Ca
     })
 }
 
-/// The corners that the side from `a` to `b` adds to the clipped polygon: `a` if it is inside (at a depth of
-/// zero or more), and the point where the side crosses the edge, if it does.
+/// The corners that the side from `a` to `b` adds to the clipped polygon: `a` if it is inside, and the point
+/// where the side crosses the clipping edge, if it does. A depth is the distance of a point from that edge,
+/// negative outside.
 fn clip_polygon_side(a: CanvasPoint, b: CanvasPoint, depth_a: f64, depth_b: f64) -> [Option<CanvasPoint>; 2] {
     let crosses = (depth_a < 0.0) != (depth_b < 0.0);
     let share = depth_a / (depth_a - depth_b);
@@ -122,8 +123,8 @@ fn clip_polygon_side(a: CanvasPoint, b: CanvasPoint, depth_a: f64, depth_b: f64)
     [(depth_a >= 0.0).then_some(a), crossing]
 }
 
-/// Cuts a line into dashes; the pattern holds lengths of dashes and gaps in turn, and is empty for a full
-/// line.
+/// Cuts a line into dashes. `pattern` lists the lengths of dashes and gaps in turn, canvas units; it is empty
+/// for a full line.
 pub(super) fn split_into_dashes(line: &[CanvasPoint], pattern: &[f64]) -> Vec<Vec<CanvasPoint>> {
     let Some(first) = line.first().filter(|_| pattern.iter().sum::<f64>() > 0.0) else {
         return vec![line.to_vec()];

@@ -1,4 +1,4 @@
-//! Filters for names and texts from files before they are shown.
+//! Filters that remove or escape control characters in names and texts from files before they are shown.
 
 use std::fmt::Write;
 
@@ -9,8 +9,8 @@ pub fn make_printable(text: &str) -> String {
     text.chars().filter(|c| !is_bidi_control(*c)).map(|c| if is_control(c) { ' ' } else { c }).collect()
 }
 
-/// Text for a terminal: every control character, line ends included, is written as its escape, such as
-/// `\u001b`, which means the same in JSON.
+/// Text for a terminal. Every control character (line ends too) and every character that changes the
+/// direction of text is written as its JSON escape, such as `\u001b`.
 #[must_use]
 pub fn escape_controls(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
@@ -28,8 +28,8 @@ fn is_bidi_control(c: char) -> bool {
     matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
-/// Whether a character controls a terminal or is invalid in XML. All of them have at most four hexadecimal
-/// digits.
+/// Whether a character controls a terminal or is invalid in XML. The code points of all these characters have
+/// at most four hexadecimal digits.
 fn is_control(c: char) -> bool {
     c.is_control() || matches!(c, '\u{2028}' | '\u{2029}' | '\u{fffe}' | '\u{ffff}')
 }

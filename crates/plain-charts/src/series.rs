@@ -9,18 +9,18 @@ use super::style::{Rgb, WHITE};
 use super::style::{SHADING_OPACITY, UNITS_PER_MM};
 use portable_math as math;
 
-/// Width of a column for thinning, canvas units: one pixel.
+/// Width of the columns in which the points of a line are thinned, canvas units: one pixel.
 const THINNING_COLUMN: f64 = 4.0;
 /// Half width of a symbol, canvas units.
 const SYMBOL_HALF_WIDTH: f64 = 0.8 * UNITS_PER_MM;
-/// Smallest radius of a single point of a line, canvas units.
+/// Smallest radius of the dot that marks a point without neighbours on a line, canvas units.
 const MIN_DOT_HALF_WIDTH: u32 = 4;
 /// Half width of the cap at the end of an error bar, canvas units.
 const CAP_HALF_WIDTH: f64 = 0.7 * UNITS_PER_MM;
 /// Width of the line of an error bar, canvas units.
 const ERROR_BAR_WIDTH: u32 = 3;
 
-/// Draws a series over its error bars.
+/// Draws the error bars of a series and then the series on top of them.
 pub(super) fn draw_series(canvas: &mut Canvas, placed: &PanelLayout, series: &Series) {
     for bar in &series.error_bars {
         draw_error_bar(canvas, placed, *bar, series.colour.rgb());
@@ -70,7 +70,7 @@ pub(super) fn draw_marks(
     }
 }
 
-/// Draws a line over a wider white one, with dots if its points are far apart or if it has only one.
+/// Draws a line on top of a wider white line. Dots are added if points are far apart or if there is only one.
 fn draw_edged_line(canvas: &mut Canvas, run: &[CanvasPoint], colour: Rgb, area: &CanvasArea) {
     const DOT: u32 = 5;
     const EDGE: u32 = 3;
@@ -103,7 +103,7 @@ fn draw_symbol(canvas: &mut Canvas, (x, y): CanvasPoint, mark: Mark, colour: Rgb
     }
 }
 
-/// Draws a symbol with its outline and inside.
+/// Draws a symbol whose outline has one colour and whose inside has another.
 fn draw_shape(canvas: &mut Canvas, (x, y): CanvasPoint, shape: MarkerShape, colour: Rgb, inside: Rgb) {
     let corner = |(a, b): &CanvasPoint| (x + a * SYMBOL_HALF_WIDTH, y + b * SYMBOL_HALF_WIDTH);
     let mut outline: Vec<CanvasPoint> = shape.corners().iter().map(corner).collect();
@@ -148,7 +148,7 @@ fn is_strictly_inside(area: &CanvasArea, (x, y): CanvasPoint) -> bool {
     x > area.left && x < area.right && y > area.top && y < area.bottom
 }
 
-/// Draws the surface between two curves.
+/// Fills the area between the lower and the upper curve of a ribbon.
 pub(super) fn draw_ribbon(canvas: &mut Canvas, placed: &PanelLayout, ribbon: &Ribbon) {
     let corners = |(x, low, high): (f64, f64, f64)| {
         let [low, high] = [low, high].map(|end| placed.y.canvas_position_or_low(end));

@@ -4,8 +4,8 @@ use super::path::CanvasPoint;
 use portable_math as math;
 use std::fmt::Write;
 
-/// Colours for colour-blind readers (Okabe and Ito). The yellow is left out, because it vanishes on white;
-/// orange and sky blue are darkened to give thin lines a contrast of 3 to 1.
+/// Colours for colour-blind readers (Okabe and Ito). Their yellow is left out, because it is hardly visible
+/// on white; orange and sky blue are darkened to give thin lines a contrast of 3 to 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[allow(missing_docs)]
 pub enum Colour {
@@ -64,7 +64,7 @@ pub enum Mark {
     Line,
     /// A thin full line.
     Thin,
-    /// A thick full line, for use below a thin one.
+    /// A thick full line, to be drawn below a thin one.
     Thick,
     /// A dashed line.
     Dashed,
@@ -72,7 +72,7 @@ pub enum Mark {
     Dotted,
     /// A thin dashed line.
     ThinDashed,
-    /// A line with its points, edged with white to be visible on any background.
+    /// A line edged with white, to be visible on any background, with dots where its points are far apart.
     Edged,
     /// Small dots, not joined.
     Dots,
@@ -80,7 +80,7 @@ pub enum Mark {
     Circles,
     /// Crosses, not joined.
     Crosses,
-    /// Full symbols of this shape, joined by a line.
+    /// Filled symbols of this shape, joined by a line.
     Joined(MarkerShape),
     /// Hollow symbols of this shape, not joined.
     Hollow(MarkerShape),
@@ -98,7 +98,7 @@ pub enum MarkerShape {
 }
 
 impl MarkerShape {
-    /// Corners in units of the symbol's half width, y downwards; none for a disc.
+    /// Corners relative to the centre, in units of the symbol's half width, y downwards; none for a disc.
     pub(super) fn corners(self) -> &'static [CanvasPoint] {
         match self {
             Self::Disc => &[],
@@ -140,7 +140,7 @@ pub(super) const WHITE: Rgb = (255, 255, 255);
 pub(super) const BLACK: Rgb = (0, 0, 0);
 pub(super) const GRID: Rgb = (0xDD, 0xDD, 0xDD);
 pub(super) const FRAME: Rgb = (0x33, 0x33, 0x33);
-/// Near white and near black, which do not change with the theme.
+/// Near white and near black, which the dark theme does not replace.
 pub(super) const NEAR_WHITE: Rgb = (0xFE, 0xFE, 0xFE);
 const NEAR_BLACK: Rgb = (0x01, 0x01, 0x01);
 
@@ -155,7 +155,7 @@ pub enum ColourMap {
     /// Viridis: sequential, from low to high.
     #[default]
     Viridis,
-    /// Diverging: blue below and vermilion above the middle, which is near white.
+    /// Diverging: blue below the middle of the range, near white at the middle, vermilion above it.
     Diverging,
 }
 
@@ -174,14 +174,14 @@ const VIRIDIS: [Rgb; 11] = [
     (0xBB, 0xDF, 0x27),
     (0xFD, 0xE7, 0x25),
 ];
-/// Blue, near white, vermilion: distinct for the colour-blind. The end colours differ by one from the line
-/// colours, so that the dark theme does not replace them.
+/// Blue, near white, vermilion: distinct for the colour-blind. The end colours differ from the line colours
+/// by 1 in one component, so that the dark theme does not replace them.
 const DIVERGING: [Rgb; 5] =
     [(0x00, 0x72, 0xB1), (0x80, 0xB8, 0xD8), (0xF7, 0xF7, 0xF5), (0xEA, 0xAE, 0x80), (0xD5, 0x5E, 0x01)];
-/// Colour of missing values: a grey that neither map contains.
+/// Colour of missing values: a grey that neither colour map contains.
 pub(super) const NO_VALUE: Rgb = (0xE4, 0xE4, 0xE4);
 
-/// Colour at a fraction of the map from 0 to 1; outside this range, the colour of the nearer end.
+/// Colour at a fraction of the colour map from 0 to 1; outside this range, the colour of the nearer end.
 pub(super) fn sample_colour_map(map: ColourMap, share: f64) -> Rgb {
     let stops: &[Rgb] = match map {
         ColourMap::Viridis => &VIRIDIS,
@@ -223,28 +223,29 @@ pub const FULL_WIDTH_MM: f64 = 170.0;
 pub const COLUMN_WIDTH_MM: f64 = 85.0;
 /// Largest height of a figure in print, mm: Springer's journals, among the strictest, allow 234 mm.
 pub const MAX_HEIGHT_MM: f64 = 230.0;
-/// Size of labels, mm (7.5 pt, readable at print size).
+/// Font size of labels, mm (7.4 pt, readable at print size).
 pub(super) const TEXT_MM: f64 = 2.6;
 pub(super) const TITLE_MM: f64 = 3.2;
 pub(super) const SMALL_MM: f64 = 2.3;
 pub(super) const LINE_MM: f64 = 4.0;
 pub(super) const EDGE_MM: f64 = 2.0;
 pub(super) const TICK_MM: f64 = 1.0;
-/// Smallest distance of labelled ticks, mm.
+/// Smallest distance of labelled ticks along the x axis and along the y axis, mm.
 pub(super) const X_TICKS_MM: f64 = 18.0;
 pub(super) const Y_TICKS_MM: f64 = 5.5;
-/// Smallest distance of labelled ticks on a logarithmic axis, mm.
+/// Smallest distance of labelled ticks along a logarithmic x axis and a logarithmic y axis, mm.
 pub(super) const X_LOG_TICKS_MM: f64 = 7.0;
 pub(super) const Y_LOG_TICKS_MM: f64 = 3.6;
-/// Opacity of shaded surfaces: pale enough for lines and grid to stay readable.
+/// Opacity of shaded areas: pale enough for lines and grid to stay readable.
 pub(super) const SHADING_OPACITY: f64 = 0.22;
 
 // Dark theme: the style sheet of figures on screens. Print has none and keeps the light colours.
 
-/// Colours in the light theme and their replacements in the dark theme; all others (heat maps and lines over
-/// them) stay. The dark palette is Okabe and Ito's in lighter shades, with hues in the same order.
+/// Colours of the light theme, each with its replacement in the dark theme. All other colours (of heat maps
+/// and of lines over them) stay. The dark palette is that of Okabe and Ito in lighter shades, in the same
+/// order.
 const DARK_COLOURS: [(Rgb, Rgb); 13] = [
-    ((0xFF, 0xFF, 0xFF), (0x16, 0x16, 0x16)), // ground
+    ((0xFF, 0xFF, 0xFF), (0x16, 0x16, 0x16)), // background
     ((0x00, 0x00, 0x00), (0xF0, 0xF0, 0xEE)), // text and black lines
     ((0x33, 0x33, 0x33), (0xB8, 0xB8, 0xB4)), // frame
     ((0xDD, 0xDD, 0xDD), (0x3A, 0x3A, 0x38)), // grid

@@ -28,14 +28,15 @@ impl PanelPlacement {
         Some((self.x.canvas_position(x)?, self.y.canvas_position(y)?))
     }
 
-    /// Canvas coordinates of the corners at the upper left and the lower right.
+    /// Canvas coordinates of the upper left and the lower right corner of the axes.
     pub fn corners(&self) -> [(f64, f64); 2] {
         [(self.area.left, self.area.top), (self.area.right, self.area.bottom)]
     }
 }
 
 impl Figure {
-    /// The figure for a screen, with the SVG elements on top that `over` makes from the panel positions.
+    /// The figure as SVG for a screen. `over` receives the positions of the panels and returns SVG elements,
+    /// which are drawn on top.
     pub fn svg_with_overlay(&self, over: impl FnOnce(&[PanelPlacement]) -> String) -> String {
         let layout = FigureLayout::new(self);
         let place = |p: &PanelLayout| PanelPlacement { x: p.x, y: p.y, area: p.area };
@@ -58,8 +59,8 @@ impl Figure {
         }
     }
 
-    /// Height in a medium, mm. In print, panels are lowered until the figure is at most [`MAX_HEIGHT_MM`]
-    /// high, as far as they stay legible.
+    /// Height in a medium, mm. In print, panel heights are reduced until the figure is at most
+    /// [`MAX_HEIGHT_MM`] high, or until panels cannot be reduced further and stay legible.
     #[must_use]
     pub fn height_mm(&self, medium: Medium) -> f64 {
         FigureLayout::new(&self.resize_for_medium(medium)).height
@@ -75,7 +76,8 @@ impl Figure {
         limit_height(bare, MAX_HEIGHT_MM)
     }
 
-    /// Renders `laid_out`, this figure resized for a medium, with the title and name of `self`.
+    /// Renders `laid_out`, a copy of this figure resized for a medium, with the title and the accessible name
+    /// of `self`.
     fn render_layout(&self, laid_out: &Self, style: &str, marked: bool) -> String {
         let parts = [self.title.as_str(), &self.subtitle].into_iter();
         let name: Vec<&str> = parts.filter(|s| !s.is_empty()).collect();
@@ -85,7 +87,7 @@ impl Figure {
 
 fn render_svg(figure: &Figure, [title, name]: [&str; 2], style: &str, marked: bool) -> String {
     let layout = FigureLayout::new(figure);
-    // print has neither style nor script
+    // a figure in print has neither style sheet nor script
     let live = !style.is_empty();
     let size =
         ((figure.width_mm * UNITS_PER_MM).round() as u32, (layout.height * UNITS_PER_MM).round() as u32);

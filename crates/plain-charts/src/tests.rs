@@ -33,7 +33,7 @@ fn as_svg(figure: &Figure) -> String {
     figure.to_svg(Medium::Screen)
 }
 
-/// The lines of a colour and width, as lists of points.
+/// The drawn lines of a colour and stroke width, as lists of points.
 fn lines(svg: &str, colour: &str, width: u32) -> Vec<Vec<(f64, f64)>> {
     let look = format!("stroke=\"{colour}\" stroke-width=\"{width}\" d=\"");
     let paths = svg
@@ -43,7 +43,7 @@ fn lines(svg: &str, colour: &str, width: u32) -> Vec<Vec<(f64, f64)>> {
     paths.flat_map(|data| data.trim_end_matches("\"/>").split('M').skip(1)).map(points).collect()
 }
 
-/// The points of path data, which hold a start and relative steps.
+/// The points of SVG path data, which consist of a start and relative steps.
 fn points(data: &str) -> Vec<(f64, f64)> {
     let spaced = data.replace('l', " ").replace('-', " -");
     let numbers: Vec<f64> = spaced.split_whitespace().map(|n| n.parse().unwrap()).collect();

@@ -11,10 +11,10 @@ pub(super) const LETTER: f64 = 0.58;
 pub(super) const WIDE_LETTER: f64 = 0.63;
 pub(super) const WIDE_BOLD_LETTER: f64 = 0.7;
 const ELLIPSIS: char = '\u{2026}';
-/// Largest fraction of a text that stands in the first of two lines.
+/// Largest fraction of the width of a text that goes into the first of two lines.
 const NEAR_MIDDLE: f64 = 0.65;
 
-/// Estimated width of text, mm; ideographs and emoji count twice, combining marks not at all.
+/// Estimated width of a text, mm. An ideograph or emoji counts as two letters, a combining mark as none.
 pub(super) fn text_width(text: &str, size_mm: f64) -> f64 {
     text.width() as f64 * LETTER * size_mm
 }
@@ -47,7 +47,7 @@ pub(super) fn wrap_lines(text: &str, letter_mm: f64, width_mm: f64) -> Vec<Strin
     lines
 }
 
-/// Text cut with an ellipsis to at most `width_mm` in the widest font.
+/// Text of at most `width_mm` in the widest font; longer text is cut and ends with an ellipsis.
 pub(super) fn truncate_text(text: &str, size_mm: f64, width_mm: f64) -> String {
     let letter_mm = WIDE_LETTER * size_mm;
     if text.width() as f64 * letter_mm <= width_mm {
@@ -63,13 +63,14 @@ pub(super) fn truncate_text(text: &str, size_mm: f64, width_mm: f64) -> String {
     format!("{}{ELLIPSIS}", kept.trim_end())
 }
 
-/// Text in one line of at most `width_mm`, or in two lines of small letters, the second cut if necessary.
+/// Text in one line of at most `width_mm`, or in two lines of small letters. The second line is cut if
+/// necessary.
 pub(super) fn wrap_in_two_lines(text: &str, width_mm: f64) -> String {
     let text = make_printable(text);
     if text.width() as f64 * WIDE_LETTER * TEXT_MM <= width_mm {
         return text;
     }
-    // text that fits one line of small letters is broken near its middle
+    // text that fits into one line of small letters is broken near its middle
     let own_mm = text.width() as f64 * WIDE_LETTER * SMALL_MM;
     let line_mm = if own_mm <= width_mm { NEAR_MIDDLE * own_mm } else { width_mm };
     let broken = wrap_lines(&text, WIDE_LETTER * SMALL_MM, line_mm);

@@ -23,7 +23,7 @@ mod tests {
     fn the_mean_of_a_sine_is_what_the_sinc_says() {
         let half = 0.9; // pi f T: 900 Hz with an exposure of about 0.32 ms
         let integral: f64 = nodes_and_weights(-half, half).map(|(t, weight)| weight * t.cos()).sum();
-        // the rule is exact up to the ninth degree; the first term that it misses is 1.4e-10 here
+        // the rule is exact up to the ninth degree; its first error term is 1.4e-10 here
         assert!((integral / (2.0 * half) - half.sin() / half).abs() < 2e-10, "{integral}");
     }
 }

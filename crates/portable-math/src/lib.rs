@@ -1,44 +1,45 @@
-//! Functions whose last bit is the same on every machine, and draws from the normal distribution.
+//! Mathematical functions whose results are the same to the last bit on every machine, and random draws from
+//! the normal distribution.
 //!
 //! The functions of `f64` call the system's library, whose rounding is not specified: glibc has one version
 //! for processors with fused multiply-add and another for those without. The functions here consist only of
-//! additions, multiplications and divisions, whose rounding IEEE 754 specifies. It also specifies that of
-//! `sqrt`, `mul_add`, `floor` and the like, which are used as methods of `f64`.
+//! additions, multiplications and divisions, whose rounding IEEE 754 specifies. IEEE 754 also specifies the
+//! rounding of `sqrt`, `mul_add`, `floor` and similar functions; these are used as methods of `f64`.
 //!
 //! ```
-//! // the same bits wherever it runs
+//! // the same bits on every machine
 //! assert_eq!(portable_math::sin(1.0).to_bits(), 0x3fea_ed54_8f09_0cee);
 //! ```
 
-#![cfg_attr(not(test), warn(clippy::disallowed_methods))] // tests may use them
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))] // tests may call them
 
 pub mod gauss_legendre;
 mod normal;
 
 pub use normal::StandardNormal;
 
-/// The sine of an angle, rad.
+/// The sine of an angle in rad.
 #[must_use]
 #[inline]
 pub fn sin(x: f64) -> f64 {
     libm::sin(x)
 }
 
-/// The cosine of an angle, rad.
+/// The cosine of an angle in rad.
 #[must_use]
 #[inline]
 pub fn cos(x: f64) -> f64 {
     libm::cos(x)
 }
 
-/// Sine and cosine of an angle, rad.
+/// Sine and cosine of an angle in rad.
 #[must_use]
 #[inline]
 pub fn sin_cos(x: f64) -> (f64, f64) {
     libm::sincos(x)
 }
 
-/// The tangent of an angle, rad.
+/// The tangent of an angle in rad.
 #[must_use]
 #[inline]
 pub fn tan(x: f64) -> f64 {
@@ -66,7 +67,7 @@ pub fn atan(x: f64) -> f64 {
     libm::atan(x)
 }
 
-/// The angle of the point `(x, y)`, rad.
+/// The angle from the positive x axis to the point `(x, y)`, rad.
 #[must_use]
 #[inline]
 pub fn atan2(y: f64, x: f64) -> f64 {
@@ -121,7 +122,7 @@ pub fn powf(x: f64, y: f64) -> f64 {
     libm::pow(x, y)
 }
 
-/// `x^n` by squaring; the compiler may compute [`f64::powi`] in another way.
+/// `x^n` by repeated squaring; the compiler may compute [`f64::powi`] in another way.
 #[must_use]
 #[inline]
 pub fn powi(x: f64, n: i32) -> f64 {

@@ -1,7 +1,7 @@
 //! Draws from the standard normal distribution by the ziggurat method of Doornik ("An improved ziggurat
-//! method to generate normal random samples", 2005). Layers and use of random bits are those of the crate
-//! `rand_distr`, so the draws are the same. Only the last bits of draws above 3.65 in size may differ,
-//! because they need a logarithm.
+//! method to generate normal random samples", 2005). The layers and the use of the random bits are those of
+//! the crate `rand_distr`, so both give the same draws. Only draws whose absolute value exceeds 3.65 may
+//! differ in their last bits, because they need a logarithm.
 
 use super::{exp, ln};
 use rand::Rng;
@@ -14,7 +14,7 @@ pub struct StandardNormal;
 impl Distribution<f64> for StandardNormal {
     fn sample<R: Rng + ?Sized>(&self, generator: &mut R) -> f64 {
         loop {
-            // 8 bits choose the layer, 52 others the place in it, from -1 to 1
+            // 8 bits choose the layer, 52 other bits the place in the layer, from -1 to 1
             let bits = generator.next_u64();
             let layer = (bits & 0xff) as usize;
             let place = f64::from_bits(FROM_TWO | (bits >> 12)) - 3.0;
@@ -50,11 +50,11 @@ fn relative_density(x: f64) -> f64 {
     exp(-x * x / 2.0)
 }
 
-/// Exponent bits of the numbers from 2 to 4; 52 random bits are the mantissa.
+/// Sign and exponent bits of the floating-point numbers from 2 to 4; 52 random bits become the mantissa.
 const FROM_TWO: u64 = 0x4000_0000_0000_0000;
 
-/// Edges of 256 layers of equal area. The lowest layer has the edge `LAYER_EDGES[1]` and includes the tail
-/// beyond it; `LAYER_EDGES[0]` is the edge of a box of the same area.
+/// Edges of 256 layers of equal area under the density, in standard deviations. The lowest layer has the edge
+/// `LAYER_EDGES[1]` and includes the tail beyond it; `LAYER_EDGES[0]` is the edge of a box of the same area.
 #[rustfmt::skip] // fewer lines
 const LAYER_EDGES: [f64; 257] = [
     3.91075795953709, 3.654152885361009, 3.4492782985609645, 3.320244733839166, 3.224575052047029,
@@ -130,7 +130,7 @@ mod tests {
             assert!((found - expected).abs() <= 4.0 * f64::EPSILON, "{found:e} {expected:e}");
             assert!(found == expected || expected.abs() > LAYER_EDGES[1], "{found:e} {expected:e}");
         }
-        // expected: 2.58e-4 of all draws
+        // expected in the tail: 2.58e-4 of all draws
         assert!((450..600).contains(&beyond), "{beyond} of 2,000,000 in the tail");
         assert!(differing <= beyond / 2, "{differing} of {beyond}");
     }

@@ -1,4 +1,4 @@
-//! The transform of a record, in which the components of many bands can be found.
+//! The windowed transform of a record, from which the components of many bands can be found.
 
 use super::component::Component;
 use super::error::{SpectrumError, check_band, check_record};
@@ -71,7 +71,7 @@ impl WindowedTransform {
         check_band(Some(band_hz), self.frame_rate_hz)
     }
 
-    /// Root mean square of the motion between two frequencies, m, as [`Spectrum::rms_in_band_m`].
+    /// Root mean square of the motion between two frequencies, m; see [`Spectrum::rms_in_band_m`].
     pub fn rms_in_band_m(&self, low_hz: f64, high_hz: f64) -> f64 {
         let (p, rate_hz) = (&self.periodogram, self.frame_rate_hz);
         rms_in_band_m(&self.amplitude_m, p.bin_hz(rate_hz), p.noise_bandwidth_hz(rate_hz), (low_hz, high_hz))
@@ -89,7 +89,7 @@ impl WindowedTransform {
         [of(0), of(self.samples.len() - half)]
     }
 
-    /// The whole spectrum, with the components that the settings ask for.
+    /// The whole spectrum, with the number and band of components that the settings request.
     pub(super) fn into_spectrum(self, settings: &SpectrumSettings) -> Spectrum {
         let band_hz = settings.band_hz.unwrap_or((0.0, self.frame_rate_hz / 2.0));
         let (noise_floor_m, components) = self.find_components(band_hz, settings.max_components);
@@ -132,12 +132,13 @@ impl WindowedTransform {
 pub struct Spectrum {
     /// Frequencies of the bins, Hz, from 0 to half the frame rate.
     pub frequency_hz: Vec<f64>,
-    /// Amplitude of a sine that peaks in each bin, m. With many gaps it is too small (by 9 % at 900 Hz and
-    /// 5,000 frames/s with 40 % of the frames missing at random), unlike the amplitudes of the components.
+    /// Amplitude in each bin, m: that of a sine whose peak is in the bin. With many gaps it is too small (by
+    /// 9 % at 900 Hz and 5,000 frames/s with 40 % of the frames missing at random), unlike the amplitudes of
+    /// the components.
     pub amplitude_m: Vec<f64>,
     /// Root mean square of the noise in a bin, m, from the median over the band.
     pub noise_floor_m: f64,
-    /// Reciprocal of the length of the record, Hz; the data contain no finer structure.
+    /// Reciprocal of the length of the record, Hz; the data show no structure finer than this.
     pub resolution_hz: f64,
     /// Equivalent noise bandwidth of the window over the frames present, Hz (1.5 times the resolution without
     /// gaps).

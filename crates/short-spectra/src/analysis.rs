@@ -43,9 +43,9 @@ pub struct SpectralAnalysis {
     pub model_m: Vec<f64>,
     /// Residual in each frame, m.
     pub residual_m: Vec<Option<f64>>,
-    /// The oscillations among the components, except one that drifts; empty for a long record.
+    /// The oscillations among the components, except a drifting one; empty for a long record.
     pub oscillations: Vec<Oscillation>,
-    /// Course of the strongest component above the slow ones, if there is one.
+    /// Frequency over time of the strongest component above the slow components, if there is one.
     pub ridge: Option<Ridge>,
     /// Power density of the record without the removed parts; `None` if gaps leave no room for tapers, and
     /// for a long record.
@@ -106,8 +106,8 @@ impl std::fmt::Display for RemovedTrend {
     }
 }
 
-/// Largest number of columns of a smooth trend; with more, it bends as fast as a component, so the frames
-/// after a step are tried instead.
+/// Largest number of columns of a smooth trend. With more, a trend bends as fast as a component, so the
+/// frames after a step are tried instead.
 const MAX_SMOOTH_TREND_COLUMNS: usize = 20;
 
 impl SpectralAnalysis {
@@ -172,14 +172,14 @@ impl SpectralAnalysis {
             }
             plain.get_or_insert(part.analysis);
         }
-        // a low-order trend after a step is better than a high-order one that oscillates through it
+        // a low-order trend after a step is better than a high-order trend through the step
         let best = plain.filter(|_| whole.trend_competes).unwrap_or(whole.analysis);
         Ok(best.with_densities(record.frame_rate_hz))
     }
 
     /// Analyses each stretch between the steps of a piece. The result for a stretch is that of the first
-    /// range of frames that leaves only noise, or else of the first range whose trend has no fast waves.
-    /// Fitting a trend through a step takes many times as long as fitting the oscillation that the step
+    /// range of frames whose fit leaves only noise, or else of the first range whose trend has no fast waves.
+    /// Fitting a trend through a step would take many times as long as fitting the oscillation that the step
     /// starts.
     fn analyse_between_steps(record: &SampledRecord, settings: &SpectrumSettings) -> Vec<Self> {
         let of_stretch = |tries: &Vec<Range<usize>>| {
@@ -225,7 +225,7 @@ impl SpectralAnalysis {
         let smooth = |fit: &ModelFit| fit.model.trend().column_count() <= MAX_SMOOTH_TREND_COLUMNS;
         if let Some((drifting, range)) = drift {
             if let Some(pair) = search.split_into_pair(&fit, &range) {
-                // two oscillations that beat look like one that drifts
+                // two oscillations that beat look like one with a drifting frequency
                 course = course.map(|course| DriftCourse { range: None, ..course });
                 fit = search.run_second_pass(pair).ok_or_else(too_few)?;
             } else {
@@ -233,7 +233,7 @@ impl SpectralAnalysis {
                 fit = search.select_without_drift(&fit).ok_or_else(too_few)?;
             }
         } else if !search.trend_grows || smooth(&fit) {
-            // if no trend describes a step, a second pass would split everything into pieces
+            // if no trend describes a step, a second pass would split the motion into pieces
             fit = search.run_second_pass(fit).ok_or_else(too_few)?;
         }
         let exhausted = search.trend_grows && fit.model.trend().next_richer().is_none();
@@ -271,8 +271,8 @@ impl SpectralAnalysis {
     }
 }
 
-/// An analysis, whether it leaves only noise, and whether its trend has waves as fast as a component; trend
-/// and component then cancel each other even where the record is flat.
+/// An analysis, whether it leaves only noise, and whether its trend has waves as fast as a component. Such a
+/// trend and the component cancel each other even where the record is flat.
 struct Attempt {
     leaves_only_noise: bool,
     trend_competes: bool,

@@ -8,19 +8,22 @@ use super::second_pass::DoubtfulTerm;
 use portable_math as math;
 use std::f64::consts::{PI, TAU};
 
-/// Maximum number of steps of the search for the best shape; each halving counts as a step.
+/// Maximum number of steps of the search for the best frequency, drift and decay of an alternative; each
+/// halving of the step sizes counts as a step.
 const MOST_STEPS: usize = 40;
-/// Initial step sizes of the frequency and of its change over the record, cycles, and of the decay, nepers.
+/// Initial step sizes of the search: of the frequency and of its change over the record, cycles, and of the
+/// decay, nepers.
 const FIRST_STEPS: [f64; 3] = [0.3, 1.0, 1.0];
-/// Parameters of a term, and extra parameters of an alternative.
+/// Number of parameters of a term of the fit, and number of additional parameters of an alternative.
 const TERM_PARAMETERS: f64 = 4.0;
 const EXTRA_PARAMETERS: f64 = 1.0;
-/// Distance, resolutions, within which terms may be parts of one oscillation.
+/// Distance in frequency, resolutions, within which terms may be parts of one oscillation.
 const NEARBY_RESOLUTIONS: f64 = 5.0;
 /// Number of blocks that represent the record: a shift of the frequency by a few cycles in the record hardly
 /// changes the phase within a block.
 const BLOCKS: usize = 128;
-/// Limits of the time, in lengths of the record, in which an amplitude may fall to zero.
+/// Shortest and longest time, in lengths of the record, in which an amplitude that falls linearly may reach
+/// zero.
 const LINEAR_DECAY_ENDS: (f64, f64) = (0.1, 4.0);
 
 /// An oscillation whose frequency or amplitude changes at a constant rate.
@@ -62,15 +65,15 @@ impl UnsteadyTone {
 }
 
 impl ModelSelector<'_> {
-    /// Indices of the terms that leave more than noise around them.
+    /// Indices of the terms around which the residual exceeds noise.
     pub(super) fn terms_with_residual(&self, fit: &ModelFit) -> Vec<usize> {
         let terms = fit.model.terms();
         let leaves = |k: &usize| terms[*k].cycles > 0.0 && self.leaves_peak(fit, &terms[*k]);
         (0..terms.len()).filter(leaves).collect()
     }
 
-    /// The terms that leave more than noise around them, each with the criterion that its replacement must
-    /// fall below.
+    /// The terms around which the residual exceeds noise. Each has the Bayesian information criterion below
+    /// which that of its replacement must be.
     pub(super) fn doubtful_terms(&self, fit: &ModelFit) -> Vec<DoubtfulTerm> {
         let least = self.bic_of(&fit.model);
         let criterion = |k: usize| self.alternatives_criterion(fit, k).min(least);
@@ -78,8 +81,8 @@ impl ModelSelector<'_> {
         terms.map(|k| DoubtfulTerm { index: k, criterion: criterion(k) }).collect()
     }
 
-    /// Indices of terms that may be parts of one oscillation: an oscillation of constant drift or linear fall
-    /// in their place explains more.
+    /// Indices of terms that may be parts of one oscillation: a single oscillation with a constant drift or a
+    /// linear fall in their place has a lower Bayesian information criterion.
     pub(super) fn unsteady_terms(&self, fit: &ModelFit) -> Vec<usize> {
         let terms = fit.model.terms();
         let steady = self.bic_of(&fit.model);
@@ -91,8 +94,8 @@ impl ModelSelector<'_> {
         fit.model.oscillations().into_iter().filter(is_piece).collect()
     }
 
-    /// The criterion with an oscillation of constant drift or linear fall in the place of term `k`, or of `k`
-    /// and its neighbours.
+    /// The Bayesian information criterion if one oscillation with a constant drift or a linear fall replaces
+    /// term `k` alone, or `k` and its neighbours, whichever is lower.
     pub(super) fn alternatives_criterion(&self, fit: &ModelFit, k: usize) -> f64 {
         let group = nearby_terms(fit.model.terms(), k);
         let alone = self.replacement_criterion(fit, k, &[k]);
@@ -130,7 +133,8 @@ impl ModelSelector<'_> {
         self.bic_with(parts, alone(false).min(alone(true)), EXTRA_PARAMETERS - less)
     }
 
-    /// Reduction of the sum of squares by a shape with its best amplitude and phase, m^2.
+    /// Reduction of the sum of squares by an oscillation of this shape with its best amplitude and phase,
+    /// m^2.
     fn power_of_alternative(&self, values: &[f64], shape: &UnsteadyTone) -> f64 {
         let add = |[cc, cs, ss, xc, xs]: [f64; 5], (i, x): (usize, &f64)| {
             let (envelope, phase) = shape.envelope_and_phase((i as f64 + 0.5) / values.len() as f64);
@@ -143,7 +147,7 @@ impl ModelSelector<'_> {
         if determinant > 0.0 { (ss * xc * xc - 2.0 * cs * xc * xs + cc * xs * xs) / determinant } else { 0.0 }
     }
 
-    /// The record demodulated by a frequency and summed over blocks.
+    /// The values demodulated by a frequency, cycles in the record, and summed over blocks.
     fn demodulate_blocks(&self, values: &[f64], cycles: f64) -> Vec<DemodulatedBlock> {
         let frames = values.len();
         let size = frames.div_ceil(BLOCKS);
@@ -162,7 +166,7 @@ impl ModelSelector<'_> {
     }
 }
 
-/// The oscillations that may be parts of one oscillation with term `k`.
+/// Indices of the oscillations, `k` included, that may be parts of one oscillation with term `k`.
 pub(super) fn nearby_terms(terms: &[SineTerm], k: usize) -> Vec<usize> {
     let near = |j: &usize| terms[*j].cycles > 0.0 && are_near(&terms[*j], &terms[k]);
     (0..terms.len()).filter(near).collect()
@@ -174,16 +178,16 @@ fn are_near(a: &SineTerm, b: &SineTerm) -> bool {
 
 /// A block of frames of the demodulated record.
 struct DemodulatedBlock {
-    /// Time of its middle, in lengths of the record.
+    /// Time of the middle of the block, in lengths of the record.
     middle: f64,
-    /// Sum of its demodulated frames, m.
+    /// Sum of the demodulated frames of the block, m: real and imaginary part.
     phasor: [f64; 2],
-    /// Sum of the weights of its frames.
+    /// Sum of the weights of the frames of the block.
     weight: f64,
 }
 
-/// Approximates `power_of_alternative` from blocks; the relative error is about the reciprocal of the number
-/// of cycles in the record.
+/// Approximates `power_of_alternative` from sums over blocks; the relative error is about the reciprocal of
+/// the number of cycles in the record.
 fn power_from_blocks(blocks: &[DemodulatedBlock], start: &SineTerm, shape: &UnsteadyTone) -> f64 {
     let add = |[re, im, power]: [f64; 3], block: &DemodulatedBlock| {
         let (envelope, phase) = shape.envelope_and_phase(block.middle);

@@ -7,27 +7,30 @@ use super::relations::{describe_relations, find_relations};
 use super::settings::{CLEAR_DB, MIN_CYCLES, SpectrumSettings};
 use crate::sampling::{aliased_frequencies_hz, exposure_gain};
 
-/// Exposure gain below which a reason is given: a loss of 10 % exceeds the uncertainty of a scale.
+/// Exposure gain below which a component counts as attenuated: a loss of 10 % exceeds the uncertainty of a
+/// scale.
 const ATTENUATED_BELOW: f64 = 0.9;
 /// Largest shift of a frequency by a richer trend, in standard deviations.
 const MOST_TREND_SHIFT: f64 = 3.0;
 /// Largest ratio of the residual around a component to its amplitude; above it, a second line or a drift
 /// explains as much.
 const MOST_RESIDUAL: f64 = 0.25;
-/// Distance of two oscillations, resolutions, below which they may be only one: at half a resolution and 50
-/// dB, a single oscillation fits a pair of equal amplitudes as well as two do.
+/// Distance of two oscillations, resolutions, below which they may be a single one. At half a resolution and
+/// 50 dB, a single oscillation fits a pair of equal amplitudes as well as two oscillations do.
 const LEAST_SEPARATION: f64 = 0.5;
-/// Range of a drift, resolutions, that two lines cannot imitate: pairs up to 1.7 resolutions apart looked
-/// like one component that drifts by up to five.
+/// Range of a drift, resolutions, that two steady lines cannot imitate: pairs up to 1.7 resolutions apart
+/// looked like one component that drifts by up to five.
 const LEAST_CLEAR_DRIFT: f64 = 5.0;
-/// Damping ratio above which an oscillation is over within a cycle: its amplitude falls to a quarter.
+/// Damping ratio above which an oscillation is over within a cycle: at this ratio its amplitude falls to a
+/// quarter in one cycle.
 pub(super) const SINGLE_CYCLE_DAMPING: f64 = 0.22;
-/// Largest distance of a drifting frequency from its extrapolated rate, resolutions of its segments: noise in
-/// bands of 5 to 40 resolutions strays by 0.35 or more, a measured cycle by up to 0.26.
+/// Largest distance of a drifting frequency from the value extrapolated with its rate, resolutions of its
+/// segments. For noise in bands of 5 to 40 resolutions this distance is 0.35 or more, for a measured
+/// oscillation up to 0.26.
 const MOST_STRAY: f64 = 0.3;
 /// Ratio of an amplitude to its standard deviation from which the amplitude is significant.
 const LEAST_DEVIATIONS: f64 = 3.0;
-/// Limits that the camera and the motion set.
+/// Properties of the camera and the motion that limit which frequencies can be trusted.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RecordContext {
     pub frame_rate_hz: f64,
@@ -53,7 +56,7 @@ pub(super) struct Evidence {
     /// Ratio of the largest residual peak within the lobe around the component to its amplitude; only peaks
     /// that stand out from the noise count.
     pub residual_ratio: f64,
-    /// Whether a frequency with a constant drift or an amplitude that falls linearly explains more.
+    /// Whether an oscillation with a constant frequency drift or a linearly falling amplitude explains more.
     pub unsteady: bool,
     /// Distance to the nearest other oscillation, resolutions.
     pub nearest: Option<f64>,
@@ -61,17 +64,18 @@ pub(super) struct Evidence {
     pub fragment_distance: Option<f64>,
     /// Fraction of the segments in which a drifting component was followed.
     pub followed_share: Option<f64>,
-    /// Whether the component is as slow as the waves of a trend that had to grow.
+    /// Whether the component is as slow as the waves of a trend to which columns had to be added.
     pub slow: bool,
     /// Whether the component and two others near it begin late or end soon.
     pub crowded: bool,
-    /// Median distance of a drifting frequency from its extrapolated rate, resolutions of its segments.
+    /// Median distance of a drifting frequency from the value extrapolated with its rate, resolutions of its
+    /// segments.
     pub median_stray: Option<f64>,
     /// Range of the drift, resolutions.
     pub drift: Option<f64>,
     /// Whether the component changes over a record that is too long for a fit.
     pub changes: bool,
-    /// Whether the component stayed at the peak at which it was found.
+    /// Whether the component stayed at the peak at which it was found while it was fitted.
     pub keeps_peak: bool,
 }
 

@@ -14,11 +14,12 @@ pub struct Component {
     /// component and from the shift with a richer trend; for a periodogram it is 1.6 times the Cramér-Rao
     /// bound, plus the effect of a removed trend.
     pub frequency_sd_hz: f64,
-    /// Lowest and highest frequency of a component that drifts; `frequency_hz` is then the mean, from the
-    /// cycles counted while it was followed.
+    /// Lowest and highest frequency of a component that drifts. `frequency_hz` is then the mean: the number
+    /// of cycles counted while the component was followed, divided by the time.
     pub range_hz: Option<FrequencyRange>,
-    /// Start, s from the first frame analysed; `None` for a component present from the first frame on. For a
-    /// component found in a piece of a long record and present when the piece starts: the start of the piece.
+    /// Start, s from the first frame analysed; `None` for a component present from the first frame on. If the
+    /// component was found in a piece of a long record and is present when the piece starts, the start of the
+    /// piece.
     pub begins_s: Option<f64>,
     /// Amplitude, m; for a decaying component, at its own start or that of the record, whichever is later.
     pub amplitude_m: f64,
@@ -33,10 +34,10 @@ pub struct Component {
     /// Cramér-Rao bound of the frequency, Hz, for this component alone in a record without gaps, in white
     /// noise of the size found around it.
     pub cramer_rao_hz: f64,
-    /// Probability that noise alone produces as steady a line (Thomson's F over the tapers): small for a
-    /// steady oscillation, near one for a ring-down.
+    /// Probability that noise alone produces a line as steady as this component (Thomson's F over the
+    /// tapers): small for a steady oscillation, near one for a ring-down.
     pub line_probability: Option<f64>,
-    /// Method that estimated it.
+    /// Method that estimated the component.
     pub estimator: Estimator,
     /// Shift of the frequency if the trend has two more columns, Hz.
     pub trend_shift_hz: Option<f64>,
@@ -52,7 +53,7 @@ pub struct Component {
     pub subharmonic_of: Option<Subharmonic>,
     /// The component of which this is a sideband.
     pub sideband_of: Option<Sideband>,
-    /// The multiple of the mains frequency that lies within the standard deviation of the frequency.
+    /// The multiple of the mains frequency that lies within three standard deviations of the frequency.
     pub mains: Option<MainsMultiple>,
     /// The verdict of the most serious reason, or clear.
     pub verdict: ComponentVerdict,
@@ -121,10 +122,10 @@ pub enum ComponentVerdict {
     NotResolvable,
     /// A faster oscillation that the motion may contain would appear at the same frequency.
     AliasSuspected,
-    /// No trend describes the motion under the component, or a richer trend shifts it by more than three
-    /// standard deviations; its amplitude is within three standard deviations of zero; the residual around it
-    /// exceeds a quarter of its amplitude; or no oscillation of constant frequency and steady decay explains
-    /// it.
+    /// No trend describes the motion under the component, or a richer trend shifts its frequency by more than
+    /// three standard deviations; its amplitude is within three standard deviations of zero; the residual
+    /// around it exceeds a quarter of its amplitude; or no oscillation of constant frequency and steady decay
+    /// explains it.
     Ambiguous,
     /// A multiple of the frequency of a stronger component, to within four standard deviations.
     Harmonic,
@@ -133,14 +134,14 @@ pub enum ComponentVerdict {
     Subharmonic,
     /// A stronger component, modulated by another component.
     Sideband,
-    /// Within its standard deviation of a multiple of the mains frequency: a lamp may have caused it.
+    /// Within three standard deviations of a multiple of the mains frequency: a lamp may have caused it.
     Mains,
     /// The exposure has passed less than nine tenths of the amplitude.
     Attenuated,
     /// Above the level that noise reaches in one of a hundred spectra, but less than `CLEAR_DB` above the
     /// noise floor.
     Weak,
-    /// No reason against it.
+    /// There is no reason against the component.
     #[default]
     Clear,
 }

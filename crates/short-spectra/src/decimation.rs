@@ -1,6 +1,6 @@
 //! Records in which only every second, third ... frame was kept, as from a camera of that lower rate.
 
-/// First frame with a value, and distance of the kept frames if it is at least two frames.
+/// First frame with a value, and distance between the kept frames; `None` if this distance is one frame.
 pub(super) fn find_stride(samples: &[Option<f64>]) -> Option<(usize, usize)> {
     let mut present = samples.iter().enumerate().filter(|(_, x)| x.is_some()).map(|(i, _)| i);
     let first = present.next()?;
@@ -15,7 +15,7 @@ pub(super) fn find_stride(samples: &[Option<f64>]) -> Option<(usize, usize)> {
     (stride > 1).then_some((first, stride))
 }
 
-/// The kept frames of such a record, at their own rate.
+/// The kept frames of a record, from the first kept frame and the distance between kept frames.
 pub(super) fn decimate(samples: &[Option<f64>], (first, stride): (usize, usize)) -> Vec<Option<f64>> {
     samples.iter().skip(first).step_by(stride).copied().collect()
 }

@@ -80,8 +80,8 @@ pub enum SpectrumError {
 
 // Checks before a record is analysed.
 
-/// Padding factor of longer records: bins half a resolution apart still show every peak of a Hann window,
-/// which is four resolutions wide.
+/// Largest padding factor of records whose requested padded length is too long: bins half a resolution apart
+/// still show every peak of a Hann window, which is four resolutions wide.
 const LONG_PADDING: usize = 2;
 
 /// Checks that a band contains a frequency of the spectrum.

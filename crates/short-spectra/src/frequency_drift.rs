@@ -1,8 +1,8 @@
-//! A cycle whose frequency changes over the record: it is sought in addition to steady and decaying
-//! oscillations and treated as one component.
+//! Search for an oscillation whose frequency changes over the record, in addition to steady and decaying
+//! oscillations. It is treated as one component.
 //!
-//! Sinusoids can only split such a cycle into pieces. If they leave a large peak, or if three or more of them
-//! lie within the range of a drifting ridge, the ridge is the component and the pieces are dropped.
+//! Sinusoids can only split such an oscillation into pieces. If they leave a large peak, or if three or more
+//! of them lie within the range of a drifting ridge, the ridge is the component and the pieces are dropped.
 
 use super::model_selection::{DriftRegion, LOBE, ModelFit, ModelSelector};
 use super::periodogram::upper_median;
@@ -16,34 +16,34 @@ const SLOW_COMPONENT: (f64, f64) = (4.0, 0.25);
 /// The lower end of the band is the frequency of the lowest strong component divided by this margin, because
 /// the window hides lower frequencies near the ends of a record.
 const BAND_MARGIN: f64 = 2.0;
-/// Fraction of followed segments from which a component counts as followed everywhere.
+/// Fraction of the segments from which a component that was followed in them counts as followed everywhere.
 pub(super) const FULLY_FOLLOWED: f64 = 0.9;
-/// Shorter segments, as fractions of the best length, that are tried if less than `FULLY_FOLLOWED` was
-/// followed, and the smallest increase of the followed fraction for which they are used: noise hides a
+/// Fractions of the best segment length that are tried if less than `FULLY_FOLLOWED` was followed. A shorter
+/// length is used only if it increases the followed fraction by more than `LEAST_GAIN`, because noise hides a
 /// component in short segments.
 const SHORTER_SEGMENTS: [f64; 3] = [0.8, 0.65, 0.5];
 const LEAST_GAIN: f64 = 0.1;
-/// Standard deviation of the instant of a cycle, cycles: the shape of a cycle changes with its frequency, so
-/// the phase of the fundamental moves relative to the start of the cycle.
+/// Standard deviation of the start of a cycle that is measured from the phase of the fundamental, cycles: the
+/// shape of a cycle changes with its frequency, so this phase moves relative to the start of the cycle.
 const CYCLE_INSTANT_SD: f64 = 0.05;
 /// Distance of points, segments, at which they share so few frames that their noise is independent.
 const INDEPENDENT_SEGMENTS: f64 = 0.5;
-/// Fraction of the segments above which a drift must be followed to count.
+/// A drift counts only if it was followed in more than this fraction of the segments.
 const LEAST_FOLLOWED: f64 = 0.08;
-/// Smallest range of a drift, resolutions; a smaller range is a slightly broad line.
+/// Smallest range of a drift, resolutions; a smaller range is that of a slightly broadened line.
 const LEAST_RANGE: f64 = 2.0;
-/// Number of sinusoids within the range from which they count as pieces of one cycle.
+/// Number of sinusoids within the range from which they count as pieces of one oscillation.
 const FRAGMENTS: usize = 3;
-/// Ratio of the largest residual peak within the range to the largest sinusoid there above which sinusoids do
-/// not explain the cycle.
+/// Ratio of the largest residual peak within the range to the largest sinusoid there. Above this ratio,
+/// sinusoids do not explain the oscillation.
 const LARGE_RESIDUAL: f64 = 0.25;
 
-/// The course of the strongest component above the slow ones.
+/// The frequency over time of the strongest component above the slow components.
 pub(super) struct DriftCourse {
     pub ridge: Ridge,
-    /// Fraction of the segments in which it was followed.
+    /// Fraction of the segments in which the component was followed.
     pub followed_share: f64,
-    /// Frequency range, if it is a component that drifts.
+    /// Frequency range, if the component drifts.
     pub range: Option<FrequencyRange>,
 }
 
@@ -62,7 +62,7 @@ impl DriftCourse {
         upper_median(pairs.map(stray).collect()).unwrap_or(0.0)
     }
 
-    /// The frequencies that the course covers in a spectrum, if it is a component that drifts.
+    /// The frequencies that the component covers in a spectrum, if it drifts.
     pub(super) fn drift_region(&self) -> Option<DriftRegion> {
         let FrequencyRange { low_hz, high_hz, .. } = self.range?;
         Some(DriftRegion { low_hz, high_hz, lobe_hz: LOBE / self.ridge.segment_s })
@@ -88,9 +88,9 @@ pub(super) fn find_drift_course(
     Some(DriftCourse { ridge, followed_share, range })
 }
 
-/// The ridge for the segment length that shows the component best. If that ridge misses much of the record,
-/// the one for the shorter length that misses least: the component may be weak or change fast in a part of
-/// the record.
+/// The ridge for the segment length that shows the component best. If this ridge misses much of the record,
+/// shorter segments are tried and the ridge that misses least is taken: the component may be weak or change
+/// fast in a part of the record.
 fn select_best_ridge(record: &[Option<f64>], frame_rate_hz: f64, band: (f64, f64)) -> Option<(f64, Ridge)> {
     let cut = |segment_s: Option<f64>| {
         let settings = time_frequency::SpectrogramSettings { segment_s, band_hz: Some(band) };
@@ -157,7 +157,7 @@ fn remove_slow_parts(search: &ModelSelector, fit: &ModelFit, low_hz: f64) -> Vec
     record
 }
 
-/// Whether sinusoids only split the drifting cycle into pieces.
+/// Whether sinusoids only split the drifting oscillation into pieces.
 fn is_fragmented(search: &ModelSelector, fit: &ModelFit, range: &FrequencyRange) -> bool {
     let resolution_hz = search.resolution_hz();
     if range.high_hz - range.low_hz < LEAST_RANGE * resolution_hz {
@@ -172,15 +172,15 @@ fn is_fragmented(search: &ModelSelector, fit: &ModelFit, range: &FrequencyRange)
     pieces().count() >= FRAGMENTS || left_m > LARGE_RESIDUAL * largest_m
 }
 
-/// Means along a course, which describe it as one component.
+/// Means along a ridge that describe it as one component.
 pub(super) struct RidgeMean {
-    /// Ratio of the cycles counted along the course to its duration, Hz.
+    /// Ratio of the number of cycles along the ridge to its duration, Hz.
     pub frequency_hz: f64,
     pub frequency_sd_hz: f64,
-    /// Root of the mean power, m.
+    /// Root of the mean squared amplitude, m.
     pub amplitude_m: f64,
     pub amplitude_sd_m: f64,
-    /// Mean over the points, weighted by their power, dB.
+    /// Mean over the points, weighted by their squared amplitudes, dB.
     pub snr_db: f64,
 }
 
@@ -206,7 +206,7 @@ impl RidgeMean {
     }
 }
 
-/// Cycles along a course, their variance, and the duration of the course.
+/// Number of cycles along a ridge, its variance, and the duration of the ridge.
 #[derive(Default)]
 struct CycleCount {
     cycles: f64,
@@ -239,7 +239,7 @@ impl CycleCount {
         for pair in part.windows(2) {
             let [a, b] = [&pair[0], &pair[1]];
             let apart_s = b.time_s - a.time_s;
-            // from a cubic through both frequencies and their rates
+            // cycles expected from a cubic through both frequencies with both rates
             let expected = apart_s * (a.frequency_hz + b.frequency_hz) / 2.0
                 + apart_s * apart_s * (a.rate_hz_per_s - b.rate_hz_per_s) / 12.0;
             let part_of_one = (b.phase_rad - a.phase_rad) / TAU;
@@ -251,8 +251,8 @@ impl CycleCount {
 
     fn add_end(&mut self, end: &RidgeEnd, point: &RidgePoint) {
         let apart_s = (end.time_s - point.time_s).abs();
-        // from a parabola through both frequencies with the rate of the point; a mismatch at the end counts
-        // as uncertainty
+        // cycles from a parabola through both frequencies with the rate of the point; a mismatch at the end
+        // counts as uncertainty
         let led_hz = point.frequency_hz + point.rate_hz_per_s * (end.time_s - point.time_s);
         let off_hz = (end.frequency_hz - led_hz) / 3.0;
         self.cycles += apart_s * ((point.frequency_hz + led_hz) / 2.0 + off_hz);

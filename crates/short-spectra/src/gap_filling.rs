@@ -15,8 +15,8 @@
 
 use rayon::prelude::*;
 
-/// Longest gap that is filled, frames: filling a longer gap would amplify noise more than a gap of weight
-/// zero does harm.
+/// Longest gap that is filled, frames: filling a longer gap would amplify noise and do more harm than a gap
+/// of weight zero.
 pub(crate) const LONGEST_FILLED_GAP: usize = 4;
 const DIFFERENCE: [f64; 5] = [1.0, -4.0, 6.0, -4.0, 1.0];
 const ORDER: usize = DIFFERENCE.len() - 1;
@@ -78,7 +78,7 @@ fn solve_cluster(samples: &[Option<f64>], cluster: &[usize]) -> Option<[f64; MOS
         let difference = &samples[start..=start + ORDER];
         differences += usize::from(normal.add_difference(difference, start, next, &cluster[next..]));
     }
-    // `ORDER` more differences than unknowns: a fill supported from one side only would extrapolate
+    // with fewer differences, the gap has values on one side only and would be extrapolated
     if differences < cluster.len() + ORDER { None } else { normal.cholesky_solve(cluster.len()) }
 }
 

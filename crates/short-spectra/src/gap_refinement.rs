@@ -4,7 +4,7 @@
 //! to the frames present (`least_squares.rs`). The residual of the fit decides what follows:
 //! - It is white: the sinusoids are the whole signal. Every frame present then counts the same, which is most
 //!   accurate, and components that the filling created are found to be absent.
-//! - It is not white (the cycle decays or drifts, the trend is not a cubic): only the residual is filled, the
+//! - It is not white (a decay or drift, or the trend is not a cubic): only the residual is filled, the
 //!   model is added back, and the fit is repeated with the Hann weights of the transform. Without gaps this
 //!   gives the maximum of the windowed periodogram, so the result is the same with and without gaps.
 //!
@@ -22,19 +22,19 @@ use super::trend::Trend;
 use super::{gap_filling, periodogram};
 use portable_math as math;
 
-/// Fraction of missing frames above which components are refined; with fewer missing, filled gaps shift 900
-/// Hz only by hundredths of a hertz.
+/// Fraction of missing frames above which components are refined. With fewer missing, filled gaps shift a
+/// component at 900 Hz only by hundredths of a hertz.
 pub(crate) const REFINED_MISSING: f64 = 0.10;
 /// Maximum number of components that are fitted together, largest first; smaller ones keep their start
 /// values.
 pub(super) const MOST_REFINED: usize = MAX_COMPONENTS;
-/// Number of frames for each unknown below which the fit would follow the noise.
+/// Number of frames per unknown below which the fit would follow the noise.
 const FRAMES_PER_UNKNOWN: usize = 4;
-/// The residual is white if its mean square is below this multiple of that of noise. With 60 differences of
-/// fourth order, noise exceeds this limit once in a thousand records; a misfit as large as the noise leaks no
-/// more than the noise does.
+/// The residual counts as white if its mean square is below this multiple of the noise variance that follows
+/// from its fourth differences. With 60 differences, noise exceeds this limit once in a thousand records. A
+/// misfit as large as the noise leaks no more than the noise does.
 const WHITE_RATIO: f64 = 2.0;
-/// Minimum number of fourth differences that can tell noise from a cycle.
+/// Minimum number of fourth differences that can distinguish noise from an oscillation.
 const FEWEST_DIFFERENCES: usize = 20;
 /// Number of times that the residual is filled: the second fill changes the result by a tenth of what the
 /// first does.
@@ -45,7 +45,7 @@ const FILL_ROUNDS: usize = 2;
 pub(super) struct RefinementStart {
     /// Frequency, cycles in the record.
     pub cycles: f64,
-    /// Whether the frequency may move; the frequency of a residue of the trend may not.
+    /// Whether the fit may change the frequency; it is fixed for a residue of the trend.
     pub moves: bool,
 }
 
@@ -73,8 +73,8 @@ pub(super) struct RefinedDeviations {
 pub(super) enum Refinement {
     /// The component stays as estimated from the transform.
     Unchanged,
-    /// The component stays as estimated from the transform; a fit to the frames present at its frequency has
-    /// this amplitude, m.
+    /// The component stays as estimated from the transform. A fit to the frames present with this fixed
+    /// frequency has this amplitude, m.
     FixedFrequency(f64),
     Refined(RefinedComponent),
 }
@@ -137,8 +137,8 @@ fn fit_components(
     outcome
 }
 
-/// Result for each start. `white` means that all weights are one and the residual is noise, which determines
-/// the standard deviations.
+/// Result for each start. `white` means that all weights are one and the residual is noise; only then can the
+/// standard deviations be determined.
 fn refinement_outcomes(
     problem: &SineProblem,
     solved: &SineSolution,
@@ -169,8 +169,8 @@ fn refinement_outcomes(
     Some(starts.iter().enumerate().map(outcome).collect())
 }
 
-/// Whether the fourth differences of the values are as large as white noise of their variance would make
-/// them, which is 70 times that variance.
+/// Whether values are white noise: the mean square of their fourth differences is then 70 times their
+/// variance.
 fn is_white(left: &[Option<f64>]) -> bool {
     const GAIN: f64 = 70.0;
     let difference = |w: &[Option<f64>]| Some(w[0]? - 4.0 * w[1]? + 6.0 * w[2]? - 4.0 * w[3]? + w[4]?);

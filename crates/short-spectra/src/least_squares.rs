@@ -21,7 +21,7 @@ use std::rc::Rc;
 const MOST_FREQUENCY_SHIFT: f64 = 1.0;
 /// Maximum number of halvings of a step that raises the misfit.
 const MOST_HALVINGS: i32 = 8;
-/// A step of less than this many cycles and nepers is the last.
+/// The fit ends with a step that changes all cycles and nepers by less than this.
 const SMALLEST_STEP: f64 = 1e-6;
 /// Ratio of an eigenvalue of the normal matrix, scaled to a unit diagonal, to the largest eigenvalue, below
 /// which the data do not determine its direction.
@@ -66,14 +66,14 @@ impl FreeSet {
     }
 }
 
-/// A sinusoid, decaying or not; a relaxation if it has no cycles.
+/// A sinusoid, decaying or not; if it has no cycles, a relaxation (a decaying exponential).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SineTerm {
     /// Cycles in the record.
     pub cycles: f64,
     /// Decay over the record, nepers.
     pub nepers: f64,
-    /// First frame in which it is present.
+    /// First frame in which the term is present.
     pub first: usize,
     /// Parameters that a fit moves.
     pub free: FreeSet,
@@ -100,10 +100,10 @@ pub(super) fn nepers_from_damping_ratio(cycles: f64, damping_ratio: f64) -> f64 
     TAU * cycles * damping_ratio / (1.0 - damping_ratio * damping_ratio).sqrt()
 }
 
-/// Accuracy with which a minimum is approached.
+/// Accuracy with which a fit approaches the minimum of the misfit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Tolerance {
-    /// To a few hundredths of a standard deviation, because more terms follow.
+    /// To a few hundredths of a standard deviation, while terms are still added.
     Coarse,
     /// To the last step that lowers the misfit.
     Fine,
@@ -112,8 +112,8 @@ pub(super) enum Tolerance {
 impl Tolerance {
     /// Relative decrease of the misfit below which a step is the last, and maximum number of steps.
     /// [`Self::Fine`] reaches a thousandth of a standard deviation for 450 frames, a hundredth for a million.
-    /// A steady tone takes four steps, a drifting one a dozen; a signal that is not a sinusoid may never
-    /// converge.
+    /// A steady tone takes four steps, a drifting tone a dozen; for a signal that is not a sinusoid, the
+    /// steps may never converge.
     fn least_decrease_and_most_steps(self) -> (f64, usize) {
         match self {
             Self::Coarse => (1e-6, 8),
@@ -122,8 +122,8 @@ impl Tolerance {
     }
 }
 
-/// A record with the weights of its frames, and its trend, which is fitted together with the sinusoids
-/// because they are not orthogonal.
+/// A record with the weights of its frames, and its trend. The trend is fitted together with the sinusoids,
+/// because it is not orthogonal to them.
 #[derive(Debug, Clone)]
 pub(super) struct SineProblem {
     pub trend: Trend,
@@ -281,7 +281,8 @@ impl SineProblem {
         Some(solved.terms.iter().map(&mut step).collect())
     }
 
-    /// Covariance of the unknowns for a residual of unit white noise, and the indices of each term in it.
+    /// Covariance of the unknowns for a residual of unit white noise, and the indices of each term's unknowns
+    /// in it.
     pub(super) fn covariance(&self, solved: &SineSolution) -> Option<SineCovariance> {
         let map = self.unknowns_matrix(solved);
         let gram = self.columns.gram_matrix::<COLUMNS_WITH_SLOPES>(&solved.terms);
@@ -374,7 +375,7 @@ fn pseudo_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let back = |inverse: &DMatrix<f64>| {
         DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| inverse[(i, j)] * scale[i] * scale[j])
     };
-    // eigenvalues take ten times as long, and only undetermined directions need them
+    // eigenvalues take ten times as long and are needed only if directions are undetermined
     if let Some(factor) = scaled.clone().cholesky() {
         let pivots = factor.l_dirty().diagonal();
         if pivots.iter().all(|pivot| pivot * pivot > WELL_POSED_PIVOT) {

@@ -1,15 +1,16 @@
-//! Components of short records with missing frames.
+//! Finds the oscillations, called components, in short records with missing frames.
 //!
-//! [`SpectralAnalysis::from_record`] fits a record: trend, steady and decaying oscillations by least squares
-//! on the frames present, and a drifting component by its ridge, each with standard deviations and a verdict.
+//! [`SpectralAnalysis::from_record`] fits a trend and steady or decaying oscillations to the frames present
+//! by least squares, and follows a component whose frequency drifts through short-time spectra. Every
+//! component has standard deviations and a verdict.
 //!
-//! [`analyse_spectrum`] finds the peaks of one Hann-windowed spectrum, fast and without choices that depend
-//! on the data, so that a fit can compare thousands of records. Gaps of up to four frames are filled for the
-//! transform only (`gap_filling.rs`). If more than a tenth of the frames are missing, the components are then
-//! refined on the frames present (`gap_refinement.rs`). The record is detrended, weighted, padded with zeros
-//! and transformed. A frame that is still missing has weight zero on the true frame grid. Amplitudes are
-//! scaled by the sum of the weights present, `2 |sum w x exp(-i w t)| / sum w`: the peak of a sine of
-//! amplitude A has the height A.
+//! [`analyse_spectrum`] finds the peaks of one Hann-windowed spectrum. It is fast and makes no choices that
+//! depend on the data, so that a fit can compare thousands of records. Gaps of up to four frames are filled
+//! for the transform only (`gap_filling.rs`). If more than a tenth of the frames are missing, the components
+//! are then refined on the frames present (`gap_refinement.rs`). The record is detrended, weighted, padded
+//! with zeros and transformed. A frame that is still missing keeps its place in time and has weight zero.
+//! Amplitudes are scaled by the sum of the weights present, `2 |sum w x exp(-i w t)| / sum w`: the peak of a
+//! sine of amplitude A has the height A.
 //!
 //! # Three tones among gaps
 //!
@@ -34,7 +35,7 @@
 //! # Ok::<(), short_spectra::SpectrumError>(())
 //! ```
 
-#![cfg_attr(not(test), warn(clippy::disallowed_methods))] // tests may use them
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))] // tests may call them
 
 mod amplitude_spectrum;
 mod analysis;

@@ -1,11 +1,11 @@
 //! Frequency and decay of a ring-down by the matrix pencil, in a band around a peak.
 //!
 //! The record is demodulated by the frequency of the peak and summed in blocks of `D` frames. The block sums
-//! of `z^n` are again an exponential, `z^(mD)` times a constant. Sixty block sums therefore represent the
-//! record, and a decay from the first frame on remains exact, where a filter would blur it. The number of
-//! exponentials is the number of singular values of the Hankel matrix of the sums above the noise, by the
-//! minimum description length. The shift from each row of the matrix to the next gives the poles (Hua and
-//! Sarkar 1990; Roy and Kailath 1989).
+//! of an exponential `z^n` are again an exponential, `z^(mD)` times a constant. Sixty block sums therefore
+//! represent the record. A decay from the first frame on remains exact, whereas a filter would blur it. The
+//! number of exponentials is the number of singular values above the noise of the Hankel matrix of the sums,
+//! by the minimum description length. The shift from each row of the matrix to the next gives the poles (Hua
+//! and Sarkar 1990; Roy and Kailath 1989).
 
 use nalgebra::{Complex, DMatrix, DVector};
 use portable_math as math;
@@ -23,8 +23,8 @@ const PRECISION: f64 = 5.0 * f64::EPSILON;
 /// Maximum number of iterations of a decomposition. One that converges takes a few per row; with gaps in the
 /// record it may not converge.
 const MOST_ITERATIONS: usize = 2000;
-/// Largest growth over the record, nepers; with a larger growth, powers come near the largest floating-point
-/// number. A record that is mostly gaps gives such poles.
+/// Largest growth over the record, nepers. With a larger growth, which a record of mostly gaps may give,
+/// powers of a pole come near the largest floating-point number.
 const MOST_NEPERS: f64 = 200.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pole {

@@ -20,8 +20,8 @@ use std::f64::consts::{PI, TAU};
 const MOST_ROUNDS: usize = 12;
 /// Maximum number of rounds in which the second pass tries ring-downs and pairs.
 const SECOND_PASS_ROUNDS: usize = 5;
-/// Number of cycles in the record below which a step causes peaks of its own: the spectrum of a step over a
-/// tenth of the record lies there.
+/// Number of cycles in the record below which a step causes peaks of its own: a step that takes a tenth of
+/// the record has its spectrum there.
 pub(super) const STEP_CYCLES: f64 = 8.0;
 /// Half width of the lobe of a Hann window, resolutions: a residual closer to a term belongs to that term.
 pub(super) const LOBE: f64 = 2.0;
@@ -34,13 +34,14 @@ const FRAMES_PER_UNKNOWN: usize = 4;
 /// Number of frames per column that a trend alone needs, for example eight for the four columns of a cubic.
 /// This is less than `FRAMES_PER_UNKNOWN`, because noise cannot imitate a trend.
 pub(super) const FRAMES_PER_COLUMN: usize = 2;
-/// A relaxation must lower the misfit by the square of this many standard deviations of the noise: eight
-/// decays are tried, and one in 10,000 noise records reaches this limit.
+/// A relaxation must lower the misfit by the square of this number of standard deviations of the noise. Eight
+/// decays are tried, and one in 10,000 records of noise reaches this limit.
 const RELAXATION_STANDS_OUT: f64 = 4.5;
-/// Multiples of the frequency of a drifting cycle whose peaks belong to the cycle, because it is not a sine.
+/// Multiples of the frequency of a drifting oscillation at which peaks belong to that oscillation, because it
+/// need not be a sine.
 const DRIFT_HARMONICS: [f64; 4] = [1.0, 2.0, 3.0, 4.0];
-/// Decays over the record, nepers, that are tried besides that of the matrix pencil, which may fail if there
-/// are gaps.
+/// Decays over the record, nepers, that are tried in addition to the decay from the matrix pencil, which may
+/// fail if there are gaps.
 const START_NEPERS: [f64; 4] = [0.0, 2.0, 6.0, 18.0];
 
 /// A record to decompose.
@@ -52,24 +53,25 @@ pub(super) struct ModelSelector<'a> {
     pub periodogram: &'a Periodogram,
     /// Amplitude of rounding errors, m.
     pub rounding_m: f64,
-    /// Whether the trend may grow.
+    /// Whether columns may be added to the trend.
     pub trend_grows: bool,
-    /// Whether noise is measured around each component, because it need not be white. Not set while a
-    /// drifting cycle is sought, because a cycle that drifts over an octave looks like noise.
+    /// Whether noise is measured around each component, because it need not be white. False during the search
+    /// for a drifting oscillation, because one that drifts over an octave looks like noise.
     pub noise_is_coloured: bool,
-    /// Range of a drifting cycle; peaks in it and its multiples belong to that cycle.
+    /// Frequency range of a drifting oscillation; peaks in this range and in its multiples belong to that
+    /// oscillation.
     pub drift_region: Option<DriftRegion>,
     offset: Vec<f64>,
     pub(super) data: Vec<f64>,
     pub(super) weights: Vec<f64>,
 }
 
-/// Range of a drifting cycle.
+/// Frequency range of a drifting oscillation.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct DriftRegion {
     pub low_hz: f64,
     pub high_hz: f64,
-    /// Half width of the lobe of the segments in which it was followed, Hz.
+    /// Half width of the window's lobe for the segments in which the oscillation was followed, Hz.
     pub lobe_hz: f64,
 }
 
@@ -165,7 +167,7 @@ impl<'a> ModelSelector<'a> {
         }
     }
 
-    /// Whether an oscillation is slower than the fastest wave that the trend can show.
+    /// Whether an oscillation is slower than the fastest wave that the trend can describe.
     pub(super) fn trend_competes(&self, fit: &ModelFit) -> bool {
         let fastest = fit.model.trend().fastest_waves();
         fit.model.terms().iter().any(|term| term.cycles > 0.0 && term.cycles < fastest)
@@ -187,7 +189,7 @@ impl<'a> ModelSelector<'a> {
         self.add_terms(self.fit_model(self.problem_with_trend(trend), &[], Tolerance::Coarse)?, false)
     }
 
-    /// Decomposes the record again without the terms of a drifting cycle.
+    /// Decomposes the record again without the terms that lie in the range of a drifting oscillation.
     pub(super) fn select_without_drift(&self, fit: &ModelFit) -> Option<ModelFit> {
         let parts = &fit.model;
         let stays =
@@ -218,14 +220,14 @@ impl<'a> ModelSelector<'a> {
         self.prune_terms(fit)
     }
 
-    /// The model with another part added; `None` if nothing stands out from the noise or no further part can
-    /// be determined.
+    /// The model with another part added; `None` if no peak stands out from the noise or if the frames do not
+    /// determine a further part.
     fn improve_model(&self, fit: &ModelFit) -> Option<SineModel> {
         let parts = &fit.model;
         let fresh = fit.peaks.accepted.iter().filter(|p| self.is_new_peak(parts.terms(), p));
         let (mut high, low): (Vec<Peak>, Vec<Peak>) =
             fresh.copied().partition(|p| self.cycles_of_peak(p) >= STEP_CYCLES);
-        // noise need not be white, but the residue of a step is not noise
+        // a high peak is compared with the noise around it; a low peak may be the residue of a step
         high.retain(|p| !self.noise_is_coloured || self.stands_out_widely(fit, p));
         let room = MAX_COMPONENTS.saturating_sub(parts.oscillations().len());
         let largest = low.first().filter(|l| high.first().is_none_or(|h| l.amplitude_m > h.amplitude_m));
@@ -251,7 +253,7 @@ impl<'a> ModelSelector<'a> {
         self.frame_rate_hz / self.samples.len() as f64
     }
 
-    /// Whether a peak lies outside the lobe of every term and is not part of a drifting cycle.
+    /// Whether a peak lies outside the lobe of every term and is not part of a drifting oscillation.
     pub(super) fn is_new_peak(&self, terms: &[SineTerm], peak: &Peak) -> bool {
         let cycles = self.cycles_of_peak(peak);
         let own = |t: &SineTerm| t.cycles > 0.0 && is_in_lobe(cycles, t);
@@ -260,7 +262,7 @@ impl<'a> ModelSelector<'a> {
             && !self.is_in_drift_region(peak.frequency_hz)
     }
 
-    /// Whether a frequency lies in the range of a drifting cycle or of its multiples.
+    /// Whether a frequency lies in the range of a drifting oscillation or in a multiple of this range.
     pub(super) fn is_in_drift_region(&self, hz: f64) -> bool {
         self.drift_region.is_some_and(|DriftRegion { low_hz, high_hz, lobe_hz }| {
             let near = |multiple: f64| hz > multiple * low_hz - lobe_hz && hz < multiple * high_hz + lobe_hz;
@@ -268,7 +270,8 @@ impl<'a> ModelSelector<'a> {
         })
     }
 
-    /// Explains a low peak by a sinusoid, more trend or a relaxation, whichever has the lowest criterion.
+    /// Explains a low peak by a sinusoid, a richer trend or a relaxation, whichever gives the lowest Bayesian
+    /// information criterion.
     fn explain_low_peak(&self, fit: &ModelFit, peak: &Peak) -> Option<SineModel> {
         let parts = &fit.model;
         let mut candidates = Vec::new();
@@ -285,13 +288,13 @@ impl<'a> ModelSelector<'a> {
         self.fit_if_better(parts, &self.select_best(candidates)?)
     }
 
-    /// The model with the lowest criterion.
+    /// The model with the lowest Bayesian information criterion; `None` without models.
     pub(super) fn select_best(&self, models: impl IntoIterator<Item = SineModel>) -> Option<SineModel> {
         let order = |a: &SineModel, b: &SineModel| self.bic_of(a).total_cmp(&self.bic_of(b));
         models.into_iter().min_by(order)
     }
 
-    /// The fitted candidate, if its criterion is lower than that of the model `parts`.
+    /// The fitted candidate, if its Bayesian information criterion is lower than that of the model `parts`.
     fn fit_if_better(&self, parts: &SineModel, candidate: &SineModel) -> Option<SineModel> {
         self.fit_model(candidate.problem.clone(), candidate.terms(), Tolerance::Coarse)
             .filter(|fitted| self.bic_of(fitted) < self.bic_of(parts))
@@ -320,8 +323,8 @@ impl<'a> ModelSelector<'a> {
         (relaxations > 0).then(moved).flatten().filter(|moved| moved.solution.misfit < least)
     }
 
-    /// A sinusoid for each peak, largest first, except for peaks in the lobe of a larger one: a fast decay
-    /// has noise peaks on its flanks.
+    /// A sinusoid for each peak, largest first, except for peaks in the lobe of a larger one: the broad peak
+    /// of a fast decay has noise peaks on its flanks.
     fn start_sinusoids(&self, fit: &ModelFit, peaks: &[Peak]) -> Vec<SineTerm> {
         let mut terms: Vec<SineTerm> = Vec::new();
         for peak in peaks {
@@ -389,7 +392,8 @@ impl<'a> ModelSelector<'a> {
         self.bic_with(parts, parts.solution.misfit, 0.0)
     }
 
-    /// The criterion of a model with another misfit, m^2, and `more` additional unknowns.
+    /// The Bayesian information criterion of a model with another misfit, m^2, and with `more` additional
+    /// unknowns.
     pub(super) fn bic_with(&self, parts: &SineModel, misfit: f64, more: f64) -> f64 {
         let present = self.periodogram.sums.present as f64;
         let terms = parts.terms();
@@ -434,8 +438,8 @@ impl<'a> ModelSelector<'a> {
         let covariance = parts.problem.covariance(&parts.solution)?;
         let white_m = self.periodogram.noise_sd_m(fit.peaks.floor_m);
         let kept = |(k, term): (usize, &SineTerm)| {
-            // the noise of a bin holds both parts of an amplitude, so it is sqrt(2) times the standard
-            // deviation of the amplitude
+            // the noise in a bin has a cosine and a sine part, so its root mean square is sqrt(2) times the
+            // standard deviation of an amplitude
             let sd = covariance.deviations(k, parts.amplitudes(k)).amplitude;
             let least = fit.peaks.detection * std::f64::consts::SQRT_2 * sd;
             let amplitude_m = parts.amplitude_m(k);
@@ -453,7 +457,7 @@ impl<'a> ModelSelector<'a> {
         let terms = parts.terms();
         let stays = |t: &SineTerm| t.cycles == 0.0 || matches!(t.free, FreeSet::Both | FreeSet::Cycles);
         let stay: Vec<bool> = terms.iter().map(stays).collect();
-        // a term that left its peak may have moved to that of another, and then neither amplitude is known
+        // a term that left its peak may be at the peak of another term; then both amplitudes are unknown
         let judged = || terms.iter().enumerate().map(kept).collect();
         Some(if stay.iter().all(|stays| *stays) { judged() } else { stay })
     }
@@ -469,7 +473,8 @@ pub(super) fn lobe_half_width(term: &SineTerm) -> f64 {
 }
 
 impl SineTerm {
-    /// Whether its decay is within the bounds and less than `2 pi` nepers per cycle.
+    /// Whether the term is an oscillation whose decay is within the bounds and less than `2 pi` nepers per
+    /// cycle.
     pub(super) fn is_oscillation(&self) -> bool {
         let (low, high) = self.nepers_bounds();
         self.cycles > 0.0 && self.nepers > low && self.nepers < high && self.nepers < TAU * self.cycles

@@ -1,10 +1,10 @@
 //! Power density of noise-like motion, with its uncertainty and a test for steady lines, from several tapers
 //! of one record.
 //!
-//! Each sine taper gives a nearly independent estimate. Their mean is the density, and their scatter its
-//! uncertainty (jackknife over the tapers). Thomson's harmonic F measures how well one steady sine explains
-//! all of them. A line is spread over `tapers + 1` resolutions, so other estimators give its frequency more
-//! accurately.
+//! Each sine taper gives a nearly independent estimate of the density. The result is the mean of these
+//! estimates; its uncertainty follows from their scatter (jackknife over the tapers). Thomson's harmonic F
+//! measures how well one steady sine explains the estimates of all tapers. A line is spread over `tapers + 1`
+//! resolutions, so other estimators give its frequency more accurately.
 //!
 //! Sources: Riedel and Sidorenko 1995 (IEEE Trans. Signal Process. 43, 188) for the tapers; Thomson 1982
 //! (Proc. IEEE 70, 1055) for F; Thomson and Chave 1991 (in Haykin, Advances in Spectrum Analysis and Array
@@ -22,17 +22,18 @@ use std::ops::RangeInclusive;
 /// Default number of tapers: a density with 14 degrees of freedom scatters by 38 %, and a line is 8
 /// resolutions wide, 53 Hz in 0.15 s, so that 78 Hz is still separate from zero and from 900 Hz.
 pub const TAPERS: usize = 7;
-/// Smallest and largest number of tapers: one has no scatter, and more than fifty smooth away every feature.
+/// Smallest and largest number of tapers: a single taper has no scatter, and more than fifty smooth away
+/// every feature.
 pub(crate) const TAPER_RANGE: RangeInclusive<usize> = 2..=50;
-/// Smallest width of the window of a noise floor, in widths of a line, so that a line does not set its own
-/// floor.
+/// Smallest width of the running median that gives a noise floor, in widths of a line, so that a line does
+/// not raise the floor under itself.
 pub(crate) const FLOOR_LINES: f64 = 5.0;
 /// Longest padded record, samples, limited by memory because every taper keeps its transform.
 const MOST_PADDED: usize = 1 << 24;
 /// Number of values from which threads share the work; fewer take a millisecond or two.
 const PARALLEL_FROM: usize = 1 << 17;
-/// A sum of powers without one taper that is below this fraction of the sum over all tapers is rounding
-/// error.
+/// If the sum of the powers of all tapers but one is below this fraction of the sum over all tapers, it is
+/// rounding error.
 const ROUNDING: f64 = 1e-15;
 
 /// A multitaper estimate; one value per bin, from 0 to half the frame rate.
@@ -171,18 +172,18 @@ impl Multitaper {
         Some((density / factor, density * factor))
     }
 
-    /// Probability that noise alone, flat within the width of a line, gives an F as large as that of a bin:
-    /// `(1 + F/(K-1))^-(K-1)` for `K` tapers. In a record of `n` frames, a probability below `1/n` counts as
-    /// a line (Thomson's rule). `None` for a bin outside the spectrum.
+    /// Probability that noise alone, flat within the width of a line, gives an F at least as large as that of
+    /// a bin: `(1 + F/(K-1))^-(K-1)` for `K` tapers. In a record of `n` frames, a probability below `1/n`
+    /// counts as a line (Thomson's rule). `None` for a bin outside the spectrum.
     #[must_use]
     pub fn line_probability(&self, bin: usize) -> Option<f64> {
         let others = (self.tapers - 1) as f64;
         Some(math::powf(1.0 + self.line_f.get(bin)? / others, -others))
     }
 
-    /// Mean density of the noise in every bin, m^2/Hz: the running median of the density over `width_hz`, at
-    /// least `FLOOR_LINES` lines wide, without the bins that stand out from it. The curve follows a steady
-    /// slope of the density, and is flat over half the width of the median at both ends.
+    /// Mean density of the noise in every bin, m^2/Hz, from the running median of the density over
+    /// `width_hz`, at least `FLOOR_LINES` lines wide. Bins far above the median are left out of it. The curve
+    /// follows a steady slope of the density, and is flat over half the width of the median at both ends.
     #[must_use]
     pub fn noise_density(&self, width_hz: f64) -> Vec<f64> {
         let bin_hz = self.frequency_hz.get(1).copied().unwrap_or(f64::INFINITY);
@@ -213,7 +214,7 @@ fn trim_missing_ends(samples: &[Option<f64>]) -> &[Option<f64>] {
     samples.get(first..end).unwrap_or_default()
 }
 
-/// The values of `of` in order, computed in parallel if `work` is large.
+/// The values `of(0)`, `of(1)`, ..., `count` in number, computed in parallel if `work` is large.
 fn map_parallel_above<T: Send>(count: usize, work: usize, of: impl Fn(usize) -> T + Sync) -> Vec<T> {
     if work < PARALLEL_FROM {
         (0..count).map(&of).collect()
@@ -275,13 +276,13 @@ fn estimate_bin(tapered: &[TaperTransform], bin: usize, scale: f64) -> Multitape
     }
 }
 
-/// Standard deviation of the logarithm of the mean of `powers`, whose sum is `total`, from the means that
-/// omit one of them.
+/// Standard deviation of the logarithm of the mean of `powers`, whose sum is `total`, by the jackknife: from
+/// the means that omit one of the powers.
 fn jackknife_log_sd<I: Iterator<Item = f64>>(total: f64, powers: impl Fn() -> I) -> f64 {
     if total <= 0.0 {
         return 0.0;
     }
-    // (the divisor of the means is the same for all, so it does not affect the standard deviation)
+    // (all means have the same divisor, so it does not affect the standard deviation)
     let logs = || powers().map(|p| math::ln(((total - p) / total).max(ROUNDING)));
     let (count, sum, squares) = logs().fold((0.0, 0.0, 0.0), |(n, s, q), x| (n + 1.0, s + x, q + x * x));
     let scatter: f64 = squares - sum * sum / count;
@@ -292,15 +293,15 @@ fn jackknife_log_sd<I: Iterator<Item = f64>>(total: f64, powers: impl Fn() -> I)
 
 /// Number of knots of the curve in the width of its window; the logarithm is linear between knots.
 const KNOTS_PER_WINDOW: usize = 4;
-/// Ratio of a bin to the curve above which it counts as a line; with 14 degrees of freedom, one bin of noise
-/// in seventy does.
+/// Ratio of the density in a bin to the noise curve above which the bin counts as part of a line. With 14
+/// degrees of freedom, one bin of noise in seventy exceeds this ratio.
 const LINE_RATIO: f64 = 2.0;
 /// Number of passes, each without the lines found before it; after three, the skirts of a line 60 dB above
 /// the noise are excluded.
 const FLOOR_PASSES: usize = 3;
 
 /// Mean of the noise in every bin; `window` is the width of the median, bins, and `degrees` the number of
-/// degrees of freedom in a bin.
+/// degrees of freedom of the density in a bin.
 pub(super) fn noise_floor_curve(density: &[f64], window: usize, degrees: f64) -> Vec<f64> {
     let all = running_median(density, window, |_| true);
     let without_lines =
@@ -309,8 +310,8 @@ pub(super) fn noise_floor_curve(density: &[f64], window: usize, degrees: f64) ->
     (0..FLOOR_PASSES).fold(all, without_lines).into_iter().map(|m| m * mean_over_median).collect()
 }
 
-/// Running median over the bins that count. A window in which fewer bins count than half its width is widened
-/// until it has enough; at the ends it is cut off.
+/// Running median over the bins that `counts` selects. A window in which fewer of these bins lie than half
+/// its width is widened until it has enough; at the ends of the spectrum it is cut off.
 fn running_median(density: &[f64], window: usize, counts: impl Fn(usize) -> bool + Sync) -> Vec<f64> {
     let Some(last) = density.len().checked_sub(1) else { return Vec::new() };
     let (half, step) = ((window / 2).max(1), (window / KNOTS_PER_WINDOW).max(1));
@@ -383,15 +384,16 @@ fn student_t_probability(angle: f64, degrees: usize) -> f64 {
 /// Number of frames whose inner products are summed at a time, so that the sum does not depend on the number
 /// of threads.
 const PRODUCT_BLOCK: usize = 1 << 15;
-/// Energy on the frames present, relative to the largest, below which a combination of tapers is dropped: it
-/// lies in the gaps, and scaled to unit energy it would leak over the whole spectrum.
+/// Smallest energy of a combination of tapers on the frames present, relative to the largest such energy. A
+/// combination with less energy lies in the gaps and is dropped; scaled to unit energy, it would leak over
+/// the whole spectrum.
 const LEAST_ENERGY_SHARE: f64 = 0.1;
 
-/// Combinations of sine tapers.
+/// Tapers that are linear combinations of sine tapers.
 pub(super) struct SineTapers {
-    /// Angle of the first taper from frame to frame.
+    /// Phase step of the first sine taper from frame to frame, rad.
     turn: f64,
-    /// One row of sine coefficients for each taper.
+    /// Coefficients of the sines, one row for each taper.
     rows: DMatrix<f64>,
 }
 
@@ -415,13 +417,14 @@ impl SineTapers {
         sine * row.iter().rev().fold((0.0, 0.0), next).0
     }
 
-    /// Coefficients of the sines in a taper.
+    /// Coefficients of the sines in the taper with this index.
     pub(super) fn coefficients(&self, taper: usize) -> Vec<f64> {
         self.rows.row(taper).iter().copied().collect()
     }
 }
 
-/// `sum sin(j a) sin(k a)` over the frames present, `a` the angle of the frame.
+/// `sum sin(j a) sin(k a)` over the frames present, where `a` is the phase of the first sine taper in the
+/// frame.
 fn taper_inner_products(samples: &[Option<f64>], turn: f64, count: usize) -> DMatrix<f64> {
     let block = |index: usize| {
         let mut sum = DMatrix::zeros(count, count);
@@ -441,7 +444,8 @@ fn taper_inner_products(samples: &[Option<f64>], turn: f64, count: usize) -> DMa
     map_parallel_above(samples.len().div_ceil(PRODUCT_BLOCK), samples.len(), block).into_iter().sum()
 }
 
-/// `G^(-1/2)`, or, if some combinations of tapers lie in the gaps, the other combinations, each of unit
+/// Coefficients of orthonormal tapers, one row each: `G^(-1/2)` for the inner products `G`. If some
+/// combinations of tapers lie in the gaps, these are dropped, and the other combinations are scaled to unit
 /// energy.
 fn orthonormal_combinations(products: &DMatrix<f64>) -> DMatrix<f64> {
     let eigen = products.clone().symmetric_eigen();
@@ -469,7 +473,7 @@ mod tests {
         // with many degrees of freedom the mean and the median agree
         let curve = noise_floor_curve(&density, 200, 1e9);
         assert_eq!(curve.len(), 1000);
-        // next to the line, the median is that of the remaining bins, at most 20 bins to one side: 7 %
+        // next to the line, the median is off by at most 20 bins to one side: 7 %
         assert!((100..900).all(|bin| (curve[bin] / slope(bin) - 1.0).abs() < 0.07), "{:?}", &curve[380..620]);
         assert!([150, 300, 700, 850].iter().all(|bin| (curve[*bin] / slope(*bin) - 1.0).abs() < 1e-3));
     }

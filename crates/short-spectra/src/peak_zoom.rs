@@ -1,30 +1,33 @@
-//! Location of a peak of a long record between bins that are far apart, by summing the transform around it.
+//! Location of a peak in the spectrum of a long record with few bins, by evaluating the transform between
+//! bins.
 //!
 //! The record is demodulated once by the frequency of the bin and summed in about a thousand blocks. Near
-//! that frequency the sums represent the record, because a fraction of a cycle over the record hardly turns
-//! the phase within a block.
+//! that frequency the sums represent the record, because a frequency difference of a fraction of a cycle per
+//! record hardly changes the phase within a block.
 
 use portable_math as math;
 use std::f64::consts::TAU;
 
-/// Number of blocks that represent the record: half a cycle over the record turns the phase by 0.003 rad
-/// within a block, which lowers the amplitude by 4e-7.
+/// Number of blocks that represent the record. A frequency difference of half a cycle per record changes the
+/// phase by 0.003 rad within a block, which lowers the amplitude by a fraction of 4e-7.
 const DEMODULATED_BLOCKS: usize = 1024;
-/// Number of frames after which a rotated phasor starts afresh, so that rounding errors do not accumulate.
+/// Number of frames after which a rotated phasor is computed afresh, so that rounding errors do not
+/// accumulate.
 const FRAMES_PER_RESTART: usize = 256;
-/// Distance of the three amplitudes of a parabola, cycles: an eighth of a resolution.
+/// Distance between the three amplitudes that define a parabola, cycles in the record: an eighth of a
+/// resolution.
 const PARABOLA_SPACING: f64 = 0.125;
-/// Number of parabolas; each is centred on the vertex of the one before, at most half a spacing away, because
-/// a parabola is exact only at its own centre.
+/// Number of parabolas that are fitted in turn. Each is centred on the vertex of the one before, at most half
+/// a spacing away, because a parabola is exact only at its own centre.
 const PARABOLAS: usize = 6;
 
 /// A weighted record.
 pub(super) struct WeightedRecord<'a> {
-    /// The record less its trend, m.
+    /// The record without its trend, m.
     pub residual: &'a [f64],
     /// Weight of each frame.
     pub weights: &'a [f64],
-    /// Factor that converts a sum to an amplitude.
+    /// Factor that converts a weighted sum over the frames to an amplitude.
     pub amplitude_scale: f64,
 }
 

@@ -1,4 +1,5 @@
-//! Components: local maxima that are not a sidelobe, a ripple of a larger peak, or noise.
+//! Search for components in a spectrum: local maxima that are neither sidelobes nor ripples of a larger peak
+//! nor noise.
 
 use super::component::{Component, ComponentVerdict, Estimator};
 use super::gap_refinement::{MOST_REFINED, Refinement, RefinementStart};
@@ -15,10 +16,11 @@ const FALSE_ALARM: f64 = 0.01;
 const TRIALS_PER_RESOLUTION: f64 = 3.0;
 /// Half width of the main lobe of a Hann window, resolutions.
 const LOBE: f64 = 2.0;
-/// Assumed ratio of sidelobes to those of the window, because a real component is neither steady nor alone.
+/// Factor by which the sidelobes of a component are assumed to exceed those of the window, because a real
+/// component is neither steady nor alone.
 const SIDELOBE_MARGIN: f64 = 1.5;
-/// Assumed ratio of sidelobes to those of the window below [`MIN_CYCLES`]: a residue of the trend is not a
-/// sine, and its sidelobes fall more slowly.
+/// Factor as [`SIDELOBE_MARGIN`] for a peak below [`MIN_CYCLES`]: such a peak is a residue of the trend, not
+/// a sine, and its sidelobes fall more slowly.
 const TREND_MARGIN: f64 = 4.0;
 /// Smallest ratio of a listed amplitude to that of the largest resolvable component: -50 dB. The part of a
 /// tone of twelve cycles that a cubic absorbs appears 56 dB below the tone.
@@ -26,10 +28,11 @@ const DYNAMIC_RANGE: f64 = 3.2e-3;
 /// A maximum counts if, on the way to every larger maximum, the spectrum falls below this fraction of its
 /// height: 3 dB, half the power.
 const VALLEY_RATIO: f64 = FRAC_1_SQRT_2;
-/// Smallest width of the median of the noise floor, resolutions, so that a component does not set its own
-/// floor.
+/// Smallest width, resolutions, of the band whose median gives the noise floor, so that a component does not
+/// raise the floor under itself.
 const FLOOR_RESOLUTIONS: f64 = 40.0;
-/// Ratio of the standard deviation of this estimator to the Cramér-Rao bound, measured at 20 dB (1.5 to 1.8).
+/// Ratio of the standard deviation of the frequency of a spectral maximum to the Cramér-Rao bound; 1.5 to 1.8
+/// was measured at 20 dB.
 const OVER_BOUND: f64 = 1.6;
 /// Error of a frequency after removal of a cubic, resolutions: 0.03 Hz at 78 Hz in 0.15 s.
 const TREND_SHARE: f64 = 0.005;
@@ -40,10 +43,10 @@ impl WindowedSpectrum<'_> {
     }
 }
 
-/// The peaks that are components of their own.
+/// The noise floor of a spectrum, and its peaks that are components of their own.
 pub(super) struct PeakList {
     pub floor_m: f64,
-    /// Ratio of a peak to the noise floor from which it is a component.
+    /// Smallest ratio of a peak to the noise floor at which the peak is a component.
     pub detection: f64,
     /// Every peak accepted, largest first; peaks outside the band leak into it too.
     pub accepted: Vec<Peak>,
@@ -82,8 +85,8 @@ impl PeakList {
         let absent = |index: usize| match outcomes[index] {
             Refinement::Unchanged => false,
             Refinement::FixedFrequency(amplitude_m) => amplitude_m < least_m,
-            // the noise of a bin holds both parts of an amplitude, so it is sqrt(2) times the standard
-            // deviation of the amplitude
+            // the noise in a bin has a cosine and a sine part, so its root mean square is sqrt(2) times the
+            // standard deviation of an amplitude
             Refinement::Refined(r) => {
                 let noise_m = r.deviations.map_or(0.0, |sd| self.detection * SQRT_2 * sd.amplitude_m);
                 r.amplitude_m < least_m.max(noise_m)
@@ -147,8 +150,8 @@ fn noise_floor(spectrum: &WindowedSpectrum, (low, high): (f64, f64)) -> f64 {
     upper_median(inside).map_or(0.0, |median| median / LN_2.sqrt())
 }
 
-/// Ratio to the floor that noise reaches anywhere in the band with the probability [`FALSE_ALARM`]: a bin
-/// exceeds `r` times its rms with the probability `exp(-r^2)`.
+/// Ratio to the noise floor that noise reaches anywhere in the band with the probability [`FALSE_ALARM`]: a
+/// bin exceeds `r` times its root mean square with the probability `exp(-r^2)`.
 fn detection_threshold(spectrum: &WindowedSpectrum, (low, high): (f64, f64)) -> f64 {
     let trials = (TRIALS_PER_RESOLUTION * (high - low) / spectrum.resolution_hz).max(1.0);
     math::ln(trials / FALSE_ALARM).sqrt()

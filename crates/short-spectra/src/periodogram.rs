@@ -1,23 +1,23 @@
-//! The Hann-windowed amplitude spectrum for one pattern of missing frames, reused for every record of that
-//! pattern.
+//! Hann window and transform for one pattern of missing frames, reused for the amplitude spectra of all
+//! records with that pattern.
 
 use super::transform::RealTransform;
 use portable_math as math;
 use std::cell::RefCell;
 use std::sync::{Arc, OnceLock};
 
-/// Number of windows without gaps that a thread keeps: a fit uses a few lengths, the same in every run of its
-/// model.
+/// Number of windows without gaps that a thread keeps: a fit uses records of a few lengths, which are the
+/// same in every run of its model.
 const CACHED_WINDOWS: usize = 16;
 /// Longest padded length of a window that is kept, samples; all kept windows together take a few megabytes.
 const LONGEST_CACHED: usize = 1 << 16;
 
 thread_local! {
-    /// The last windows without gaps, newest last.
+    /// The windows without gaps that were made last, the newest at the end.
     static WINDOWS: RefCell<Vec<HannWindow>> = const { RefCell::new(Vec::new()) };
 }
 
-/// A window over the frames present: weights, and the sidelobes of their transform.
+/// A Hann window over the frames present: its weights, and the sidelobes of the transform of the weights.
 #[derive(Clone)]
 struct HannWindow {
     weights: Arc<Vec<f64>>,
@@ -53,7 +53,7 @@ impl HannWindow {
     }
 }
 
-/// A window over the frames present, with its transform.
+/// A Hann window over the frames present, with the Fourier transform that it is used with.
 pub(super) struct Periodogram {
     transform: RealTransform,
     /// Weight of each frame.
@@ -70,24 +70,26 @@ impl Periodogram {
         Self { transform: RealTransform::new(padded), weights, envelope, sums, padded }
     }
 
-    /// The sidelobes of the weights' transform; computed on first use.
+    /// Envelope of the sidelobes of the window, as [`sidelobe_maxima`] gives it; computed on first use.
     pub(super) fn sidelobe_envelope(&self) -> &[f64] {
         let lobe = || self.transform.magnitudes(self.weights.iter().map(|w| w / self.sums.first));
         self.envelope.get_or_init(|| sidelobe_maxima(lobe(), self.weights.len(), self.padded))
     }
 
-    /// Factor that converts a weighted sum to an amplitude.
+    /// Factor that converts a weighted sum over the frames to an amplitude.
     pub(super) fn amplitude_scale(&self) -> f64 {
         2.0 / self.sums.first
     }
 
-    /// Amplitude that a sine at each bin would have, m.
+    /// Amplitude in each bin of the weighted spectrum, m; a sine at the frequency of a bin has its own
+    /// amplitude there.
     pub(super) fn amplitudes(&self, residual: &[f64]) -> Vec<f64> {
         let scaled = self.amplitude_scale();
         self.transform.magnitudes(residual.iter().zip(self.weights.iter()).map(|(x, w)| x * w * scaled))
     }
 
-    /// The spectrum in which peaks are sought; `least_m` is the amplitude of rounding errors.
+    /// The spectrum in the form in which its peaks are searched for; `least_m` is the amplitude of rounding
+    /// errors, m.
     pub(super) fn windowed_spectrum<'a>(
         &'a self,
         amplitude_m: &'a [f64],
@@ -134,13 +136,13 @@ impl Periodogram {
         frame_rate_hz * self.sums.second / (self.sums.first * self.sums.first)
     }
 
-    /// Standard deviation of white noise that has this root mean square in a bin, m.
+    /// Standard deviation per frame, m, of the white noise whose root mean square in a bin is `rms_m`.
     pub(super) fn noise_sd_m(&self, rms_m: f64) -> f64 {
         rms_m * self.sums.first / (2.0 * self.sums.second.sqrt())
     }
 }
 
-/// Sums over the weights of a record.
+/// Sums over the weights of a window.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct WindowSums {
     pub first: f64,
@@ -167,7 +169,7 @@ pub(super) fn hann_weights(samples: &[Option<f64>]) -> Vec<f64> {
     samples.iter().enumerate().map(|(i, x)| if x.is_some() { weight(i) } else { 0.0 }).collect()
 }
 
-/// The upper median; `None` for an empty list.
+/// The median, or the larger of the two middle values of an even number of values; `None` for an empty list.
 pub(super) fn upper_median(mut values: Vec<f64>) -> Option<f64> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
@@ -175,11 +177,11 @@ pub(super) fn upper_median(mut values: Vec<f64>) -> Option<f64> {
 
 /// Bin width, resolutions, above which bins miss the top of a sidelobe, which is one resolution wide.
 const COARSE_BINS: f64 = 0.25;
-/// Number of bins by which the distance of two peaks is reduced if the bins are that coarse: half a bin for
-/// each peak, and one bin because the top of a sidelobe may lie between two bins.
+/// Number of bins by which the distance of two peaks is reduced if bins are wider than `COARSE_BINS`: half a
+/// bin for each peak, and one bin because the top of a sidelobe may lie between two bins.
 const ROUNDED_BINS: usize = 2;
 
-/// An amplitude spectrum with the sidelobes of its window.
+/// An amplitude spectrum with the envelope of the sidelobes of its window.
 pub(super) struct WindowedSpectrum<'a> {
     pub amplitude_m: &'a [f64],
     pub envelope: &'a [f64],
@@ -200,7 +202,7 @@ pub(super) fn sidelobe_maxima(lobe: Vec<f64>, frames: usize, padded: usize) -> V
         envelope[k] = envelope[k].max(envelope[k + 1]);
     }
     if frames as f64 > COARSE_BINS * padded as f64 {
-        // the position of both peaks is up to half a bin off, which is too much of a sidelobe's width
+        // both peaks are up to half a bin off, which is too much of a sidelobe's width
         let rounded = ROUNDED_BINS.min(envelope.len());
         envelope.rotate_right(rounded);
         envelope.iter_mut().take(rounded).for_each(|value| *value = 1.0);

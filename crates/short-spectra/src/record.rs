@@ -1,6 +1,6 @@
 //! A record: samples on an even grid, with gaps.
 
-/// A record and the camera that took it.
+/// A record of displacement, with the frame rate and the exposure of the camera that took it.
 #[derive(Debug, Clone, Copy)]
 pub struct SampledRecord<'a> {
     /// One sample per frame, m; `None` for a missing frame.

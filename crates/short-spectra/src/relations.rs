@@ -1,8 +1,9 @@
-//! Relations of a component to another, as a multiple, a fraction or a sideband, or to the mains.
+//! Relations of the frequency of a component: to another component as a multiple, a fraction or a sideband,
+//! or to the mains frequency as a multiple.
 //!
-//! A relation is met within four standard deviations. Many multiples, or large standard deviations, would
-//! match every frequency, so multiples are tried only until the probability of a random match exceeds one in
-//! twenty.
+//! A relation counts if the frequencies agree with it within four standard deviations. Many multiples, or
+//! large standard deviations, would match every frequency. Multiples are therefore tried only until the
+//! probability of a random match exceeds one in twenty.
 
 use super::classification::RecordContext;
 use super::component::{Component, ComponentVerdict, Harmonic, MainsMultiple, Sideband, Subharmonic};
@@ -10,42 +11,46 @@ use super::settings::MIN_CYCLES;
 use crate::sampling::alias_hz;
 use portable_math as math;
 
-/// Highest multiple tried: a signal whose edges last a tenth of its period has no higher ones.
+/// Highest multiple tried: a signal whose edges last a tenth of its period has no higher multiples.
 const MOST_MULTIPLE: usize = 20;
-/// Highest multiple tried above half the frame rate: the exposure passes little of higher ones.
+/// Highest multiple tried among those above half the frame rate: the exposure passes little of higher
+/// multiples.
 const MOST_FOLDED: usize = 8;
 /// Highest multiple that is tried whatever the probability of a random match is.
 const ALWAYS_TRIED_MULTIPLES: usize = 5;
-/// Periods of a subharmonic, cycles of the stronger component; longer ones have never been observed.
+/// Denominators of the fractions tried: the period of a subharmonic in cycles of the stronger component.
+/// Longer periods have never been observed.
 const SUBHARMONIC_DENOMINATORS: [usize; 2] = [2, 3];
 const MOST_FRACTION: usize = 5;
-/// Number of sidebands on each side of a component.
+/// Number of sidebands that are tried on each side of a carrier.
 const SIDEBANDS: usize = 2;
-/// Number of standard deviations within which a relation is met: in all but one of five thousand records with
-/// three relations, all three are met.
+/// Number of standard deviations within which a relation counts. Of five thousand records with three true
+/// relations, all but one then show all three.
 const MATCH_DEVIATIONS: f64 = 4.0;
-/// Largest distance from a relation, resolutions; a wider tolerance would match by chance.
+/// Largest deviation of a frequency from a relation, resolutions; a wider tolerance would match by chance.
 const MATCH_RESOLUTIONS: f64 = 0.5;
 /// Probability of a random match up to which more multiples are tried.
 const CHANCE_MATCHES: f64 = 0.05;
-/// Smallest ratio of the amplitudes of two sidebands if no component has the modulation frequency.
+/// Smallest ratio of the amplitudes, smaller to larger, of two mirror-image sidebands if no component has the
+/// modulation frequency.
 const SIDEBAND_RATIO: f64 = 0.5;
 /// Number of standard deviations within which a frequency counts as a multiple of the mains frequency.
 const MAINS_DEVIATIONS: f64 = 3.0;
 const MAINS_HZ: [usize; 2] = [50, 60];
-/// Highest multiple of the mains frequency that a lamp shows; it flickers at the second multiple.
+/// Highest multiple of the mains frequency that is attributed to a lamp. The flicker of a lamp is strongest
+/// at the second multiple.
 const MOST_MAINS: usize = 12;
 /// Accuracy with which a frequency must be known to be compared with the mains, Hz: different multiples of 50
 /// and 60 Hz are at least 10 Hz apart.
 const MAINS_WITHIN_HZ: f64 = 0.5;
 
-/// Finds the relations of components, largest first.
+/// Finds the relations between components; `components` are sorted by falling amplitude.
 pub(super) fn find_relations(components: &mut [Component], at: &RecordContext) {
     for k in 0..components.len() {
         let (larger, rest) = components.split_at_mut(k);
         let Some(c) = rest.first_mut() else { continue };
         let amplitude_m = c.amplitude_m;
-        // a multiple of a multiple is related to the base of both
+        // no base is itself a multiple: a multiple of a multiple is related to the base of both
         let own = |base: &&Component| {
             base.harmonic_of.is_none()
                 && base.subharmonic_of.is_none()
@@ -92,12 +97,13 @@ pub(super) fn describe_relations(c: &Component) -> [(ComponentVerdict, Option<St
     ]
 }
 
-/// Tolerance of a relation, Hz; `sd_hz` is the standard deviation of the difference of its two sides.
+/// Tolerance of a relation, Hz; `sd_hz` is the standard deviation of the difference between the frequency
+/// found and the frequency expected.
 fn tolerance_hz(sd_hz: f64, at: &RecordContext) -> f64 {
     (MATCH_DEVIATIONS * sd_hz).min(MATCH_RESOLUTIONS * at.resolution_hz)
 }
 
-/// Whether `c` has `times` the frequency of `base`, directly or folded; adds the probability of a random
+/// Whether `c` has `times` the frequency of `base`, directly or as an alias. Adds the probability of a random
 /// match to `chance`.
 fn is_multiple(base: &Component, c: &Component, times: f64, at: &RecordContext, chance: &mut f64) -> bool {
     let within_hz = tolerance_hz(math::hypot(c.frequency_sd_hz, times * base.frequency_sd_hz), at);
@@ -105,7 +111,7 @@ fn is_multiple(base: &Component, c: &Component, times: f64, at: &RecordContext, 
     (alias_hz(times * base.frequency_hz, at.frame_rate_hz) - c.frequency_hz).abs() <= within_hz
 }
 
-/// The relation of `other` as a multiple of `base`, directly or folded.
+/// The relation of `other` as a multiple of `base`, directly or as an alias; `None` if there is none.
 fn find_harmonic(base: &Component, other: &Component, at: &RecordContext) -> Option<Harmonic> {
     let mut chance = 0.0;
     for multiple in 2..=MOST_MULTIPLE {
@@ -121,7 +127,7 @@ fn find_harmonic(base: &Component, other: &Component, at: &RecordContext) -> Opt
     None
 }
 
-/// The relation of `other` as a fraction of `base`.
+/// The relation of `other` as a fraction of `base`; `None` if there is none.
 fn find_subharmonic(base: &Component, other: &Component, at: &RecordContext) -> Option<Subharmonic> {
     let mut chance = 0.0;
     for denominator in SUBHARMONIC_DENOMINATORS {
@@ -139,9 +145,9 @@ fn find_subharmonic(base: &Component, other: &Component, at: &RecordContext) -> 
     None
 }
 
-/// Component `k` as a sideband of a larger one. Its distance from the carrier is the frequency of another
-/// component or twice that frequency, or it has a mirror image of similar amplitude on the other side of the
-/// carrier.
+/// Component `k` as a sideband of a larger component, the carrier. Either its distance from the carrier is
+/// the frequency of another component or twice that frequency, or it has a mirror image of similar amplitude
+/// on the other side of the carrier.
 fn find_sideband(components: &[Component], k: usize, at: &RecordContext) -> Option<Sideband> {
     let c = &components[k];
     let carriers = components.iter().filter(|carrier| carrier.amplitude_m > c.amplitude_m);
@@ -174,7 +180,7 @@ fn find_sideband(components: &[Component], k: usize, at: &RecordContext) -> Opti
     })
 }
 
-/// The multiple of the mains frequency that a steady component has.
+/// The multiple of the mains frequency that agrees with the frequency of a steady component, if there is one.
 fn find_mains_multiple(c: &Component) -> Option<MainsMultiple> {
     let within_hz = MAINS_DEVIATIONS * c.frequency_sd_hz;
     if within_hz > MAINS_WITHIN_HZ || c.range_hz.is_some() {

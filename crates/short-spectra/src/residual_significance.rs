@@ -6,8 +6,8 @@ use super::peaks::Peak;
 use super::periodogram::upper_median;
 use super::settings::MIN_CYCLES;
 
-/// Half width of the neighbourhood of a component in which its noise is estimated from the residual,
-/// resolutions; 48 independent values of the spectrum determine the noise to 10 %.
+/// Half width, resolutions, of the neighbourhood of a component in which the noise is estimated from the
+/// residual. The neighbourhood has 48 independent values of the spectrum, which determine the noise to 10 %.
 pub(super) const NEIGHBOURHOOD: f64 = 12.0;
 /// Smallest half width of the neighbourhood of a slow component, resolutions, and the factor by which the
 /// detection level rises there. Six values determine the noise poorly: with a probability of one in 100,000,
@@ -15,8 +15,8 @@ pub(super) const NEIGHBOURHOOD: f64 = 12.0;
 const FEWEST_RESOLUTIONS: f64 = 3.0;
 const FEW_VALUES_FACTOR: f64 = 1.7;
 /// Largest ratio of the mean square of the residual to that of the noise floor at which the residual counts
-/// as noise. The floor is a median, accurate to a few hundredths; a drift or a step leaves many times as
-/// much.
+/// as noise. The floor is a median, accurate to a few hundredths; the residual of a drift or a step is many
+/// times as large.
 const NOISE_RATIO_LIMIT: f64 = 1.5;
 
 impl ModelSelector<'_> {
@@ -29,7 +29,7 @@ impl ModelSelector<'_> {
         parts.solution.misfit < NOISE_RATIO_LIMIT * freedom.max(1.0) * floor_m * floor_m
     }
 
-    /// Amplitude of a term in the spectrum, m.
+    /// Amplitude that a term has in the windowed spectrum, m.
     pub(super) fn windowed_amplitude_m(&self, parts: &SineModel, k: usize) -> f64 {
         self.periodogram.amplitude_at(&parts.term_values(k), parts.terms()[k].cycles)
     }
@@ -40,9 +40,9 @@ impl ModelSelector<'_> {
         near.fold(0.0, |largest: f64, peak| largest.max(peak.amplitude_m))
     }
 
-    /// Largest residual amplitude near a component, m, at a peak or not; 0 if noise alone may have caused it.
-    /// A companion too close to be resolved leaves most at the end of the lobe, where it has no peak of its
-    /// own.
+    /// Largest residual amplitude near a component, m, whether at a peak or not; 0 if noise alone may have
+    /// caused it. A second oscillation too close to be resolved leaves the largest residual at the end of the
+    /// lobe, where it has no peak of its own.
     pub(super) fn significant_residual(&self, fit: &ModelFit, term: &SineTerm) -> f64 {
         let most = self.residual_near(fit, term);
         let noise_m = self.noise_floor_near(fit, term.cycles);
@@ -65,8 +65,8 @@ impl ModelSelector<'_> {
         term.cycles <= NEIGHBOURHOOD && !term.is_transient() && self.windowed_amplitude_m(parts, k) > least_m
     }
 
-    /// The noise floor around a frequency, m, but no less than that of the whole spectrum; the noise need not
-    /// be white.
+    /// The noise floor around a frequency, m, at least that of the whole spectrum. It is estimated locally,
+    /// because the noise need not be white.
     pub(super) fn noise_floor_near(&self, fit: &ModelFit, cycles: f64) -> f64 {
         let near = self.noise_floor_between(fit, cycles - NEIGHBOURHOOD, cycles + NEIGHBOURHOOD);
         fit.peaks.floor_m.max(near)
@@ -86,7 +86,8 @@ impl ModelSelector<'_> {
         amplitude_m.get(bin(low)..bin(high)).unwrap_or_default()
     }
 
-    /// Residual peaks outside the lobe of every term, which no decaying oscillation explains.
+    /// Residual peaks that no term explains: they lie outside the lobe of every term and stand out from the
+    /// noise.
     pub(super) fn unexplained_peaks(&self, fit: &ModelFit) -> Vec<Peak> {
         let lowest = MIN_CYCLES.max(fit.model.trend().fastest_waves() + 1.0);
         let is_unexplained = |p: &Peak| {
@@ -120,8 +121,8 @@ impl ModelSelector<'_> {
         if term.cycles > NEIGHBOURHOOD {
             return wide_m;
         }
-        // the noise of a shaking camera falls steeply with frequency: a neighbourhood must not reach down to
-        // zero, and a few values determine the noise less well
+        // the noise of a shaking camera falls steeply with frequency, so the neighbourhood must not reach
+        // down to zero frequency; its few values determine the noise less well, hence the factor
         let near = (term.cycles / 2.0).max(FEWEST_RESOLUTIONS);
         let few = self.noise_floor_between(fit, term.cycles - near, term.cycles + near);
         wide_m.max(FEW_VALUES_FACTOR * self.periodogram.noise_sd_m(few))

@@ -1,9 +1,9 @@
 //! Oscillations that end soon or begin inside the record: a window that starts at zero hides them.
 //!
-//! The residual is matched with decaying oscillations that begin at any frame: `z = sum x exp(-d s - 2 pi i n
-//! s)` over the frames from there on. A term of this frequency, decay and beginning lowers the sum of squares
-//! by `2 |z|^2 / sum exp(-2 d s)`. In white noise of variance one, half of that exceeds `q` with the
-//! probability `exp(-q)`.
+//! The residual `x` is matched with decaying oscillations that begin at any frame: `z = sum x exp(-d s - 2 pi
+//! i n s)` over the frames from the beginning on, where `s` is the time since the beginning in lengths of the
+//! record. A term with this frequency, decay and beginning lowers the sum of squares by `2 |z|^2 / sum exp(-2
+//! d s)`. In white noise of variance one, half of this reduction exceeds `q` with the probability `exp(-q)`.
 
 use super::least_squares::{FreeSet, SineTerm, Tolerance};
 use super::model_selection::{ModelFit, ModelSelector, STEP_CYCLES, SineModel, is_in_lobe, lobe_half_width};
@@ -17,34 +17,36 @@ use std::ops::Range;
 /// Decays over the record that are tried, nepers; a decay between two of them is matched with nine tenths of
 /// its energy.
 const DECAYS: [f64; 6] = [6.0, 12.0, 24.0, 48.0, 96.0, 192.0];
-/// Decay, nepers, after which an oscillation is over.
+/// Decay, nepers, after which an oscillation counts as over.
 const NEPERS_UNTIL_OVER: f64 = 3.5;
 /// Minimum number of frames in which an amplitude falls by a neper.
 const FRAMES_PER_NEPER: f64 = 4.0;
-/// Number of beginnings that are tried while the amplitude falls by a neper.
+/// Number of first frames that are tried per time in which the amplitude falls by a neper.
 const STARTS_PER_NEPER: f64 = 3.0;
 /// Probability that noise alone causes an oscillation to be found anywhere in a record.
 const FALSE_ALARM: f64 = 0.01;
 /// Decay over the record, nepers, above which a window that starts at zero shows too little of an
 /// oscillation.
 const TRANSIENT_NEPERS: f64 = 8.0;
-/// Smallest width of an octave, cycles in the record, because its noise floor is a median.
+/// Smallest width of a band that is used as an octave, cycles in the record: its noise floor is a median,
+/// which needs enough bins.
 const OCTAVE: f64 = 20.0;
-/// Maximum number of steps of the search for the placement of a term; each halving counts as a step.
+/// Maximum number of steps of the search for the frequency, decay and first frame of a term; each halving
+/// counts as a step.
 const MOST_MOVES: usize = 30;
-/// Number of cycles in the record up to which a decay may be the residue of a step: twice the number up to
-/// which a step causes peaks.
+/// Number of cycles in the record up to which a decaying oscillation may be the residue of a step: twice the
+/// number up to which a step causes peaks.
 const SLOW_CYCLES: f64 = 2.0 * STEP_CYCLES;
 /// A term may have begun with the record, its start hidden by other terms, if it would have decayed by at
-/// most this much before its first frame, nepers.
+/// most this much from the start of the record to its first frame, nepers.
 const MOST_NEPERS_LOST: f64 = 2.0;
-/// Fraction of the sum of squares of a record below which a misfit is rounding error, being a difference of
-/// such sums.
+/// Fraction of the sum of squares of a record below which a misfit is rounding error, because the misfit is a
+/// difference of such sums.
 const ROUNDING_SHARE: f64 = 1e-12;
-/// Maximum number of rounds in which terms are placed anew; each changes one term.
+/// Maximum number of rounds in which the placement of terms is optimised again; each round changes one term.
 const MOST_ROUNDS: usize = 6;
-/// Ratio of the determinant of cosine and sine to the product of their squares, below which they are not
-/// independent.
+/// Smallest ratio of the determinant of the normal matrix of cosine and sine to the product of its diagonal
+/// elements. With a smaller ratio, cosine and sine are not independent.
 const SINGULAR: f64 = 1e-3;
 /// Ratio of the length of a transform to that of a decay: the bins are a seventh of the width of a peak
 /// apart.
@@ -65,20 +67,20 @@ impl SineTerm {
     }
 }
 
-/// A decay that is tried throughout the residual.
+/// A decay that is tried with many first frames in the residual.
 struct Trial {
     nepers: f64,
     /// Length of its transform, values.
     padded: usize,
-    /// Distance of the beginnings that are tried, frames.
+    /// Distance of the first frames that are tried, frames.
     step: usize,
     /// Bins of the transform to try, with the standard deviation of the noise there, m.
     bins: Vec<(usize, f64)>,
 }
 
-/// The best decays in the residual: the one that stands out most from the noise around it, and the one that
-/// lowers the sum of squares most, unless it is slow. They may differ, because a large decay raises the noise
-/// around itself.
+/// The best decaying oscillations in the residual: the one that stands out most from the noise around it, and
+/// the one that lowers the sum of squares most, unless it is slow. They may differ, because a large decaying
+/// oscillation raises the noise around itself.
 #[derive(Default)]
 struct Decays {
     stands_out: Option<(f64, SineTerm)>,
@@ -86,8 +88,8 @@ struct Decays {
 }
 
 impl Decays {
-    /// Keeps a decay if it stands out more or explains more than those before. The decay lowers the sum of
-    /// squares by twice `square`; `half` is `square` in units of the variance of the noise.
+    /// Keeps a decaying oscillation if it stands out more or explains more than those before. It lowers the
+    /// sum of squares by twice `square`; `half` is `square` in units of the variance of the noise.
     fn keep_larger(&mut self, term: SineTerm, half: f64, square: f64) {
         if self.stands_out.is_none_or(|(least, _)| half > least) {
             self.stands_out = Some((half, term));
@@ -97,7 +99,8 @@ impl Decays {
         }
     }
 
-    /// The decay that stands out most and, with `both`, the decay that explains most, if it differs.
+    /// The oscillation that stands out most and, with `both`, the one that explains most, if it is a
+    /// different one.
     fn terms(self, both: bool) -> impl Iterator<Item = SineTerm> {
         let (first, second) = (self.stands_out.map(|met| met.1), self.explains.map(|met| met.1));
         first.into_iter().chain(second.filter(|second| both && Some(*second) != first))
@@ -132,15 +135,16 @@ impl ModelSelector<'_> {
                 (free && self.bic_of(&fitted) < least).then_some(fitted)
             };
             let met = self.match_decays(fit, &left, &noise, replacement_range(terms, out));
-            // the one that explains most may be a part of a doubtful term
+            // the oscillation that explains most may be a part of a doubtful term
             met.terms(doubtful.is_empty()).filter_map(fitted).collect::<Vec<SineModel>>()
         };
         places.iter().flat_map(placed).collect()
     }
 
-    /// Places brief terms anew and drops relaxations that explain nothing, as long as the criterion falls.
-    /// The first terms were placed while others were missing, and a fit does not move first frames. If only
-    /// rounding errors remain, the criterion is meaningless, and nothing is changed.
+    /// Optimises the frequency, decay and first frame of brief terms again and drops relaxations that explain
+    /// nothing, as long as the Bayesian information criterion falls. This is needed because the first terms
+    /// were placed while others were missing, and a fit does not move first frames. If only rounding errors
+    /// remain, the criterion is meaningless, and nothing is changed.
     pub(super) fn relocate_transients(&self, mut parts: SineModel) -> SineModel {
         let power: f64 = self.data.iter().zip(&self.weights).map(|(x, weight)| weight * x * x).sum();
         for _ in 0..MOST_ROUNDS {
@@ -158,8 +162,8 @@ impl ModelSelector<'_> {
         parts
     }
 
-    /// Variants of the terms: a brief term in another place, two terms in the place of the brief ones in a
-    /// lobe, all brief terms extended to the start of the record, or one relaxation less.
+    /// Variants of the terms: a brief term with an optimised placement, two terms in the place of all brief
+    /// terms in a lobe, all brief terms extended to the start of the record, or one relaxation less.
     fn transient_variants(&self, parts: &SineModel) -> Vec<Vec<SineTerm>> {
         let terms = parts.terms();
         let brief: Vec<usize> = (0..terms.len()).filter(|k| terms[*k].is_transient()).collect();
@@ -185,7 +189,8 @@ impl ModelSelector<'_> {
         again.chain(split).chain(from_start).chain(relaxed).collect()
     }
 
-    /// The term extended to the start of the record, if it would lose little before its first frame.
+    /// The term extended to the start of the record, if it would decay little from there to its first frame;
+    /// otherwise the term itself.
     fn extend_to_start(&self, term: &SineTerm) -> SineTerm {
         let lost = term.nepers * term.first as f64 / self.samples.len() as f64;
         if lost < MOST_NEPERS_LOST { SineTerm { first: 0, ..*term } } else { *term }
@@ -232,7 +237,8 @@ impl ModelSelector<'_> {
         term.envelope_values(self.samples.len()).fold((0, 0.0), add)
     }
 
-    /// The best decays above the level that noise alone reaches in one of a hundred records.
+    /// The decaying oscillations that match best, if they exceed the level that noise alone reaches in one of
+    /// a hundred records.
     fn match_decays(&self, fit: &ModelFit, left: &[f64], noise: &NoiseCurve, within: Range<f64>) -> Decays {
         let frames = self.samples.len();
         let tried = self.plan_trials(fit, noise, &within);
@@ -340,7 +346,8 @@ impl ModelSelector<'_> {
     }
 
     /// Standard deviation of the noise around a frequency, m: that of the octave below or above, whichever is
-    /// larger. An oscillation that decays within the record is wider than the neighbourhood of a line.
+    /// larger. The peak of an oscillation that decays within the record is wider than the neighbourhood of a
+    /// line.
     pub(super) fn octave_noise_sd(&self, fit: &ModelFit, cycles: f64) -> f64 {
         let octaves = [(cycles / 2.0).min(cycles - OCTAVE), cycles, (2.0 * cycles).max(cycles + OCTAVE)];
         let floors = octaves.windows(2).map(|side| self.noise_floor_between(fit, side[0], side[1]));
@@ -348,7 +355,7 @@ impl ModelSelector<'_> {
     }
 }
 
-/// Range in which the replacement of terms may lie, cycles in the record.
+/// Range in which the replacement of the terms `out` may lie, cycles in the record.
 fn replacement_range(terms: &[SineTerm], out: &[usize]) -> Range<f64> {
     match out.first().map(|k| &terms[*k]).filter(|term| term.cycles > 0.0) {
         Some(term) => term.cycles - lobe_half_width(term)..term.cycles + lobe_half_width(term),

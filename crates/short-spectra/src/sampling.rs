@@ -1,5 +1,5 @@
-//! Effects of sampling on a motion: the exposure of a frame averages it, and the frame rate folds frequencies
-//! above half of it.
+//! Effects of sampling on a motion: the exposure of a frame averages the motion, and frequencies above half
+//! the frame rate appear below it.
 
 use portable_math as math;
 use std::f64::consts::PI;
@@ -18,7 +18,8 @@ pub fn exposure_gain(frequency_hz: f64, exposure_s: f64) -> f64 {
     if half_turns == 0.0 { 1.0 } else { (math::sin(half_turns) / half_turns).abs() }
 }
 
-/// Frequency at which an exposure of `exposure_s` passes half the power, Hz; the function is its own inverse.
+/// Frequency at which an exposure of `exposure_s` passes half the power, Hz. The same function converts that
+/// frequency back to the exposure.
 pub fn half_power_hz(exposure_s: f64) -> f64 {
     HALF_POWER_CYCLES / exposure_s
 }

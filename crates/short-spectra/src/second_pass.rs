@@ -7,26 +7,26 @@ use super::least_squares::{FreeSet, SineTerm, Tolerance, nepers_from_damping_rat
 use super::model_selection::{LOBE, ModelFit, ModelSelector, STEP_CYCLES, SineModel, lobe_half_width};
 use super::time_frequency::FrequencyRange;
 
-/// Largest range of a drift, resolutions, that two beating lines may cause. The lines lie at most four
-/// resolutions apart, but where they nearly cancel, the frequency swings beyond both.
+/// Largest frequency range, resolutions, of an apparent drift that two beating lines may cause. The lines lie
+/// at most four resolutions apart, but where they nearly cancel, the frequency swings beyond both.
 const WIDEST_BEAT: f64 = 10.0;
 /// Maximum number of steps by which a trend may grow in the place of a slow ring-down; these steps together
-/// add as many unknowns as the ring-down has.
+/// add about as many unknowns as the ring-down has.
 const MOST_TREND_GROWTH: usize = 3;
-/// Difference of two criteria that is decisive: odds of a hundred to one.
+/// Difference of two Bayesian information criteria that decides between two models: odds of a hundred to one.
 const DECISIVE_DIFFERENCE: f64 = 10.0;
 
-/// A term that leaves more than noise around it.
+/// A term around which the residual exceeds noise.
 pub(super) struct DoubtfulTerm {
     pub index: usize,
-    /// The criterion that its replacement must fall below.
+    /// The Bayesian information criterion below which that of its replacement must be.
     pub criterion: f64,
 }
 
 impl ModelSelector<'_> {
-    /// The candidate with the lowest criterion: the `improved` model, or one with another ring-down, or one
-    /// with two lines in the place of one. A candidate that changes a doubtful term must explain more than a
-    /// constant drift or linear fall of that term.
+    /// The model with the lowest Bayesian information criterion: the `improved` model, one with another
+    /// ring-down, or one with two lines in the place of one. A model that changes a doubtful term must
+    /// explain more than a constant drift or a linear fall of that term would.
     pub(super) fn refine_candidates(&self, fit: &ModelFit, improved: Option<SineModel>) -> Option<SineModel> {
         let parts = &fit.model;
         let terms = parts.terms();
@@ -55,8 +55,8 @@ impl ModelSelector<'_> {
         Some(grown.unwrap_or(best))
     }
 
-    /// The model with a trend of a few more columns, if its criterion is about as low as `criterion`: a slow
-    /// ring-down may be a part of the trend that is not described yet.
+    /// The model with a trend of a few more columns, if its Bayesian information criterion is about as low as
+    /// `criterion`: a slow ring-down may be a part of the trend that is not described yet.
     fn with_grown_trend(&self, parts: &SineModel, criterion: f64) -> Option<SineModel> {
         let richer = std::iter::successors(parts.trend().next_richer(), |trend| trend.next_richer());
         let grown = richer.take(MOST_TREND_GROWTH).filter_map(|trend| {
@@ -75,8 +75,8 @@ impl ModelSelector<'_> {
         Some(self.decompose(best)).filter(|paired| self.leaves_only_noise(paired))
     }
 
-    /// Whether only noise is left around doubtful terms if a candidate replaces them. Otherwise the motion is
-    /// not a sum of oscillations, and more of them would only split it into pieces.
+    /// Whether only noise is left around doubtful terms if a candidate replaces them. If not, the motion is
+    /// not a sum of oscillations, and more oscillations would only split it into pieces.
     fn leaves_noise_near(
         &self,
         candidate: &SineModel,
@@ -89,7 +89,7 @@ impl ModelSelector<'_> {
         !fit.model.terms().iter().filter(near).any(|t| self.leaves_peak(&fit, t))
     }
 
-    /// Whether a term that begins inside the record ends within a cycle, as a step does.
+    /// Whether a term begins inside the record and decays within one cycle: such a term describes a step.
     pub(super) fn contains_step(&self, fit: &ModelFit) -> bool {
         let damped = |t: &SineTerm| {
             t.first > 0 && t.nepers > nepers_from_damping_ratio(t.cycles, SINGLE_CYCLE_DAMPING)
@@ -98,18 +98,18 @@ impl ModelSelector<'_> {
     }
 }
 
-/// Whether the lobe of a term reaches that of another.
+/// Whether the lobes of two terms touch or overlap.
 fn are_adjacent(term: &SineTerm, other: &SineTerm) -> bool {
     (term.cycles - other.cycles).abs() < LOBE + lobe_half_width(term)
 }
 
-// Two steady oscillations in the place of one, closer together than the lobe of a window that starts at zero.
-// A frequency that drifts, or an amplitude that falls linearly, can be split into two as well. A pair is
-// therefore accepted only if it leaves only noise around it, and if neither line explains more by growing or
-// decaying.
+// Two steady oscillations (a pair) in the place of one, closer together than the width of the lobe of a
+// window that starts at zero. An oscillation whose frequency drifts or whose amplitude falls linearly can
+// also be split into two. A pair is therefore accepted only if it leaves only noise around it, and if neither
+// line explains more by growing or decaying.
 
-/// Initial distances of a pair from the single term, resolutions; that term lies between the two lines or has
-/// settled on one.
+/// Initial distances of the lines of a pair from the single term, resolutions; the single term lies between
+/// the two lines or has converged to one of them.
 const PAIR_STARTS: [[f64; 2]; 5] = [[-0.35, 0.35], [-0.6, 0.6], [-0.9, 0.9], [0.0, 1.6], [-1.6, 0.0]];
 /// Largest distance of a line of the pair from the single term, resolutions.
 const PAIR_REACH: f64 = 2.0;

@@ -12,12 +12,12 @@ pub struct SpectrumSettings {
     /// padded length exceeds `LONG_PADDED`, the record is padded to `LONG_PADDED`, or to twice its own length
     /// if that is more, and its peaks are located between the bins from the samples.
     pub zero_padding: usize,
-    /// Band in which components are sought, Hz; `None` for all of the spectrum.
+    /// Band in which components are searched for, Hz; `None` for the whole spectrum.
     pub band_hz: Option<(f64, f64)>,
     /// Maximum number of components listed.
     pub max_components: usize,
-    /// Fastest oscillation that the motion may contain, Hz; aliases of a component are sought up to this
-    /// frequency.
+    /// Fastest oscillation that the motion may contain, Hz; possible aliases of a component are listed up to
+    /// this frequency.
     pub fastest_hz: f64,
 }
 

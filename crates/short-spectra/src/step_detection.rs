@@ -1,15 +1,16 @@
-//! Steps inside a record, at which a window may be cut if no sum of trend and oscillations describes it.
+//! Detection of steps inside a record. The record may be cut at a step if no sum of trend and oscillations
+//! describes the whole record.
 
 use super::periodogram::upper_median;
 use std::ops::Range;
 
-/// Fractions of the step height that bound the transition.
+/// Fractions of the range of a record between which a value belongs to the transition of a step.
 const TRANSITION_BOUNDS: (f64, f64) = (0.25, 0.75);
-/// Starts tried after a step, in widths of its transition: the tail of an exponential step can be described
-/// by relaxations.
+/// Distances after a step, in widths of its transition, at which a fit is started. If the step is
+/// exponential, relaxations can describe the tail that remains.
 const STEP_WIDTHS_AFTER: [f64; 5] = [1.0, 2.0, 3.0, 5.0, 8.0];
-/// Smallest ratio of the length of a record to that of the return from a dip. The record has about one level
-/// before and after the dip, and returns to it in a jump, faster than any slow wave.
+/// Smallest ratio of the length of a record to the duration of the return from a dip. Before and after a dip
+/// the record is at about the same level, and it returns to this level in a jump, faster than any slow wave.
 const DIP_FRACTION: usize = 20;
 
 /// First frames to try after a step, earliest first. Empty if the record changes sides repeatedly, as an
@@ -24,15 +25,15 @@ pub(super) fn starts_after_step(samples: &[Option<f64>]) -> Vec<usize> {
     starts.filter(|start| *start < samples.len()).collect()
 }
 
-/// Starts and ends tried next to a step, in widths of its transition; few, because a long record has many
-/// steps.
+/// Distances from a step, in widths of its transition, at which a stretch next to it starts or ends. Only two
+/// are tried, because a long record has many steps.
 const STEP_WIDTHS_BESIDE: [f64; 2] = [1.0, 5.0];
-/// Maximum number of steps of a piece of a record; more changes of side are an oscillation.
+/// Maximum number of steps of a piece of a record; a piece with more changes of side is an oscillation.
 const MAX_STEPS: usize = 4;
-/// Ratio of the length of a record to two other lengths: to the distance of the frames from which its slope
-/// is measured, and to the longest step. A trend describes slower changes.
+/// Ratio of the length of a record to the distance of the two frames from which a slope is measured, and
+/// smallest ratio of it to the duration of a step. A trend describes slower changes.
 const SLOPE_FRACTION: usize = 16;
-/// Largest ratio of the length of a record to that of a stretch to try.
+/// Largest ratio of the length of a record to the length of a stretch that is tried.
 const LEAST_STRETCH_FRACTION: usize = 8;
 
 /// The stretches between the steps of a record, in order, each with the ranges of frames to try: first the
@@ -59,7 +60,7 @@ pub(super) fn stretches_between_steps(samples: &[Option<f64>]) -> Vec<Vec<Range<
     starts.zip(ends).map(tried).collect()
 }
 
-/// The record less its median slope: a steady movement is not a change of side.
+/// The record without its median slope, so that a steady movement does not count as a change of side.
 fn remove_median_slope(samples: &[Option<f64>]) -> Vec<Option<f64>> {
     let apart = (samples.len() / SLOPE_FRACTION).max(1);
     let rise = |(a, b): (&Option<f64>, &Option<f64>)| a.zip(*b).map(|(a, b)| (b - a) / apart as f64);
@@ -78,7 +79,7 @@ fn find_single_step(samples: &[Option<f64>]) -> Option<(usize, usize)> {
     }
 }
 
-/// The frames outside the transition, each with whether it is on the upper side.
+/// The frames outside the transition of a step, each with whether it is on the upper side.
 fn classify_sides(samples: &[Option<f64>]) -> Vec<(usize, bool)> {
     let (low, high) =
         samples.iter().flatten().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
@@ -90,7 +91,7 @@ fn classify_sides(samples: &[Option<f64>]) -> Vec<(usize, bool)> {
     samples.iter().enumerate().filter_map(|(i, x)| Some((i, side((*x)?)?))).collect()
 }
 
-/// Last frame on the old side and first frame on the new side, for each change.
+/// For each change of side, the last frame on the old side and the first frame on the new side.
 fn find_side_changes(sided: &[(usize, bool)]) -> Vec<(usize, usize)> {
     sided.windows(2).filter(|w| w[0].1 != w[1].1).map(|w| (w[0].0, w[1].0)).collect()
 }

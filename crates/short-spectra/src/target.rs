@@ -9,6 +9,6 @@ pub struct Target {
     pub name: String,
     /// Frequency, Hz.
     pub frequency_hz: f64,
-    /// Its standard deviation, Hz, if known.
+    /// Standard deviation of the frequency, Hz, if known.
     pub frequency_sd_hz: Option<f64>,
 }

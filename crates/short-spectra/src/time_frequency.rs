@@ -1,19 +1,20 @@
-//! Short-time spectra, and the course of the strongest component in a band, for a component whose frequency
-//! drifts.
+//! Short-time spectra of a record, and the frequency over time of the strongest component in a band, for a
+//! component whose frequency drifts.
 //!
-//! A cycle may follow a slow change of its source, so a spectrum of the whole record smears it over all
-//! frequencies that it passes. [`Spectrogram`] cuts the record into overlapping Hann-weighted segments.
-//! [`Spectrogram::find_ridge`] follows the strongest component from column to column
-//! (`time_frequency/ridge_tracking.rs`) and then fits to each segment a sinusoid whose frequency and
-//! amplitude change linearly (`time_frequency/chirp.rs`). Unlike a maximum between bins, that frequency holds
-//! at the centre of the segment, and the fitted rate extrapolates it to the ends of the record, half a
-//! segment farther out.
+//! The frequency of an oscillation may follow a slow change of its source. A spectrum of the whole record
+//! then smears the oscillation over all frequencies that it passes. [`Spectrogram`] cuts the record into
+//! overlapping Hann-weighted segments, one per column. [`Spectrogram::find_ridge`] follows the strongest
+//! component from column to column (`time_frequency/ridge_tracking.rs`) and then fits to each segment a
+//! sinusoid whose frequency and amplitude change linearly (`time_frequency/chirp.rs`). The fitted frequency
+//! is that at the centre of the segment, unlike the frequency of a maximum between bins. The fitted rate
+//! extrapolates the frequency to the ends of the record, which are half a segment beyond the outermost
+//! centres.
 //!
 //! Accuracy: the range of a chirp from 359 to 692 Hz in 0.1 to 0.6 s at 20 dB is estimated within 2 %, also
-//! with harmonics, a residue of a ring-down, or a fifth of the frames missing. Limits: for a frequency that
-//! swings within a segment (a cycle that follows a faster ring-down), the result is its mean, with larger
-//! standard deviations; a frequency that turns round at the very end of a record of a tenth of a second is
-//! extrapolated 2 to 3 % too far.
+//! with harmonics, a residue of a ring-down, or a fifth of the frames missing. Limits: if the frequency
+//! swings within a segment (because it follows a faster ring-down), the result is its mean, with larger
+//! standard deviations. If the frequency turns round at the very end of a record of a tenth of a second, it
+//! is extrapolated 2 to 3 % too far.
 
 mod chirp;
 pub mod course;
@@ -29,20 +30,21 @@ use portable_math as math;
 pub use ridge::{FrequencyRange, Ridge, RidgeEnd, RidgePoint};
 use std::ops::RangeInclusive;
 
-/// Maximum number of frames of a segment of chosen length; it limits the bins of a column.
+/// Maximum number of frames of a segment whose length is chosen from the data; it limits the bins of a
+/// column.
 const LONGEST_SEGMENT_FRAMES: usize = 2048;
-/// Minimum number of segments side by side in a record, so that a component that lasts half of it has a
-/// course too.
+/// Minimum number of segments that fit end to end into a record, so that a component that lasts half the
+/// record can be followed, too.
 const FEWEST_SEGMENTS: usize = 3;
-/// Ratio of successive lengths that are tried.
+/// Ratio of successive segment lengths that are tried.
 const LENGTH_RATIO: f64 = std::f64::consts::SQRT_2;
-/// Fraction of the best concentration, -1.5 dB, from which a shorter segment is preferred: it follows the
-/// drift more closely.
+/// Fraction of the best concentration, -1.5 dB, that is sufficient for a segment length. The shortest
+/// sufficient length is used, because shorter segments follow a drift more closely.
 const NEARLY_BEST_CONCENTRATION: f64 = 0.7;
-/// Number of columns by which a length is judged; more would only cost time.
+/// Number of columns from which the concentration of a segment length is computed; more would only cost time.
 const TRIED_COLUMNS: usize = 48;
 
-/// Segments of the length that shows the strongest component of the band best.
+/// Layout of segments of the length that shows the strongest component of the band best.
 pub(super) fn choose_segment_layout(
     samples: &[Option<f64>],
     frame_rate_hz: f64,
@@ -65,9 +67,9 @@ pub(super) fn choose_segment_layout(
     SegmentLayout::with_overlap(record, lengths[shortest], OVERLAP, MOST_COLUMNS)
 }
 
-/// Ratio of the geometric mean of the squared maxima of the columns to the power of noise in a bin. That
-/// power is inversely proportional to the length of a segment. The geometric mean weighs columns with a large
-/// and a small component alike.
+/// Concentration of a segment length: ratio of the geometric mean of the squared maxima of the columns to the
+/// noise power in a bin, up to a constant factor. The noise power is inversely proportional to the length of
+/// a segment. The geometric mean weighs columns with a large and a small component alike.
 fn peak_concentration(
     samples: &[Option<f64>],
     layout: &SegmentLayout,
@@ -85,13 +87,13 @@ fn peak_concentration(
 /// Minimum number of bins per resolution of a spectrogram; rounding up to a power of two gives up to twice as
 /// many.
 pub(super) const FINE_PADDING: usize = 4;
-/// Minimum number of bins per resolution if only a maximum is sought: a Hann lobe sampled at every half
-/// resolution is at most 0.4 dB too low.
+/// Minimum number of bins per resolution if only the maximum of a column is needed: a Hann lobe sampled at
+/// every half resolution is at most 0.4 dB too low.
 const COARSE_PADDING: usize = 2;
-/// Fraction of the window's weight that must be present.
+/// Smallest fraction of the window's weight that must lie on frames with a value.
 const LEAST_PRESENT: f64 = 0.5;
 
-/// The bins of a transform.
+/// The frequency bins of the transform of a segment.
 pub(super) struct SegmentBins {
     /// Length of the transform, samples.
     pub padded: usize,
@@ -114,7 +116,7 @@ impl SegmentBins {
         first..=(bin(high).floor() as usize).clamp(first, self.padded / 2)
     }
 
-    /// Amplitudes of each segment in some of the bins, m; `None` if too much is missing.
+    /// Amplitudes of each segment in some of the bins, m; `None` for a segment with too few frames present.
     pub(super) fn column_amplitudes(
         &self,
         samples: &[Option<f64>],
@@ -143,9 +145,9 @@ impl SegmentBins {
 /// Maximum number of columns of a spectrogram: a figure shows no more, and memory must not grow with the
 /// record.
 pub const MOST_COLUMNS: usize = 400;
-/// Minimum number of cycles of the band's lower end in a segment. The lobe of a Hann window is two
-/// resolutions wide on either side, so with four cycles the component is clear of zero and of its own mirror
-/// image.
+/// Minimum number of cycles in a segment for a component at the lower end of the band. The lobe of a Hann
+/// window is two resolutions wide on either side, so with four cycles the lobe overlaps neither zero
+/// frequency nor the component's own mirror image.
 pub(crate) const SEGMENT_CYCLES: f64 = 4.0;
 /// Minimum number of frames of a segment: three for each of the five unknowns of the fit, plus one.
 pub(super) const FEWEST_FRAMES: usize = 16;
@@ -153,7 +155,7 @@ pub(super) const FEWEST_FRAMES: usize = 16;
 /// weight.
 pub(super) const OVERLAP: usize = 4;
 
-/// Segments of a record, in frames.
+/// Segments of a record; all lengths are in frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct SegmentLayout {
     pub frames: usize,
@@ -197,22 +199,23 @@ impl SegmentLayout {
     }
 }
 
-/// Upper end of the default band, as a fraction of half the frame rate: a higher component is as likely to be
-/// an alias.
+/// Upper end of the default band, as a fraction of half the frame rate: a component at a higher frequency is
+/// as likely to be an alias as not.
 const DEFAULT_BAND_TOP: f64 = 0.9;
-/// Ratio of the lower end of the default band to the frequency of the largest slow component: at this
-/// distance, the peak of a ring-down has faded in a Hann spectrum of four of its cycles.
+/// Ratio of the lower end of the default band to the frequency of the largest slow component. At this
+/// distance from a ring-down, the flank of its peak has faded in a Hann spectrum of four of its cycles.
 const SLOW_COMPONENT_MARGIN: f64 = 4.0;
-/// Number of segments of `SEGMENT_CYCLES` that a record should hold at the lower end of the default band.
+/// Number of segments of `SEGMENT_CYCLES` cycles each that a record should hold at the lower end of the
+/// default band.
 const SEGMENTS_AT_LOWEST: f64 = 4.0;
 
-/// Settings for the cutting of a record into short spectra.
+/// Settings for cutting a record into the segments of a spectrogram.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SpectrogramSettings {
     /// Length of a segment, s; `None` chooses it from the data. Lengths a factor of the square root of two
-    /// apart are tried, from `SEGMENT_CYCLES` of the band's lower end to a third of the record (and 2048
-    /// frames). The shortest length is taken whose maxima stand out from the noise within 1.5 dB of the best:
-    /// in longer segments a drifting component smears, in shorter ones noise hides it.
+    /// apart are tried, from `SEGMENT_CYCLES` cycles of the band's lower end up to a third of the record, at
+    /// most 2048 frames. The shortest length is taken whose maxima stand out from the noise within 1.5 dB of
+    /// the best. In longer segments a drifting component smears; in shorter segments noise hides it.
     pub segment_s: Option<f64>,
     /// Band for which the length is chosen, Hz; `None` uses [`default_band_hz`] with no slow component.
     pub band_hz: Option<(f64, f64)>,
@@ -225,15 +228,15 @@ pub struct Spectrogram {
     pub time_s: Vec<f64>,
     /// Frequencies of the bins, Hz, from 0 to half the frame rate; at least four bins per resolution.
     pub frequency_hz: Vec<f64>,
-    /// For each segment the amplitude in each bin, m: that of a steady sine of amplitude A is A at its peak.
-    /// `None` if missing frames leave less than half the window's weight.
+    /// For each segment, the amplitude in each bin, m; a steady sine of amplitude A has the value A at its
+    /// peak. `None` if missing frames leave less than half the window's weight.
     pub amplitude_m: Vec<Option<Vec<f64>>>,
     /// Length of a segment, s.
     pub segment_s: f64,
     /// Distance between neighbouring segments, s.
     pub hop_s: f64,
-    /// Reciprocal of the length of a segment, Hz; two components closer than two resolutions are one in a
-    /// column.
+    /// Reciprocal of the length of a segment, Hz; two components closer than two resolutions form a single
+    /// peak in a column.
     pub resolution_hz: f64,
     pub(super) layout: SegmentLayout,
     pub(super) frame_rate_hz: f64,
@@ -241,7 +244,7 @@ pub struct Spectrogram {
 
 impl Spectrogram {
     /// Short-time spectra of a record of displacement, m, one sample per frame (`None` for a frame without a
-    /// value). Steps and ring-downs should be removed as far as possible.
+    /// value). Steps and ring-downs should be removed beforehand as far as possible.
     ///
     /// # Errors
     /// [`SpectrumError`] if the record, the frame rate, the band or the segment allows no spectra.

@@ -1,4 +1,4 @@
-//! The Fourier transform of real samples, and the only file that uses the transform library.
+//! The Fourier transform of real samples; this is the only file that uses the transform library.
 
 use portable_math as math;
 use realfft::num_traits::{FromPrimitive, Num, One, Signed, Zero};
@@ -12,7 +12,7 @@ use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 /// A value of a transform.
 pub(super) type Complex = nalgebra::Complex<f64>;
 
-/// Plans of the lengths used so far, by any thread: a plan takes longer to make than to use.
+/// Transform plans of the lengths used so far by any thread: a plan takes longer to make than to use.
 static PLANNER: LazyLock<Mutex<RealFftPlanner<PortableReal>>> =
     LazyLock::new(|| Mutex::new(RealFftPlanner::new()));
 
@@ -25,13 +25,13 @@ impl RealTransform {
     /// A transform of records padded with zeros to `padded` values, a power of two from 2 on.
     pub(super) fn new(padded: usize) -> Self {
         debug_assert!(padded.is_power_of_two() && padded >= 2);
-        // (a thread that panicked while it planned leaves whole plans behind)
+        // (a thread that panicked while planning has left only complete plans)
         let mut planner = PLANNER.lock().unwrap_or_else(PoisonError::into_inner);
         Self { plan: with_exact_twiddles(padded, || planner.plan_fft_forward(padded)) }
     }
 
-    /// `sum x exp(-2 pi i k n / padded)` for every `k` from 0 to half the length, which is at least that of
-    /// `values`.
+    /// `sum x exp(-2 pi i k n / padded)` for every `k` from 0 to half the length. There must be at most
+    /// `padded` values.
     pub(super) fn spectrum_values(&self, values: impl Iterator<Item = f64>) -> Vec<Complex> {
         self.execute_plan(values).into_iter().map(|z| Complex { re: z.re.0, im: z.im.0 }).collect()
     }
@@ -56,12 +56,12 @@ impl RealTransform {
     }
 }
 
-// Numbers of the transform library that equal `f64` except for sines and cosines.
+// A number type for the transform library that equals `f64` except for sines and cosines.
 //
 // The library takes the twiddle factors of a plan from the system's sine and cosine, whose last bits depend
-// on the processor from lengths of 4,096 on, and orders additions differently for the types it knows. A type
-// of our own avoids both: for each number that the library passes in, it finds the part of a turn with that
-// cosine, and takes the cosine from libm instead.
+// on the processor from lengths of 4,096 on. It also orders additions differently for the number types that
+// it knows. A type of our own avoids both. While a plan is made, the type finds for each number that the
+// library passes in the part of a full turn with that cosine, and takes the cosine from libm instead.
 
 thread_local! {
     /// Number of equal parts into which the twiddle factors of the plan being made divide a full turn; zero
@@ -85,16 +85,16 @@ pub(super) fn with_exact_twiddles<T>(parts: usize, plan: impl FnOnce() -> T) -> 
     made
 }
 
-/// The exact cosine if a number approximates the cosine of a part of a turn; otherwise the number itself.
+/// The cosine from libm if a number approximates the cosine of a part of a turn; otherwise the number itself.
 fn exact_cosine(number: f64) -> f64 {
     let parts = TWIDDLE_DIVISIONS.get() as f64;
     let (size, quarter) = (number.abs(), parts / 4.0);
-    // outside of planning no number changes: the transform itself uses one half in each step
+    // numbers change only while a plan is made: the transform itself uses the number 0.5
     if size > 1.0 || parts == 0.0 {
         return number;
     }
     let part = (math::acos(size) / TAU * parts).round();
-    // from the smaller of the angle and its complement to a quarter turn
+    // computed from the angle or its complement to a quarter turn, whichever is smaller
     let cosine = match part {
         part if part >= quarter => 0.0,
         part if 2.0 * part <= quarter => math::cos(TAU * (part / parts)),

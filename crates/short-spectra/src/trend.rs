@@ -6,7 +6,7 @@ use portable_math as math;
 use serde::Serialize;
 use std::fmt;
 
-/// Highest degree of a polynomial: the last wave of a higher one would only fit the ends of a record.
+/// Highest degree of a polynomial trend: still higher degrees would only fit the ends of a record.
 pub(crate) const HIGHEST_DEGREE: usize = 23;
 /// Maximum number of columns of a trend; only records longer than a tenth of a second need a high-pass of
 /// more cosines.
@@ -14,8 +14,8 @@ pub(super) const MOST_COLUMNS: usize = 48;
 
 /// A trend to remove.
 ///
-/// A trend is often far larger than the components on top of it. Removing only its mean or a line leaves an
-/// error of 0.9 to 1 Hz at 78 Hz in 0.15 s; a cubic leaves 0.03 Hz.
+/// A trend is often far larger than the components on top of it. For a component at 78 Hz in a record of 0.15
+/// s, removing only the mean or a line leaves a frequency error of 0.9 to 1 Hz; a cubic leaves 0.03 Hz.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub enum Detrend {
     /// Nothing.
@@ -29,13 +29,13 @@ pub enum Detrend {
     Cubic,
     /// A polynomial of this degree, at most `HIGHEST_DEGREE`.
     Polynomial(usize),
-    /// Everything slower than this frequency, Hz: a line and every cosine of half-waves over the record below
-    /// this frequency, at most 46. This is a linear projection on the frames present, so it causes no delay
-    /// and attenuates nothing above the frequency.
+    /// Everything slower than this frequency, Hz: a line, and every cosine with a whole number of half-waves
+    /// over the record below this frequency, at most 46. They are fitted linearly to the frames present,
+    /// which causes no delay and attenuates nothing above the frequency.
     HighPass(f64),
 }
 
-/// A name that does not denote a detrending.
+/// Error: a text that is not the name of a detrending.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "unknown detrending `{found}`; expected `none`, `mean`, `line`, `cubic`, `polynomial:N` (N up to {HIGHEST_DEGREE}) or `high-pass:HZ`"
@@ -50,8 +50,8 @@ impl Detrend {
     const NAMED: [(&str, Self); 4] =
         [("none", Self::None), ("mean", Self::Mean), ("line", Self::Line), ("cubic", Self::Cubic)];
 
-    /// The choice with one of the names `none`, `mean`, `line`, `cubic`, `polynomial:7` or `high-pass:40`;
-    /// the numbers may differ.
+    /// The choice that a text names: `none`, `mean`, `line`, `cubic`, `polynomial:7` or `high-pass:40`, with
+    /// any numbers.
     ///
     /// # Errors
     /// [`UnknownDetrend`] with the known names.
@@ -139,8 +139,8 @@ impl Trend {
         }
     }
 
-    /// Number of waves over the record of the fastest motion that the trend can describe; it absorbs slower
-    /// components.
+    /// Number of waves over the record of the fastest motion that the trend can describe; the trend absorbs
+    /// slower components.
     pub(super) fn fastest_waves(self) -> f64 {
         let (Self::Polynomial(count) | Self::Cosines(count)) = self;
         count as f64 / 2.0
@@ -192,7 +192,8 @@ impl Trend {
         }
     }
 
-    /// Coefficients by singular values of the normal equations, which frames in clumps may make singular.
+    /// Coefficients of the trend, from a singular value decomposition of the normal equations. These
+    /// equations may be singular if the frames present lie in clumps.
     fn fit_coefficients(self, samples: &[Option<f64>]) -> Option<DVector<f64>> {
         /// Fraction of the number of frames below which a singular value of the normal matrix counts as zero.
         const SINGULAR: f64 = 1e-12;
@@ -202,7 +203,7 @@ impl Trend {
         if columns == 0 {
             return None;
         }
-        // on the stack: a million frames each add to it
+        // arrays on the stack, because each of up to a million frames adds to them
         let (mut normal, mut right) = ([[0.0; MOST_COLUMNS]; MOST_COLUMNS], [0.0; MOST_COLUMNS]);
         let mut row = [0.0; MOST_COLUMNS];
         for (s, x) in

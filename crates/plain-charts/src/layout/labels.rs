@@ -7,14 +7,15 @@ use crate::figure::Figure;
 use crate::style::{Colour, EDGE_MM, LINE_MM, Mark, SMALL_MM, TEXT_MM, UNITS_PER_MM};
 use crate::text::{WIDE_BOLD_LETTER, WIDE_LETTER, text_width, truncate_text};
 
-/// Maximum number of rows of labels above a panel; labels without a row are left out, but their lines are
-/// drawn.
+/// Maximum number of rows of labels above a panel. A label that fits into no row is left out, but its
+/// vertical line is drawn.
 const MAX_LABEL_ROWS: usize = 4;
 /// Ratio of the width of bold letters to that of plain letters.
 const BOLD_WIDTH_RATIO: f64 = WIDE_BOLD_LETTER / WIDE_LETTER;
 
-/// Row of each label, first of the vertical lines, then of the top labels, without overlap; `None` if no row
-/// is free. The top labels are next to the panel.
+/// Row of each label above a panel, chosen so that labels do not overlap: first the labels of the vertical
+/// lines, then the top labels. Row 0 is next to the panel; top labels have the lowest rows. `None` if no row
+/// is free.
 pub(super) fn assign_label_rows(panel: &Panel, x: &CanvasAxis) -> Vec<Option<usize>> {
     let end = |line: &str| x.from + (text_width(line, SMALL_MM) * BOLD_WIDTH_RATIO + 1.0) * UNITS_PER_MM;
     let title_ends: Vec<f64> = panel.title.lines().rev().map(end).collect();
@@ -27,8 +28,8 @@ pub(super) fn assign_label_rows(panel: &Panel, x: &CanvasAxis) -> Vec<Option<usi
     rules.into_iter().map(|row| row.map(|row| row + taken)).chain(captions).collect()
 }
 
-/// The lowest free row for every label, without overlap with the title. `title_ends` are the ends of the
-/// lines of the title, the lowest line first.
+/// The lowest free row for every label, without overlap with the title. `title_ends` are the right ends of
+/// the title lines, canvas units, the lowest line first.
 fn stack_labels(labels: &[(&str, f64)], x: &CanvasAxis, title_ends: &[f64]) -> Vec<Option<usize>> {
     let place = |at: f64| x.canvas_position(at).filter(|at| *at >= x.from && *at <= x.to);
     let mut order: Vec<(usize, f64)> =
@@ -51,14 +52,15 @@ fn stack_labels(labels: &[(&str, f64)], x: &CanvasAxis, title_ends: &[f64]) -> V
     rows
 }
 
-/// Left and right end of a label above the panel: centred on its position, moved inside the axes.
+/// Left and right end of a label above the panel, canvas units: centred on its position, but moved inside the
+/// axes.
 pub(crate) fn label_span(label: &str, at: f64, x: &CanvasAxis) -> (f64, f64) {
     let width = text_width(&shorten_to_panel(label, x), SMALL_MM) * UNITS_PER_MM;
     let left = (x.canvas_position(at).unwrap_or(x.from) - width / 2.0).min(x.to - width).max(x.from);
     (left, left + width)
 }
 
-/// A label, cut at the width of the panel.
+/// A label, truncated to the width of the panel.
 pub(crate) fn shorten_to_panel(label: &str, x: &CanvasAxis) -> String {
     truncate_text(label, SMALL_MM, (x.to - x.from) / UNITS_PER_MM)
 }
@@ -73,8 +75,8 @@ pub(crate) enum LegendEntry<'a> {
     Hatch(&'a str, HatchPattern),
 }
 
-/// The entries of the legend with their positions, and the top of the first panel, mm. The legend stands
-/// above the panels.
+/// The entries of the legend with their positions, mm, and the position of the top of the first panel, mm.
+/// The legend is above the panels.
 pub(super) fn place_legend(figure: &Figure) -> (Vec<(LegendEntry<'_>, f64, f64)>, f64) {
     let mut entries: Vec<LegendEntry<'_>> = Vec::new();
     for panel in &figure.panels {
@@ -103,10 +105,10 @@ pub(super) fn place_legend(figure: &Figure) -> (Vec<(LegendEntry<'_>, f64, f64)>
     (placed, end + 1.0)
 }
 
-/// Width of the sample before an entry of the legend, mm.
+/// Width of the graphic sample before the text of a legend entry, mm.
 const LEGEND_SAMPLE_MM: f64 = 8.0;
 
-/// The text of a legend entry, cut to one line.
+/// The text of a legend entry, truncated to one line.
 pub(crate) fn legend_text(label: &str, figure: &Figure) -> String {
     truncate_text(label, TEXT_MM, figure.width_mm - 2.0 * EDGE_MM - LEGEND_SAMPLE_MM)
 }

@@ -1,4 +1,4 @@
-//! Position of a panel, and the ticks that fit.
+//! Position of a panel on the canvas, and the ticks for which it has room.
 
 use super::visible_y_values;
 use crate::axis;
@@ -10,7 +10,7 @@ use crate::style::{
 };
 use crate::text::{LETTER, WIDE_LETTER, text_width, truncate_text, wrap_in_two_lines};
 
-/// Number of ticks to be tried on a narrow x axis, however close they are.
+/// Number of ticks tried first on a narrow x axis, even if they are closer together than usual.
 const LEAST_X_TICKS: f64 = 4.0;
 
 /// A panel with its position; areas in canvas units, lengths in mm.
@@ -21,11 +21,11 @@ pub(crate) struct PanelLayout<'a> {
     pub area: CanvasArea,
     /// Whether the ticks of the x axis are labelled here.
     pub has_x_labels: bool,
-    /// Rows of the labels of vertical lines, then of the top labels.
+    /// Rows of the labels above the panel: first of the vertical lines, then of the top labels.
     pub label_rows: Vec<Option<usize>>,
     /// Letter of the panel; `None` for a single panel.
     pub letter: Option<char>,
-    /// Left end of the panel's column, mm.
+    /// Left end of the panel's column, mm from the left edge of the figure.
     pub column_mm: f64,
     /// Height of the labels below the axes, mm.
     pub(super) under_mm: f64,
@@ -70,12 +70,13 @@ impl<'a> PanelLayout<'a> {
         placed
     }
 
-    /// Canvas coordinates of a point in the units of the axes; `None` for a point without a place on them.
+    /// Canvas coordinates of a point in axis units; `None` if an axis has no position for it, such as zero on
+    /// a logarithmic axis.
     pub(crate) fn canvas_point(&self, (x, y): (f64, f64)) -> Option<CanvasPoint> {
         Some((self.x.canvas_position(x)?, self.y.canvas_position(y)?))
     }
 
-    /// Widens one axis about its middle until both have the same scale.
+    /// Widens the range of one axis about its middle until both axes have the same length per unit.
     fn equalise_scales(&mut self) {
         let unit = |axis: &CanvasAxis| (axis.high - axis.low) / (axis.to - axis.from).abs();
         let most = unit(&self.x).max(unit(&self.y));
@@ -107,7 +108,7 @@ impl<'a> PanelLayout<'a> {
         ticks
     }
 
-    /// Ends of the label of a tick of the x axis.
+    /// Left and right end of a tick label of the x axis, canvas units.
     fn tick_label_span(&self, tick: &Tick) -> Option<(f64, f64)> {
         let at = self.x.canvas_position(tick.value)?;
         let half = text_width(tick.label.as_ref()?, TEXT_MM) * UNITS_PER_MM / 2.0;
@@ -150,17 +151,17 @@ impl<'a> PanelLayout<'a> {
 
 // Ticks of a y axis and the width of their labels.
 
-/// Largest fraction of the column width for names along a y axis, and of the height of the axes for vertical
-/// names below an x axis.
+/// Largest fraction of the column width that names along a y axis may take, and of the height of the axes
+/// that vertical names below an x axis may take.
 pub(super) const MOST_NAMES: f64 = 0.4;
 /// Half the width of a label of five digits, mm; a label may be centred on the end of the axis.
 pub(super) const HALF_LABEL_MM: f64 = 2.0;
 /// Smallest distance of labelled ticks, mm, on a y axis that would otherwise have fewer than two: the height
 /// of a line of text.
 const CROWDED_Y_TICKS_MM: f64 = LINE_MM;
-/// Height of each line of a name in two lines of small letters, mm.
+/// Height of each line of a name that is wrapped to two lines of small letters, mm.
 pub(crate) const SMALL_LINE_MM: f64 = SMALL_MM + 0.1;
-/// Gap between names of two lines, mm.
+/// Vertical gap between neighbouring names that are wrapped to two lines, mm.
 const BETWEEN_NAMES_MM: f64 = 0.6;
 
 /// Whether at least two ticks have labels; a single label shows no scale.
@@ -183,7 +184,7 @@ pub(super) fn y_axis_ticks(panel: &Panel, y: &CanvasAxis, names_mm: f64) -> Vec<
     })
 }
 
-/// Width of the widest label of a y axis, mm.
+/// Width of the widest tick label of a y axis, mm.
 pub(crate) fn widest_label_mm(ticks: &[Tick]) -> f64 {
     let width = |label: &str| match label.split_once('\n') {
         Some((first, second)) => text_width(first, SMALL_MM).max(text_width(second, SMALL_MM)),

@@ -26,14 +26,14 @@ const EXHAUSTED_TREND_WAVES: f64 = 2.0;
 /// a camera. Applies only if the trend has more than `FEWEST_COLUMNS` columns, the number of a cubic.
 const SLOW_CYCLES: f64 = 6.5;
 const FEWEST_COLUMNS: usize = 4;
-/// Number of other transients near a transient from which it counts as crowded.
+/// Number of other short-lived oscillations near a short-lived one from which it counts as crowded.
 const CROWD_NEIGHBOURS: usize = 2;
 /// Distance, resolutions, within which two oscillations that are not both steady may be parts of one: the
 /// window hardly separates them, and their errors cancel.
 const FRAGMENT_RESOLUTIONS: f64 = 2.0;
-/// Standard deviation of the shift of a frequency by an unresolved companion, resolutions, per unit of the
-/// ratio of residual to amplitude. In fifty pairs of equal amplitudes, half a resolution to one resolution
-/// apart, the largest shift was 4.6 in the same unit.
+/// Standard deviation of the shift of a frequency by an unresolved second oscillation, resolutions, per unit
+/// of the ratio of residual to amplitude. In fifty pairs of equal amplitudes, half a resolution to one
+/// resolution apart, the largest shift was 4.6 in the same unit.
 const COMPANION_SHIFT: f64 = 2.0;
 /// Standard deviation of a frequency that no oscillation explains, resolutions: uniform within one resolution
 /// of its peak.
@@ -45,8 +45,8 @@ pub(super) struct FitReading<'a> {
     /// Model with every decay free, from which damping is estimated.
     free_decay_model: SineModel,
     free_decay_covariance: SineCovariance,
-    /// The model with every decay free and a trend of two more columns, which shows what depends on the
-    /// trend.
+    /// The model with every decay free and a trend of two more columns. It shows how much the results depend
+    /// on the trend.
     richer_trend_model: Option<SineModel>,
     /// Fit in which every insignificant decay is held at zero, from which frequency and amplitude are
     /// estimated.
@@ -220,7 +220,7 @@ impl<'a> FitReading<'a> {
         (component, evidence)
     }
 
-    /// Whether an oscillation is as slow as the waves of a trend that had to grow.
+    /// Whether an oscillation is as slow as the waves of a trend to which columns had to be added.
     fn is_slow(&self, k: usize) -> bool {
         let parts = &self.decomposition.model;
         let grown = parts.trend().column_count() > FEWEST_COLUMNS;
@@ -349,7 +349,7 @@ impl<'a> FitReading<'a> {
         let bin = |cycles: f64| ((cycles * bins_a_cycle) as usize).min(amplitude_m.len() - 1);
         let around = &amplitude_m[bin(low)..=bin(high)];
         let mean_square = around.iter().map(|a| a * a).sum::<f64>() / around.len() as f64;
-        // every oscillation in this range has removed up to four of the values
+        // every oscillation in this range has reduced the number of free values by up to four
         let values = 2.0 * (high - low);
         let inside = parts.terms().iter().filter(|t| t.cycles > low && t.cycles < high);
         let taken: f64 = inside.map(|t| 2.0 + t.free.count() as f64).sum();

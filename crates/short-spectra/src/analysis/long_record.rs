@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use std::f64::consts::{LN_2, TAU};
 use transients::Transient;
 
-/// Number of pieces of the record, which overlap by half, and number of independent values in them.
+/// Number of pieces of the record, which overlap by half, and number of independent values among them.
 const PHASE_SEGMENTS: usize = 31;
 const INDEPENDENT_SEGMENTS: f64 = 16.0;
 /// Largest scatter of a steady line over the pieces, as a fraction of its amplitude or of the noise.
@@ -85,7 +85,8 @@ fn merge_components(
     components
 }
 
-/// A component that stands out from the noise around it, with the evidence of the whole record.
+/// A component with the evidence of the whole record; `None` if it does not stand out from the noise around
+/// it.
 fn assess_component(
     spectrum: &Spectrum,
     left_m: &[Option<f64>],
@@ -123,7 +124,7 @@ fn local_noise_floor_m(spectrum: &Spectrum, frequency_hz: f64) -> f64 {
         .map_or(spectrum.noise_floor_m, |m| spectrum.noise_floor_m.max(m / LN_2.sqrt()))
 }
 
-/// Whether a component keeps amplitude and phase over the pieces of the record, each seen through a Hann
+/// Whether a component keeps its amplitude and phase over the pieces of the record, each weighted with a Hann
 /// window.
 fn is_steady(left_m: &[Option<f64>], frame_rate_hz: f64, c: &Component, floor_m: f64) -> bool {
     let length = 2 * left_m.len() / (PHASE_SEGMENTS + 1);
@@ -223,7 +224,7 @@ mod tests {
         assert_eq!(list.len(), 2, "{list:?}");
         assert_read(near(&list, 600.0), &Rings(600.0, 0.05, 3e-5, 0));
         assert_eq!(near(&list, 600.0).begins_s, None);
-        // it ends after twenty frames, which every window that starts at zero hides
+        // the ring-down ends after twenty frames, which a window that starts at zero hides
         let list = listed(&[Rings(1200.0, 0.08, 3e-5, 0)]);
         assert!((near(&list, 1200.0).frequency_hz - 1200.0).abs() < 30.0, "{list:?}");
     }

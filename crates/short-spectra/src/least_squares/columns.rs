@@ -41,7 +41,7 @@ impl TermColumn {
     }
 }
 
-/// A record's weighted frames and a trend's columns over them: constant during a fit.
+/// The weighted frames of a record and the columns of a trend in these frames, both constant during a fit.
 #[derive(Debug)]
 pub(super) struct FixedColumns {
     frames: usize,
@@ -92,7 +92,7 @@ impl FixedColumns {
         };
         let zeros = (DMatrix::zeros(trend + 1, width), DMatrix::zeros(width, width));
         let (mixed, own) = parts.into_iter().fold(zeros, |sum, part| (sum.0 + part.0, sum.1 + part.1));
-        // the data, which are the last fixed column, go behind the terms
+        // the data are the last fixed column and come after the terms here
         let place = |k: usize| if k == trend { trend + width } else { k };
         let mut gram = DMatrix::zeros(trend + width + 1, trend + width + 1);
         for i in 0..=trend {

@@ -1,9 +1,9 @@
 //! A sinusoid whose frequency and amplitude change linearly, fitted to a segment by Gauss-Newton steps, which
 //! are damped if they do not lower the misfit.
 //!
-//! Time runs over a segment as `x` from -1 to 1: `(1 + s x) (p cos phi + q sin phi)`, `phi = a x + b x^2 + c
-//! x^3`. With segments of `T` seconds the frequency is `(a + 2 b x + 3 c x^2) / (pi T)`. The slope of the
-//! amplitude is distinct from the frequency, because `p` and `q` share the one slope `s`.
+//! The time `x` runs over a segment from -1 to 1. The value is `(1 + s x) (p cos phi + q sin phi)` with the
+//! phase `phi = a x + b x^2 + c x^3`. For a segment of `T` seconds the frequency is `(a + 2 b x + 3 c x^2) /
+//! (pi T)`. The slope of the amplitude cannot imitate a frequency, because `p` and `q` share the slope `s`.
 
 use crate::periodogram::{self, upper_median};
 use crate::transform::RealTransform;
@@ -11,18 +11,18 @@ use nalgebra::{SMatrix, SVector};
 use portable_math as math;
 use std::f64::consts::PI;
 
-/// Number of unknowns for a frequency that changes linearly: p, q, s, a, b.
+/// Number of unknowns for a frequency that changes at a constant rate: p, q, s, a, b.
 pub(super) const LINEAR_UNKNOWNS: usize = 5;
-/// Number of unknowns if the rate changes too: c is the sixth.
+/// Number of unknowns if the rate changes too: `c` in addition to p, q, s, a, b.
 pub(super) const CURVED_UNKNOWNS: usize = 6;
 /// Maximum number of steps; five are usual.
 const MOST_STEPS: usize = 20;
-/// A step that changes the phase at the ends of the segment by less than this, rad, is the last: the
+/// A step is the last if it changes the phase at the ends of the segment by less than this, rad. The
 /// remaining error is of the order of the square of this change.
 const SMALLEST_PHASE_STEP: f64 = 1e-3;
-/// First damping of a step that does not lower the misfit, as a fraction of the diagonal.
+/// First damping after a step that does not lower the misfit, as a fraction of the normal matrix's diagonal.
 const FIRST_DAMPING: f64 = 1e-2;
-/// Damping above which no step lowers the misfit any more.
+/// Damping above which the fit stops, because no step lowers the misfit any more.
 const LARGEST_DAMPING: f64 = 1e4;
 /// Number of frames per unknown below which the fit would follow the noise.
 const FRAMES_PER_UNKNOWN: usize = 3;
@@ -57,7 +57,7 @@ impl Chirp {
         (a + x * (2.0 * b + 3.0 * x * c)) / PI
     }
 
-    /// Change of the frequency over the segment at the rate in its middle, cycles.
+    /// Change of the frequency over the whole segment at the rate in its middle, cycles in the segment.
     pub(super) fn change(&self) -> f64 {
         4.0 * self.0[4] / PI
     }
@@ -74,13 +74,13 @@ impl Chirp {
         math::hypot(self.0[0], self.0[1])
     }
 
-    /// Phase in the middle of the segment, as a cosine, rad.
+    /// Phase of the component as a cosine in the middle of the segment, rad.
     pub(super) fn phase(&self) -> f64 {
         -math::atan2(self.0[1], self.0[0])
     }
 
-    /// `x`, cosine and sine of the phase in each frame, rotated from the frame before: third differences of a
-    /// cubic are constant.
+    /// `x`, cosine and sine of the phase in each frame. They are rotated from frame to frame, which is
+    /// possible because the third differences of a cubic phase are constant.
     fn phases(&self, frames: usize) -> impl Iterator<Item = (f64, f64, f64)> + use<> {
         let [.., a, b, c] = self.0;
         let h = 2.0 / frames as f64;
@@ -105,7 +105,8 @@ impl Chirp {
         (1.0 + self.0[2] * x) * (self.0[0] * cosine + self.0[1] * sine)
     }
 
-    /// Whether the amplitude falls to zero within the segment: the component begins or ends near its middle.
+    /// Whether the amplitude falls to zero within the segment: the component then begins or ends near its
+    /// middle.
     pub(super) fn vanishes(&self) -> bool {
         self.0[2].abs() >= 1.0
     }
@@ -124,7 +125,7 @@ impl Chirp {
     }
 }
 
-/// Normal equations at some parameters.
+/// Normal equations and misfit of the fit at given parameters.
 struct ChirpNormal<const N: usize> {
     matrix: SMatrix<f64, N, N>,
     right: SVector<f64, N>,
@@ -162,7 +163,7 @@ impl ChirpSegment<'_> {
         Some(ChirpFit { parameters: shape, covariance: inverse * spread * inverse })
     }
 
-    /// The start with its best amplitude, and no slope of the amplitude.
+    /// The start with its best amplitude and phase, and with no slope of the amplitude.
     fn with_fitted_amplitude(&self, start: Chirp) -> Option<Chirp> {
         let [.., a, b, c] = start.0;
         let normal = self.normal_equations::<2>(&Chirp([0.0, 0.0, 0.0, a, b, c]), |w| w);
@@ -187,7 +188,7 @@ impl ChirpSegment<'_> {
     }
 }
 
-/// The parameters after a step; an amplitude falls at most to zero at one end of the segment.
+/// The parameters after a step. The slope is limited so that the amplitude falls at most to zero at one end.
 fn apply_step<const N: usize>(shape: Chirp, step: &SVector<f64, N>) -> Chirp {
     let mut next = shape.0;
     next.iter_mut().zip(step.iter()).for_each(|(value, step)| *value += step);
@@ -210,14 +211,16 @@ impl<const N: usize> ChirpFit<N> {
 
 /// Half width of the lobe of a Hann window, resolutions.
 const LOBE: f64 = 2.0;
-/// Number of multiples of the frequency that do not count as noise, because a cycle need not be a sine.
+/// Number of multiples of the frequency that do not count as noise, because the oscillation need not be a
+/// sine.
 const HARMONICS: usize = 3;
 /// Smallest width of the band from whose median the noise is estimated, resolutions.
 const FEWEST_RESOLUTIONS: f64 = 20.0;
-/// Minimum number of bins of a median; if fewer remain, the multiples count as noise too.
+/// Minimum number of bins of a median; if fewer remain without the multiples, the multiples count as noise
+/// too.
 const FEWEST_BINS: usize = 8;
-/// Number of neighbours on either side in the median of a column: one segment's length, so that a column's
-/// own few bins do not decide.
+/// Number of neighbouring columns on either side in the median of the noise of a column: one segment length.
+/// The few bins of a single column are too uncertain.
 const NEIGHBOURS: usize = 4;
 
 /// Measures the noise of segments of one length.
@@ -237,7 +240,7 @@ impl SegmentNoise {
         Self { transform, window, padded, band }
     }
 
-    /// Residual of a segment without the fitted component, as noise.
+    /// Residual of a segment after the fitted component is subtracted, measured as noise.
     pub(super) fn measure_residual(&self, segment: &[Option<f64>], shape: &Chirp) -> ResidualNoise {
         let values = segment.iter().zip(shape.values(segment.len())).zip(&self.window);
         let weighted = values.map(|((sample, value), w)| sample.map_or(0.0, |sample| w * (sample - value)));
@@ -264,14 +267,14 @@ impl SegmentNoise {
     }
 }
 
-/// Residual in a segment, as the standard deviation per frame of white noise of the same power, m.
+/// Residual in a segment, m, as the standard deviation per frame of white noise of the same power.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ResidualNoise {
-    /// The noise: the residual in the band, over at least 20 resolutions, outside the component and its
+    /// Noise: the residual in the band, over at least 20 resolutions, but outside the component and its
     /// multiples.
     pub around_m: f64,
-    /// Residual at the component's own frequency; larger than the noise if the component is not such a
-    /// sinusoid.
+    /// Residual at the component's own frequency. It is larger than the noise if the component is not a
+    /// sinusoid with linearly changing frequency and amplitude.
     pub under_m: f64,
 }
 
@@ -280,7 +283,7 @@ fn is_in_harmonic_lobe(cycles: f64, shape: &Chirp, multiple: usize) -> bool {
     (cycles - k * shape.cycles_at(0.0)).abs() <= LOBE + k * shape.change().abs() / 2.0
 }
 
-/// The median of each column and its neighbours.
+/// The median over each column and its neighbours.
 pub(super) fn median_filter(deviations: &[Option<f64>]) -> Vec<f64> {
     let around = |c: usize| {
         let near = &deviations[c.saturating_sub(NEIGHBOURS)..(c + NEIGHBOURS + 1).min(deviations.len())];

@@ -1,45 +1,47 @@
-//! Courses: the parts of a ridge in which the frequencies of the segments agree, so that they follow one
-//! component.
+//! Courses: the parts of a ridge in which the frequencies of neighbouring segments agree, so that the part
+//! follows one component.
 //!
 //! A ridge has points wherever the ratio of amplitude to noise exceeds what noise alone reaches in one of a
 //! hundred records. Two kinds of points do not belong to a course. First, a simulated record has no noise, so
-//! residues while nothing moves count as points: they exceed rounding errors, although they lie far below
-//! every colour of the map. Second, if the frequency of a cycle swings several times within a segment, its
-//! sidebands are as high as the carrier, and the strongest line changes from segment to segment.
+//! residues count as points even while nothing moves: they exceed rounding errors, although they lie far
+//! below every colour of the map. Second, if the frequency of an oscillation swings several times within a
+//! segment, its sidebands are as high as the carrier, and the strongest line changes from segment to segment.
 
 use super::{Ridge, RidgePoint, Spectrogram};
 use portable_math as math;
 
-/// Range of amplitudes of a course, and of the colours of a spectrogram, dB.
+/// Range of amplitudes below the largest that a course includes, and range of the colours of a spectrogram,
+/// dB.
 pub const DYNAMIC_RANGE_DB: f64 = 60.0;
 /// Largest difference of frequency between segments that share three quarters of their frames, after the
 /// change by the fitted rates is subtracted, resolutions. The neighbours that determine a frequency range
 /// must agree equally well. Noise in the weakest component of a ridge causes less than a tenth of this
 /// difference, and a single component has no other reason to jump.
 const MAX_FREQUENCY_STEP: f64 = 0.25;
-/// Distance of segments that share three quarters of their frames, segments.
+/// Distance between segments that share three quarters of their frames, in segment lengths.
 const USUAL_HOP: f64 = 0.25;
-/// Minimum number of segments of a part if they share few frames.
+/// Minimum number of segments in a part of a ridge if neighbouring segments share few frames.
 const MIN_PART_SEGMENTS: usize = 3;
 
-/// A frequency at a speed.
+/// A frequency and the speed at which it was measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpeedPoint {
     /// Mean speed over the segment, m/s.
     pub speed_m_per_s: f64,
     /// Frequency, Hz.
     pub frequency_hz: f64,
-    /// Its standard deviation, Hz, if known.
+    /// Standard deviation of the frequency, Hz, if known.
     pub frequency_sd_hz: Option<f64>,
 }
 
-/// The coherent parts of a ridge, in order of time, with a gap between one and the next.
+/// The parts of a ridge whose frequencies agree from segment to segment, in order of time, with gaps between
+/// them.
 pub fn coherent_parts(ridge: &Ridge, of: &Spectrogram) -> Vec<Vec<RidgePoint>> {
     let largest_m = of.amplitude_m.iter().flatten().flatten().fold(0.0, |most: f64, a| most.max(*a));
     let least_m = math::powf(10.0, -DYNAMIC_RANGE_DB / 20.0) * largest_m;
     let strong: Vec<RidgePoint> = ridge.points.iter().filter(|p| p.amplitude_m >= least_m).copied().collect();
-    // up to the next segment that shares no frame with the first: fewer points cover hardly more than one
-    // segment and may agree by chance
+    // the last segment shares no frame with the first: fewer points cover hardly more than one segment and
+    // may agree by chance
     let fewest = MIN_PART_SEGMENTS.max((ridge.segment_s / ridge.hop_s).round() as usize + 1);
     let parts = strong.chunk_by(|a, b| is_continuous(ridge, a, b)).filter(|part| part.len() >= fewest);
     parts.map(<[RidgePoint]>::to_vec).collect()

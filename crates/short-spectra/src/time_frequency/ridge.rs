@@ -18,11 +18,12 @@ pub struct RidgePoint {
     pub rate_hz_per_s: f64,
     /// Amplitude at that time, m.
     pub amplitude_m: f64,
-    /// Phase of the component as a cosine, rad.
+    /// Phase of the component as a cosine at that time, rad.
     pub phase_rad: f64,
-    /// Ratio of the amplitude to that of noise in a bin of the column, `20 log10`, dB.
+    /// Ratio of the amplitude to the amplitude of noise in a bin of the column, `20 log10`, dB.
     pub snr_db: f64,
-    /// Ratio of the residual of the fit at the component to its amplitude, in a bin of the column.
+    /// Ratio of the residual at the component's frequency to the component's amplitude, both in a bin of the
+    /// column.
     pub residual_ratio: f64,
 }
 
@@ -33,7 +34,7 @@ pub struct RidgeEnd {
     pub time_s: f64,
     /// Frequency at that time, Hz.
     pub frequency_hz: f64,
-    /// Its standard deviation, Hz.
+    /// Standard deviation of the frequency, Hz.
     pub frequency_sd_hz: f64,
 }
 
@@ -54,9 +55,10 @@ pub struct Ridge {
     pub hop_s: f64,
 }
 
-/// Distance, resolutions, within which neighbours agree.
+/// Largest difference of two neighbouring frequencies, resolutions, at which they agree.
 const AGREEMENT_RESOLUTIONS: f64 = 0.25;
-/// Neighbours also agree if they differ by at most this many standard deviations of the difference.
+/// Two neighbouring frequencies also agree if they differ by at most this many standard deviations of the
+/// difference.
 const AGREEMENT_DEVIATIONS: f64 = 4.0;
 /// Distance of points with nearly independent noise, segments.
 const INDEPENDENT_SEGMENTS: f64 = 0.5;
@@ -100,7 +102,7 @@ impl Ridge {
 }
 
 fn frequency_range(ridge: &Ridge) -> Option<FrequencyRange> {
-    // an end extrapolated with a large standard deviation limits nothing
+    // an end with a large standard deviation does not count for the range
     let known = |end: &&RidgeEnd| end.frequency_sd_hz < AGREEMENT_RESOLUTIONS / ridge.segment_s;
     let start = ridge.start.as_ref().filter(known).zip(ridge.points.first());
     let end = ridge.end.as_ref().filter(known).zip(ridge.points.last());
@@ -125,7 +127,7 @@ fn frequency_range(ridge: &Ridge) -> Option<FrequencyRange> {
         confirmed.chain(ends).map(|(hz, sd_hz)| (hz, math::hypot(sd_hz, bent))).collect();
     let (low_hz, low_sd_hz) = all.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0))?;
     let (high_hz, high_sd_hz) = all.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0))?;
-    // two standard deviations of a less certain frequency may reach farther
+    // two standard deviations of a less certain frequency may reach beyond the limit
     let beyond =
         |of: &dyn Fn(f64, f64) -> f64| all.iter().map(|(hz, sd_hz)| of(*hz, *sd_hz)).fold(0.0, f64::max);
     Some(FrequencyRange {
@@ -136,14 +138,14 @@ fn frequency_range(ridge: &Ridge) -> Option<FrequencyRange> {
     })
 }
 
-/// Change of the frequency in the outer half of a segment next to an interruption, Hz: the course may
-/// continue there.
+/// Change of the frequency in the outer half of a segment next to an interruption, Hz. The component may
+/// continue there without a point.
 fn change_beyond_hz(ridge: &Ridge, point: &RidgePoint) -> f64 {
     (point.rate_hz_per_s * ridge.segment_s / 2.0).abs()
 }
 
-/// A third of the difference between the frequency at an end and that extrapolated from the point next to it,
-/// Hz: the uncertainty of a course that bends there.
+/// A third of the difference between the frequency at an end and the frequency extrapolated to that end from
+/// the nearest point, Hz. It is the uncertainty due to a change of the rate there.
 fn end_mismatch_hz(end: &RidgeEnd, point: &RidgePoint) -> f64 {
     let led_hz = point.frequency_hz + point.rate_hz_per_s * (end.time_s - point.time_s);
     (end.frequency_hz - led_hz).abs() / 3.0
@@ -155,9 +157,9 @@ fn change_within_cycle_hz(point: &RidgePoint) -> f64 {
     (point.rate_hz_per_s / point.frequency_hz / 2.0).abs()
 }
 
-/// Bias of a bending course at its turning points, Hz: a fit of a constant rate to a segment of length `T`
-/// cuts a corner of curvature `c` by up to `c T^2 / 24`. The curvature is the median change of the rate over
-/// half a segment.
+/// Bias of a frequency at the turning points of a curved course, Hz: a fit of a constant rate to a segment of
+/// length `T` cuts a corner of curvature `c` by up to `c T^2 / 24`. The curvature is the median change of the
+/// rate over half a segment, divided by the time between.
 fn curvature_bias_hz(ridge: &Ridge) -> f64 {
     let apart = (INDEPENDENT_SEGMENTS * ridge.segment_s / ridge.hop_s).round().max(1.0) as usize;
     let bend = |w: &[RidgePoint]| {

@@ -1,5 +1,5 @@
-//! The points of a ridge: fits to the segments and to the ends of the record, started from the path through
-//! the columns.
+//! The points of a ridge: fits to the segments and to the ends of the record. The fits start from the best
+//! path through the columns of the spectrogram.
 
 use super::chirp::{
     CURVED_UNKNOWNS, Chirp, ChirpFit, ChirpSegment, LINEAR_UNKNOWNS, ResidualNoise, SegmentNoise,
@@ -12,12 +12,13 @@ use crate::periodogram::{self, upper_median};
 use crate::settings::ROUNDING;
 use portable_math as math;
 
-/// Probability that noise alone causes one point of a ridge.
+/// Probability that noise alone causes any point of a ridge in a record.
 const FALSE_ALARM: f64 = 0.01;
 /// Number of independent trials per resolution of each segment: overlapping columns have more maxima than
 /// independent values.
 const TRIALS: f64 = 10.0;
-/// Largest distance of a fit from the path, resolutions: half way down the lobe of a Hann window.
+/// Largest distance of a fitted frequency from the path, resolutions: half way down the lobe of a Hann
+/// window.
 const FARTHEST_FROM_PATH: f64 = 1.0;
 /// Standard deviation of a frequency due to leakage of other components into a fit, resolutions.
 const LEAKAGE_SD: f64 = 0.002;
@@ -36,8 +37,8 @@ const CONTRADICTS: f64 = 3.5;
 /// Bias of a fitted frequency due to a changing rate, divided by the change of the rate from one segment to
 /// the next: `<x^4>/<x^2>/24` for the sine weights.
 const CURVATURE_BIAS: f64 = 0.4154 / 24.0;
-/// Ratio of the bias of a frequency due to a changing rate to its standard deviation, above which the rate
-/// may change in the fit of a point.
+/// Ratio of the bias of a frequency due to a changing rate to its standard deviation. Above this ratio, a
+/// point is fitted with a changing rate.
 const SIGNIFICANT_CURVATURE: f64 = 0.5;
 /// Largest difference, resolutions, between the frequency of the ridge at the centre of its outermost segment
 /// and that of a fit at the end of the record. Applies to fits of at least one segment.
@@ -49,7 +50,7 @@ pub(super) struct SegmentFit {
     /// Standard deviation of the frequency for noise of standard deviation 1 in each frame, cycles in the
     /// segment.
     unit_sd: f64,
-    /// Residual in a frame next to the component and at its frequency, m.
+    /// Residual per frame, m: at frequencies next to the component, and at the component's own frequency.
     residual: ResidualNoise,
 }
 
@@ -58,7 +59,7 @@ impl SegmentFit {
         Self { chirp: fitted.parameters, unit_sd: fitted.cycles_variance(0.0).sqrt(), residual }
     }
 
-    /// Noise that determines the standard deviations of the fit, m.
+    /// Standard deviation of the noise from which the standard deviations of the fit follow, m.
     fn noise_m(&self) -> f64 {
         self.residual.around_m.max(self.residual.under_m)
     }
@@ -88,7 +89,8 @@ impl<'a> RidgeTracker<'a> {
         }
     }
 
-    /// Start of each fit on the path through the columns; `None` for a column without spectrum.
+    /// Start of the fit of each column, on the path through the columns; `None` for a column without a
+    /// spectrum.
     pub(super) fn fit_starts(&self, spectrogram: &Spectrogram) -> Vec<Option<Chirp>> {
         let bins = SegmentBins::new(&self.layout, FINE_PADDING);
         let band = bins.bins_in_band(self.band_hz, self.frame_rate_hz);
@@ -172,8 +174,8 @@ impl<'a> RidgeTracker<'a> {
         (0..fits.len()).map(mend).collect()
     }
 
-    /// Repeats a fit with a changing rate if the rates half a segment before and after it show a significant
-    /// bias of the frequency.
+    /// Repeats the fit of a column with a changing rate if the rates half a segment before and after it show
+    /// a significant bias of the frequency.
     pub(super) fn refit_with_curvature(&self, fits: &[Option<SegmentFit>]) -> Vec<Option<SegmentFit>> {
         let (weights, noise) = (sine_weights(self.layout.frames), self.segment_noise());
         let bent = |c: usize| {
@@ -198,8 +200,8 @@ impl<'a> RidgeTracker<'a> {
         (0..fits.len()).map(bent).collect()
     }
 
-    /// Ratio of amplitude to noise that noise alone reaches anywhere in band and record with the probability
-    /// [`FALSE_ALARM`].
+    /// Ratio of amplitude to noise that noise alone reaches anywhere in the band and the record with the
+    /// probability [`FALSE_ALARM`].
     fn detection_threshold(&self) -> f64 {
         let resolutions = (self.band_hz.1 - self.band_hz.0) / self.resolution_hz;
         let segments = self.samples.len() as f64 / self.layout.frames as f64;
@@ -226,15 +228,15 @@ impl<'a> RidgeTracker<'a> {
         })
     }
 
-    /// The frequency at the end of the record next to a column, by separate fits with a changing rate. A
-    /// straight course extrapolated by half a segment would have a smaller standard deviation, but a wrong
-    /// frequency. A longer stretch is more accurate while the course is smooth, so the longest fit is taken
-    /// with which all shorter ones agree. The shortest fit only confirms, because other components leak into
-    /// it most.
+    /// The frequency at the end of the record next to a column, by separate fits with a changing rate.
+    /// Extrapolating a constant rate by half a segment would give a smaller standard deviation, but a wrong
+    /// frequency. A longer fit is more accurate while the course is smooth, so the longest fit is taken with
+    /// which all shorter fits agree. The shortest fit only confirms longer ones, because other components
+    /// leak into it most.
     pub(super) fn ridge_end(&self, column: usize, fit: &SegmentFit) -> Option<RidgeEnd> {
         let end = |segments: f64| self.extrapolate_to_end(column, fit, segments);
         let ends: Vec<RidgeEnd> = END_SEGMENTS.into_iter().filter_map(end).collect();
-        // the noise of the longer fit is a part of that of the shorter fit
+        // variances subtract, because the shorter fit contains the noise of the longer fit
         let agree = |longer: &RidgeEnd, shorter: &RidgeEnd| {
             let variance = math::powi(shorter.frequency_sd_hz, 2) - math::powi(longer.frequency_sd_hz, 2);
             (longer.frequency_hz - shorter.frequency_hz).abs() <= CONTRADICTS * variance.max(0.0).sqrt()
@@ -328,7 +330,7 @@ fn follow_ridge(spectrogram: &Spectrogram, samples: &[Option<f64>], band_hz: (f6
     }
 }
 
-/// Removes points in runs that are too short for a course.
+/// Removes the points of runs that are too short for a ridge.
 fn remove_short_runs(mut points: Vec<Option<RidgePoint>>) -> Vec<Option<RidgePoint>> {
     let fewest = FEWEST_POINTS.min(points.len());
     for run in points.chunk_by_mut(|a, b| a.is_some() == b.is_some()).filter(|run| run.len() < fewest) {
@@ -337,7 +339,7 @@ fn remove_short_runs(mut points: Vec<Option<RidgePoint>>) -> Vec<Option<RidgePoi
     points
 }
 
-// The path with the largest sum through the columns (Viterbi): levels less the costs of jumps.
+// The best path through the columns (Viterbi): it maximises the sum of the levels minus the costs of jumps.
 
 /// Standard deviation of the change of frequency over a quarter of a segment, resolutions. A drift of half a
 /// resolution in a quarter of a segment moves the frequency by two resolutions within the segment, about the
@@ -360,7 +362,7 @@ pub(super) struct PathLevels<'a> {
 
 impl PathLevels<'_> {
     /// The bin of each column on the best path. A level counts by the logarithm of its power, so that the
-    /// path stays with a component that fades; a jump costs half the square of its size in standard
+    /// path stays with a component that fades. A jump costs half the square of its size in standard
     /// deviations.
     pub(super) fn best_path(&self) -> Vec<usize> {
         let sd = (JUMP_SD * self.quarters * self.bins_per_resolution).max(1.0);
@@ -388,8 +390,8 @@ impl PathLevels<'_> {
     }
 }
 
-/// Advances the sums by one column; returns for each bin the bin of the previous column from which its sum
-/// comes.
+/// Advances the sums of the path search by one column. Returns for each bin the bin of the previous column
+/// from which its sum comes.
 fn advance_column(sums: &mut Vec<f64>, costs: &[f64]) -> Vec<u32> {
     let bins = sums.len();
     let reach = costs.len() - 1;

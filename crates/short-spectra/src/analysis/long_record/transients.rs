@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-/// Pieces of one length, frames.
+/// Pieces of a record that all have the same length, frames.
 struct SegmentScale {
     length: usize,
     /// Maximum number of pieces that are analysed.
@@ -62,15 +62,16 @@ impl Transient {
         (c.frequency_hz - other.frequency_hz).abs() < within_hz || holds(c, other) || holds(other, c)
     }
 
-    /// Whether another component, which changes over the window, may be this one seen over the whole window:
-    /// a line whose width grows with the decay.
+    /// Whether `other`, a component of the whole record that changes over it, may be this component. Over the
+    /// whole record a decaying oscillation shows as a line whose width grows with the decay.
     pub(super) fn explains_component(&self, other: &Component) -> bool {
         let c = &self.component;
         let width_hz = c.damping_ratio.map_or(0.0, |ratio| 2.0 * ratio * c.frequency_hz);
         self.matches_component(other) || (c.frequency_hz - other.frequency_hz).abs() < width_hz
     }
 
-    /// Adds a doubt to a component that does not decay: outside the stretch it may have another frequency.
+    /// Adds a doubt to a component that does not decay within the stretch: outside it may have another
+    /// frequency.
     fn with_persistence_doubt(mut self) -> Self {
         if self.nepers < NEPERS_OF_DECAY {
             let words = "it goes on outside the part of the window in which it was read, and may drift or \
@@ -123,8 +124,8 @@ pub(super) fn find_transients(record: &SampledRecord, settings: &SpectrumSetting
 }
 
 /// The components of a piece that do not last for the whole record: those whose power exceeds the normal
-/// power at their frequency, and those that end within the piece. Components that end within a cycle are left
-/// out, because every step causes one.
+/// power at their frequency, and those that end within the piece. A component that dies out within one cycle
+/// of its own oscillation is left out, because any step in the record produces such a component.
 fn read_piece(record: &SampledRecord, settings: &SpectrumSettings, piece: &UnusualPiece) -> Vec<Transient> {
     let rate_hz = record.frame_rate_hz;
     let passes = |brief: &Transient| {
@@ -157,7 +158,8 @@ fn stretch_transients(
     })
 }
 
-/// Nepers by which a component decays before the end of a record; 0 if the decay is not significant.
+/// Nepers by which a component decays from its start to the end of a record; 0 if the decay is not
+/// significant.
 fn decay_nepers(c: &Component, lasts_s: f64) -> f64 {
     let decay =
         c.damping_ratio.zip(c.damping_ratio_sd).filter(|(ratio, sd)| *ratio > SAME_WITHIN_DEVIATIONS * sd);
@@ -171,14 +173,14 @@ fn decay_nepers(c: &Component, lasts_s: f64) -> f64 {
 // times the mean power. Steady lines and noise of any colour are therefore normal, even if most of the pieces
 // contain a step.
 
-/// Probability that noise alone exceeds the level of a piece anywhere in a record.
+/// Probability that noise alone exceeds the level of any piece anywhere in a record.
 const FALSE_ALARM: f64 = 0.01;
 /// The normal power is the quantile 1 / `NORMAL_POWER_QUANTILE` of the powers of the pieces, divided by
 /// `QUARTER_OF_NOISE`, the ratio of this quantile to the mean power for noise.
 const NORMAL_POWER_QUANTILE: usize = 4;
 const QUARTER_OF_NOISE: f64 = 0.287_682_072_451_780_9;
-/// Half width of the neighbourhood whose median is the lower limit of the noise of a bin, bins; the quartile
-/// of a few pieces is inaccurate.
+/// Half width, bins, of the neighbourhood whose median is a lower limit of the normal power in a bin. The
+/// limit is needed because the quartile of a few pieces is inaccurate.
 const NEIGHBOURHOOD: usize = 8;
 /// Number of cycles in a piece below which a step, not an oscillation, exceeds the normal power.
 const FEWEST_CYCLES: usize = 8;
@@ -230,8 +232,8 @@ pub(super) fn cut_segments(samples: &[Option<f64>], length: usize, band: (f64, f
     pieces
 }
 
-/// Up to `most` pieces with the largest excess, each in bins in which no piece before it exceeds the normal
-/// power.
+/// Indices of up to `most` pieces with the largest excess. For each piece, only those bins count in which no
+/// piece chosen before exceeds the normal power.
 pub(super) fn select_unusual(pieces: &[UnusualPiece], most: usize) -> Vec<usize> {
     let mut chosen = Vec::new();
     let mut open = vec![true; pieces.first().map_or(0, |piece| piece.excess.len())];
@@ -260,7 +262,7 @@ fn segment_power_spectrum(samples: &[Option<f64>]) -> Vec<f64> {
     amplitude_m.into_iter().map(|a| math::powi(periodogram.noise_sd_m(a), 2)).collect()
 }
 
-/// Power of the record's noise and steady lines in each bin.
+/// Normal power in each bin, which is the power of the noise and steady lines of the record.
 fn normal_power_spectrum(pieces: &[UnusualPiece], bins: usize) -> Vec<f64> {
     let of_bin = |bin: usize| {
         let mut powers: Vec<f64> = pieces.iter().map(|piece| piece.excess[bin]).collect();
