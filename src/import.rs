@@ -1,9 +1,10 @@
-//! Reads the exports of tracking programs into a [`Recording`](crate::recording::Recording) with a report.
-//! Frame rate, scale and direction of y have no defaults: the user must give those that the file does not
-//! contain.
+//! Reads the files that tracking programs export into a [`Recording`](crate::recording::Recording), and
+//! reports what was found. Frame rate, scale and direction of y have no defaults: the user must give those
+//! that the file does not contain.
 //!
-//! Coordinates keep the origin of the file. They are only scaled and, if y points down, mirrored (`y` becomes
-//! `-y`). A new format needs one file with one `FileFormat`, and one row in `FORMATS`.
+//! Coordinates keep the origin of the file. They are only scaled to metres and, if y points down in the file,
+//! mirrored (`y` becomes `-y`). To add a format, add one file that implements `FileFormat`, and one line to
+//! `FORMATS`.
 
 mod assemble;
 mod error;
@@ -24,14 +25,14 @@ pub(crate) use reader::companion::companion_names;
 use reader::encoding::DecodedText;
 use reader::{Document, encoding};
 
-/// Imports one recording from one or more files with the same frame grid.
+/// Imports one recording from one or more files whose rows fall on the same grid of frames.
 ///
 /// # Errors
-/// [`ImportError`] with the place, what was found, what was expected and what to do.
+/// [`ImportError`], which says where the problem is, what was found there, what was expected, and what to do.
 pub fn import(sources: &[ImportSource], options: &ImportOptions) -> Result<Import, ImportError> {
     options::check_options(options)?;
     check_file_names(sources)?;
-    // (in parallel, because hashing takes a third as long as reading)
+    // (files are hashed and read in parallel, because hashing takes a third as long as reading)
     let (hashes, imported) = rayon::join(|| hash_sources(sources), || read_exports(sources, options));
     let mut imported = imported?;
     imported.file.source =

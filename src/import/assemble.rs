@@ -1,4 +1,5 @@
-//! Makes a recording from the tracks: calibration, choice of points, frame grid, findings and description.
+//! Makes a recording from the tracks of the files: converts units, chooses the tracks of tip and head, puts
+//! both on one frame grid, and adds the findings and the description of the recording.
 
 use super::error::{ImportError, ImportResult};
 use super::options::ImportOptions;
@@ -18,7 +19,7 @@ use crate::recording::quality::{
 use crate::recording::{Recording, Traces, rotate_traces};
 use crate::toml_file;
 
-/// Word in a track's name or a header that marks simulated data.
+/// Word that marks simulated data if it occurs in the name of a track or in a header of the file.
 const SYNTHETIC: &str = "synthetic";
 
 pub(crate) fn assemble_recording(
@@ -52,7 +53,8 @@ pub(crate) fn assemble_recording(
     }
     drop(exports);
     for source in sources {
-        // (the stored findings must not depend on the folder of the files)
+        // (stored findings must not depend on the folder of the files, so each path is replaced by its file
+        // name)
         let name = base_name(&source.name);
         report
             .findings
@@ -177,11 +179,13 @@ fn describe_recording(
     Ok(file)
 }
 
-/// Rotates the recording into the view of a level camera, and describes the rotation. A recording whose tilt
-/// is not clear is left unchanged. Errors name `file`.
+/// Rotates all positions by the measured tilt of the camera, so that they are as seen by a level camera, and
+/// describes the rotation. Without `--level`, or if the tilt is too small or too uncertain, the recording is
+/// returned unchanged. Error messages name `file`.
 ///
 /// # Errors
-/// [`ImportError::Unusable`] if the path does not show the tilt, or if a point has only one coordinate.
+/// [`ImportError::Unusable`] if the tilt cannot be measured from the path of the tip, or if a point has only
+/// one coordinate in a frame.
 fn level_recording(
     recording: Recording,
     file: &str,
@@ -212,7 +216,8 @@ fn level_recording(
         return Ok((recording, Some(entry)));
     }
     let traces = rotate_traces(recording.traces(), tilt.angle_rad, tilt.centre_m).map_err(|e| refuse(&e))?;
-    // (the rotated coordinates no longer show the quantisation step of the export)
+    // (the quantisation step of the export is checked before the rotation, because rotated coordinates no
+    // longer show it)
     report.findings.extend(check_position_steps(&measured, optics));
     let (name, grid) = (recording.name().to_owned(), recording.grid());
     let level = Recording::new(name, grid, traces, recording.is_synthetic())

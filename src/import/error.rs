@@ -1,4 +1,4 @@
-//! Errors of an import: the place, what was found, what was expected, and what to do.
+//! Errors of an import. Each says where the problem is, what was found, what was expected, and what to do.
 
 use crate::recording::files::FilesError;
 use crate::toml_file::TomlError;
@@ -7,7 +7,7 @@ use std::fmt::{self, Display};
 /// A place in a text file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TextLocation {
-    /// File as named by the user.
+    /// Path of the file as the user gave it.
     pub file: String,
     /// Line number, counted from 1.
     pub line: usize,
@@ -21,22 +21,23 @@ impl Display for TextLocation {
     }
 }
 
-/// Problem with a cell.
+/// Reason why a cell cannot be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CellProblem {
-    /// Text where a number belongs.
+    /// The cell contains text instead of a number.
     NotANumber,
-    /// A row without a time or frame number.
+    /// The time or the frame number of the row is missing.
     NoTime,
-    /// A frame number with a fraction, or larger than that of any recording.
+    /// The frame number is not a whole number, or is too large for any recording.
     NotAFrame,
-    /// The same time as in the row above.
+    /// The time or frame number is the same as in the row above.
     Duplicate,
-    /// A time earlier than that of the row above.
+    /// The time or frame number is smaller than that of the row above.
     Backwards,
-    /// A time between two frames.
+    /// The time is between two frames of the frame grid.
     OffGrid,
-    /// A frame or time so far from the others that nearly all frames between them have no row.
+    /// The frame number or time is so far from that of the row above that nearly all frames would have no
+    /// row.
     FarAway,
 }
 
@@ -46,48 +47,49 @@ pub enum ImportError {
     /// No file was given.
     #[error("no file to import: name the exported table")]
     NoSource,
-    /// A file name that occurs twice, or that is the name of a file of the recording itself.
+    /// Two files have the same name, or a file has the name of one of the recording's own files, such as
+    /// `trace.csv`.
     #[error(
         "{file}: found the file name `{name}`, expected one that no other file of the recording has; rename \
          the export"
     )]
     Name {
-        /// File as named by the user.
+        /// Path of the file as the user gave it.
         file: String,
-        /// File name without its folders.
+        /// Name of the file, without the path of its folder.
         name: String,
     },
-    /// Two rows of one track in the same frame.
+    /// One track has two rows with the same frame number or time.
     #[error(
         "{place}: found {what} {found} of track `{track}` a second time (first in line {first}), expected \
          every {what} once in a track; see in the tracking program which of the two is right and export again, or split the track where it merges with \
          another"
     )]
     DuplicateRow {
-        /// Place of the second row.
+        /// Place of the second of the two rows.
         place: TextLocation,
         /// `frame` or `time`.
         what: &'static str,
-        /// The frame number or the time.
+        /// The frame number or time that occurs twice.
         found: f64,
         /// Name of the track.
         track: String,
-        /// Line number of the first row.
+        /// Line number of the first of the two rows.
         first: usize,
     },
-    /// A table or a file without positions over time, such as another table of the same program.
+    /// The file does not contain positions over time. It may be another kind of table of the same program.
     #[error("{place}: found {found}, expected {expected}; {advice}")]
     WrongTable {
         /// The file, or the place in the file that shows the problem.
         place: String,
-        /// Contents of the file.
+        /// Contents of the file, in words.
         found: String,
-        /// Contents that are expected instead.
+        /// Contents that are expected instead, in words.
         expected: String,
         /// How to export the expected table from the program.
         advice: String,
     },
-    /// A row with more or fewer cells than the others.
+    /// A row has more or fewer cells than the other rows of the table.
     #[error(
         "{place}: found {found} cells, expected {expected} as in the rest of the table; complete \
          the row from what the tracking program shows (a missing value is an empty cell), or export again"
@@ -100,12 +102,12 @@ pub enum ImportError {
         /// Number of cells in the other rows.
         expected: usize,
     },
-    /// A cell that cannot be used.
+    /// A cell cannot be used.
     #[error("{place}: column {name}: found `{found}`, expected {expected}; {advice}")]
     Cell {
         /// Place of the cell.
         place: TextLocation,
-        /// Problem with the cell.
+        /// Reason why the cell cannot be used.
         problem: CellProblem,
         /// Name of the column.
         name: String,
@@ -116,10 +118,10 @@ pub enum ImportError {
         /// What to do.
         advice: &'static str,
     },
-    /// A file or a value that cannot be used.
+    /// A file or a value cannot be used.
     #[error("{place}: found {found}, expected {expected}; {advice}")]
     Format {
-        /// The file, with line and column if they are known, or the option.
+        /// The file, with line and column if they are known; or the option whose value is refused.
         place: String,
         /// What was found.
         found: String,
@@ -128,7 +130,7 @@ pub enum ImportError {
         /// What to do.
         advice: String,
     },
-    /// A file that cannot be used, with the reason as one sentence.
+    /// A file cannot be used; the reason is given as one sentence.
     #[error("{place}: {problem}")]
     Unusable {
         /// The file, with line and column if they are known.
@@ -136,7 +138,8 @@ pub enum ImportError {
         /// What was found and expected, and what to do.
         problem: String,
     },
-    /// A point was not named, or not found.
+    /// It is not clear which track is the tip or the head: no track is named for it, or the given name fits
+    /// no track or several.
     #[error("--point {point}: found {found}, expected {expected}; {advice}")]
     Point {
         /// `tip` or `head`.
@@ -145,10 +148,11 @@ pub enum ImportError {
         found: String,
         /// What was expected.
         expected: String,
-        /// The tracks that were found, and the one with the most similar name.
+        /// The tracks that the files contain, and perhaps the track whose name is most similar to the given
+        /// one.
         advice: String,
     },
-    /// Options that are missing for facts that the file does not contain, such as the frame rate.
+    /// The user has to give options for facts that the file does not contain, such as the frame rate.
     #[error("{files}: read as {format}, which does not say all of how it was recorded, and no default is \
         safe; give\n  {}", .missing.join("\n  "))]
     MissingOptions {
@@ -156,20 +160,20 @@ pub enum ImportError {
         files: String,
         /// Format of the files.
         format: String,
-        /// Each missing option, with its reason and the value that the file suggests.
+        /// One text for each missing option: what it means, and which value the file suggests.
         missing: Vec<String>,
     },
-    /// An option with an unusable value.
+    /// An option has a value that cannot be used.
     #[error("{option}: found `{found}`, expected {expected}")]
     Option {
         /// Name of the option.
         option: &'static str,
-        /// Value of the option.
+        /// Value that the user gave.
         found: String,
         /// Values that are allowed.
         expected: String,
     },
-    /// The file's times contradict the declared rate.
+    /// The times in the file imply another frame rate than the user declared.
     #[error(
         "{file}: the times imply {implied_hz:.6} frames/s, but --frame-rate-hz says {declared_hz} (a factor \
          of {factor:.4}). Usually the times are those of playback, and every frequency would be wrong by \
@@ -182,41 +186,42 @@ pub enum ImportError {
             milliseconds, add --time ms" } else { "" }
     )]
     RateMismatch {
-        /// File as named by the user.
+        /// Path of the file as the user gave it.
         file: String,
         /// Frame rate that the times imply, 1/s.
         implied_hz: f64,
-        /// Declared frame rate, 1/s.
+        /// Frame rate that the user declared, 1/s.
         declared_hz: f64,
-        /// Number of frames from row to row, if the declared rate is right and the times are real.
+        /// Value of `--frame-step` that may explain the difference: if only every n-th frame was tracked, n.
+        /// `None` if no small whole number explains it.
         step: Option<usize>,
     },
-    /// The camera's own record contradicts the declared rate.
+    /// The declared frame rate differs from the one in the camera's record or in the file.
     #[error(
         "--frame-rate-hz: found {declared_hz}, but {record} has {recorded_hz} frames/s; leave the option out if \
          that is the rate at which this video was recorded, or move the record away if it belongs to another \
          one"
     )]
     RecordedRateMismatch {
-        /// Declared frame rate, 1/s.
+        /// Frame rate that the user declared, or else that of the first record, 1/s.
         declared_hz: f64,
-        /// The camera's record with another rate.
+        /// Source of the other frame rate, such as the name of the camera's record.
         record: String,
-        /// Frame rate in the record, 1/s.
+        /// Frame rate in that source, 1/s.
         recorded_hz: f64,
     },
-    /// The specification of the twin is not valid TOML.
+    /// The specification of the twin, from which a synthetic export was made, is not valid TOML.
     #[error(transparent)]
     Twin(#[from] TomlError),
-    /// The description of the recording cannot be written.
+    /// A `trace.csv`, the file of a recording's positions, cannot be read.
     #[error(transparent)]
     Files(#[from] FilesError),
 }
 
-/// Result of a step of an import.
+/// Result of a function of the import: a value, or an [`ImportError`].
 pub(crate) type ImportResult<T> = Result<T, ImportError>;
 
-/// Maximum number of characters of a cell in an error message.
+/// Maximum number of characters that an error message shows of a cell.
 const LONGEST_CELL: usize = 60;
 
 impl ImportError {
@@ -244,7 +249,8 @@ impl ImportError {
         Self::Unusable { place: place.to_string(), problem: problem.to_string() }
     }
 
-    /// Error in the columns of a table, with a line that shows it.
+    /// Error for a table with unsuitable columns; `line` is the line that shows the problem, usually the
+    /// header.
     pub(crate) fn columns(file: &str, line: usize, problem: impl Display, advice: impl Display) -> Self {
         Self::unusable(format!("{file}:{line}:1"), format!("{problem}; {advice}"))
     }
@@ -255,19 +261,21 @@ impl ImportError {
         Self::unusable(format!("{file}:1:1"), problem)
     }
 
-    /// Error for a table with column names but no numbers; `line` is the last line that is not empty.
+    /// Error for a table with column names but no numbers; `line` is the line that the message names, usually
+    /// the last line that is not empty.
     pub(crate) fn header_only(file: &str, line: usize) -> Self {
         let (found, expected) = ("no rows of numbers after the header", "one a frame");
         Self::format(format!("{file}:{line}:1"), found, expected, "export again with the data rows selected")
     }
 
-    /// Error for files or tracks that do not share a frame grid.
+    /// Error for files or tracks whose rows do not fall on one common grid of frames.
     pub(crate) fn grid_mismatch(file: &str, found: &str, expected: &str, other: &str) -> Self {
         let advice = "export both tracks from one clip with the same time settings";
         Self::format(file, found, format!("{expected} as in {other}"), advice)
     }
 
-    /// Error for a cell that cannot be used, with what it should contain and what to do.
+    /// Error for a cell that cannot be used. `expected` says what the cell should contain, `advice` what to
+    /// do.
     pub(crate) fn cell(
         place: TextLocation,
         problem: CellProblem,

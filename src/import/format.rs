@@ -1,17 +1,19 @@
-//! Interface of the file formats of tracking programs.
+//! The interface of all file formats of tracking programs.
 
 use crate::import::error::ImportResult;
 use crate::import::options::ImportOptions;
 use crate::import::reader::Document;
 use crate::import::reader::track_file::TrackFile;
 
-/// A file format; each format in `formats` implements it.
+/// A file format of a tracking program. Each module in `formats` implements this trait.
 pub(crate) trait FileFormat: Sync {
     /// Name of the format on the command line.
     fn name(&self) -> &'static str;
-    /// Feature of the contents that identifies the format; `None` if the format is not recognised. Tables of
-    /// the same program without positions are also recognised, so that [`FileFormat::read`] can refuse them.
+    /// Text on the feature of the document that identifies this format; `None` if the document is not in this
+    /// format. A table of the same program without positions is recognised too, so that [`FileFormat::read`]
+    /// can refuse it with advice.
     fn recognises(&self, document: &Document) -> Option<String>;
-    /// Reads the clocks and tracks, in the units of the file.
+    /// Reads the clocks (frame numbers and times of the rows) and the tracks (positions of points), in the
+    /// units of the file.
     fn read<'a>(&self, document: &'a Document<'a>, options: &ImportOptions) -> ImportResult<TrackFile<'a>>;
 }

@@ -1,5 +1,5 @@
-//! The supported formats, and the choice of the format of a file. A new format needs one file in this folder
-//! and one line in [`FORMATS`].
+//! The supported formats, and the choice of the format in which a file is read. To add a format, add one file
+//! to this folder and one line to [`FORMATS`].
 
 mod deeplabcut;
 mod dice;
@@ -24,7 +24,7 @@ use crate::import::format::FileFormat;
 use crate::recording::quality::{Check, QualityFinding, Severity};
 use crate::toml_file;
 
-/// The supported formats, in the order of detection.
+/// The supported formats, in the order in which they are tried on a file.
 static FORMATS: &[&dyn FileFormat] = &[
     &wiperlab::Wiperlab,
     &dippmotion::DippMotion,
@@ -44,10 +44,10 @@ static FORMATS: &[&dyn FileFormat] = &[
     &plain::GENERIC,
 ];
 
-/// Programs whose layout is not published; their tables need `--columns`.
+/// Programs that do not publish the layout of their tables. Such tables can be read only with `--columns`.
 const UNDOCUMENTED: [&str; 5] = ["movias", "movias-neo", "tema", "proanalyst", "xcitex"];
 
-/// A format, and the feature of the contents that identifies it.
+/// A format, and a text on the feature by which it recognises a document.
 type RecognisedFormat = (&'static dyn FileFormat, String);
 
 pub(crate) fn choose_format(
@@ -59,8 +59,8 @@ pub(crate) fn choose_format(
     };
     let format = FORMATS.iter().copied().find(|format| format.name() == name);
     let format = format.ok_or_else(|| unknown_format_error(name))?;
-    // (a table that the format of its own program refuses is refused even if --format names another format,
-    // but not with --columns, because the user then says which columns are positions)
+    // (a table without positions is refused by the format of its own program, even if --format names another
+    // format. With --columns it is not refused, because the user then says which columns are positions)
     let mut checked = documents.iter().filter(|_| options.columns.is_none());
     match checked.find_map(|document| refusal_by_others(format, document, options)) {
         Some(refusal) => Err(refusal),
@@ -73,7 +73,8 @@ fn detect_format(
     options: &ImportOptions,
 ) -> ImportResult<(&'static dyn FileFormat, String)> {
     if options.columns.is_some() {
-        // (tables of Kinovea's windows are filtered and lack samples, even if their columns are named)
+        // (a table of Kinovea's kinematics windows is read as such even with --columns, because its positions
+        // are filtered and may lack samples)
         let windows = documents.iter().all(kinovea::is_window);
         let format: &dyn FileFormat = if windows { &kinovea::Kinovea } else { &plain::GENERIC };
         return Ok((format, "--columns names the columns".to_owned()));
@@ -92,7 +93,7 @@ fn detect_format(
     found.ok_or(ImportError::NoSource)
 }
 
-/// The first format that recognises a document. If another format recognises it as a table of its program
+/// The first format that recognises the document. If a later format recognises it as a table of its program
 /// without positions, the document is refused.
 fn recognise_document(document: &Document, options: &ImportOptions) -> ImportResult<RecognisedFormat> {
     let mut found = recognising_formats(document);
@@ -105,18 +106,19 @@ fn recognise_document(document: &Document, options: &ImportOptions) -> ImportRes
     found.find_map(|(other, _)| refusal_by(other, document, options)).map_or(Ok(first), Err)
 }
 
-/// The formats that recognise a document, except the plain table, which belongs to no program.
+/// The formats that recognise the document. The plain format is left out, because it belongs to no program.
 fn recognising_formats<'d>(document: &'d Document) -> impl Iterator<Item = RecognisedFormat> + 'd {
     let of_programs = FORMATS.iter().copied().filter(|format| format.name() != plain::PLAIN.name());
     of_programs.filter_map(|format| format.recognises(document).map(|reason| (format, reason)))
 }
 
-/// Error of `format`, which recognises the document, if the document contains no positions over time.
+/// Error with which `format` refuses the document because it contains no positions over time; `None` if it
+/// has no such error. The document must be one that `format` recognises.
 fn refusal_by(format: &dyn FileFormat, document: &Document, options: &ImportOptions) -> Option<ImportError> {
     format.read(document, options).err().filter(|error| matches!(error, ImportError::WrongTable { .. }))
 }
 
-/// Error of a format other than `chosen` that recognises the document but finds no positions in it.
+/// Error of the first format other than `chosen` that recognises the document but finds no positions in it.
 fn refusal_by_others(
     chosen: &dyn FileFormat,
     document: &Document,
@@ -126,7 +128,8 @@ fn refusal_by_others(
     others.into_iter().find_map(|(format, _)| refusal_by(format, document, options))
 }
 
-/// Findings about tables that would be refused if `--columns` did not name their columns.
+/// Findings about tables that are read only because `--columns` names their columns; without it, they would
+/// be refused.
 pub(crate) fn find_doubtful_columns(
     chosen: &dyn FileFormat,
     documents: &[Document],
@@ -141,7 +144,7 @@ pub(crate) fn find_doubtful_columns(
     options.columns.iter().flat_map(|_| documents.iter().filter_map(doubt)).collect()
 }
 
-/// The names of all formats, in the order of detection.
+/// The names of all formats, in the order in which they are tried on a file.
 pub fn format_names() -> Vec<&'static str> {
     FORMATS.iter().map(|format| format.name()).collect()
 }

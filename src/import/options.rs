@@ -1,12 +1,12 @@
-//! Options of an import: facts that the export itself does not contain.
+//! Options of an import. They give facts that the exported file itself does not contain.
 
 use crate::import::error::ImportError;
 use crate::import::reader::CoordinateUnit;
 use crate::recording::files::YAxis;
 use toml::Value;
 
-/// Options of an import. If neither an option nor the file gives a fact that has no safe default, the import
-/// is refused.
+/// Options of an import. Some facts, such as the frame rate, have no safe default. If neither an option nor
+/// the file gives such a fact, the import is refused.
 #[derive(Debug, Clone, Default)]
 pub struct ImportOptions {
     /// Name of the recording, for messages and figures.
@@ -15,16 +15,15 @@ pub struct ImportOptions {
     pub format: Option<String>,
     /// Text encoding; `None` detects it from the contents.
     pub encoding: Option<String>,
-    /// Rate at which the camera recorded, 1/s.
+    /// Rate at which the camera recorded, 1/s; not the rate of playback.
     pub frame_rate_hz: Option<f64>,
-    /// Length of one unit of the file's coordinates.
+    /// Length of one unit of the coordinates in the file; `None` uses the unit that the file states.
     pub scale: Option<CoordinateScale>,
-    /// Direction of y in the file.
+    /// Direction of y in the file: up or down.
     pub y_axis: Option<YAxis>,
     /// Exposure time of a frame, s.
     pub exposure_s: Option<f64>,
-    /// Meaning of the time column; `None` stands for the default of the format, usually seconds of the
-    /// recording.
+    /// Meaning of the time column; `None` uses the default of the format, usually real time in seconds.
     pub time: Option<TimeColumn>,
     /// Number of frames from one row to the next, if only every n-th frame was tracked; `None` means 1.
     pub frame_step: Option<usize>,
@@ -32,40 +31,41 @@ pub struct ImportOptions {
     pub tip: Option<String>,
     /// Name of the track of the head.
     pub head: Option<String>,
-    /// Columns of a plain table.
+    /// Meaning of the columns of a plain table, as given with `--columns`.
     pub columns: Option<ColumnMap>,
-    /// Confidence below which a position counts as missing.
+    /// Confidence, from 0 to 1, below which a position counts as missing.
     pub min_likelihood: Option<f64>,
-    /// Whether the tilt of the camera is corrected in both tracks.
+    /// Whether the positions of tip and head are rotated to correct the tilt of the camera.
     pub level: bool,
-    /// Table `[conditions]` of the recording.
+    /// Contents of the table `[conditions]` in the description of the recording.
     pub conditions: toml::Table,
-    /// Name and text of the specification of a twin, if the export is synthetic.
+    /// File name and text of the specification of the twin from which the export was made; `None` if a camera
+    /// took the recording.
     pub twin: Option<(String, String)>,
 }
 
-/// Largest frame step; with a larger one, no vibration could be seen.
+/// Largest allowed frame step; with a larger step, no vibration could be resolved.
 const LARGEST_STEP: usize = 1000;
 
-/// Meaning of a time column.
+/// Meaning of the numbers in a time column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TimeColumn {
-    /// Seconds of the recording itself, from which the frame rate may be determined.
+    /// Seconds of real time; the frame rate may be determined from them.
     Real,
-    /// Milliseconds of the recording itself.
+    /// Milliseconds of real time.
     Milliseconds,
-    /// Frame numbers.
+    /// Frame numbers instead of times.
     Frames,
-    /// Times of playback, which only count frames.
+    /// Times of playback. They only count frames, and do not show the rate at which the camera recorded.
     Playback,
 }
 
-/// Length of one unit of the file's coordinates.
+/// Length of one unit of the coordinates in a file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum CoordinateScale {
-    /// Coordinates are pixels; the value is the length that a pixel shows, m.
+    /// The coordinates are pixels; the value is the length that one pixel shows, m.
     MetresPerPixel(f64),
-    /// Coordinates are lengths; the value is their unit, m.
+    /// The coordinates are lengths; the value is the length of their unit, m, e.g. 1e-3 for millimetres.
     Unit(f64),
 }
 
@@ -77,10 +77,10 @@ const LENGTH_UNITS: [(&str, f64); 6] =
     [("m", 1.0), ("cm", 1e-2), ("mm", 1e-3), ("um", 1e-6), ("\u{b5}m", 1e-6), ("\u{3bc}m", 1e-6)];
 
 impl CoordinateScale {
-    /// Reads `21.5um/px`, or a unit of length such as `mm`.
+    /// Reads a length per pixel such as `21.5um/px`, or a unit of length such as `mm`.
     ///
     /// # Errors
-    /// [`ImportError::Option`] for anything else.
+    /// [`ImportError::Option`] for any other text.
     pub fn parse(text: &str) -> Result<Self, ImportError> {
         let expected =
             "a length a pixel such as 21.5um/px, or the unit of the file's coordinates: m, cm, mm or um";
@@ -93,14 +93,16 @@ impl CoordinateScale {
         let (number, name) = length.split_at(length.find(|c| !is_digit(c)).ok_or_else(refuse)?);
         let number = number.parse::<f64>().ok().filter(|n| n.is_finite() && *n > 0.0).ok_or_else(refuse)?;
         let unit = unit(name.trim()).ok_or_else(refuse)?;
-        // a double cannot hold 1e-6 exactly: multiplying by it rounds twice, dividing by 1e6 rounds once
+        // 1e-6 is not exact in binary: multiplying by it rounds twice, dividing by 1e6 rounds only once
         Ok(Self::MetresPerPixel(number / (1.0 / unit).round()))
     }
 
     /// Whether coordinates in `unit` have this scale.
     pub(crate) fn agrees_with(self, unit: CoordinateUnit) -> bool {
         match (self, unit) {
-            (Self::Unit(metres), CoordinateUnit::Metres(stated)) => (metres / stated - 1.0).abs() <= SAME_UNIT,
+            (Self::Unit(metres), CoordinateUnit::Metres(stated)) => {
+                (metres / stated - 1.0).abs() <= SAME_UNIT
+            }
             (Self::MetresPerPixel(_), CoordinateUnit::Pixel) => true,
             _ => false,
         }
@@ -122,12 +124,12 @@ impl CoordinateScale {
     }
 }
 
-/// A column, by its number or by its name in the header.
+/// A column of a table, given by its number or by its name in the header.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ColumnName {
     /// Number of the column, counted from 1.
     Number(usize),
-    /// Name in the header row.
+    /// Name of the column in the header row.
     Name(String),
 }
 
@@ -140,7 +142,8 @@ impl std::fmt::Display for ColumnName {
     }
 }
 
-/// Columns of a plain table: pairs of key and column, in the order given.
+/// Meaning of the columns of a plain table: pairs of a key such as `tip-x` and a column, in the order in
+/// which the user gave them.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ColumnMap(pub Vec<(&'static str, ColumnName)>);
 
@@ -159,15 +162,16 @@ pub(crate) const COLUMN_KEYS: [&str; 13] = [
     "y",
     "confidence",
 ];
-/// Value of `frame=row`: the table has neither frame numbers nor times, and every row is a frame.
+/// Column name in `frame=row`, which means that the table has neither frame numbers nor times and that every
+/// row is one frame.
 pub(crate) const ROW_COLUMN: &str = "row";
 
 impl ColumnMap {
-    /// Reads `time=1,tip-x=2,tip-y=3,head-x=4,head-y=5`; a column is given by its number, counted from 1, or
-    /// by its name in the header.
+    /// Reads text such as `time=1,tip-x=2,tip-y=3,head-x=4,head-y=5`. A column is given by its number,
+    /// counted from 1, or by its name in the header.
     ///
     /// # Errors
-    /// [`ImportError::Option`] naming the part at fault.
+    /// [`ImportError::Option`], which shows the faulty part of the text.
     pub fn parse(text: &str) -> Result<Self, ImportError> {
         let refuse = |found: &str, expected: &str| ImportError::option("--columns", found, expected);
         let mut columns: Vec<(&'static str, ColumnName)> = vec![];
@@ -213,14 +217,15 @@ impl ColumnMap {
         Ok(columns)
     }
 
-    /// The column of `key`.
+    /// The column that the user gave for `key`.
     pub(crate) fn get(&self, key: &str) -> Option<&ColumnName> {
         self.0.iter().find(|(known, _)| *known == key).map(|(_, column)| column)
     }
 }
 
 impl ImportOptions {
-    /// Reads `KEY=VALUE` into `[conditions]`; numbers and true/false keep their type.
+    /// Adds `KEY=VALUE` to the table `[conditions]`. A number, `true` or `false` is stored with its type, any
+    /// other value as text.
     ///
     /// # Errors
     /// [`ImportError::Option`] if the key is missing or was given before.
@@ -239,10 +244,10 @@ impl ImportOptions {
         }
     }
 
-    /// Reads `tip=NAME` or `head=NAME`.
+    /// Reads `tip=NAME` or `head=NAME`, where `NAME` is the name of a track.
     ///
     /// # Errors
-    /// [`ImportError::Option`] for any other text, and for a point that was given before.
+    /// [`ImportError::Option`] for any other text, or if the point was given before.
     pub(crate) fn add_point(&mut self, text: &str) -> Result<(), ImportError> {
         let refuse = |expected: &str| ImportError::option("--point", text, expected);
         let pair = text.split_once('=').filter(|pair| !pair.1.trim().is_empty());
@@ -266,10 +271,10 @@ impl ImportOptions {
 /// Range of accepted frame rates, 1/s: from time lapse to well above the fastest camera.
 const RATES_HZ: std::ops::RangeInclusive<f64> = 1e-3..=1e9;
 
-/// Refuses options with numbers outside their range.
+/// Refuses options whose numbers are outside the allowed range.
 ///
 /// # Errors
-/// [`ImportError::Option`] naming the option.
+/// [`ImportError::Option`], which names the option.
 pub(crate) fn check_options(options: &ImportOptions) -> Result<(), ImportError> {
     let positive = [("--frame-rate-hz", options.frame_rate_hz), ("--exposure-s", options.exposure_s)];
     for (option, value) in positive {

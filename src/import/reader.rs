@@ -1,5 +1,5 @@
-//! The steps from bytes to tracks on a frame grid, which all formats share: encoding, dialect, table, layout,
-//! timing.
+//! The steps that all formats share to get from the bytes of a file to tracks on a frame grid: text encoding,
+//! dialect (delimiter and decimal mark), table of cells, meaning of the columns, and timing.
 
 pub(crate) mod calibration;
 pub(crate) mod column;
@@ -23,6 +23,7 @@ pub(crate) mod track_file;
 
 use super::error::ImportResult;
 use super::source::{ImportSource, base_name};
+pub(crate) use column::{ColumnMeaning, ColumnUnit, CoordinateUnit, TimeUnit};
 use encoding::DecodedText;
 pub(crate) use findings::new_finding;
 pub(crate) use instances::{InstanceFields, PointFields, RowOrder, RowPosition, RowStamp, TrackCollector};
@@ -30,20 +31,19 @@ pub(crate) use layout::{LostRule, PointCells, TableLayout};
 pub(crate) use number::{CellNumber, parse_number};
 pub(crate) use rows::{RowView, TextRow};
 pub(crate) use table::DelimitedTable;
-pub(crate) use column::{ColumnMeaning, ColumnUnit, CoordinateUnit, TimeUnit};
 pub(crate) use track_file::{Clock, Column, Fact, Facts, Track, TrackFile, clock_lines};
 
-/// A decoded file with its table and the texts of its companions.
+/// A decoded file, with its table and the texts of its companion files.
 pub(crate) struct Document<'a> {
-    /// File as named by the user.
+    /// Path of the file as the user gave it.
     pub file: &'a str,
-    /// File name without folders and extension.
+    /// Name of the file, without folders and extension.
     pub stem: &'a str,
     /// Text of the file, without a byte-order mark.
     pub text: &'a str,
-    /// The text as a table, or the error if it is not one.
+    /// The text as a table, or the error that says why it is not a table.
     pub table: ImportResult<DelimitedTable<'a>>,
-    /// The texts of the companions, with their names.
+    /// Name and text of each companion file.
     pub companions: Vec<(&'a str, String)>,
 }
 
@@ -64,7 +64,7 @@ impl<'a> Document<'a> {
         self.table.as_ref().map_err(Clone::clone)
     }
 
-    /// Note on encoding, delimiter and decimal mark.
+    /// Note for the report on encoding, delimiter and decimal mark.
     pub(crate) fn encoding_note(&self, decoded: &DecodedText) -> String {
         let dialect = self.table.as_ref().map_or_else(|_| String::new(), |table| table.dialect.describe());
         format!("{}: {}{dialect}", self.file, decoded.encoding)

@@ -11,9 +11,9 @@ use crate::text::sha256;
 pub struct Import {
     /// The recording.
     pub recording: Recording,
-    /// Contents of its `recording.toml`.
+    /// Contents of the recording's file `recording.toml`.
     pub file: RecordingFile,
-    /// Report on what was found and decided.
+    /// Report on what was found in the files and what was decided.
     pub report: ImportReport,
 }
 
@@ -26,12 +26,13 @@ pub struct ImportReport {
     pub reason: String,
     /// Notes on what was read and assumed.
     pub notes: Vec<String>,
-    /// Findings on quality that only the export shows; they are stored in `recording.toml`.
+    /// Findings about the quality of the data that only the exported file shows, such as rounded times. They
+    /// are stored in `recording.toml`.
     pub findings: Vec<QualityFinding>,
 }
 
 impl ImportReport {
-    /// The report as lines of text.
+    /// The report as lines of text: format, notes and findings.
     #[must_use]
     pub fn lines(&self) -> Vec<String> {
         let first = format!("format: {} ({})", self.format, self.reason);
@@ -39,7 +40,7 @@ impl ImportReport {
         std::iter::once(first).chain(notes).chain(self.findings.iter().map(QualityFinding::to_line)).collect()
     }
 
-    /// Findings more severe than a note, with their advice.
+    /// The findings that are more severe than a note, each as text with its advice.
     pub fn warnings(&self) -> impl Iterator<Item = String> {
         let graver = self.findings.iter().filter(|finding| finding.severity > Severity::Note);
         graver.map(|finding| {
@@ -55,15 +56,16 @@ impl ImportReport {
 /// A file to import.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ImportSource {
-    /// Path or name as given by the user; its last part is the name of the copy in the recording's folder.
+    /// Path or name as given by the user. The copy in the recording's folder has the name after its last
+    /// slash.
     pub name: String,
     /// Contents of the file.
     pub bytes: Vec<u8>,
-    /// Companion files, such as the record of a camera.
+    /// Companion files, such as the file in which the camera recorded its settings.
     pub companions: Vec<CompanionFile>,
 }
 
-/// A file in the folder of an export that belongs to the export.
+/// A file that belongs to an export and is in the same folder, such as the camera's record of its settings.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CompanionFile {
     /// Path or name as given by the user.
@@ -73,14 +75,15 @@ pub struct CompanionFile {
 }
 
 impl ImportSource {
-    /// A source without companions.
+    /// A source without companion files.
     #[must_use]
     pub fn without_companions(name: impl Into<String>, bytes: Vec<u8>) -> Self {
         Self { name: name.into(), bytes, companions: vec![] }
     }
 }
 
-/// Refuses file names that occur twice, because every copy in the recording's folder needs its own name.
+/// Refuses file names that occur twice or belong to the recording's own files, because every copy in the
+/// recording's folder needs its own name.
 pub(crate) fn check_file_names(sources: &[ImportSource]) -> Result<(), ImportError> {
     if sources.is_empty() {
         return Err(ImportError::NoSource);
@@ -96,13 +99,13 @@ pub(crate) fn check_file_names(sources: &[ImportSource]) -> Result<(), ImportErr
     Ok(())
 }
 
-/// Last part of a path with slashes or backslashes.
+/// The part of a path after its last slash or backslash.
 pub(crate) fn base_name(path: &str) -> &str {
     path.rsplit(['/', '\\']).next().unwrap_or(path)
 }
 
-/// Names and bytes of the files that are stored with the recording, in the order of `[source]`. A companion
-/// of several exports is stored once.
+/// Names and bytes of the files that are stored with the recording, in the order in which `[source]` lists
+/// them. A companion file that belongs to several exports is stored once.
 pub(crate) fn preserved_files(sources: &[ImportSource]) -> Vec<(&str, &[u8])> {
     let mut kept: Vec<(&str, &[u8])> =
         sources.iter().map(|source| (base_name(&source.name), source.bytes.as_slice())).collect();
@@ -115,7 +118,7 @@ pub(crate) fn preserved_files(sources: &[ImportSource]) -> Vec<(&str, &[u8])> {
     kept
 }
 
-/// SHA-256 of the stored files, in their order.
+/// SHA-256 hashes of the files that are stored with the recording, in the order of [`preserved_files`].
 pub(crate) fn hash_sources(sources: &[ImportSource]) -> Vec<String> {
     preserved_files(sources).into_iter().map(|(_, bytes)| sha256(bytes)).collect()
 }

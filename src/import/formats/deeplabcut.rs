@@ -1,5 +1,5 @@
-//! DeepLabCut and Lightning Pose: tables below three header rows (four with individuals), and tables of
-//! labels that were set by hand.
+//! Reads tables of DeepLabCut and Lightning Pose: predicted positions below three header rows (four if there
+//! are several animals), and labels that were set by hand.
 
 use crate::import::error::{CellProblem, ImportError, ImportResult};
 use crate::import::format::FileFormat;
@@ -11,10 +11,12 @@ use crate::import::reader::{
 };
 use crate::recording::quality::{Check, QualityFinding, Severity};
 
-/// Words in the names of files or scorers that mark smoothed positions: those of DeepLabCut's filtered
-/// predictions and of the ensemble Kalman smoother of Lightning Pose.
+/// Words in the name of a file or of its scorer (the trained model) that show that its positions were
+/// smoothed. They occur in DeepLabCut's filtered predictions and in the output of Lightning Pose's ensemble
+/// Kalman smoother.
 const SMOOTHED: [&str; 3] = ["filtered", "smoother", "smoothed"];
-/// Columns of the skeleton table, which contains lengths and angles between body parts.
+/// Columns of DeepLabCut's skeleton table, which contains lengths and angles between body parts instead of
+/// positions.
 const SKELETON: [&str; 3] = ["length", "orientation", "likelihood"];
 
 pub(crate) struct DeepLabCut;
@@ -51,7 +53,8 @@ impl FileFormat for DeepLabCut {
             let layout = TableLayout { frame: Some(0), ..layout };
             let mut export = layout.read_tracks(document, table, facts())?;
             if header.points.iter().all(|point| point.confidence.is_none()) {
-                // (predictions have a likelihood; positions without one may be labels set by hand)
+                // (predictions have a likelihood; positions without a likelihood may be labels that were set
+                // by hand)
                 let picked =
                     export.clocks.iter().filter_map(|clock| picked_frames_finding(document.file, clock));
                 export.findings.extend(picked);
@@ -68,7 +71,7 @@ fn facts() -> Facts {
     Facts::pixels_down("DeepLabCut writes image pixels, y downwards")
 }
 
-/// Whether the rows are identified by names of pictures instead of frame numbers.
+/// Whether the first cell of each row is the name of a picture instead of a frame number.
 fn names_images(table: &DelimitedTable, header: &DeepLabCutHeader) -> bool {
     table.head.get(header.start).is_some_and(|row| {
         table.parse_cell(row.first_cell()) == CellNumber::Text && row.first_cell().contains('.')
@@ -105,14 +108,14 @@ fn filtering_finding(document: &Document, header: &DeepLabCutHeader) -> Option<Q
     Some(new_finding(Check::Filtered, Severity::Caution, (1.0, ""), found, advice))
 }
 
-// The header rows: scorer, individual, body part, coordinate.
+// The header rows of a table: scorer, individual, body part, coordinate.
 
-/// First cells of the header rows; a table of one animal has no row `individuals`.
+/// Texts in the first cells of the header rows. A table of one animal has no row `individuals`.
 const ROW_NAMES: [&str; 4] = ["scorer", "individuals", "bodyparts", "coords"];
-/// Name of the individual that has the body parts that occur only once in a picture.
+/// Name in the row `individuals` for points that occur only once in a picture and belong to no animal.
 const UNIQUE_INDIVIDUAL: &str = "single";
-/// Possible numbers of cells before the coordinates: one for a frame number or the path of a picture, three
-/// for a path that is split into parts.
+/// Possible numbers of cells before the coordinates in a row: one for a frame number or the path of a
+/// picture, or three for a path that is split into folder, video and picture.
 const INDEX_CELLS: [usize; 2] = [1, 3];
 const HEADER_ADVICE: &str = "the rows above the numbers are scorer, bodyparts, coords, with individuals in \
     second place if there are several; restore them as DeepLabCut wrote them, or have it write the table \
@@ -120,9 +123,9 @@ const HEADER_ADVICE: &str = "the rows above the numbers are scorer, bodyparts, c
 
 const PART_EXPECTED: &str = "x and y of every body part";
 
-/// Contents of the header rows.
+/// What the header rows say about the columns of a table.
 pub(crate) struct DeepLabCutHeader {
-    /// Index of the first row of numbers in the head of the table.
+    /// Index in `DelimitedTable::head` of the first row of numbers.
     pub start: usize,
     /// Number of cells before the coordinates.
     pub index_cells: usize,
@@ -130,7 +133,7 @@ pub(crate) struct DeepLabCutHeader {
     pub cells: usize,
     pub points: Vec<PointCells>,
     pub scorers: Vec<String>,
-    /// Names of the coordinates that are not read.
+    /// Names in the row `coords` of the columns that are not read.
     ignored: Vec<String>,
 }
 
@@ -142,7 +145,7 @@ struct BodyPart<'t> {
     name: &'t str,
 }
 
-/// Columns of the x, y and likelihood of a body part.
+/// Indices of the columns with x, y and likelihood of a body part; `None` for a column that is missing.
 #[derive(Default)]
 struct BodyPartCells([Option<usize>; 3]);
 
@@ -180,7 +183,7 @@ impl DeepLabCutHeader {
         Ok(header)
     }
 
-    /// Adds a column to its body part.
+    /// Adds the column `cell` to the body part that the header rows name for it.
     fn add_column<'t>(
         &mut self,
         table: &DelimitedTable,
@@ -233,7 +236,7 @@ impl DeepLabCutHeader {
     }
 }
 
-/// The header rows in their order.
+/// The three or four header rows, in the order of the file.
 fn header_rows<'t>(table: &'t DelimitedTable) -> ImportResult<Vec<&'t TextRow>> {
     let several = table.head.get(1).is_some_and(|row| row.first_cell() == ROW_NAMES[1]);
     let expected = ROW_NAMES.iter().filter(|name| several || **name != ROW_NAMES[1]);
@@ -276,16 +279,18 @@ fn header_error(table: &DelimitedTable, row: &TextRow, found: &str, expected: &s
     ImportError::columns(table.file, row.line, format!("found {found}, expected {expected}"), HEADER_ADVICE)
 }
 
-// Labels set by hand: each row names a picture of a video, and the picture's name ends in the frame number.
+// Labels that were set by hand. Each row names a picture of a video, and the name of the picture ends in the
+// frame number.
 
-/// What the cell of a picture should contain, and what to do if it does not.
+/// What the cell with the name of a picture should contain, and what the user can do if it does not.
 const PICTURE_REMEDY: (&str, &str) = (
     "a picture whose name ends in its frame number, such as img0042.png",
     "rename the pictures by their frames in the table, or import the table of analyze_videos, which numbers the \
      frames",
 );
 
-/// Reads one row for each labelled picture. The rows may be in any order, and most frames have no row.
+/// Reads a table with one row for each labelled picture. The rows may be in any order, and most frames of the
+/// video have no row.
 pub(crate) fn read_labels<'a>(
     document: &'a Document,
     table: &'a DelimitedTable,
@@ -331,7 +336,7 @@ pub(crate) fn read_labels<'a>(
         count += 1;
     }
     let video = video.unwrap_or_default();
-    // (the collected track has no name, so the error names the video)
+    // (all rows belong to one instance without a name, so the error names the video instead)
     let name_video = |error| match error {
         ImportError::DuplicateRow { place, what, found, first, .. } => {
             ImportError::DuplicateRow { place, what, found, first, track: video.clone() }
@@ -366,7 +371,7 @@ fn read_label(table: &DelimitedTable, record: &RowView, cells: &PointCells) -> I
     })
 }
 
-/// Folder of the picture in a row, which is named after the video, and name of the picture.
+/// Name of the folder of the picture in a row, and name of the picture. The folder has the name of the video.
 fn split_picture_path<'r>(record: &RowView<'r>, index_cells: usize) -> (String, &'r str) {
     if index_cells > 1 {
         return (record.cell(index_cells - 2).to_owned(), record.cell(index_cells - 1));
@@ -376,7 +381,8 @@ fn split_picture_path<'r>(record: &RowView<'r>, index_cells: usize) -> (String, 
     (folder.rsplit(['/', '\\']).next().unwrap_or("").to_owned(), image)
 }
 
-/// The number at the end of a picture's name, before the extension.
+/// The number at the end of a picture's name, before the extension; `None` if the name does not end in a
+/// number.
 fn frame_number(image: &str) -> Option<f64> {
     let stem = image.rsplit_once('.').map_or(image, |(stem, _)| stem);
     let digits = stem.trim_end_matches(|c: char| c.is_ascii_digit()).len();

@@ -1,4 +1,5 @@
-//! DICe (Digital Image Correlation Engine) in tracking mode: one file per subset, one row per frame.
+//! Reads the solution files of DICe (Digital Image Correlation Engine) in tracking mode: one file per subset
+//! of the picture, one row per frame.
 
 use crate::import::error::{ImportError, ImportResult, TextLocation};
 use crate::import::format::FileFormat;
@@ -9,18 +10,20 @@ use crate::import::reader::{
 use crate::recording::files::YAxis;
 
 const FRAME: &str = "FRAME";
-/// Columns with the centre of the subset in the reference picture; the columns in `DISPLACEMENT` contain the
-/// displacement from there.
+/// Columns with the centre of the subset in the reference picture, pixels. The columns in `DISPLACEMENT`
+/// contain the displacement of the subset from this centre.
 const REFERENCE: [&str; 2] = ["COORDINATE_X", "COORDINATE_Y"];
 const DISPLACEMENT: [&str; 2] = ["DISPLACEMENT_X", "DISPLACEMENT_Y"];
 const SIGMA: &str = "SIGMA";
 const STATUS: &str = "STATUS_FLAG";
-/// Values of [`STATUS`] for a correlated frame: `CORRELATION_SUCCESSFUL`, `INITIALIZE_..._SUCCESSFUL` and
-/// `SEARCH_..._SUCCESSFUL` of DICe's `Status_Flag`. Other values mark failures or averages of other subsets.
+/// Values of the column [`STATUS`] in frames that were correlated: `CORRELATION_SUCCESSFUL`,
+/// `INITIALIZE_..._SUCCESSFUL` and `SEARCH_..._SUCCESSFUL` of DICe's `Status_Flag`. Other values mean a
+/// failure, or an average of other subsets.
 const SUCCESSFUL: [f64; 7] = [0.0, 1.0, 2.0, 3.0, 4.0, 6.0, 18.0];
-/// Text in the comments before `true` or `false`, which states whether displacements are from frame to frame.
+/// Text in the comment lines after which `true` or `false` says whether displacements are relative to the
+/// previous frame.
 const INCREMENTAL: &str = "Incremental correlation:";
-/// Maximum number of lines in the comment block.
+/// Maximum number of comment lines at the start of a file.
 const PREAMBLE_LINES: usize = 64;
 
 pub(crate) struct Dice;
@@ -91,8 +94,8 @@ fn no_header_error(table: &DelimitedTable) -> ImportError {
     ImportError::columns(table.file, table.first_line(), problem, advice)
 }
 
-/// Refuses a field of points, in which one frame has many reference positions. In tracking mode the frame
-/// number increases and the reference position is constant.
+/// Refuses a full-field result, which has many reference positions in one frame. In tracking mode, the frame
+/// number increases from row to row, and the reference position is constant.
 fn refuse_full_field(
     table: &DelimitedTable,
     start: usize,
@@ -147,7 +150,7 @@ fn full_field_error(place: TextLocation, found: String) -> ImportError {
     )
 }
 
-/// Refuses displacements from frame to frame, which are not positions.
+/// Refuses displacements relative to the previous frame, because they do not give positions.
 fn refuse_incremental(document: &Document) -> ImportResult<()> {
     let lines =
         document.text.lines().take(PREAMBLE_LINES).enumerate().filter(|(_, line)| line.starts_with("***"));

@@ -1,4 +1,5 @@
-//! DIPP-MOTION (DITECT): the data of an X-Y graph as a table in CP932, below a header of varying length.
+//! Reads exports of DIPP-MOTION (DITECT): the data of an X-Y graph as a table in the encoding CP932, below a
+//! header of varying length.
 
 use crate::import::error::{ImportError, ImportResult, TextLocation};
 use crate::import::format::FileFormat;
@@ -9,20 +10,21 @@ use crate::import::reader::{
 };
 use crate::recording::quality::{Check, QualityFinding, Severity};
 
-/// Beginning of the first line.
+/// Beginning of the first line of the file.
 const MARK: &str = "DIPP-MOTION";
-/// "Time" in Japanese: beginning of the name of the first column.
+/// Beginning of the name of the first column: "time" in Japanese.
 const TIME: &str = "\u{6642}\u{9593}";
-/// "Unit of the horizontal axis" and "unit of the vertical axis" in Japanese; the axes are x and y.
+/// Names of the settings for the units of x and y: "unit of the horizontal axis" and "unit of the vertical
+/// axis" in Japanese.
 const UNITS: [&str; 2] = ["\u{6a2a}\u{8ef8}\u{5358}\u{4f4d}", "\u{7e26}\u{8ef8}\u{5358}\u{4f4d}"];
-/// "Coordinate value" in Japanese: part of the name of a graph of positions.
+/// Part of the name of a graph of positions: "coordinate value" in Japanese.
 const COORDINATE: &str = "\u{5ea7}\u{6a19}\u{5024}";
-/// Endings of the names of the two columns of a point.
+/// Endings of the names of the two columns of a point, for x and y.
 const AXES: [&str; 2] = ["(X)", "(Y)"];
-/// Units of time by their symbol in the name of a column, in seconds.
+/// Units of time: symbol in the name of the time column, and length in seconds.
 const TIME_UNITS: [(&str, f64); 4] = [("s", 1.0), ("sec", 1.0), ("ms", 1e-3), ("\u{79d2}", 1.0)];
-/// Largest coordinate of a point that counts as the local origin, in units of the file; rounding errors of
-/// 1e-11 occur.
+/// If no coordinate of a point is larger than this in absolute value, in units of the file, the point is the
+/// origin of a local coordinate system. Rounding errors of 1e-11 occur.
 const AT_ORIGIN: f64 = 1e-6;
 /// Advice on saving the table that contains the positions.
 const MENU: &str = "save the data of the graph of X coordinate against Y coordinate of the points as CSV";
@@ -55,8 +57,8 @@ impl FileFormat for DippMotion {
     }
 }
 
-/// Refuses every graph except that of X against Y, for example a graph of speeds. A line in brackets names
-/// the graph.
+/// Refuses every graph except that of the coordinate X against the coordinate Y, for example a graph of
+/// speeds. A header line in square brackets names the graph.
 fn refuse_other_graph(table: &DelimitedTable) -> ImportResult<()> {
     let mut rows = table.head.iter().map(|row| (row.line, row.first_cell()));
     match rows.find(|(_, cell)| cell.starts_with('[') && cell.contains("] - [")) {
@@ -71,7 +73,7 @@ fn graph_error(place: TextLocation, found: String) -> ImportError {
     ImportError::wrong_table(place, found, "the X and Y coordinates of points over time", MENU)
 }
 
-/// Index of the row of column names, which starts with the time.
+/// Index of the row of column names, whose first cell names the time.
 fn find_header(table: &DelimitedTable) -> ImportResult<usize> {
     let names_time = |row: &TextRow| {
         row.first_cell().starts_with(TIME) && row.cells.iter().skip(1).any(|cell| !cell.is_empty())
@@ -92,7 +94,7 @@ fn point_columns(table: &DelimitedTable, row: &TextRow) -> ImportResult<Vec<Poin
     })
 }
 
-/// The unit of both axes, if the header contains it.
+/// The unit of x and y; `None` if the header does not contain it. Different units for x and y are refused.
 fn coordinate_unit(table: &DelimitedTable) -> ImportResult<Fact<CoordinateUnit>> {
     let named = |name: &str| table.head.iter().find(|row| row.first_cell() == name);
     let [Some(x), Some(y)] = UNITS.map(named) else { return Ok(None) };
@@ -110,7 +112,7 @@ fn coordinate_unit(table: &DelimitedTable) -> ImportResult<Fact<CoordinateUnit>>
     }
 }
 
-/// The unit in the name of the time column; if it has none, seconds are assumed.
+/// The unit in the name of the time column. If the name contains no unit, seconds are assumed.
 fn time_unit(table: &DelimitedTable, row: &TextRow) -> ImportResult<TimeUnit> {
     let name = row.first_cell().trim_start_matches(TIME);
     let sign = name.trim_matches(|c: char| {

@@ -1,5 +1,5 @@
-//! DLTdv (versions 5 to 8) and Argus: positions in pixels, as two columns for each point and camera, or as
-//! triplets of row, column and value.
+//! Reads the exports of DLTdv (versions 5 to 8) and Argus: positions in pixels, either as two columns for
+//! each point and camera, or as triplets of row, column and value.
 
 mod flat;
 mod sparse;
@@ -39,7 +39,7 @@ impl FileFormat for Dltdv {
     }
 }
 
-/// Explains what the direction of y depends on, if the table does not show it.
+/// Text on what the direction of y depends on, for a table that does not show it.
 pub(crate) const Y_AXIS_QUESTION: &str = "DLTdv 8 counts pixels from the top of the picture (down), DLTdv 5 to 7 and \
     Argus from its bottom (up), and this table does not tell which of them wrote it";
 pub(crate) const FIRST_PIXEL: &str =
@@ -47,7 +47,7 @@ pub(crate) const FIRST_PIXEL: &str =
 pub(crate) const SEVERAL_CAMERAS: &str = "several cameras: tip and head have to come from one of them; rows \
     are frames of the first camera, from which the others may be offset";
 
-/// Facts about coordinates in pixels; if the direction of y is unknown, the user is asked for it.
+/// Facts about coordinates in pixels. If the direction of y is `None`, the user is asked for it.
 pub(crate) fn pixel_facts(y_axis: Fact<YAxis>) -> Facts {
     let y_axis_open = y_axis.is_none().then_some(Y_AXIS_QUESTION);
     Facts {
@@ -58,14 +58,14 @@ pub(crate) fn pixel_facts(y_axis: Fact<YAxis>) -> Facts {
     }
 }
 
-/// Name of the track of a point, with the camera if there are several.
+/// Name of the track of a point. If there are several cameras, it contains the number of the camera.
 pub(crate) fn camera_track_name(point: &str, camera: &str, several: bool) -> String {
     if several { format!("{point}_cam{camera}") } else { point.to_owned() }
 }
 
-// Files of DLTdv without positions. Each is refused with advice on the file to import.
+// Files of DLTdv that contain no positions. Each is refused with advice on the file to import instead.
 
-/// Ending of a file's name, and contents of the file.
+/// Kinds of files without positions: ending of the file's name, and contents in words.
 const SIBLING_KINDS: [(&str, &str); 5] = [
     ("xyzpts", "positions in space, reconstructed from several cameras"),
     ("xyzres", "residuals of a reconstruction"),
@@ -115,7 +115,8 @@ fn has_space_columns(row: &TextRow) -> bool {
     !row.cells.is_empty() && row.cells.chunks(3).all(of_point)
 }
 
-/// Kind of a file by its name, if its contents are triplets or a calibration.
+/// Index in [`SIBLING_KINDS`] of the kind that the name of a file shows; `None` if its contents are neither
+/// triplets nor a calibration.
 fn kind_by_name(document: &Document) -> Option<usize> {
     let table = document.table.as_ref().ok()?;
     let stem = base_name(document.stem).to_lowercase();

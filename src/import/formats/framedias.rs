@@ -1,5 +1,5 @@
-//! Frame-DIAS (DKH): `.rd` files with rows of coordinates below a line of counts. A companion `.set` file
-//! contains the names of the points and the rate of the camera.
+//! Reads the `.rd` files of Frame-DIAS (DKH): rows of coordinates below a line of counts. A companion `.set`
+//! file contains the names of the points and the rate of the camera.
 
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::format::FileFormat;
@@ -11,15 +11,18 @@ use crate::import::reader::{
 };
 use crate::import::source::base_name;
 
-/// Number of cells in the first line: number of frames, number of points, and time from frame to frame.
+/// Number of cells in the first line: number of frames, number of points, and time from frame to frame in
+/// seconds.
 const COUNTS: usize = 3;
-/// Extension of the table.
+/// Extension of the file with the table.
 const EXTENSION: &str = ".rd";
-/// Keys in the `.set` file.
+/// Keys in the `.set` file: recording rate (this one), names of the points, and interval of the recorded
+/// frames.
 const RATE: &str = "CameraSpeed";
 const NAMES: &str = "PointName";
 const INTERVAL: &str = "RecInterval";
-/// Longest time from frame to frame, s; a larger third number in the first line has another meaning.
+/// Longest time from frame to frame that is accepted, s. If the third number in the first line is larger, it
+/// has another meaning, and the file is not one of Frame-DIAS.
 const LONGEST_STEP_S: f64 = 10.0;
 
 pub(crate) struct FrameDias;
@@ -29,8 +32,8 @@ impl FileFormat for FrameDias {
         "framedias"
     }
 
-    /// The file contains no names, so its first line has to match the rows below, or its extension has to be
-    /// `.rd`.
+    /// Recognises a file by its first line. The file contains no column names, so the counts in that line
+    /// have to match the rows below, or the extension has to be `.rd`.
     fn recognises(&self, document: &Document) -> Option<String> {
         let table = document.table.as_ref().ok()?;
         let counts = FrameDiasCounts::find(table)?;
@@ -103,13 +106,14 @@ impl FrameDiasCounts {
     }
 }
 
-/// Refuses the table, and names the line of a row.
+/// Returns an error that refuses the table and names the line of a row; `row` is its index in
+/// `DelimitedTable::head`.
 fn refuse_row<T>(table: &DelimitedTable, row: usize, problem: &str, advice: &str) -> ImportResult<T> {
     let line = table.head.get(row).map_or(1, |row| row.line);
     Err(ImportError::columns(table.file, line, problem, advice))
 }
 
-/// Number of points in a row, which must match the first line.
+/// Number of points in a row. It must be equal to the number of points in the first line.
 fn count_points(table: &DelimitedTable, counts: FrameDiasCounts) -> ImportResult<usize> {
     let row = table.head.get(1).ok_or_else(|| ImportError::header_only(table.file, 1))?;
     let cells = row.used_width();
@@ -141,7 +145,7 @@ fn check_frame_count(
     refuse_row(table, 0, &problem, "the file is cut short or was edited: save it again")
 }
 
-/// Contents of the `.set` file.
+/// Contents of the companion `.set` file; every field is empty if there is no such file.
 #[derive(Debug, Clone, Default, PartialEq)]
 struct FrameDiasSettings {
     file: Option<String>,
@@ -176,7 +180,8 @@ impl FrameDiasSettings {
         self.file.as_deref().unwrap_or_default()
     }
 
-    /// Names of the points. A list of another length is refused, because it belongs to another file.
+    /// Names of the points, from the `.set` file or else `point1`, `point2`, ... A list of names whose length
+    /// is not `points` is refused, because it belongs to another table.
     fn names(&self, table: &DelimitedTable, points: usize) -> ImportResult<Vec<String>> {
         if self.names.is_empty() {
             return Ok((1..=points).map(|point| format!("point{point}")).collect());
@@ -193,8 +198,8 @@ impl FrameDiasSettings {
         refuse_row(table, 0, &problem, advice)
     }
 
-    /// Frame rate of the camera. A rate that contradicts the times is refused, unless the times are those of
-    /// playback.
+    /// Frame rate of the camera from the `.set` file. A rate that contradicts the time from frame to frame in
+    /// the table is refused, unless the user declares that the times are playback times.
     fn frame_rate(
         &self,
         table: &DelimitedTable,
@@ -228,7 +233,7 @@ impl FrameDiasSettings {
     }
 }
 
-/// Splits `"a","b"` into names; a name may contain a comma.
+/// Splits a list such as `"a","b"` into names; a name in quotation marks may contain a comma.
 fn split_quoted_names(list: &str) -> Vec<String> {
     let (mut names, mut open) = (vec![String::new()], false);
     for c in list.chars() {

@@ -1,5 +1,5 @@
-//! ImageJ and Fiji: the Results table, the table of the plugin Manual Tracking, and MTrackJ's table of
-//! points.
+//! Reads tables of ImageJ and Fiji: the Results table, the table of the plugin Manual Tracking, and MTrackJ's
+//! table of points.
 
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::format::FileFormat;
@@ -65,9 +65,9 @@ fn no_header_error(table: &DelimitedTable) -> ImportError {
     ImportError::columns(table.file, table.first_line(), problem, advice)
 }
 
-// Common to all tables of ImageJ: the direction of y, and errors at the header.
+// For all tables of ImageJ: the direction of y, and errors about the header.
 
-/// Facts from the documentation that hold for all three tables.
+/// Facts from ImageJ's documentation that are true for all three kinds of table.
 pub(crate) fn imagej_facts() -> Facts {
     let why = "ImageJ counts y from the top of the picture, unless `Invert Y coordinates` was ticked in \
         Analyze > Set Measurements"
@@ -75,7 +75,7 @@ pub(crate) fn imagej_facts() -> Facts {
     Facts { y_axis: Some((YAxis::Down, why)), ..Facts::default() }
 }
 
-/// Refuses the table, and names the line of its header.
+/// Returns an error that refuses the table and names the line of its header.
 fn refuse_header<T>(
     table: &DelimitedTable,
     row: &TextRow,
@@ -86,13 +86,14 @@ fn refuse_header<T>(
     Err(ImportError::wrong_table(table.location(row.line, 1), found, expected, advice))
 }
 
-// The table of the plugin Manual Tracking: whole pixels, one row per click.
+// The table of the plugin Manual Tracking: coordinates in whole pixels, one row per mouse click.
 
-/// Beginnings of two column names that end in a degree sign; its encoding is unknown, and it may be lost.
+/// Beginnings of two column names (`MANUAL_TRACK`, `MANUAL_SLICE`) that end in a degree sign. The degree sign
+/// is not compared, because its encoding is unknown and it may be lost.
 const MANUAL_TRACK: &str = "Track n";
 const MANUAL_SLICE: &str = "Slice n";
-/// Maximum number of characters of such a name; a wrong encoding may turn the degree sign into two
-/// characters.
+/// Maximum number of characters of the column names that end in a degree sign; a wrong encoding may turn this
+/// sign into two characters.
 const MANUAL_NAME_LENGTH: usize = MANUAL_TRACK.len() + 3;
 
 fn find_numbered_column(names: &[&str], start: &str) -> Option<usize> {
@@ -143,19 +144,19 @@ pub(crate) fn read_manual_tracking<'a>(
 
 // MTrackJ's table of points: coordinates and times with their units in the header.
 
-/// Columns that number clusters, tracks and points. The numbers of points start again in each track and are
-/// not frame numbers.
+/// Names of the columns that number clusters, tracks and points. The numbers of points start again in each
+/// track, so they are not frame numbers.
 const MTRACKJ_CLUSTER: &str = "CID";
 const MTRACKJ_TRACK: &str = "TID";
 const MTRACKJ_POINT: &str = "PID";
-/// Units for which the times are frame numbers.
+/// Units in the name of the time column that mean that its values are frame numbers.
 const FRAME_UNITS: [&str; 2] = ["frame", "frames"];
 
 pub(crate) fn is_mtrackj_header(names: &[&str]) -> bool {
     names.first() == Some(&"Nr") && names.contains(&MTRACKJ_TRACK)
 }
 
-/// Index and unit of a column such as `x [pixel]`.
+/// Index of the column of the quantity `wanted`, and its unit, from a column name such as `x [pixel]`.
 fn find_quantity<'r>(names: &[&'r str], wanted: &str) -> Option<(usize, &'r str)> {
     names.iter().enumerate().find_map(|(at, name)| {
         let (quantity, unit) = name
@@ -215,7 +216,8 @@ pub(crate) fn read_mtrackj<'a>(
     Ok(export)
 }
 
-/// Replaces the error for a repeated time by advice to set the frame interval, without which every time is 0.
+/// Replaces the error for a repeated time by advice to set the frame interval. Without a frame interval,
+/// every time in the table is 0.
 fn no_interval_error(error: ImportError) -> ImportError {
     match error {
         ImportError::DuplicateRow { place, what: "time", found, track, first } => ImportError::wrong_table(
@@ -230,14 +232,15 @@ fn no_interval_error(error: ImportError) -> ImportError {
 
 // ImageJ's Results table: one row per measurement.
 
-/// Columns of the position of a point: its centroid, or else its centre of mass. `BX` and `BY`, a corner of
-/// the bounding box, are not read.
+/// Names of the columns with the position of a point: its centroid, or else its centre of mass. `BX` and
+/// `BY`, a corner of its bounding box, are not read.
 const POSITIONS: [[&str; 2]; 2] = [["X", "Y"], ["XM", "YM"]];
 const SLICE: &str = "Slice";
 const FRAME: &str = "Frame";
-/// Column that gives the counter of the multi-point tool to which a point belongs.
+/// Column with the number of the counter to which a point belongs. Counters group the points of ImageJ's
+/// multi-point tool.
 const COUNTER: &str = "Counter";
-/// Measurements that identify an ImageJ table if its first column has no name.
+/// Names of measurements that show that a table is ImageJ's if its first column has no name.
 const MEASUREMENTS: [&str; 13] = [
     "Area",
     "Mean",
@@ -254,8 +257,8 @@ const MEASUREMENTS: [&str; 13] = [
     "Label",
 ];
 
-/// Whether a header belongs to a Results table. It contains positions and a slice; or its first column has no
-/// name, and others have the names of ImageJ's measurements.
+/// Whether a header is that of a Results table. Either it names positions and a slice; or its first column
+/// has no name, and other columns are called like ImageJ's measurements.
 pub(crate) fn is_results_header(names: &[&str]) -> bool {
     let has = |name: &str| names.contains(&name);
     let measured = MEASUREMENTS.iter().any(|name| has(name));
@@ -310,8 +313,8 @@ pub(crate) fn read_results<'a>(
     Ok(export)
 }
 
-/// Column that counts the frames: `Slice`, or `Frame` in a hyperstack. If the table has both, the column
-/// whose values change is used; the table is refused if both change.
+/// Index of the column that counts the frames: `Slice`, or `Frame` in a hyperstack. If the table has both,
+/// the column whose values change is used; the table is refused if both change.
 fn clock_column(table: &DelimitedTable, row: &TextRow) -> ImportResult<usize> {
     let at = |name: &str| row.position(name);
     match (at(SLICE), at(FRAME)) {
@@ -344,7 +347,7 @@ fn clock_column(table: &DelimitedTable, row: &TextRow) -> ImportResult<usize> {
     }
 }
 
-/// Whether the texts in a column differ.
+/// Whether a column contains at least two different texts.
 fn column_varies(table: &DelimitedTable, cell: usize) -> ImportResult<bool> {
     let mut rows = table.rows(1);
     let mut first: Option<String> = None;
@@ -359,7 +362,8 @@ fn column_varies(table: &DelimitedTable, cell: usize) -> ImportResult<bool> {
     Ok(false)
 }
 
-/// Explains that a slice contains several points, which the table does not distinguish.
+/// Replaces the error for two rows in one slice by an error that says that the slice contains several points,
+/// which the table does not distinguish.
 fn several_points_error(error: ImportError, counted: bool) -> ImportError {
     let ImportError::DuplicateRow { place, found, first, .. } = error else { return error };
     let of = if counted { " and counter" } else { "" };

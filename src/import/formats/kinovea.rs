@@ -1,5 +1,6 @@
-//! Kinovea: trajectories as CSV and as TXT, and the tables of its kinematics windows. Projects (`.kva`) and
-//! tables of chronometers are refused with advice on the export that contains the positions.
+//! Reads the exports of Kinovea: trajectories as CSV and as TXT, and the tables of its kinematics windows.
+//! Projects (`.kva`) and tables of chronometers are refused with advice on the export that contains the
+//! positions.
 
 mod text;
 
@@ -14,17 +15,17 @@ use crate::import::reader::{
 use crate::recording::quality::{Check, QualityFinding, Severity};
 use text::TITLE;
 
-/// Beginning of the root element of a project.
+/// Beginning of the root element of a Kinovea project.
 const PROJECT: &str = "<KinoveaVideoAnalysis";
-/// Number of characters at the start of a file in which the root element of a project is sought.
+/// Number of characters at the start of a file that are searched for the root element of a project.
 const PROJECT_START_CHARACTERS: usize = 1000;
-/// Name of the first column of the trajectories, in every language of the program.
+/// Name of the first column in the table of the trajectories, in every language of the program.
 const TIME: &str = "Time";
-/// Endings of the names of the two columns of a point.
+/// Endings of the names of the two columns of a point, for x and y.
 const AXES: [&str; 2] = ["/X", "/Y"];
-/// Name of the only point of a plain track.
+/// Name of the only point of a plain track, as in the column name `tip/0/X`.
 const PLAIN_TRACK_KEY: &str = "0";
-/// Endings of the row names of chronometers.
+/// Endings of the row names in a table of Kinovea's chronometers.
 const CHRONOMETER: [&str; 2] = ["(Cumulative)", "(Duration)"];
 pub(crate) struct Kinovea;
 
@@ -74,7 +75,7 @@ impl FileFormat for Kinovea {
     }
 }
 
-/// Whether a file is a table of the kinematics windows, which needs `--columns`.
+/// Whether a file is a table of Kinovea's kinematics windows, which needs `--columns`.
 pub(crate) fn is_window(document: &Document) -> bool {
     matches!(file_kind(document), Some(KinoveaFileKind::Window))
 }
@@ -135,7 +136,8 @@ fn read_trajectories<'a>(document: &'a Document, table: &'a DelimitedTable) -> I
     Ok(export)
 }
 
-/// Name of a plain track, or name of an object and its point.
+/// Name of a track, from a column name without the axis. `tip/0` is a plain track called `tip`; in `Angle
+/// 1/o`, object and point are both kept.
 fn track_name(path: &str) -> &str {
     match path.rsplit_once('/') {
         Some((name, PLAIN_TRACK_KEY)) if !name.is_empty() => name,
@@ -157,14 +159,17 @@ pub(crate) fn kinovea_facts() -> Facts {
 
 // Tables of Kinovea's kinematics windows: one filtered series per column, times in whole milliseconds.
 
-/// Ending of the name of the first column in every language of the program.
+/// Ending of the name of the first column in a table of the kinematics windows, in every language of the
+/// program.
 const MILLISECONDS: &str = "(ms)";
-/// Frame rate, 1/s, above which several samples fall into the same millisecond and only the last is written.
+/// Frame rate, 1/s, above which several samples have the same time in whole milliseconds; Kinovea then writes
+/// only the last of them.
 const HIGHEST_RATE_HZ: f64 = 1000.0;
-/// Names that other programs give to times.
+/// Names of the time column that are used by other programs and not by Kinovea.
 const OTHER_TIME_NAMES: [&str; 2] = ["t", "T"];
 
-/// Whether a table has times in whole milliseconds, and series whose names are not those of coordinates.
+/// Whether a table looks like one of Kinovea's kinematics windows: its times are whole milliseconds, and the
+/// names of its series are not names of coordinates.
 pub(crate) fn is_window_header(table: &DelimitedTable, names: &[&str]) -> bool {
     let Some((time, series)) = names.split_first() else { return false };
     let word = time.strip_suffix(MILLISECONDS).map(str::trim);
@@ -177,7 +182,7 @@ pub(crate) fn is_window_header(table: &DelimitedTable, names: &[&str]) -> bool {
         && is_whole_column(table, 0)
 }
 
-/// Whether two names differ only in x and y, such as `tipX` and `tipY`.
+/// Whether the list contains two names that differ only in x and y, such as `tipX` and `tipY`.
 fn has_coordinate_pair(series: &[&str]) -> bool {
     let names: Vec<String> = series.iter().map(|name| name.to_lowercase()).collect();
     names.iter().any(|name| name.contains('x') && names.contains(&name.replace('x', "y")))
@@ -189,8 +194,8 @@ fn is_coordinate(name: &str) -> bool {
         .any(|word| matches!(word, "x" | "y" | "z" | "px" | "py" | "frame"))
 }
 
-/// Reads a table of the kinematics windows, which needs `--columns` because it does not say what its series
-/// are.
+/// Reads a table of Kinovea's kinematics windows. It needs `--columns`, because it does not say what its
+/// series are.
 pub(crate) fn read_window<'a>(
     document: &'a Document<'a>,
     table: &DelimitedTable,
@@ -242,7 +247,8 @@ fn samples_lost_error(table: &DelimitedTable, rate_hz: f64) -> ImportError {
     )
 }
 
-/// Finding about rows at every millisecond: the camera ran at 1000 frames/s, or faster with samples lost.
+/// Finding about a table with one row per millisecond. Either the camera recorded at 1000 frames/s, or it was
+/// faster and samples were lost.
 fn lost_samples_finding(export: &TrackFile) -> Option<QualityFinding> {
     let times = export.clocks.first()?.times();
     let every = times.len() > 1 && times.windows(2).all(|pair| pair[1] - pair[0] == 1.0);
@@ -256,7 +262,7 @@ fn lost_samples_finding(export: &TrackFile) -> Option<QualityFinding> {
     every.then(|| new_finding(Check::SamplesLost, Severity::Serious, value, found, advice))
 }
 
-/// Whether every cell of a column in the head of the table is a whole number.
+/// Whether a column contains only whole numbers in the rows of `DelimitedTable::head` below the header.
 fn is_whole_column(table: &DelimitedTable, column: usize) -> bool {
     let whole = |row: &TextRow| {
         let number = row.cells.get(column).map(|cell| table.parse_cell(cell));

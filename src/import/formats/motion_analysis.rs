@@ -1,16 +1,17 @@
-//! motion-analysis-2d (Saga University): one row per frame, times with four decimals.
+//! Reads tables of the program motion-analysis-2d (Saga University): one row per frame, times with four
+//! decimals.
 
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::format::FileFormat;
 use crate::import::options::ImportOptions;
 use crate::import::reader::{DelimitedTable, Document, Facts, TableLayout, TrackFile, layout};
 
-/// Names of the first columns.
+/// Names of the first two columns, which contain the frame number and the time.
 const CLOCK: [&str; 2] = ["frame_no", "time"];
-/// Endings of the names of the two columns of a point.
+/// Endings of the names of the two columns of a point, for x and y.
 const AXES: [&str; 2] = ["-x", "-y"];
-/// Endings of the names of columns of angles, which follow the points; a wrong encoding often damages the
-/// Greek letter.
+/// Endings of the names of columns with angles. These columns come after those of the points. A wrong
+/// encoding often damages the Greek letter.
 const ANGLES: [&str; 3] = ["-\u{3b8}", "-\u{3f4}", "-theta"];
 
 pub(crate) struct MotionAnalysis;

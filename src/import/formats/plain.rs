@@ -87,8 +87,10 @@ impl TableColumns {
 
     /// All columns that are read.
     fn used(&self) -> Vec<usize> {
-        let of_points =
-            self.points.iter().flat_map(|point| point.x.iter().chain(&point.y).copied().chain(point.confidence));
+        let of_points = self
+            .points
+            .iter()
+            .flat_map(|point| point.x.iter().chain(&point.y).copied().chain(point.confidence));
         self.clock().chain(self.track).chain(of_points).collect()
     }
 
@@ -170,7 +172,8 @@ impl TableColumns {
             .filter(|(column, name)| !used.contains(column) && !name.is_empty())
             .map(|(_, name)| name.as_str())
             .collect();
-        let other = if other.is_empty() { String::new() } else { format!("; not read: {}", other.join(", ")) };
+        let other =
+            if other.is_empty() { String::new() } else { format!("; not read: {}", other.join(", ")) };
         format!("line {} names the columns; the rows are placed by {clock}{units}{other}", line(header))
     }
 
@@ -186,7 +189,8 @@ impl TableColumns {
             }
         }
         let fit = median_step_s(&times).and_then(|step_s| number_frames(&times, step_s));
-        let Some(fit) = fit.filter(|fit| !fit.is_on_grid() || fit.frames.last() != Some(&(times.len() - 1))) else {
+        let Some(fit) = fit.filter(|fit| !fit.is_on_grid() || fit.frames.last() != Some(&(times.len() - 1)))
+        else {
             return Ok(None);
         };
         let (number, name) = (column + 1, self.name(table, column));

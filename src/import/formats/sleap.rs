@@ -1,4 +1,5 @@
-//! SLEAP: the analysis CSV, and the tables of sleap-io with one row per point, per instance or per frame.
+//! Reads tables of SLEAP: the analysis CSV, and the tables of sleap-io with one row per point, per instance
+//! or per frame.
 
 use crate::import::error::{ImportError, ImportResult, TextLocation};
 use crate::import::format::FileFormat;
@@ -9,7 +10,8 @@ use crate::import::reader::{
     TextRow, Track, TrackCollector, TrackFile,
 };
 
-/// Separates the names of track and node in the key of a row with one point; no name contains it.
+/// Character between the names of track and node in the key of a row, if every row is one point. No name
+/// contains this character.
 const SEPARATOR: char = '\u{1f}';
 const TRACK_FIRST: &str = "give every instance a track of its own in SLEAP (run the inference with a \
     tracker, or at most one instance), and export again";
@@ -51,13 +53,14 @@ impl FileFormat for Sleap {
             collector.finish(document.file, RowOrder::Any).map_err(duplicate_instance_error)?;
         match (columns.node, columns.slots.as_slice(), tracks.as_mut_slice()) {
             (Some(_), ..) => name_by_node(&mut tracks),
-            // (a single node of a single instance gives its name to the track)
+            // (if there is one instance with one node, the track gets the name of the node)
             (None, [InstanceColumns { nodes, .. }], [track]) if nodes.len() == 1 => {
                 track.name.clone_from(&nodes[0].name)
             }
             _ => {}
         }
-        // (a table of labels has the same columns as a table of predictions)
+        // (a table of labels has the same columns as a table of predictions, so its frame numbers are
+        // checked)
         let longest = clocks.iter().max_by_key(|clock| clock.len());
         let finding = longest.and_then(|clock| picked_frames_finding(document.file, clock));
         Ok(TrackFile {
@@ -76,7 +79,7 @@ fn facts() -> Facts {
     Facts::pixels_down("SLEAP writes image pixels, y downwards")
 }
 
-/// Reads one instance of a row. An instance with neither a track nor a position is skipped.
+/// Reads the positions of one instance in a row. An instance with neither a track nor a position is skipped.
 fn read_instance(
     table: &DelimitedTable,
     record: &RowView,
@@ -118,8 +121,8 @@ fn read_instance(
     Ok(())
 }
 
-/// Names the tracks of a table with one row per point: by their node, by their instance if it has only one
-/// node, or by both.
+/// Names the tracks of a table with one row per point. A track is named after its node if there is only one
+/// instance, after its instance if there is only one node, otherwise after both.
 fn name_by_node(tracks: &mut [Track]) {
     let parts = tracks.iter().filter_map(|track| track.name.split_once(SEPARATOR));
     let parts: Vec<(String, String)> = parts.map(|(a, b)| (a.to_owned(), b.to_owned())).collect();
@@ -134,8 +137,8 @@ fn name_by_node(tracks: &mut [Track]) {
     }
 }
 
-/// Explains that one frame contains two instances with the same track or with none, which cannot be
-/// distinguished.
+/// Replaces the error for a repeated frame by an error that says that the frame contains two instances with
+/// the same track or without a track, which cannot be distinguished.
 fn duplicate_instance_error(error: ImportError) -> ImportError {
     let ImportError::DuplicateRow { place, found, track, first, .. } = error else { return error };
     let name = track.trim_matches(SEPARATOR).replace(SEPARATOR, ":");
@@ -151,17 +154,18 @@ fn untracked_error(place: TextLocation, found: &str) -> ImportError {
     ImportError::wrong_table(place, found, "one instance of a track in a frame", TRACK_FIRST)
 }
 
-/// Column of the frame numbers, counted from 0.
+/// Name of the column of frame numbers, which count from 0.
 pub(crate) const FRAME: &str = "frame_idx";
 const TRACK: &str = "track";
 const NODE: &str = "node";
-/// Columns that name the video.
+/// Names of columns that identify the video.
 const VIDEO: [&str; 3] = ["video_path", "video_idx", "video"];
-/// Prefix of the names of instances that are numbered anew in each frame.
+/// Beginning of the names of instances that are numbered anew in each frame, so that a name does not identify
+/// a track.
 const NUMBERED: &str = "inst";
 const ADVICE: &str = "export again with File > Export Analysis CSV, or `sio export FILE.slp -o FILE.csv`";
 
-/// Columns of a node.
+/// Name of a node (a tracked point of the skeleton), and indices of its columns.
 pub(crate) struct NodeCells {
     pub name: String,
     pub x: usize,
@@ -169,25 +173,25 @@ pub(crate) struct NodeCells {
     pub score: Option<usize>,
 }
 
-/// Source of the track of an instance.
+/// Where the name of the track of an instance is found.
 pub(crate) enum TrackSource {
-    /// A cell of the row.
+    /// The cell with this index in each row contains the name.
     Cell(usize),
-    /// The name of the instance in the names of its columns.
+    /// The column names contain the name of the instance, which is this text.
     Name(String),
     Nobody,
 }
 
-/// Columns of an instance.
+/// Columns of an instance (one tracked animal or object).
 pub(crate) struct InstanceColumns {
     pub whose: TrackSource,
     pub nodes: Vec<NodeCells>,
 }
 
-/// Columns of a table.
+/// Indices of the columns of a table of SLEAP.
 pub(crate) struct SleapColumns {
     pub frame: usize,
-    /// Column that names the node, if every row is a point.
+    /// Index of the column that names the node, if every row is a point; otherwise `None`.
     pub node: Option<usize>,
     pub slots: Vec<InstanceColumns>,
     video: Option<usize>,
@@ -243,7 +247,8 @@ impl SleapColumns {
         InstanceFields { has_frame: true, has_time: false, clock_cell: self.frame, points }
     }
 
-    /// Refuses a row with a wrong number of cells, or of another video than the rows before (`video`).
+    /// Refuses a row with a wrong number of cells, or with another video than the rows before it. `video` is
+    /// the video of the first row; that row sets it.
     pub(crate) fn check_row(
         &self,
         table: &DelimitedTable,
@@ -267,10 +272,10 @@ impl SleapColumns {
     }
 }
 
-/// The nodes, each with the columns `NAME.x`, `NAME.y` and perhaps `NAME.score`.
+/// Finds the nodes in the column names. A node has the columns `NAME.x`, `NAME.y` and perhaps `NAME.score`.
 ///
 /// # Errors
-/// Name of a node without y.
+/// The name of the first node that has no column for y.
 fn find_nodes(names: &[&str]) -> Result<Vec<NodeCells>, String> {
     let at = |name: String| names.iter().position(|known| *known == name);
     let node = |(x, name): (usize, &str)| {
@@ -281,7 +286,8 @@ fn find_nodes(names: &[&str]) -> Result<Vec<NodeCells>, String> {
     columns.map(node).collect()
 }
 
-/// Groups the nodes of a table with one row per frame by instance: their columns are `INSTANCE.NODE.x`.
+/// Groups the nodes of a table with one row per frame by their instance. The column names have the form
+/// `INSTANCE.NODE.x`.
 fn find_instances(nodes: Vec<NodeCells>, at: impl Fn(&str) -> Option<usize>) -> Vec<InstanceColumns> {
     let mut slots: Vec<(String, InstanceColumns)> = vec![];
     for mut node in nodes {

@@ -1,4 +1,4 @@
-//! Tracker (Open Source Physics): tables from File > Export > Data or copied from the data view.
+//! Reads tables of Tracker (Open Source Physics), from File > Export > Data or copied from its data view.
 
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::format::FileFormat;
@@ -8,7 +8,7 @@ use crate::import::reader::{
     DelimitedTable, Document, Facts, PointCells, TableLayout, TextRow, TrackFile, layout,
 };
 
-/// Number of rows at the top in which the column names are sought.
+/// Number of rows at the top of a table that are searched for the column names.
 const HEADER_ROWS: usize = 6;
 /// Columns of positions in world coordinates, with y upwards unless the axes were turned.
 const WORLD: [&str; 2] = ["x", "y"];
@@ -56,8 +56,8 @@ impl FileFormat for TrackerFormat {
         }
         let notes = name_unnamed_points(&mut points, document.stem);
         let at = |name: &str| columns.iter().position(|column| *column == name);
-        // (speeds after the positions are blank at the ends of a track, and some editors remove trailing
-        // blanks)
+        // (a row may end after the positions: speeds in later columns are blank at the ends of a track, and
+        // some editors remove trailing blanks)
         let layout = |time: Option<usize>, frame: Option<usize>, points: Vec<PointCells>| {
             let cells = points.iter().flat_map(|point| point.x.iter().chain(&point.y).copied());
             let width = cells.chain(time).chain(frame).max().map_or(0, |last| last + 1);
@@ -77,8 +77,8 @@ impl FileFormat for TrackerFormat {
     }
 }
 
-/// Facts about image pixels or world coordinates. The unit and the axes of world coordinates are those of the
-/// user's calibration, which the export does not name.
+/// Facts about the coordinates, which are image pixels or world coordinates. Unit and axes of world
+/// coordinates come from the user's calibration, which the export does not contain.
 fn facts(pair: [&str; 2]) -> Facts {
     if pair == WORLD {
         let open = "Tracker's x and y point up unless its axes were turned; image pixels point down";
@@ -115,12 +115,14 @@ fn no_header_error(table: &DelimitedTable) -> ImportError {
     ImportError::columns(table.file, table.first_line(), problem, advice)
 }
 
-/// Index and text of the title of a column: the one above it, or else the nearest one to its left.
+/// Index and text of the title of a column: the title directly above the column, or else the nearest title to
+/// the left.
 fn find_title<'t>(titles: &[&'t str], column: usize) -> Option<(usize, &'t str)> {
     titles.iter().take(column + 1).rposition(|title| !title.is_empty()).map(|at| (at, titles[at]))
 }
 
-/// The points: each x with the y under the same title, or without titles with the next y before another x.
+/// Finds the points of a table. An x column belongs to the y column under the same title. Without titles, it
+/// belongs to the next y column before another x column.
 fn find_points(columns: &[&str], titles: &[&str], [x_name, y_name]: [&str; 2]) -> Vec<PointCells> {
     let title_of = |column: usize| find_title(titles, column);
     let (mut points, mut seen) = (vec![], vec![]);
@@ -128,7 +130,7 @@ fn find_points(columns: &[&str], titles: &[&str], [x_name, y_name]: [&str; 2]) -
         let title = title_of(x);
         if let Some((at, _)) = title {
             if seen.contains(&at) {
-                continue; // (a second x under the same title is the user's own column)
+                continue; // (the user has added a second x under the same title)
             }
             seen.push(at);
         }
@@ -140,8 +142,8 @@ fn find_points(columns: &[&str], titles: &[&str], [x_name, y_name]: [&str; 2]) -
     points
 }
 
-/// Names the points that have no title: a single point after its file, several points by numbers. Returns a
-/// note on each name.
+/// Names the points that have no title: a single point after its file, several points `track1`, `track2`, ...
+/// Returns a note on each name.
 fn name_unnamed_points(points: &mut [PointCells], stem: &str) -> Vec<String> {
     let several = points.len() > 1;
     let unnamed = points.iter_mut().enumerate().filter(|(_, point)| point.name.is_empty());
@@ -167,9 +169,9 @@ fn no_positions_error(table: &DelimitedTable, row: &TextRow, columns: &[&str]) -
     ImportError::columns(table.file, row.line, problem, advice)
 }
 
-// Tables of several tracks side by side, each with its own clock.
+// Tables with several tracks side by side, each with its own clock.
 
-/// Columns of one clock, and the points that it times.
+/// Columns of one clock, and the points whose rows have this clock.
 struct ClockGroup {
     pub time: Option<usize>,
     pub frame: Option<usize>,
@@ -180,7 +182,8 @@ fn find_columns(columns: &[&str], name: &str) -> Vec<usize> {
     columns.iter().enumerate().filter(|(_, column)| **column == name).map(|(at, _)| at).collect()
 }
 
-/// Whether all columns of times are equal in every row, and all columns of frame numbers too.
+/// Whether all columns of times are equal in every row within their rounding, and all columns of frame
+/// numbers too.
 fn clocks_agree(table: &DelimitedTable, start: usize, columns: &[&str]) -> ImportResult<bool> {
     for clocks in [find_columns(columns, TIME), find_columns(columns, FRAME)] {
         let [first, others @ ..] = clocks.as_slice() else { continue };
@@ -221,7 +224,7 @@ fn group_by_clock(
     Ok(groups)
 }
 
-/// The clock under the same title as column `x`, or else the nearest clock to its left.
+/// Column of the clock under the same title as column `x`, or else of the nearest clock to the left of `x`.
 fn clock_of_column(clocks: &[usize], titles: &[&str], x: usize) -> Option<usize> {
     let title = find_title(titles, x).map(|(at, _)| at);
     let under = |clock: &&usize| title.is_some() && find_title(titles, **clock).map(|(at, _)| at) == title;

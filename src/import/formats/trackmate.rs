@@ -1,4 +1,5 @@
-//! TrackMate (Fiji): tables of spots as CSV, simple tracks as XML, and whole projects.
+//! Reads the exports of TrackMate, a plugin of Fiji: tables of spots as CSV, simple tracks as XML, and whole
+//! projects.
 
 mod project;
 mod spots;
@@ -39,13 +40,14 @@ impl FileFormat for TrackMate {
     }
 }
 
-/// Name of the root element, if it is one of TrackMate's.
+/// Name of the XML root element, if it is one that TrackMate writes.
 fn root_element(document: &Document) -> Option<&'static str> {
     let element = XmlReader::root_name(document)?;
     [SIMPLE_ROOT, project::PROJECT_ROOT].into_iter().find(|known| element == *known)
 }
 
-// Simple tracks: `<Tracks><particle><detection t x y z/>`, where `t` counts frames.
+// Simple tracks as XML: `<Tracks><particle><detection t x y z/>`, where the attribute `t` is the frame
+// number.
 
 pub(crate) const SIMPLE_ROOT: &str = "Tracks";
 const SIMPLE_TRACK: &str = "particle";
@@ -92,13 +94,13 @@ fn read_simple_spot(xml: &XmlReader, element: &XmlElement, interval: Option<f64>
     Ok(Spot { line: element.line, frame, time, x, y })
 }
 
-// Sorting of the spots into tracks.
+// Conversion of the spots to clocks and tracks.
 
 /// Advice on the exports that contain positions.
 pub(crate) const EXPORT_ADVICE: &str = "in TrackMate's display panel press Tracks, choose the tab Spots and then \
     Export to CSV; or run the action Export tracks to XML file";
 
-/// A position in one frame.
+/// Position of a tracked object in one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Spot {
     pub line: usize,
@@ -109,17 +111,17 @@ pub(crate) struct Spot {
     pub y: Option<f64>,
 }
 
-/// A track; its spots may be in any order.
+/// A track as TrackMate stores it; its spots may be in any order.
 pub(crate) struct Trajectory {
     pub name: String,
     pub spots: Vec<Spot>,
 }
 
-/// Contents of a file of TrackMate.
+/// Contents of a file of TrackMate, before they are converted to clocks and tracks.
 #[derive(Default)]
 pub(crate) struct TrackMateFile<'a> {
     pub trajectories: Vec<Trajectory>,
-    /// Unit of the coordinates, and text on where it was found.
+    /// Unit of the coordinates as the file writes it, and a text on where it was found.
     pub space_unit: Option<(String, String)>,
     pub time_unit: Option<String>,
     pub table: Option<&'a DelimitedTable<'a>>,
@@ -128,19 +130,19 @@ pub(crate) struct TrackMateFile<'a> {
     pub notes: Vec<String>,
 }
 
-/// How the times of a file are used.
+/// How the times of a file are used, with a note and a finding for the report.
 struct SpotTimes {
-    /// Unit of the times; `None` if the file has no times or they only repeat the frame numbers.
+    /// Unit of the times; `None` if the file has no times, or if the times only repeat the frame numbers.
     unit: Option<TimeUnit>,
     note: Option<String>,
     finding: Option<QualityFinding>,
 }
 
 impl<'a> TrackMateFile<'a> {
-    /// Sorts the spots into clocks and tracks.
+    /// Converts every track to a clock and a track with positions; tracks that split or merge are left out.
     ///
     /// # Errors
-    /// [`ImportError::DuplicateRow`] if a requested track has two spots in one frame,
+    /// [`ImportError::DuplicateRow`] if a track that the user chooses has two spots in one frame;
     /// [`ImportError::WrongTable`] if there are no tracks.
     pub(crate) fn into_track_file(
         mut self,
@@ -175,7 +177,7 @@ impl<'a> TrackMateFile<'a> {
         Ok(TrackFile { table: self.table, clocks, tracks, ..file })
     }
 
-    /// Leaves out tracks that split or merge, because they have several positions in a frame.
+    /// Leaves out tracks that split or merge, because they have several positions in one frame.
     fn leave_out_branching(
         &mut self,
         document: &Document,
@@ -207,7 +209,7 @@ impl<'a> TrackMateFile<'a> {
         Ok((count > 0).then(|| new_finding(Check::BranchingTracks, Severity::Caution, value, found, advice)))
     }
 
-    /// Decides whether the times add information to the frame numbers.
+    /// Decides whether the times are used: not if they only repeat the frame numbers.
     fn spot_times(&self, file: &str) -> SpotTimes {
         let mut spots = self.trajectories.iter().flat_map(|track| &track.spots);
         let none = SpotTimes { unit: None, note: None, finding: None };
@@ -244,7 +246,8 @@ impl<'a> TrackMateFile<'a> {
 }
 
 impl Trajectory {
-    /// Error for two spots in one frame, if there are any.
+    /// Error for the first two spots of the track in one frame; `None` if every frame has one spot. The spots
+    /// must be sorted by frame.
     fn duplicate_spot_error(&self, file: &str) -> Option<ImportError> {
         let same = |pair: &&[Spot]| pair[0].frame.is_some() && pair[0].frame == pair[1].frame;
         let pair = self.spots.windows(2).find(same)?;
@@ -263,7 +266,8 @@ impl Trajectory {
     }
 }
 
-/// Whether `--point` names the track, or, without any `--point`, the track is called tip or head.
+/// Whether the user chooses this track: `--point` names it, or no `--point` is given and it is called `tip`
+/// or `head`.
 fn is_requested(options: &ImportOptions, name: &str) -> bool {
     let named = [options.tip.as_deref(), options.head.as_deref()];
     if named.iter().all(Option::is_none) {
@@ -282,7 +286,7 @@ fn no_tracks_error(document: &Document) -> ImportError {
     )
 }
 
-/// Length of a unit of time, s, by its name.
+/// Length of a unit of time, s; `unit` is its name in lower case.
 fn unit_seconds(unit: &str) -> Option<f64> {
     match unit {
         "s" | "sec" | "secs" | "second" | "seconds" => Some(1.0),
@@ -294,10 +298,10 @@ fn unit_seconds(unit: &str) -> Option<f64> {
     }
 }
 
-/// The unit of length that the file names; an unknown unit gives a note.
+/// The unit with the name `text`, and a text on where it was found. An unknown unit gives `None` and a note.
 fn length_unit(text: &str, place: &str, notes: &mut Vec<String>) -> Option<(CoordinateUnit, String)> {
     let name = text.trim().trim_matches(['(', ')']).trim();
-    // (micrometres are the only unit with a sign outside ASCII, which a wrong encoding damages)
+    // (a unit with a damaged character is the micrometre: only its micro sign is outside ASCII)
     let sign = name.strip_suffix('m').unwrap_or_default();
     let lost = !sign.is_empty() && sign.chars().all(|c| c == '?' || !c.is_ascii());
     let unit = match name {

@@ -1,5 +1,5 @@
-//! trackpy: its table of linked features, saved with `to_csv`. The column y precedes x, and an index column
-//! without a name may precede both.
+//! Reads trackpy's table of linked features, saved with `to_csv`. The column y comes before x, and an index
+//! column without a name may come before both.
 
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::format::FileFormat;
@@ -10,17 +10,18 @@ use crate::import::reader::{
 
 const PARTICLE: &str = "particle";
 const FRAME: &str = "frame";
-/// Properties of a feature, by their names in trackpy.
+/// Columns with properties of a feature, by their names in trackpy.
 const FEATURE_PROPERTIES: [&str; 6] = ["mass", "ecc", "signal", "raw_mass", "ep", "size"];
-/// Minimum number of these names that identifies a table without particles as trackpy's.
+/// A table without the column `particle` is trackpy's if it has at least this number of the columns in
+/// [`FEATURE_PROPERTIES`].
 const MIN_FEATURE_PROPERTIES: usize = 3;
 
-/// Number of rows at the top in which the column names are sought; a user may have added lines above them.
+/// Number of rows at the top that are searched for the column names; a user may have added lines above them.
 const HEADER_ROWS: usize = 3;
 
 pub(crate) struct Trackpy;
 
-/// Whether a row is the header of a table of features, linked or not.
+/// Whether a row is the header of trackpy's table of features, linked to particles or not.
 fn is_feature_header(names: &[&str]) -> bool {
     let at = |name: &str| names.iter().position(|known| *known == name);
     let (Some(x), Some(y), Some(_)) = (at("x"), at("y"), at(FRAME)) else { return false };
@@ -66,7 +67,7 @@ impl FileFormat for Trackpy {
         if export.tracks.is_empty() {
             return Err(unlinked_error(table, row.line));
         }
-        // (pandas writes the numbers of particles as `0.0` if any of them is missing)
+        // (pandas writes the number of a particle as `0.0` if the column has a missing value in any row)
         for track in &mut export.tracks {
             if let Some(whole) = track.name.strip_suffix(".0") {
                 track.name = whole.to_owned();
@@ -84,11 +85,11 @@ fn no_column_error(table: &DelimitedTable, row: Option<&TextRow>, advice: &str) 
     ImportError::columns(table.file, row.map_or(1, |row| row.line), problem, advice)
 }
 
-/// Index of the column of frame numbers. The table has two such columns if the frame number is also its
-/// index.
+/// Index of the column of frame numbers. The table has two such columns if the frame number is also the index
+/// of the rows.
 ///
 /// # Errors
-/// [`ImportError::Unusable`] if two such columns differ in a row.
+/// [`ImportError::Unusable`] if the two columns differ in a row.
 fn find_frame_column(table: &DelimitedTable, header: usize, names: &TextRow) -> ImportResult<Option<usize>> {
     let mut at = names.cells.iter().enumerate().filter(|(_, cell)| *cell == FRAME).map(|(index, _)| index);
     let Some(first) = at.next() else { return Ok(None) };
@@ -106,7 +107,7 @@ fn find_frame_column(table: &DelimitedTable, header: usize, names: &TextRow) -> 
     Ok(Some(first))
 }
 
-/// Line number of the first row in which two cells differ.
+/// Line number of the first row in which the cells of two columns differ.
 fn first_difference(table: &DelimitedTable, start: usize, cells: [usize; 2]) -> ImportResult<Option<usize>> {
     let mut rows = table.rows(start);
     while let Some(record) = rows.next_row()? {

@@ -1,5 +1,5 @@
-//! TRC, the table of markers of motion-capture programs: lines of settings, then the names of the markers,
-//! each above three columns.
+//! Reads TRC files, the tables of markers of motion-capture programs. They have lines of settings, and then
+//! the names of the markers, each above three columns.
 
 use crate::import::error::{ImportError, ImportResult, TextLocation};
 use crate::import::format::FileFormat;
@@ -13,11 +13,11 @@ use crate::recording::quality::{Check, QualityFinding, Severity};
 
 /// First word of the file.
 const MAGIC: &str = "PathFileType";
-/// Number of columns of the clock: frame number and time, s.
+/// Number of columns for frame number and time, s; they are the first columns.
 const CLOCK_CELLS: usize = 2;
 /// Number of columns of a marker: X, Y and Z.
 const AXES: usize = 3;
-/// Names of units in full, with their symbols.
+/// Names of units of length in full, with their symbols.
 const LONG_UNITS: [(&str, &str); 4] =
     [("millimeters", "mm"), ("centimeters", "cm"), ("meters", "m"), ("metres", "m")];
 
@@ -52,12 +52,12 @@ impl FileFormat for Trc {
     }
 }
 
-/// The settings in lines 2 and 3: names and values.
+/// The settings of a TRC file: line 2 contains their names, line 3 their values.
 struct TrcSettings<'t> {
     table: &'t DelimitedTable<'t>,
     names: &'t TextRow,
     values: &'t TextRow,
-    /// Index of the row with the names of the markers in the head of the table.
+    /// Index in `DelimitedTable::head` of the row with the names of the markers.
     markers: usize,
 }
 
@@ -72,7 +72,7 @@ impl<'t> TrcSettings<'t> {
         Ok(Self { table, names, values, markers })
     }
 
-    /// Text and place of a setting.
+    /// Text and place of the setting `name`; `None` if it is missing or empty.
     fn setting(&self, name: &str) -> Option<(&'t str, TextLocation)> {
         let at = self.names.position(name)?;
         let text = self.values.cells.get(at).filter(|text| !text.is_empty())?;
@@ -92,7 +92,7 @@ impl<'t> TrcSettings<'t> {
         Err(settings_error(place, &found, "a number above 0"))
     }
 
-    /// Index of the first row of data, and the columns of every marker.
+    /// Index of the first row of data, and the columns of x and y of every marker.
     fn marker_columns(&self, table: &DelimitedTable) -> ImportResult<(usize, Vec<PointCells>)> {
         let row = table.head.get(self.markers);
         let line = row.map_or(self.values.line, |row| row.line);
@@ -127,13 +127,14 @@ impl<'t> TrcSettings<'t> {
             Some((CoordinateUnit::parse(short)?, format!("{place} says Units {text}")))
         });
         let camera = self.positive_setting("CameraRate").or_else(|_| self.positive_setting("DataRate")).ok();
-        // (the rate of the rows is used; it differs from the camera's if they were resampled)
+        // (the rate of the rows, DataRate, is used; it differs from the camera's rate if the rows were
+        // resampled)
         let rows = self.positive_setting("DataRate").ok();
         let frame_rate_hz = rows.or(camera).map(|(rate, place)| (rate, format!("the settings in {place}")));
         Facts { unit, frame_rate_hz, time: TimeUnit::Seconds(1.0), ..Facts::default() }
     }
 
-    /// Refuses a file whose settings contradict its rows.
+    /// Refuses a file whose settings (number of frames, rate) contradict its rows.
     fn check_rows(&self, export: &TrackFile) -> ImportResult<()> {
         let Some(clock) = export.clocks.first() else { return Ok(()) };
         let (frames, place) = self.positive_setting("NumFrames")?;
@@ -155,7 +156,7 @@ impl<'t> TrcSettings<'t> {
         }
     }
 
-    /// Finding about rows at another rate than the camera's.
+    /// Finding about rows whose rate differs from the camera's rate, because they were resampled.
     fn resampling_finding(&self) -> Option<QualityFinding> {
         let (camera_hz, place) = self.positive_setting("CameraRate").ok()?;
         let (rate_hz, _) = self.positive_setting("DataRate").ok()?;

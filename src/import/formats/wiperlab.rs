@@ -1,4 +1,5 @@
-//! This program's own `trace.csv`: metres, seconds, y upwards. The numbers are read back bit for bit.
+//! Reads this program's own `trace.csv`, in metres and seconds with y upwards. Every number is read back
+//! exactly as it was written (bit for bit).
 
 use crate::import::error::ImportResult;
 use crate::import::format::FileFormat;

@@ -1,5 +1,6 @@
-//! Frame rate, scale, direction of y and unit of the times. They come from the user, the file or the
-//! documentation of its format; an import that lacks one is refused and asks for it.
+//! Determines frame rate, scale, direction of y and unit of the times. They come from the user, the file or
+//! the documentation of its format. If one of them is unknown, the import is refused, and the error asks the
+//! user for it.
 
 use super::column::{CoordinateUnit, TimeUnit};
 use super::rate::{FrameRate, RATE_AGREEMENT, format_rate, implied_rate};
@@ -12,13 +13,13 @@ use crate::import::source::ImportReport;
 use crate::recording::files::YAxis;
 use crate::recording::quality::QualityFinding;
 
-/// Times that imply a frame rate up to this value, 1/s, look like frame numbers: no camera that films a wiper
-/// is so slow.
+/// If the times imply a frame rate of at most this value, 1/s, they look like frame numbers: no camera that
+/// films a wiper is so slow.
 const SLOWEST_HZ: f64 = 1.0;
 /// A millisecond, s.
 const MILLISECOND_S: f64 = 1e-3;
 
-/// Explains what the direction of y depends on, if the format has no explanation of its own.
+/// Text on what the direction of y depends on; used if the format has no such text of its own.
 const Y_AXIS_OPEN: &str = "world coordinates point up unless their axes were turned; image pixels point down";
 
 /// Facts that every import needs.
@@ -30,7 +31,7 @@ pub(crate) struct ImportCalibration {
     /// Scales of x and y of the tip, and of x and y of the head.
     pub scales: [[CoordinateScale; 2]; 2],
     pub y_axis: YAxis,
-    /// Exposure time of a frame, s.
+    /// Exposure time of a frame, s; `None` if unknown.
     pub exposure_s: Option<f64>,
 }
 
@@ -150,7 +151,7 @@ fn convert_times(export: &mut TrackFile, options: &ImportOptions) -> ImportResul
             return Ok(numbered);
         }
     };
-    // (a double cannot hold 1e-3 exactly: multiplying by it rounds twice, dividing by 1000 rounds once)
+    // (1e-3 is not exact in binary: multiplying by it rounds twice, dividing by 1000 rounds only once)
     let divide = if factor < 1.0 { (1.0 / factor).round() } else { 1.0 };
     for clock in &mut export.clocks {
         clock.digit *= factor;
@@ -188,9 +189,13 @@ fn frame_rate(
     if !matches!(options.time, Some(TimeColumn::Real | TimeColumn::Milliseconds)) {
         return Ok(None);
     }
-    report.findings.extend(implied.filter(|rate| rate.hz <= SLOWEST_HZ).map(findings::counted_frames_finding));
+    report
+        .findings
+        .extend(implied.filter(|rate| rate.hz <= SLOWEST_HZ).map(findings::counted_frames_finding));
     let source = "from the times, which --time declares to be the recording's own";
-    report.notes.extend(implied.map(|rate| format!("recording rate {} frames/s: {source}", format_rate(rate.hz))));
+    report
+        .notes
+        .extend(implied.map(|rate| format!("recording rate {} frames/s: {source}", format_rate(rate.hz))));
     Ok(implied.cloned())
 }
 
@@ -203,8 +208,8 @@ fn compare_rates(used: &FrameRate, mut times: FrameRate, options: &ImportOptions
     findings::rate_difference(used, &times)
 }
 
-/// The declared exposure time, or else that of the first camera's record. Refuses a record with another
-/// exposure time.
+/// Exposure time, s: the one that the user declares, or else the one in the first camera's record. A record
+/// with another exposure time is refused.
 fn exposure_s(
     exports: &[TrackFile],
     options: &ImportOptions,
@@ -235,7 +240,10 @@ fn coordinate_scales(
     options: &ImportOptions,
     report: &mut ImportReport,
 ) -> ImportResult<Option<[[CoordinateScale; 2]; 2]>> {
-    let all = exports.iter().enumerate().flat_map(|(file, export)| (0..export.tracks.len()).map(move |at| (file, at)));
+    let all = exports
+        .iter()
+        .enumerate()
+        .flat_map(|(file, export)| (0..export.tracks.len()).map(move |at| (file, at)));
     let chosen = chosen.as_ref().map_or_else(|_| all.map(Some).collect(), |chosen| chosen.to_vec());
     // (a column whose header has no unit takes that of the other coordinate of its point)
     let stated = |(file, track): TrackIndex| {
@@ -280,13 +288,16 @@ fn coordinate_scales(
         Some((CoordinateUnit::Metres(metres), _)) => Some(CoordinateScale::Unit(*metres)),
         _ => options.scale,
     };
-    let scales: Vec<[Option<CoordinateScale>; 2]> = units.iter().map(|unit| [scale_of(&unit[0]), scale_of(&unit[1])]).collect();
+    let scales: Vec<[Option<CoordinateScale>; 2]> =
+        units.iter().map(|unit| [scale_of(&unit[0]), scale_of(&unit[1])]).collect();
     let of_tracks = |point: usize| chosen.get(point).is_some_and(Option::is_some);
     if (0..scales.len()).any(|point| of_tracks(point) && scales[point].contains(&None)) {
         return Ok(None);
     }
     let any = scales.as_flattened().iter().flatten().next().copied().unwrap_or(CoordinateScale::Unit(1.0));
-    Ok(Some([0, 1].map(|point| scales.get(point).map_or([any; 2], |pair| pair.map(|scale| scale.unwrap_or(any))))))
+    Ok(Some(
+        [0, 1].map(|point| scales.get(point).map_or([any; 2], |pair| pair.map(|scale| scale.unwrap_or(any)))),
+    ))
 }
 
 fn y_direction(exports: &[TrackFile], options: &ImportOptions, report: &mut ImportReport) -> Option<YAxis> {

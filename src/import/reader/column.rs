@@ -2,7 +2,7 @@
 
 use crate::import::options::CoordinateScale;
 
-/// Names of columns of frame numbers, in lower case and without separators.
+/// Names of columns of frame numbers, in lower case and without separators; the last three are Japanese.
 const FRAMES: [&str; 16] = [
     "frame",
     "frames",
@@ -21,20 +21,21 @@ const FRAMES: [&str; 16] = [
     "\u{30d5}\u{30ec}\u{30fc}\u{30e0}\u{756a}\u{53f7}", // furemu bango: frame number
     "\u{30b3}\u{30de}",                                 // koma: picture of a film
 ];
-/// Names of columns of times, with the unit that a name implies.
+/// Names of columns of times, in lower case and without separators, with the unit that a name implies (`None`
+/// if it implies none).
 const TIMES: [(&[&str], Option<TimeUnit>); 4] = [
-    // (the last name is jikan: time)
+    // (the last name is Japanese jikan: time)
     (&["t", "time", "zeit", "temps", "tempo", "tiempo", "\u{6642}\u{9593}"], None),
-    // (seconds or milliseconds, possibly since 1970)
+    // (a timestamp may be in seconds or milliseconds, and may count from 1970)
     (&["timestamp"], Some(TimeUnit::Unknown)),
     (&["seconds", "second", "sec", "timesec"], Some(TimeUnit::Seconds(1.0))),
     (&["milliseconds", "millisecond", "msec", "ms", "timems", "timemsec"], Some(TimeUnit::Seconds(1e-3))),
 ];
-/// Names of columns that identify the object of a row.
+/// Names of columns that name the object to which a row belongs, in lower case and without separators.
 const KEYS: [&str; 10] =
     ["id", "track", "trackid", "objectid", "object", "particle", "marker", "point", "label", "name"];
 const CONFIDENCES: [&str; 4] = ["confidence", "likelihood", "score", "conf"];
-/// Parts of names that mark speeds, forces and other vectors that are not positions.
+/// Parts of column names that mark speeds, forces and other quantities that are not positions.
 const NOT_POSITIONS: [&str; 18] = [
     "v",
     "vel",
@@ -55,7 +56,7 @@ const NOT_POSITIONS: [&str; 18] = [
     "err",
     "error",
 ];
-/// Separators between the parts of a name.
+/// Characters between the parts of a column name.
 const SEPARATORS: [char; 5] = ['_', '.', '-', ' ', ':'];
 
 #[derive(Debug, Clone, PartialEq)]
@@ -63,8 +64,8 @@ pub(crate) enum ColumnMeaning {
     Frame,
     Time(TimeUnit),
     Key,
-    /// A coordinate of a point (axis 0 is x, 1 is y). The name of the point is empty if the table has only
-    /// one.
+    /// A coordinate of a point; axis 0 is x, axis 1 is y. The name of the point is empty if the column is
+    /// called only `x` or `y`.
     Coordinate {
         point: String,
         axis: usize,
@@ -109,7 +110,8 @@ impl ColumnMeaning {
         }
     }
 
-    /// Takes a unit from the row below, if the name has none; returns whether the row gave a unit.
+    /// Takes the unit from `text`, the cell below the column name, if the name itself has no unit. Returns
+    /// whether a unit was taken.
     pub(crate) fn take_unit(&mut self, text: &str) -> bool {
         match self {
             Self::Coordinate { unit: unit @ None, .. } => {
@@ -125,7 +127,8 @@ impl ColumnMeaning {
     }
 }
 
-/// Splits a name with a unit after it: `x (mm)`, `x [mm]`, `tip_x_px`.
+/// Splits a column name such as `x (mm)`, `x [mm]` or `tip_x_px` into name and unit; the unit is `None` if
+/// there is none.
 fn split_unit(name: &str) -> (&str, Option<&str>) {
     let name = name.trim();
     for (open, close) in [('(', ')'), ('[', ']')] {
@@ -159,7 +162,8 @@ fn parse_clock(base: &str, unit: Option<&str>) -> Option<ColumnMeaning> {
     })
 }
 
-/// Point and axis of a name such as `tip_x`, `tip.x`, `x_tip`, `X tip` or `x`.
+/// Name of the point, and axis (0 is x, 1 is y), from a column name such as `tip_x`, `tip.x`, `x_tip`, `X
+/// tip` or `x`.
 fn parse_coordinate(base: &str) -> Option<(String, usize)> {
     let axis = |part: &str| ["x", "y"].iter().position(|axis| part.eq_ignore_ascii_case(axis));
     if let Some(axis) = axis(base) {
@@ -173,7 +177,8 @@ fn parse_coordinate(base: &str) -> Option<(String, usize)> {
     position.then(|| (point.to_owned(), axis))
 }
 
-/// Point and axis of a name without separators: `TipX`, a word in another script followed by `X`, or `x1`.
+/// Name of the point, and axis (0 is x, 1 is y), from a column name without separators: `TipX`, a word in
+/// another script followed by `X`, or `x1`.
 fn parse_joined_coordinate(base: &str) -> Option<(&str, usize)> {
     let is_number = |rest: &&str| !rest.is_empty() && rest.chars().all(|c| c.is_ascii_digit());
     if let Some(number) = base.strip_prefix(['x', 'X', 'y', 'Y']).filter(is_number) {
@@ -186,7 +191,7 @@ fn parse_joined_coordinate(base: &str) -> Option<(&str, usize)> {
     ends_word.then_some((point, axis))
 }
 
-/// Splits a name into its beginning and its last part.
+/// Splits a column name at its last separator.
 fn split_last_part(name: &str) -> Option<(&str, &str)> {
     name.rsplit_once(SEPARATORS).map(|(point, last)| (point.trim_end_matches(SEPARATORS), last))
 }
@@ -273,8 +278,8 @@ pub(crate) enum ColumnUnit {
 /// Symbols of units that measure neither a length nor a time, in lower case; every unit with a slash or a
 /// power is another one.
 const OTHER_UNITS: [&str; 20] = [
-    "deg", "degree", "degrees", "\u{b0}", "rad", "radians", "hz", "khz", "n", "mn", "kn", "v", "mv", "pa", "kpa",
-    "mpa", "g", "kg", "%", "c",
+    "deg", "degree", "degrees", "\u{b0}", "rad", "radians", "hz", "khz", "n", "mn", "kn", "v", "mv", "pa",
+    "kpa", "mpa", "g", "kg", "%", "c",
 ];
 
 impl ColumnUnit {

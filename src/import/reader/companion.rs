@@ -1,6 +1,6 @@
-//! Companion files of an export. The record of a Photron camera (`.cih`, `.cihx`) contains the recording
-//! rate, the step between saved frames and the exposure time; a record that contradicts the options or the
-//! table belongs to another video.
+//! Reads the companion files of an export. The record of a Photron camera (`.cih`, `.cihx`) is a file with
+//! the recording rate, the number of frames from one saved frame to the next, and the exposure time. A record
+//! that contradicts the options or the table belongs to another video.
 
 use super::rate::RATE_AGREEMENT;
 use crate::import::error::{ImportError, ImportResult};
@@ -10,7 +10,7 @@ use crate::import::reader::track_file::{Clock, Fact, TrackFile};
 use crate::import::source::{CompanionFile, ImportSource, base_name};
 use crate::recording::quality::{Check, QualityFinding, Severity};
 
-/// Names that companions of the export `file` may have in its folder, in the order in which they are read.
+/// Paths that companion files of the export `file` may have, in the order in which they are read.
 pub(crate) fn companion_names(file: &str) -> Vec<String> {
     let stem = file.rsplit_once('.').map_or(file, |(stem, _)| stem);
     let by_extension =
@@ -18,7 +18,8 @@ pub(crate) fn companion_names(file: &str) -> Vec<String> {
     by_extension.chain(point_names_file(file)).collect()
 }
 
-/// Name of DLTdv's list of point names, the companion of a sparse table.
+/// Path of the list of point names that DLTdv writes next to a sparse table, from the path of the table;
+/// `None` if the table's name does not have the form `...xypts.EXTENSION`.
 fn point_names_file(file: &str) -> Option<String> {
     let (folder, base) = file.split_at(file.len() - base_name(file).len());
     base.rsplit_once("xypts")
@@ -26,11 +27,12 @@ fn point_names_file(file: &str) -> Option<String> {
         .map(|(start, end)| format!("{folder}{start}pointNames{end}"))
 }
 
-/// Reads rate and exposure time from the camera's record of each file, if there is one.
+/// Reads frame rate and exposure time from the camera's record of each file, if there is one.
 ///
 /// # Errors
-/// [`ImportError::Format`] for a record that cannot be used or contradicts the options or the table. If the
-/// rate is declared, a record without a rate or with fewer frames than the table gives only a finding.
+/// [`ImportError::Format`] for a record that contradicts the options or the table, or whose settings cannot
+/// be used. If the user declares the frame rate, a record with unusable settings, or with fewer frames than
+/// the table has rows, gives only a finding.
 pub(crate) fn read_camera_records(
     sources: &[ImportSource],
     exports: &mut [TrackFile],
@@ -55,7 +57,7 @@ fn record_finding(severity: Severity, value: (f64, &str), found: String) -> Qual
     new_finding(Check::CameraRecord, severity, value, found, "--frame-rate-hz counts")
 }
 
-/// Settings in a camera's record; rate and exposure time have their line numbers.
+/// Settings in a camera's record. Rate and exposure time are stored with their line numbers in the record.
 struct CameraSettings {
     rate_hz: (f64, usize),
     step: SavedStep,
@@ -63,8 +65,8 @@ struct CameraSettings {
 }
 
 impl CameraSettings {
-    /// Reads the settings. A record with fewer frames than the table has rows belongs to another video and is
-    /// refused.
+    /// Reads the settings from a record. A record with fewer frames than the table has rows belongs to
+    /// another video and is refused.
     fn read(record: &CameraRecord, export: &TrackFile) -> ImportResult<Self> {
         let rows = export.clocks.iter().map(Clock::len).max().unwrap_or(0);
         if let Some(frames) = record.frame_count().filter(|frames| rows > *frames) {
@@ -77,8 +79,8 @@ impl CameraSettings {
     }
 }
 
-/// Stores the settings as facts of the export; refuses those that contradict the options, the table or
-/// another record.
+/// Stores the settings as facts of the export. Settings that contradict the options, the table or another
+/// record are refused.
 fn take_settings(
     record: &CameraRecord,
     settings: CameraSettings,
@@ -103,7 +105,8 @@ fn take_settings(
     Ok(())
 }
 
-/// Refuses a value that contradicts `known`, the value from another record or from the export itself.
+/// Refuses `value` if it contradicts `known`, the value of the same quantity from another record or from the
+/// export itself.
 fn check_agreement(
     record: &CameraRecord,
     known: &Fact<f64>,
@@ -123,8 +126,8 @@ fn is_near(one: f64, other: f64) -> bool {
     (one / other - 1.0).abs() <= RATE_AGREEMENT
 }
 
-/// Finding about a camera that saved only every n-th frame. The table may count the saved pictures or the
-/// camera's frames, so the user has to declare the rate.
+/// Finding about a camera that saved only every n-th frame. The frame numbers of the table may count the
+/// saved pictures or all frames of the camera, so the user has to declare the frame rate.
 fn saved_step_finding(
     record: &CameraRecord,
     export: &TrackFile,
@@ -151,17 +154,18 @@ fn saved_step_finding(
     Ok(record_finding(Severity::Note, (step.frames as f64, "frames"), found))
 }
 
-/// Whether the differences of a clock's frame numbers are multiples of `step`.
+/// Whether the frame number of a clock increases by a multiple of `step` from each row to the next.
 fn steps_by(clock: &Clock, step: usize) -> bool {
     let Some(frames) = &clock.frame else { return false };
     let numbers: Vec<f64> = frames.iter().flatten().collect();
     numbers.len() > 1 && numbers.windows(2).all(|pair| (pair[1] - pair[0]) % step as f64 == 0.0)
 }
 
-// The record of a Photron camera: `.cih` has lines `Key : value`, `.cihx` has XML between binary data.
+// The record of a Photron camera. A `.cih` file has lines `Key : value`; a `.cihx` file has XML between
+// binary data.
 
-/// An entry of a record: the beginning of its key in a `.cih` file, in lower case, and its element in a
-/// `.cihx` file.
+/// Names of an entry of a camera's record: the beginning of its key in a `.cih` file, in lower case, and its
+/// XML element in a `.cihx` file.
 #[derive(Clone, Copy)]
 struct CameraRecordKey {
     key: &'static str,
@@ -170,47 +174,49 @@ struct CameraRecordKey {
 
 const RATE: CameraRecordKey = CameraRecordKey { key: "record rate", element: "recordRate" };
 const FRAMES: CameraRecordKey = CameraRecordKey { key: "total frame", element: "totalFrame" };
-/// Entry with the number n, if every n-th frame of the recording was saved.
+/// Entry with the number n if only every n-th frame of the recording was saved.
 const STEP: CameraRecordKey = CameraRecordKey { key: "save step", element: "skipFrame" };
 const SHUTTER_NS: CameraRecordKey =
     CameraRecordKey { key: "shutter type2(nsec)", element: "shutterSpeedNsec" };
-/// Exposure time, s, as `1/10000` or `0.0001`; a `.cihx` file contains only the 10000.
+/// Entry with the exposure time in seconds, as `1/10000` or `0.0001`; a `.cihx` file contains only the
+/// denominator, `10000`.
 const SHUTTER: CameraRecordKey = CameraRecordKey { key: "shutter speed", element: "shutterSpeed" };
-/// Root element of a `.cihx` file.
+/// Opening tag of the root element in a `.cihx` file.
 const CIHX: &str = "<cih>";
-/// Maximum number of characters of a value in an error message.
+/// Maximum number of characters that an error message shows of a value.
 const LONGEST_SHOWN: usize = 40;
 
 const RECORD_ADVICE: &str = "give the rate at which the pictures that were tracked follow each other, --frame-rate-hz N, or \
     move the record to another folder if it belongs to another video";
 
 pub(crate) struct CameraRecord<'a> {
-    /// File as named by the user.
+    /// Path of the file as the user gave it.
     pub name: &'a str,
     text: String,
-    /// Number of lines of the file above the text.
+    /// Number of lines of the file before the text.
     skipped: usize,
 }
 
-/// A value with its line number, and its key or element as the file writes it.
+/// Value of an entry, with its line number and with its key or element name as written in the file.
 struct CameraRecordValue<'r> {
     text: &'r str,
     line: usize,
     key: &'r str,
 }
 
-/// Number of frames from one saved frame to the next, with its line number.
+/// Number of frames from one saved frame to the next, and the line of the record that states it.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SavedStep {
-    /// The step; 1 if every frame was saved.
+    /// The number of frames; 1 if every frame was saved.
     pub frames: usize,
     pub line: usize,
-    /// The entry as the file writes it.
+    /// Key and value of the entry as written in the file.
     pub written: String,
 }
 
 impl<'a> CameraRecord<'a> {
-    /// The record in a companion file, if the file has the extension of a record. Invalid bytes are replaced.
+    /// Reads the camera's record in a companion file; `None` if the file does not have the extension of a
+    /// record. Bytes that are not UTF-8 are replaced.
     pub(crate) fn parse(file: &'a CompanionFile) -> Option<Self> {
         let extension = file.name.rsplit_once('.').map(|(_, extension)| extension.to_lowercase())?;
         let text = String::from_utf8_lossy(&file.bytes);
@@ -223,8 +229,8 @@ impl<'a> CameraRecord<'a> {
         Some(Self { name: &file.name, text: text.to_owned(), skipped: before.matches('\n').count() })
     }
 
-    /// The values of an entry in the order of the file. In a record that was saved again, its own value comes
-    /// first.
+    /// All values of an entry, in the order of the file. In a record that was saved again, an entry may occur
+    /// several times; the first value is that of the saved video.
     fn values(&self, entry: CameraRecordKey) -> Vec<CameraRecordValue<'_>> {
         if self.text.starts_with(CIHX) { self.xml_values(entry.element) } else { self.text_values(entry.key) }
     }
@@ -250,7 +256,7 @@ impl<'a> CameraRecord<'a> {
         self.text.match_indices(&open).filter_map(element).collect()
     }
 
-    /// The rate at which the camera recorded, 1/s, with its line number.
+    /// The rate at which the camera recorded, 1/s, and its line number.
     pub(crate) fn rate_hz(&self) -> ImportResult<(f64, usize)> {
         let Some(value) = self.values(RATE).into_iter().next() else {
             return Err(self.refusal(1, "no recording rate".to_owned(), "the entry `Record Rate(fps)`"));
@@ -260,8 +266,8 @@ impl<'a> CameraRecord<'a> {
         rate.ok_or_else(|| self.refusal(value.line, found(), "a number above 0"))
     }
 
-    /// The step between saved frames. A `.cihx` file contains it in several places, of which the largest
-    /// counts.
+    /// Number of frames from one saved frame to the next. A `.cihx` file contains this number in several
+    /// places; the largest is used.
     pub(crate) fn saved_step(&self) -> ImportResult<SavedStep> {
         let mut values = self.values(STEP);
         if !self.text.starts_with(CIHX) {
@@ -287,11 +293,11 @@ impl<'a> CameraRecord<'a> {
         self.values(FRAMES).first()?.text.parse().ok()
     }
 
-    /// Exposure time of a frame, s, with its line number, for a camera that takes `rate_hz` frames per
-    /// second.
+    /// Exposure time of a frame, s, and its line number; `None` if the record has none. `rate_hz` is the
+    /// frame rate of the camera, 1/s.
     ///
     /// # Errors
-    /// [`ImportError::Format`] for an exposure longer than the time of a frame.
+    /// [`ImportError::Format`] if the exposure time is longer than the time of a frame, 1 / `rate_hz`.
     pub(crate) fn exposure_s(&self, rate_hz: f64) -> ImportResult<Option<(f64, usize)>> {
         let (nanoseconds, seconds) = (self.values(SHUTTER_NS), self.values(SHUTTER));
         let found = nanoseconds.first().and_then(|value| Some((parse_positive(value.text)? * 1e-9, value)));
@@ -319,8 +325,8 @@ fn parse_positive(text: &str) -> Option<f64> {
     text.parse::<f64>().ok().filter(|value| value.is_finite() && *value > 0.0)
 }
 
-/// Reads `1/10000`, `0.0001` or `10000`, with or without a unit, as seconds. Exposures are shorter than a
-/// second, so a number above 1 is a reciprocal.
+/// Converts a text such as `1/10000`, `0.0001` or `10000`, with or without a unit, to an exposure time in
+/// seconds. Exposure times are shorter than a second, so a number of 1 or more is a reciprocal.
 fn parse_exposure(text: &str) -> Option<f64> {
     let number = text.trim_end_matches(|c: char| c.is_alphabetic() || c.is_whitespace() || c == '.');
     match number.split_once('/') {

@@ -1,4 +1,4 @@
-//! Numbers that a spreadsheet has cut to the digits that it showed.
+//! Finds numbers that lost digits because a spreadsheet saved only the digits that it showed.
 
 use crate::import::error::ImportResult;
 use crate::import::reader::findings::new_finding;
@@ -9,18 +9,20 @@ use crate::recording::quality::{Check, QualityFinding, Severity};
 const CUT_NUMBER_ADVICE: &str = "a spreadsheet shows numbers so and saves what it shows: import the tracking program's own \
     export, which no spreadsheet has saved";
 
-/// Whether a text has the form `1.23E+05`, in which a spreadsheet shows a number that does not fit its cell.
+/// Whether a text has the form `1.23E+05`, in which a spreadsheet shows a number that is too wide for its
+/// cell.
 fn is_cut_number(text: &str) -> bool {
     let digits = text.strip_prefix('-').unwrap_or(text).as_bytes();
     matches!(digits, [a, b'.' | b',', b, c, b'E', b'+' | b'-', d, e]
         if [a, b, c, d, e].iter().all(|byte| byte.is_ascii_digit()))
 }
 
-/// Finding about numbers in the columns `cells` that were cut to three digits, while others in the same
-/// column were not. `start` is the index of the first row of data in the head of the table.
+/// Finding about numbers that were cut to three digits (`1.23E+05`) in a column in which other numbers have
+/// all their digits. `cells` are the indices of the columns to check; `start` is the index in
+/// `DelimitedTable::head` of the first row of data.
 ///
 /// # Errors
-/// The error of a row that cannot be read.
+/// An error if a row cannot be read.
 pub(crate) fn cut_numbers_finding(
     table: &DelimitedTable,
     start: usize,
@@ -29,7 +31,8 @@ pub(crate) fn cut_numbers_finding(
     if !table.may_have_cut_numbers() {
         return Ok(None);
     }
-    // for each column: the number of cut numbers, the first of them, and whether others are written out
+    // for each column: how many numbers are cut, line and text of the first of them, and whether other
+    // numbers have all digits
     let mut found = vec![(0_usize, None, false); cells.len()];
     let mut rows = table.rows(start);
     while let Some(record) = rows.next_row()? {

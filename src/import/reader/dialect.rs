@@ -1,28 +1,30 @@
-//! The delimiter and the decimal mark of a table: those that best explain the whole file.
+//! Finds the delimiter between the cells of a table and the decimal mark of its numbers: the two that fit the
+//! rows of the whole file best.
 
 use super::spreadsheet;
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::reader::number::{CellNumber, parse_number};
 use crate::import::reader::rows::{TextRow, parse_rows};
 
-/// Number of lines that are sampled at the start of a file to find its dialect, and again in the rest of the
-/// file.
+/// Number of lines at the start of a file from which its dialect (delimiter and decimal mark) is found. Up to
+/// as many lines are added from the rest of the file, at even distances.
 const SAMPLE_LINES: usize = 1000;
-/// Maximum size of either part of the sample, bytes; a cell of one digit takes thirty times its size in
-/// memory.
+/// Maximum size of each of the two parts of the sample (start and rest of the file), bytes. It limits the
+/// memory: a cell of one digit needs thirty times its size.
 const SAMPLE_BYTES: usize = 1 << 20;
-/// Maximum number of columns of a table, enough for ten thousand points.
+/// Maximum number of columns of a table, enough for x and y of ten thousand points.
 const MOST_COLUMNS: usize = 20_000;
-/// If more than one row in this number contains a fraction with a leading zero, the commas of the table count
-/// as decimal marks; by chance, a tenth of all fractions have a leading zero.
+/// The commas of a table without a header are decimal marks if a leading zero follows a comma, as in `1,05`,
+/// in more than one row of this number. By chance, one decimal fraction in ten has a leading zero; a whole
+/// number in a cell of its own has none.
 const ROWS_PER_FRACTION: usize = 10;
-/// Fraction of numbers among the cells above which a row counts as data.
+/// A row counts as data if the fraction of its cells that are numbers is above this value.
 const MOSTLY_NUMBERS: f64 = 0.5;
-/// The fraction that is used if no row exceeds [`MOSTLY_NUMBERS`], as in rows of three cells that name a
-/// picture and two coordinates of a labelled point.
+/// Lower limit that replaces [`MOSTLY_NUMBERS`] if no row of the file exceeds it. An example is a row with
+/// three cells that name a picture and two cells with the coordinates of a labelled point.
 const FEW_NUMBERS: f64 = 1.0 / 3.0;
-/// Minimum number of cells in a row with few numbers; a sentence that contains a number splits into fewer
-/// cells.
+/// Minimum number of cells in a row for which the limit [`FEW_NUMBERS`] is used. A sentence that contains a
+/// number splits into fewer cells.
 const FEWEST_CELLS: usize = 5;
 /// Delimiter and decimal mark of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,17 +35,17 @@ pub(crate) struct Dialect {
 }
 
 impl Dialect {
-    /// Text on delimiter and decimal mark for the report.
+    /// Text for the report on delimiter and decimal mark.
     pub(crate) fn describe(&self) -> String {
         format!(", delimiter {}, decimal mark `{}`", self.delimiter.word(), self.decimal)
     }
 
-    /// Finds the delimiter that makes the most rows of numbers with the same length, and then the decimal
-    /// mark.
+    /// Finds the delimiter that gives the most rows of numbers with an equal number of cells, and then the
+    /// decimal mark.
     ///
     /// # Errors
-    /// [`ImportError`] if no delimiter makes columns, if there are no numbers, or if the comma is both
-    /// delimiter and decimal mark.
+    /// [`ImportError`] if no delimiter splits the rows into columns, if there are no numbers, or if the comma
+    /// is both delimiter and decimal mark.
     pub(crate) fn find(file: &str, text: &str) -> ImportResult<Self> {
         let declared = declared_delimiter(text);
         let of_the_table = |line: &NumberedLine| !(is_comment(line.1) || (declared.is_some() && line.0 == 1));
@@ -68,7 +70,7 @@ impl Dialect {
     }
 }
 
-/// The first lines that are not blank, and lines at even distances in the rest of the text.
+/// The first lines of a text that are not blank, and lines at even distances in the rest of the text.
 fn sample_lines(text: &str) -> Vec<NumberedLine<'_>> {
     let mut lines: Vec<NumberedLine> = vec![];
     let (mut number, mut at) = (0, 0);
@@ -99,7 +101,7 @@ fn sample_lines(text: &str) -> Vec<NumberedLine<'_>> {
     lines
 }
 
-/// Refuses rows with too many columns before their cells fill the memory.
+/// Refuses a table with too many columns before its rows are split into cells, which would fill the memory.
 fn refuse_too_many_columns(file: &str, lines: &[NumberedLine]) -> ImportResult<()> {
     let columns = |text: &str, mark: u8| text.bytes().filter(|byte| *byte == mark).count() + 1;
     let most = |text: &str| {
@@ -120,8 +122,9 @@ fn refuse_too_many_columns(file: &str, lines: &[NumberedLine]) -> ImportResult<(
     }
 }
 
-/// Measures how well `delimiter` explains the rows: the fraction of numbers in a row, summed over all rows of
-/// median length. Only rows with at least `cells` cells and a fraction of numbers above `least` count.
+/// Measures how well `delimiter` fits the rows: the fraction of cells that are numbers, summed over all rows
+/// whose number of cells is the median. Rows with fewer than `cells` cells or a fraction of at most `least`
+/// are left out, also for the median.
 fn delimiter_score(rows: &[TextRow], delimiter: Delimiter, (least, cells): (f64, usize)) -> f64 {
     let measured = rows.iter().map(|row| (row.cells.len(), numeric_share(&row.cells, delimiter)));
     let numeric: Vec<(usize, f64)> =
@@ -131,12 +134,12 @@ fn delimiter_score(rows: &[TextRow], delimiter: Delimiter, (least, cells): (f64,
     let usual = counts.get(counts.len() / 2).copied().unwrap_or(0);
     let always_empty = |i: usize| rows.iter().all(|row| row.cells.get(i).is_none_or(String::is_empty));
     if delimiter == Delimiter::Space && (1..usual.saturating_sub(1)).any(always_empty) {
-        return 0.0; // (the spaces align the columns)
+        return 0.0; // (a column that is always empty: the spaces only align the columns)
     }
     numeric.iter().filter(|(count, _)| *count == usual).map(|(_, share)| share).sum()
 }
 
-/// Fraction of numbers among the cells that are not missing.
+/// Fraction of the cells of a row that are numbers; missing values are not counted.
 fn numeric_share(cells: &[String], delimiter: Delimiter) -> f64 {
     let is_number =
         |text: &str| is_value(text, '.') || (delimiter != Delimiter::Comma && is_value(text, ','));
@@ -153,7 +156,8 @@ fn is_value(text: &str, decimal: char) -> bool {
     matches!(parse_number(text, decimal), CellNumber::Value(_))
 }
 
-/// The decimal mark that occurs in more of the numbers. If the delimiter is a comma, it is the point.
+/// The decimal mark that occurs in more of the numbers, point or comma. If the delimiter is a comma, it is
+/// the point.
 fn decimal_mark(rows: &[TextRow], delimiter: Delimiter) -> char {
     if delimiter == Delimiter::Comma {
         return '.';
@@ -167,10 +171,11 @@ fn is_numeric(row: &&TextRow) -> bool {
     row.cells.first().is_some_and(|cell| is_value(cell, '.'))
 }
 
-/// Refuses rows such as `1,5,2,5` under a header of two names, in which the comma is also the decimal mark.
+/// Refuses rows in which the comma is both delimiter and decimal mark, such as `1,5,2,5` under a header of
+/// two names.
 fn refuse_double_comma(file: &str, rows: &[TextRow]) -> ImportResult<()> {
     let text = |cell: &String| cell.is_empty() || parse_number(cell, '.') != CellNumber::Missing;
-    // (several programs leave the column of row numbers without a name)
+    // (the first cell may be empty, because several programs give the column of row numbers no name)
     let is_word = |cell: &String| parse_number(cell, '.') == CellNumber::Text;
     let first = |row: &TextRow| row.cells.iter().find(|cell| !cell.is_empty()).is_some_and(is_word);
     let named = |row: &&TextRow| row.cells.iter().all(text) && first(row);
@@ -190,8 +195,8 @@ fn refuse_double_comma(file: &str, rows: &[TextRow]) -> ImportResult<()> {
     }
 }
 
-/// Refuses rows such as `0,000,10,050` without a header: cells with leading zeros in every second place are
-/// the fractions of numbers that were cut in two.
+/// Refuses rows such as `0,000,10,050` without a header. If only every second cell has leading zeros, these
+/// cells are the digits after a decimal comma at which numbers were cut in two.
 fn refuse_split_numbers(file: &str, rows: &[&TextRow]) -> ImportResult<()> {
     let fraction = |cell: &String| {
         cell.strip_prefix('0').is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit()))
@@ -227,7 +232,7 @@ const COLUMNS_EXPECTED: &str = "columns separated by tabs, semicolons, commas or
 const COLUMNS_ADVICE: &str = "export again with one of these delimiters, and without units or brackets next to the \
     numbers";
 
-/// Error for a text in which no delimiter makes rows of numbers.
+/// Error for a text that no delimiter splits into rows of numbers.
 fn no_columns_error(file: &str, lines: &[NumberedLine]) -> ImportError {
     let starts_like_data = |line: &&NumberedLine| {
         line.1.trim_start_matches(['"', '-', '\u{2212}', ' ']).starts_with(|c: char| c.is_ascii_digit())
@@ -251,7 +256,8 @@ fn no_columns_error(file: &str, lines: &[NumberedLine]) -> ImportError {
     }
 }
 
-/// A number in quotes with a comma, which is a decimal mark or separates thousands.
+/// Finds a number in quotation marks that contains a comma. This comma is a decimal mark or separates
+/// thousands.
 fn find_quoted_comma(line: &str) -> Option<String> {
     let is_number = |part: &&str| {
         part.contains(',')
@@ -264,7 +270,7 @@ fn find_quoted_comma(line: &str) -> Option<String> {
 
 // Delimiters and comments.
 
-/// The character between cells.
+/// What separates the cells of a row: one character, or a run of blanks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Delimiter {
     Tab,
@@ -276,24 +282,24 @@ pub(crate) enum Delimiter {
     Blanks,
 }
 
-/// The delimiters, in order of preference if several explain a file equally well: a comma may also be a
-/// decimal mark, and spaces may align columns.
+/// The delimiters, in order of preference if several fit a file equally well. The comma comes after tab and
+/// semicolon because it may be a decimal mark; spaces come last because they may only align columns.
 pub(crate) const DELIMITERS: [Delimiter; 5] =
     [Delimiter::Tab, Delimiter::Semicolon, Delimiter::Comma, Delimiter::Space, Delimiter::Blanks];
-/// Beginning of the first line in which spreadsheets declare their delimiter.
+/// Beginning of a first line such as `sep=;`, in which spreadsheets declare the delimiter.
 const DELIMITER_DECLARATION: &str = "sep=";
-/// A word for "missing" that begins like a comment.
+/// Text of a cell that means a missing value, although it begins like a comment.
 const NOT_COMMENT: &str = "#n/a";
-/// Characters that end the first cell of a row that begins like a comment.
+/// Delimiters that end the first cell of a row; used if the row begins like a comment.
 const CELL_ENDS: [char; 3] = [',', ';', '\t'];
-/// Beginnings of comments.
+/// Marks at the start of a line that make it a comment.
 const COMMENTS: [&str; 4] = ["#", "//", "***", "%"];
 
-/// A line with its number, counted from 1.
+/// Number of a line, counted from 1, and its text.
 pub(crate) type NumberedLine<'a> = (usize, &'a str);
 
 impl Delimiter {
-    /// The byte of the delimiter; `None` for a run of blanks.
+    /// The delimiter as a byte; `None` for a run of blanks.
     pub(crate) fn byte(self) -> Option<u8> {
         match self {
             Self::Tab => Some(b'\t'),
@@ -304,7 +310,8 @@ impl Delimiter {
         }
     }
 
-    /// Whether the delimiter differs from the blanks between the words of a sentence.
+    /// Whether the delimiter is a tab, semicolon or comma. The other delimiters are blanks, which also
+    /// separate the words of a sentence.
     pub(crate) fn separates_words(self) -> bool {
         matches!(self, Self::Tab | Self::Semicolon | Self::Comma)
     }
@@ -320,11 +327,12 @@ impl Delimiter {
     }
 }
 
-/// Whether a line is a comment: it starts with `#`, `//`, `***` or `%`. The word `#N/A` does not start a
-/// comment; nor does a cell that a spreadsheet has damaged, such as `#####` or `#REF!`, if numbers follow.
+/// Whether a line is a comment: it starts with `#`, `//`, `***` or `%`. A line that starts with `#N/A` is not
+/// a comment. Nor is a line whose first cell a spreadsheet has damaged, such as `#####` or `#REF!`, if
+/// numbers follow.
 pub(crate) fn is_comment(line: &str) -> bool {
     if line.starts_with(|c: char| c.is_ascii_digit() || c == '-') {
-        return false; // (as for nearly every line)
+        return false; // (nearly every line is a row of numbers)
     }
     let start = line.trim_start_matches([' ', '"']);
     let missing =
@@ -332,7 +340,7 @@ pub(crate) fn is_comment(line: &str) -> bool {
     COMMENTS.iter().any(|mark| start.starts_with(mark)) && !missing() && !starts_with_damage(start)
 }
 
-/// Whether the line is a row of numbers whose first cell a spreadsheet has damaged.
+/// Whether a line is a row of numbers whose first cell a spreadsheet has damaged.
 fn starts_with_damage(line: &str) -> bool {
     line.split_once(CELL_ENDS).is_some_and(|(cell, rest)| {
         let cell = cell.trim_matches(['"', ' ']);
@@ -341,7 +349,8 @@ fn starts_with_damage(line: &str) -> bool {
     })
 }
 
-/// The delimiter that the first line declares, and the length of that line in bytes.
+/// The delimiter that the first line declares (`sep=;`), and the length of that line in bytes; `None` if the
+/// first line declares none.
 pub(crate) fn declared_delimiter(text: &str) -> Option<(Delimiter, usize)> {
     let first = text.lines().next()?;
     let mark = first.trim_matches('"').strip_prefix(DELIMITER_DECLARATION)?.bytes().next()?;

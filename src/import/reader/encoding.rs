@@ -1,11 +1,11 @@
-//! Decodes bytes to text. This is the only file that uses `encoding_rs`.
+//! Decodes the bytes of a file to text. This is the only file that uses `encoding_rs`.
 
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::reader::file_type;
 use encoding_rs::{Encoding, SHIFT_JIS, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 use std::borrow::Cow;
 
-/// Text of an export and its original encoding; lines end in `\n` or `\r\n`.
+/// Text of an export, and the encoding in which the file stores it. Lines of the text end in `\n` or `\r\n`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct DecodedText<'a> {
     /// The text, without a byte-order mark.
@@ -14,8 +14,9 @@ pub(crate) struct DecodedText<'a> {
     pub encoding: &'static str,
 }
 
-/// Decodes `bytes` in the encoding `wanted`. If it is `None`, a byte-order mark decides; without one, strict
-/// UTF-8 is tried, then CP932 if the bytes look Japanese, otherwise Windows-1252.
+/// Decodes `bytes` from the encoding `wanted`. If `wanted` is `None`, the encoding is detected. A byte-order
+/// mark decides; without one, UTF-8 is tried first. If the bytes are not valid UTF-8, they are decoded as
+/// CP932 if they look Japanese, otherwise as Windows-1252.
 ///
 /// # Errors
 /// [`ImportError`] for files that are not text, for unknown encodings, and for bytes that are not valid in
@@ -45,7 +46,8 @@ pub(crate) fn decode_text<'a>(
     Ok(DecodedText { text: normalise_line_ends(text), encoding })
 }
 
-/// Replaces single carriage returns, which end lines in files of old Macintosh programs, by line feeds.
+/// Replaces every carriage return that has no line feed after it by a line feed. Old Macintosh programs end
+/// lines with a carriage return.
 fn normalise_line_ends(text: Cow<str>) -> Cow<str> {
     if !text.contains('\r') {
         return text;
@@ -75,9 +77,10 @@ fn detect_encoding<'a>(file: &str, bytes: &'a [u8]) -> ImportResult<(Cow<'a, str
     decode_as(file, bytes, UTF_8).or_else(|_| decode_as(file, bytes, other))
 }
 
-/// Whether bytes that are not UTF-8 are CP932. Nearly any bytes are valid CP932, but kana and the common
-/// kanji start with a byte from 0x81 to 0x9f, where Windows-1252 has quotation marks and dashes. At least
-/// half of the characters outside ASCII must be such pairs.
+/// Whether bytes that are not UTF-8 are probably CP932. Nearly any bytes are valid CP932, so this alone
+/// proves nothing. Kana and the common kanji are pairs of bytes that start with 0x81 to 0x9f; in
+/// Windows-1252, these bytes are quotation marks and dashes. At least half of the characters outside ASCII
+/// must be such pairs.
 fn looks_japanese(bytes: &[u8]) -> bool {
     let (mut pairs, mut others, mut at) = (0, 0, 0);
     while let Some(&byte) = bytes.get(at) {

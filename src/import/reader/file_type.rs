@@ -1,9 +1,9 @@
-//! Files that are not tables of points over time, such as projects, workbooks and archives. Each is refused
-//! with advice on what to export instead.
+//! Recognises files that are not tables of points over time, such as projects, workbooks and archives. Each
+//! is refused with advice on what to export instead.
 
 use crate::import::error::ImportError;
 
-/// A kind of file, and advice to its user.
+/// Name of a kind of file, and advice to a user who tries to import such a file.
 type FileKind = (&'static str, &'static str);
 
 const PICTURE: FileKind = ("a picture", "track the points in the tracking program and export their table");
@@ -18,7 +18,7 @@ const CAMERA_RECORD: FileKind = (
      recording rate is read from it",
 );
 
-/// Kinds of files by their first bytes.
+/// Kinds of files that are recognised by their first bytes.
 const BY_BYTES: [(&[u8], (&str, &str)); 27] = [
     (b"PK\x05\x06", ("an empty zip archive", "export the tracks as CSV")),
     (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", ("an old Excel workbook (.xls)", SHEET)),
@@ -65,7 +65,8 @@ const BY_BYTES: [(&[u8], (&str, &str)); 27] = [
     (b"\x00\x00\x01\xb3", VIDEO),
 ];
 
-/// Kinds of zip archives by names inside them; the first of these names that occurs decides.
+/// Kinds of zip archives that are recognised by a name or a part of a name inside them. The first entry of
+/// this list whose name occurs decides; the empty name in the last entry always occurs.
 const IN_ZIP: [(&[u8], (&str, &str)); 6] = [
     (b"opendocument.spreadsheet", ("an OpenDocument workbook (.ods)", SHEET)),
     (b"xl/", ("an Excel workbook (.xlsx)", SHEET)),
@@ -80,20 +81,21 @@ const IN_ZIP: [(&[u8], (&str, &str)); 6] = [
         ),
     ),
 ];
-/// Number of bytes at either end of a file in which names are sought: a zip archive has its first entries at
-/// the start and its directory at the end.
+/// Number of bytes at each end of a file that are searched for names such as those in `IN_ZIP`. A zip archive
+/// has its first entries at the start and its directory at the end.
 const SEARCHED_BYTES: usize = 65_536;
-/// Types of the first box of an MP4 or QuickTime file.
+/// Types that the first box (block of data) of an MP4 or QuickTime file can have.
 const MP4_BOXES: [&[u8]; 5] = [b"ftyp", b"moov", b"mdat", b"wide", b"free"];
-/// Versions of Python's pickle protocol; a file states its version in the second byte.
+/// Versions of Python's pickle protocol. The second byte of a pickle file is its version.
 const PICKLES: std::ops::RangeInclusive<u8> = 2..=5;
-/// Second byte of a C3D file. `C3D_BLOCK` is the length of its blocks, bytes; `C3D_PROCESSORS` are the
-/// processor types in its parameter section.
+/// Second byte of a C3D file, a format for motion capture. `C3D_BLOCK` is the length of its blocks, bytes;
+/// `C3D_PROCESSORS` are the possible values of the byte in its parameter section that gives the type of
+/// processor.
 const C3D: u8 = 0x50;
 const C3D_BLOCK: usize = 512;
 const C3D_PROCESSORS: std::ops::RangeInclusive<u8> = 84..=86;
 
-/// Kinds of files by the beginning of their text, in lower case.
+/// Kinds of files that are recognised by the beginning of their text, here in lower case.
 const BY_TEXT: [(&str, (&str, &str)); 5] = [
     ("<!doctype html", ("a web page", "save the table itself, not the page around it")),
     ("<html", ("a web page", "save the table itself, not the page around it")),
@@ -107,8 +109,8 @@ const BY_TEXT: [(&str, (&str, &str)); 5] = [
     ),
     ("%!ps", ("a PostScript document", "export the numbers from the tracking program")),
 ];
-/// Kinds of XML files by a text near their start, in lower case; the first of these texts that occurs
-/// decides, and the last occurs in every XML file.
+/// Kinds of XML files that are recognised by a text near their start, here in lower case. The first entry of
+/// this list whose text occurs decides; the text of the last entry occurs in every XML file.
 const IN_MARKUP: [(&str, (&str, &str)); 6] = [
     ("<cih>", CAMERA_RECORD),
     (
@@ -143,17 +145,17 @@ const IN_MARKUP: [(&str, (&str, &str)); 6] = [
         ),
     ),
 ];
-/// Kinds of JSON files by a text near their start, in lower case; the first of these texts that occurs
-/// decides, and the last, which is empty, always occurs.
+/// Kinds of JSON files that are recognised by a text near their start, here in lower case. The first entry of
+/// this list whose text occurs decides; the empty text of the last entry always occurs.
 const IN_JSON: [(&str, (&str, &str)); 3] = [
     ("captureframerate", ("Kinovea's JSON", "in Kinovea use File > Export > CSV trajectories instead")),
     ("videoframerate", ("Kinovea's JSON", "in Kinovea use File > Export > CSV trajectories instead")),
     ("", ("JSON", "export the tracks as CSV")),
 ];
-/// Number of characters at the start of a file in which these texts are sought.
+/// Number of characters at the start of a file that are searched for texts that show its kind.
 const SEARCHED_CHARACTERS: usize = 4000;
 
-/// Error for a file whose bytes show that it is not text.
+/// Error for a file whose bytes show that it is not a table in text form; `None` for any other file.
 pub(crate) fn refuse_bytes(file: &str, bytes: &[u8]) -> Option<ImportError> {
     let found = BY_BYTES.iter().find(|kind| bytes.starts_with(kind.0)).map(|kind| kind.1);
     let found = found.or_else(|| kind_of_zip(bytes)).or_else(|| kind_by_layout(bytes));
@@ -175,7 +177,7 @@ fn contains_bytes(bytes: &[u8], name: &[u8]) -> bool {
     name.is_empty() || bytes.windows(name.len()).any(|part| part == name)
 }
 
-/// Kind of a file that its first bytes alone do not show.
+/// Kind of a file that is not recognised by its first bytes alone: MP4, pickle, C3D or bitmap.
 fn kind_by_layout(bytes: &[u8]) -> Option<FileKind> {
     let at = |index: usize| bytes.get(index).copied();
     if at(0) == Some(0) && bytes.get(4..8).is_some_and(|kind| MP4_BOXES.contains(&kind)) {
@@ -195,9 +197,9 @@ fn kind_by_layout(bytes: &[u8]) -> Option<FileKind> {
         .then_some(PICTURE)
 }
 
-/// Error for a text that is not a table.
+/// Error for a text that is not a table, such as a web page, XML or JSON; `None` for any other text.
 pub(crate) fn refuse_text(file: &str, text: &str) -> Option<ImportError> {
-    // (tabs are kept: after an empty first cell, `<` starts the name of a track)
+    // (leading tabs are kept: they are empty cells, after which `<` starts the name of a track and not XML)
     let start = text.trim_start_matches([' ', '\r', '\n']).chars();
     let start = start.take(SEARCHED_CHARACTERS).collect::<String>().to_lowercase();
     let inside =

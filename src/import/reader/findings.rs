@@ -1,5 +1,5 @@
-//! Findings about the quality of a recording that only its export shows: rounded times, lost points, doubtful
-//! units.
+//! Findings about the quality of the data that only the exported file shows: rounded times, lost points,
+//! doubtful units.
 
 use super::column::CoordinateUnit;
 use super::rate::{FrameRate, find_quantum_s, format_rate};
@@ -9,23 +9,23 @@ use crate::recording::clock::OFF_GRID_LIMIT_FRAMES;
 use crate::recording::quality::{Check, QualityFinding, Severity};
 use std::collections::BTreeMap;
 
-/// Minimum number of consecutive frames at exactly (0, 0) that look like a lost point; a point may be at the
-/// origin in a single frame.
+/// Minimum number of consecutive frames at exactly (0, 0) for a finding about a lost point. In a single
+/// frame, the point may really be at the origin.
 const ZERO_RUN: usize = 3;
-/// Both coordinates of a lost point as written by scripts around OpenCV. Such a point is outside the picture,
-/// so one frame is enough.
+/// Value of both coordinates of a lost point, as scripts that use OpenCV often write it. In pixels, (-1, -1)
+/// is outside the picture, so a single frame is enough for a finding.
 const OUTSIDE_PICTURE: f64 = -1.0;
-/// Limit above which coordinates look like pixels if their unit is a millimetre or larger: a view that
-/// resolves a lip is rarely wider than this in millimetres, and a picture is hardly ever narrower than this
-/// in pixels.
+/// Coordinates above this number look like pixels if their declared unit is a millimetre or larger. A view
+/// that resolves the lip of a wiper is rarely wider than 100 mm, and a picture is hardly ever narrower than
+/// 100 pixels.
 const PIXEL_LIKE_LIMIT: f64 = 100.0;
-/// Smallest unit to which [`PIXEL_LIKE_LIMIT`] applies, m; in micrometres, every view has coordinates above
-/// the limit.
+/// Smallest declared unit for which [`PIXEL_LIKE_LIMIT`] is used, m. In micrometres, the coordinates of every
+/// view exceed the limit.
 const MILLIMETRE_M: f64 = 1e-3;
-/// Minimum number of values from which "all are whole numbers" means pixels.
+/// Minimum number of coordinates for the conclusion that they are pixels because all are whole numbers.
 const FEWEST_WHOLE: usize = 8;
-/// Rounding of times, in frames, above which the finding is a caution: a tenth of a frame shifts the phase of
-/// a component at a fifth of the frame rate by 7 degrees.
+/// Rounding step of the times, frames, above which the finding is a caution. An error of 0.1 frames shifts
+/// the phase of a component at a fifth of the frame rate by 7 degrees.
 const COARSE_FRAMES: f64 = 0.1;
 
 pub(crate) fn new_finding(
@@ -53,7 +53,8 @@ pub(crate) fn rounded_times_finding(file: &str, times: &[f64], implied_hz: f64) 
         .then(|| new_finding(Check::RoundedTimes, severity, (quantum_s, "s"), found, advice))
 }
 
-/// Finding about the frame rate that the times imply.
+/// Finding about the frame rate `implied_hz` that the times imply. `playback` says whether the times are
+/// playback times.
 pub(crate) fn implied_rate_finding(file: &str, implied_hz: f64, playback: bool) -> QualityFinding {
     let meaning = if playback { "taken as playback: the times only count frames" } else { "as declared" };
     let found = format!("{file}: the times imply {implied_hz:.6} rows/s ({meaning})");
@@ -65,7 +66,11 @@ pub(crate) fn rate_difference(used: &FrameRate, other: &FrameRate) -> Option<Qua
     let difference = used.difference(other);
     let found = format!(
         "{} says {} frames/s, but {} say {}: they differ by {:.2} %, and so would every frequency",
-        used.source, used.describe(), other.source, other.describe(), 100.0 * difference
+        used.source,
+        used.describe(),
+        other.source,
+        other.describe(),
+        100.0 * difference
     );
     let advice = "find out from the camera which is right, and give it as --frame-rate-hz";
     let value = (other.hz, "1/s");
@@ -81,38 +86,48 @@ pub(crate) fn coarse_rate_finding(rate: &FrameRate) -> Option<QualityFinding> {
     let found = format!(
         "{} imply {} frames/s: their steps have so few digits that the rate, and with it every frequency, is \
          known to {:.1} % only",
-        rate.source, format_rate(rate.hz), 100.0 * rate.error
+        rate.source,
+        format_rate(rate.hz),
+        100.0 * rate.error
     );
     let advice = "give the rate of the camera as --frame-rate-hz, or export more digits";
     let value = (rate.hz * rate.error, "1/s");
-    (rate.error > COARSE_RATE).then(|| new_finding(Check::ImpliedRate, Severity::Caution, value, found, advice))
+    (rate.error > COARSE_RATE)
+        .then(|| new_finding(Check::ImpliedRate, Severity::Caution, value, found, advice))
 }
 
 /// Finding about times that are declared as seconds but look like frame numbers.
 pub(crate) fn counted_frames_finding(implied: &FrameRate) -> QualityFinding {
-    let found =
-        format!("the times imply {} frames/s: they look like frame numbers, not seconds", format_rate(implied.hz));
+    let found = format!(
+        "the times imply {} frames/s: they look like frame numbers, not seconds",
+        format_rate(implied.hz)
+    );
     let advice = "if they are, say --time frames and give --frame-rate-hz";
     new_finding(Check::ImpliedRate, Severity::Serious, (implied.hz, "1/s"), found, advice)
 }
 
 /// Finding about coordinates in pixels that `--scale` takes for lengths.
-pub(crate) fn unit_mismatch_finding(scale: CoordinateScale, unit: CoordinateUnit, why: &str) -> QualityFinding {
+pub(crate) fn unit_mismatch_finding(
+    scale: CoordinateScale,
+    unit: CoordinateUnit,
+    why: &str,
+) -> QualityFinding {
     let (declared, stated) = (scale.describe(), unit.describe());
     let found = format!("--scale takes the coordinates for {declared}, but they are {stated} ({why})");
     let advice = "--scale counts; leave it out or correct it unless the coordinates were converted since";
     new_finding(Check::Unit, Severity::Caution, (scale.metres(), "m"), found, advice)
 }
 
-/// Finding about a direction of y that differs from that of the format.
+/// Finding about a direction of y in `--y-axis` that differs from the one that the file or its format states.
 pub(crate) fn y_axis_mismatch_finding(declared: &str, stated: &str, why: &str) -> QualityFinding {
     let found = format!("--y-axis says {declared}, but y points {stated} ({why})");
     let advice = "--y-axis counts; leave it out unless the picture or the coordinates were turned over";
     new_finding(Check::YAxis, Severity::Caution, (0.0, ""), found, advice)
 }
 
-/// Findings about runs of exactly (0, 0) or (-1, -1), and about coordinates that look like pixels but are
-/// declared as lengths.
+/// Findings about consecutive frames with a point at exactly (0, 0) or (-1, -1), and about coordinates that
+/// look like pixels but are declared as lengths. `x` and `y` have one value per frame, in the unit of the
+/// file.
 pub(crate) fn position_findings(
     name: &str,
     x: &[Option<f64>],
@@ -154,7 +169,8 @@ pub(crate) fn position_findings(
     findings
 }
 
-/// First frame and length of the longest run of frames at exactly (`value`, `value`).
+/// The longest sequence of consecutive frames at exactly (`value`, `value`): index of its first frame, and
+/// its number of frames.
 fn longest_run(x: &[Option<f64>], y: &[Option<f64>], value: f64) -> (usize, usize) {
     let (mut longest, mut run) = ((0, 0), 0);
     for (frame, (x, y)) in x.iter().zip(y).enumerate() {
@@ -166,7 +182,7 @@ fn longest_run(x: &[Option<f64>], y: &[Option<f64>], value: f64) -> (usize, usiz
     longest
 }
 
-/// Finding about positions that were dropped because of their low confidence.
+/// Finding about positions that were removed because their confidence is below `limit`.
 pub(crate) fn rejected_finding(name: &str, count: usize, tracked: usize, limit: f64) -> QualityFinding {
     let share = count as f64 / tracked.max(1) as f64;
     let found = format!(
@@ -176,18 +192,19 @@ pub(crate) fn rejected_finding(name: &str, count: usize, tracked: usize, limit: 
     new_finding(Check::ConfidenceRejected, Severity::Note, (share, ""), found, "")
 }
 
-// Labels of single pictures that were picked from a video.
+// Tables whose rows are labels of single pictures that were picked from a video.
 
 const PICKED_FRAMES_ADVICE: &str = "import the positions that the program finds in every frame of the video, not the labels \
     it is trained with";
 
-/// Finding about rows whose frame numbers have no common step.
+/// Finding about rows that are single pictures picked from a video: their frame numbers increase by no common
+/// step.
 pub(crate) fn picked_frames_finding(file: &str, clock: &Clock) -> Option<QualityFinding> {
     let frames: Vec<f64> = clock.frame.as_ref()?.iter().flatten().collect();
     let (first, last) = (*frames.first()?, *frames.last()?);
     let mut steps: BTreeMap<i64, usize> = BTreeMap::new();
     frames.windows(2).for_each(|pair| *steps.entry((pair[1] - pair[0]) as i64).or_default() += 1);
-    // (the smallest of several equally common steps, because larger steps are gaps)
+    // (of several equally common steps, the smallest is used, because larger steps are gaps)
     let (usual, count) =
         steps.iter().rev().max_by_key(|step| *step.1).map(|(step, count)| (*step, *count))?;
     let of_all = 2 * count;

@@ -1,4 +1,4 @@
-//! Puts the chosen tracks on one frame grid.
+//! Puts the tracks of tip and head on one grid of frames.
 
 use super::track_file::Column;
 use crate::import::error::{ImportError, ImportResult};
@@ -13,19 +13,19 @@ use crate::recording::FrameGrid;
 use crate::recording::clock::MAX_FRAMES;
 use crate::recording::files::YAxis;
 
-/// The clocks of the chosen tracks, placed on one frame grid.
+/// The frame grid of the recording, and for every clock of the chosen tracks its frame numbers on this grid.
 pub(crate) struct ClockGrid {
     pub(crate) grid: FrameGrid,
     used: Vec<PlacedClock>,
 }
 
 struct PlacedClock {
-    /// Index of the file of the clock.
+    /// Index of the file that contains the clock.
     file: usize,
-    /// Index of the clock in its file.
+    /// Index of the clock among the clocks of its file.
     clock: usize,
     placed: RowFrames,
-    /// Number that is added to the frames of the clock so that they count from the start of the grid.
+    /// Number that is added to the frame numbers of the clock, so that 0 is the first frame of the grid.
     shift: i64,
 }
 
@@ -83,7 +83,7 @@ impl ClockGrid {
                 .filter(|_| !playback)
                 .and_then(|hz| findings::rounded_times_finding(export.file, &times, hz));
             for finding in implied.into_iter().chain(rounded) {
-                // (clocks of one file often give the same findings)
+                // (two clocks of one file often give equal findings; one is enough)
                 if !report.findings.contains(&finding) {
                     report.findings.push(finding);
                 }
@@ -92,7 +92,8 @@ impl ClockGrid {
     }
 }
 
-/// Places every clock of the chosen tracks once, with the shift to the frame numbers of the first clock.
+/// Determines the frame numbers of every clock that a chosen track uses, and the number to add so that they
+/// count like those of the first clock. A clock that both tracks use is returned once.
 fn place_clocks(
     exports: &[TrackFile],
     chosen: &[Option<TrackIndex>; 2],
@@ -124,7 +125,7 @@ fn place_clocks(
     Ok(used)
 }
 
-/// Columns of a point on the frame grid.
+/// Coordinates and confidence of a point for every frame of the grid; `None` where a value is missing.
 #[derive(Default)]
 pub(crate) struct GridPositions {
     pub(crate) x: Vec<Option<f64>>,
@@ -133,7 +134,7 @@ pub(crate) struct GridPositions {
 }
 
 impl GridPositions {
-    /// Moves the columns of a track onto the frame grid; frames without a row are missing.
+    /// Moves the columns of a track onto the frame grid. In frames without a row, all values are missing.
     pub(crate) fn from_track(
         exports: &mut [TrackFile],
         clocks: &ClockGrid,
@@ -165,7 +166,7 @@ impl GridPositions {
         }
     }
 
-    /// Drops positions whose confidence is below `limit`.
+    /// Removes the positions whose confidence is below `limit`, and reports how many they are.
     pub(crate) fn reject_unlikely(
         &mut self,
         name: &str,

@@ -1,12 +1,13 @@
-//! Collects the rows of instances (tracks, blocks of rows) into clocks and tracks.
+//! Collects the rows of a file into clocks and tracks. Rows with the same key form an instance, such as a
+//! tracked object or a block of rows. An instance has one clock, and a track for each of its points.
 
 use super::track_file::{Column, Fact};
-use crate::import::reader::column::CoordinateUnit;
 use crate::import::error::{ImportError, ImportResult, TextLocation};
+use crate::import::reader::column::CoordinateUnit;
 use crate::import::reader::track_file::{Clock, Track};
 use std::collections::HashMap;
 
-/// Maximum number of tracks in a file; files with more contain detections that are not linked.
+/// Maximum number of instances in a file. Files with more contain detections that are not linked to tracks.
 const MOST_TRACKS: usize = 20_000;
 
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -16,7 +17,7 @@ pub(crate) struct RowPosition {
     pub confidence: Option<f64>,
 }
 
-/// Frame number or time of a row, and its line number.
+/// Line number of a row, and its frame number, its time or both.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct RowStamp {
     pub line: usize,
@@ -34,33 +35,35 @@ pub(crate) struct PointFields {
     pub has_confidence: bool,
 }
 
-/// Fields of every instance.
+/// What every row of the file contains: a frame number or a time, and points.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct InstanceFields {
     pub has_frame: bool,
     pub has_time: bool,
-    /// Index of the cell with the frame number or the time, for messages.
+    /// Index in each row of the cell with the frame number or the time; messages use it to name the place.
     pub clock_cell: usize,
     pub points: Vec<PointFields>,
 }
 
-/// Order of the rows of an instance.
+/// Order of the rows of an instance in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum RowOrder {
-    /// In order of time; any other order is an error.
+    /// The rows must be in order of time; they are not sorted.
     AsWritten,
-    /// In any order; the rows are sorted.
+    /// The rows may be in any order; they are sorted by frame number or time.
     Any,
 }
 
-/// Collects rows by instance, in the order in which the instances appear.
+/// Collects rows and groups them by instance. The instances stay in the order in which they first appear.
 pub(crate) struct TrackCollector {
     shape: InstanceFields,
     known: HashMap<String, usize>,
     instances: Vec<CollectedInstance>,
-    /// Index of the instance of the last row; the next row usually belongs to the same instance.
+    /// Index of the instance to which the last row belongs; the next row usually belongs to the same
+    /// instance.
     last: usize,
-    /// Line number of the first row that exceeds [`MOST_TRACKS`], if there is one.
+    /// Line number of the first row whose instance would be one more than [`MOST_TRACKS`]; `None` if there is
+    /// no such row.
     too_many: Option<usize>,
 }
 
@@ -75,7 +78,7 @@ impl TrackCollector {
         Self { shape, known: HashMap::new(), instances: vec![], last: 0, too_many: None }
     }
 
-    /// Adds a row of the instance `key`, with a position for each point.
+    /// Adds a row of the instance named `key`; `positions` has one position for each point.
     pub(crate) fn add_row(&mut self, key: &str, stamp: RowStamp, positions: &[RowPosition]) {
         let same = |instance: &CollectedInstance| {
             instance.key.len() == key.len() && (key.is_empty() || instance.key == key)
@@ -123,12 +126,14 @@ impl TrackCollector {
         self.instances.len() - 1
     }
 
-    /// Returns the clocks and tracks. A track is named after its point, after its instance if that has only
-    /// one point, or after both.
+    /// Returns one clock for each instance, and one track for each point of an instance. A track has the name
+    /// of its point if its instance has no name. Otherwise it has the name of its instance if instances have
+    /// only one point, the name of its point if there is only one instance, or else the name
+    /// `INSTANCE:POINT`.
     ///
     /// # Errors
-    /// [`ImportError::WrongTable`] for too many tracks, [`ImportError::DuplicateRow`] if the rows may be in
-    /// any order and an instance has two rows in one frame.
+    /// [`ImportError::WrongTable`] for too many instances; [`ImportError::DuplicateRow`] if `order` is
+    /// [`RowOrder::Any`] and two rows of an instance have the same frame number or time.
     pub(crate) fn finish(self, file: &str, order: RowOrder) -> ImportResult<(Vec<Clock>, Vec<Track>)> {
         if let Some(line) = self.too_many {
             return Err(ImportError::wrong_table(

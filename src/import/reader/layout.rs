@@ -1,5 +1,5 @@
-//! The meaning of the cells of a table. A format fills in a [`TableLayout`]; the rows of all formats are then
-//! read by the same code.
+//! The layout of a table: the meaning of each cell of a row. Every format describes its table by a
+//! [`TableLayout`], and the same code then reads the rows of all formats.
 
 use super::Document;
 use super::cut_numbers::cut_numbers_finding;
@@ -7,21 +7,23 @@ use super::number::CellNumber;
 use super::rows::RowView;
 use super::table::DelimitedTable;
 use super::track_file::{Fact, Facts, TrackFile};
-use crate::import::reader::column::CoordinateUnit;
 use crate::import::error::{ImportError, ImportResult};
+use crate::import::reader::column::CoordinateUnit;
 use crate::import::reader::instances::{
     InstanceFields, PointFields, RowOrder, RowPosition, RowStamp, TrackCollector,
 };
 use crate::recording::quality::{Check, QualityFinding, Severity};
 use portable_math as math;
 
-/// Cells of a point. A coordinate is the sum of its cells, for example of a reference and a displacement.
+/// Indices of the cells of a row that give the position of a point. A coordinate is the sum of its cells, for
+/// example of a reference position and a displacement.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct PointCells {
-    /// Name of the track; empty if the instance gives the name.
+    /// Name of the point; empty if the track is named after its instance (the group of rows to which the row
+    /// belongs).
     pub name: String,
     pub x: Vec<usize>,
-    /// Empty if the table has no y.
+    /// Indices of the cells of y; empty if the table has no y.
     pub y: Vec<usize>,
     pub confidence: Option<usize>,
     /// Units of x and y, where the header states them.
@@ -29,7 +31,7 @@ pub(crate) struct PointCells {
 }
 
 impl PointCells {
-    /// The cells as fields of an instance.
+    /// Name of the point, and whether it has y and confidence, in the form that [`TrackCollector`] needs.
     pub(crate) fn fields(&self) -> PointFields {
         PointFields {
             name: self.name.clone(),
@@ -44,37 +46,39 @@ impl PointCells {
     }
 }
 
-/// A rule by which the numbers of a row mark a lost point.
+/// A rule by which numbers in a row show that the point was lost in that frame.
 #[derive(Clone, Copy)]
 pub(crate) struct LostRule {
-    /// Cell to which the rule applies; `None` means the position.
+    /// Index of the cell whose number is tested; `None` if x and y of the position are tested.
     pub cell: Option<usize>,
-    /// Whether two numbers mean a lost point. They are x and y of the position; if `cell` is given, both are
-    /// the number in that cell.
+    /// Returns true if the point was lost. Its arguments are x and y of the position; if `cell` is given,
+    /// both arguments are the number in that cell.
     pub is: fn(f64, f64) -> bool,
-    /// The rule in words, e.g. `at exactly (0, 0)`.
+    /// The rule in words for messages, e.g. `at exactly (0, 0)`.
     pub words: &'static str,
 }
 
 #[derive(Clone)]
 pub(crate) struct TableLayout {
-    /// Index of the first row of data in the head of the table.
+    /// Index in `DelimitedTable::head` of the first row of data.
     pub start: usize,
     /// Minimum number of cells in a row.
     pub width: usize,
-    /// Maximum number of cells in a row; empty cells may follow.
+    /// Maximum number of cells in a row; any further cells must be empty.
     pub most: usize,
     pub frame: Option<usize>,
     pub time: Option<usize>,
-    /// Frame number of the first row, if the table has neither frame numbers nor times and every row is a
-    /// frame.
+    /// Frame number of the first row. It is used if the table has neither frame numbers nor times, so that
+    /// every row is a frame.
     pub first_frame: f64,
-    /// Cells that name the instance; empty if the table has only one instance.
+    /// Indices of the cells whose texts name the instance (track) of a row; empty if the table has only one
+    /// instance.
     pub key: Vec<usize>,
-    /// Whether rows that do not name their instance are left out.
+    /// Whether rows whose `key` cells are empty are left out.
     pub skip_nameless: bool,
     pub order: RowOrder,
-    /// Whether the table has several clocks, so that rows without this clock and its positions are skipped.
+    /// Whether the table has several clocks, of which this layout reads one. Rows in which this clock and all
+    /// its positions are empty are then skipped.
     pub of_others: bool,
     pub points: Vec<PointCells>,
     pub lost: Vec<LostRule>,
@@ -99,11 +103,12 @@ impl Default for TableLayout {
     }
 }
 
-/// Points whose columns come in pairs, x before y, from column `first` on. The column names end in `ends`,
-/// and `rename` makes the name of the track from their common beginning.
+/// Reads the points of a table whose columns, from index `first` on, come in pairs of x and y. The two column
+/// names of a pair end in `ends[0]` and `ends[1]`; `rename` makes the name of the track from their common
+/// beginning.
 ///
 /// # Errors
-/// Index of the first column without a partner.
+/// The index of the first column that has no partner.
 pub(crate) fn read_point_pairs(
     names: &[&str],
     first: usize,
@@ -119,12 +124,13 @@ pub(crate) fn read_point_pairs(
 }
 
 impl TableLayout {
-    /// Layout with points in rows of exactly `width` cells, from row `start` of the head on.
+    /// Layout of a table with rows of exactly `width` cells. The first row of data has the index `start` in
+    /// `DelimitedTable::head`.
     pub(crate) fn new(start: usize, width: usize, points: Vec<PointCells>) -> Self {
         Self { start, width, most: width, points, ..Self::default() }
     }
 
-    /// Reads every row.
+    /// Reads every row of data into clocks and tracks.
     ///
     /// # Errors
     /// [`ImportError`] for a row with a wrong number of cells, and for a cell that is not a number.
@@ -196,7 +202,8 @@ impl TableLayout {
             };
             let time = table.optional_number_at(&record, self.time, "time")?;
             if let (Some(_), Some(cell)) = (time, self.time) {
-                time_decimals = time_decimals.max(Some(count_decimals(record.cell(cell), table.dialect.decimal)));
+                time_decimals =
+                    time_decimals.max(Some(count_decimals(record.cell(cell), table.dialect.decimal)));
             }
             counted += 1.0;
             collector.add_row(&key, RowStamp { line: record.line, frame, time }, &positions);
@@ -204,7 +211,7 @@ impl TableLayout {
         Ok(RowCounts { lost, nameless, time_decimals })
     }
 
-    /// Indices of the cells of the clock and the positions, without repetitions.
+    /// Indices of all cells with a frame number, a time or a coordinate, each once and in increasing order.
     fn number_cells(&self) -> Vec<usize> {
         let of_points = self.points.iter().flat_map(|point| point.x.iter().chain(&point.y).copied());
         let mut cells: Vec<usize> = self.frame.into_iter().chain(self.time).chain(of_points).collect();
@@ -246,7 +253,7 @@ impl TableLayout {
                     CellNumber::Value(value) => total += value,
                     CellNumber::Missing => return Ok(None),
                     CellNumber::Text => {
-                        // (the name of the coordinate is composed only for an error)
+                        // (the name of the coordinate is composed only for an error, to save time)
                         let name = axis_name(axis, &cells.name);
                         return Err(table.not_a_number_error(record.line, part, record.cell(part), &name));
                     }
@@ -298,15 +305,15 @@ fn blank_line_error(table: &DelimitedTable, line: usize) -> ImportError {
     ImportError::format(table.location(line, 1), "an empty line", expected, advice)
 }
 
-/// Name of a coordinate in messages: `x of tip`, or `x` if the rows name the track.
+/// Name of a coordinate in messages: `x of tip`, or only `x` if `point` is empty.
 fn axis_name(axis: &str, point: &str) -> String {
     if point.is_empty() { axis.to_owned() } else { format!("{axis} of {point}") }
 }
 
-// Tables with a clock for each track: comparison of the clocks, and separate reading of tracks whose clocks
-// differ.
+// Tables with a clock for each track: the clocks are compared, and tracks whose clocks differ are read
+// separately.
 
-/// A column of times or frame numbers; `unit` converts its values to the unit in which clocks are compared.
+/// A column of times or frame numbers. Its values are multiplied by `unit` before clocks are compared.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ClockCell {
     pub cell: usize,
@@ -316,13 +323,14 @@ pub(crate) struct ClockCell {
 /// A row in which two clocks differ.
 pub(crate) struct ClockDifference {
     pub line: usize,
-    /// Cell of the second clock.
+    /// Index of the cell of the second clock.
     pub cell: usize,
-    /// Texts of the two cells; a text is empty if the row lacks that clock.
+    /// Texts in the cells of the two clocks; empty if the row lacks that clock.
     pub texts: [String; 2],
 }
 
-/// The first row, from row `start` of the head on, in which two clocks differ by more than their rounding.
+/// Finds the first row in which two clocks differ by more than the rounding of their numbers. `start` is the
+/// index in `DelimitedTable::head` of the first row of data.
 ///
 /// # Errors
 /// [`ImportError`] for rows that cannot be read, and for clocks that are not numbers.
@@ -349,7 +357,8 @@ pub(crate) fn find_clock_difference(
     Ok(None)
 }
 
-/// Value of a clock in a row, and value of one unit in its last digit.
+/// Value of a clock in a row, and the size of one unit of its last written digit, both multiplied by the unit
+/// of the clock; `None` if the value is missing.
 fn read_clock(
     table: &DelimitedTable,
     record: &RowView,
@@ -374,11 +383,11 @@ fn count_decimals(text: &str, decimal: char) -> i32 {
     i32::try_from(decimals).unwrap_or(0).saturating_sub(exponent)
 }
 
-/// Reads the tracks of a table with several clocks, with one layout per clock. Rows that are empty for a
-/// clock are skipped for that clock.
+/// Reads the tracks of a table with several clocks, with one layout per clock. For each clock, rows in which
+/// the clock and its positions are empty are skipped.
 ///
 /// # Errors
-/// As [`TableLayout::read_tracks`].
+/// The errors of [`TableLayout::read_tracks`].
 pub(crate) fn read_clocks_apart<'a>(
     layouts: Vec<TableLayout>,
     document: &'a Document,

@@ -1,21 +1,23 @@
-//! Numbers as tables write them: decimal point or comma, typographic minus signs, words for "missing".
+//! Reads numbers as they are spelled in tables: with decimal point or comma, with typographic minus signs, or
+//! as a word that means a missing value.
 
-/// Words for a missing value, in lower case.
+/// Texts of a cell that mean a missing value, in lower case.
 const MISSING_WORDS: [&str; 9] = ["", "nan", "na", "none", "-", "*", "null", "#n/a", "n/a"];
-/// Maximum length of a number with a decimal comma or a typographic minus, bytes; 17 digits and an exponent
-/// need less.
+/// Maximum length of a number with a decimal comma or a typographic minus sign, bytes. A number with 17
+/// digits and an exponent is shorter.
 const MAX_NUMBER_BYTES: usize = 64;
 
-/// Contents of a cell.
+/// Contents of a cell: a number, a missing value or other text.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum CellNumber {
-    /// One of the words for a missing value.
+    /// The cell is empty, or contains a word for a missing value.
     Missing,
     Value(f64),
     Text,
 }
 
-/// Reads a trimmed cell with the decimal mark `decimal` (`.` or `,`).
+/// Reads the text of a cell, which must have no blanks at its ends. `decimal` is the decimal mark, `.` or
+/// `,`.
 pub(crate) fn parse_number(text: &str, decimal: char) -> CellNumber {
     if decimal == '.'
         && let Some(value) = parse_finite(text)
@@ -25,7 +27,7 @@ pub(crate) fn parse_number(text: &str, decimal: char) -> CellNumber {
     if is_missing(text) { CellNumber::Missing } else { parse_spelled(text, decimal) }
 }
 
-/// Parses a finite number. Rust also parses `inf`, `nan` and `infinity`, which are not numbers in a table.
+/// Parses a finite number. Rust's parser also accepts `inf`, `nan` and `infinity`; these are refused here.
 fn parse_finite(text: &str) -> Option<f64> {
     text.parse::<f64>().ok().filter(|value| value.is_finite())
 }
@@ -35,7 +37,7 @@ fn is_missing(text: &str) -> bool {
         || (is_minus(text.chars().next()) && text.chars().count() == 1)
 }
 
-/// Whether a character is a minus sign; in some locales the mathematical minus, hyphens and dashes are used.
+/// Whether a character is used as a minus sign. Some locales use the mathematical minus, a hyphen or a dash.
 fn is_minus(c: Option<char>) -> bool {
     matches!(c, Some('-' | '\u{2212}' | '\u{2010}'..='\u{2013}'))
 }
@@ -54,8 +56,8 @@ fn parse_spelled(text: &str, decimal: char) -> CellNumber {
         *place = byte;
         length += 1;
     }
-    let text = std::str::from_utf8(&plain[..length]).unwrap_or_default(); // (all of it is ASCII)
-    // (`12,` is a number with a stray delimiter)
+    let text = std::str::from_utf8(&plain[..length]).unwrap_or_default(); // (all bytes are ASCII)
+    // (`12,` is a number with a stray delimiter after it)
     if decimal == ',' && text.ends_with('.') {
         return CellNumber::Text;
     }

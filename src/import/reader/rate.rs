@@ -85,10 +85,15 @@ fn number_rows(clock: &Clock) -> Option<(Vec<f64>, Vec<f64>, f64)> {
 fn times_error(times: &[f64], frames: &[f64], (hz, digit_s): (f64, f64)) -> f64 {
     let span_s = times.last().zip(times.first()).map_or(0.0, |(last, first)| last - first);
     let digits = 1.0 / hz / digit_s;
-    let equal = times.windows(2).zip(frames.windows(2)).all(|(time, frame)| {
-        ((time[1] - time[0]) * hz / (frame[1] - frame[0]) - 1.0).abs() <= EQUAL_STEPS
-    });
-    if equal && digits.is_finite() && digits >= FEWEST_DIGITS_PER_STEP { 0.5 / digits } else { digit_s / span_s }
+    let equal = times
+        .windows(2)
+        .zip(frames.windows(2))
+        .all(|(time, frame)| ((time[1] - time[0]) * hz / (frame[1] - frame[0]) - 1.0).abs() <= EQUAL_STEPS);
+    if equal && digits.is_finite() && digits >= FEWEST_DIGITS_PER_STEP {
+        0.5 / digits
+    } else {
+        digit_s / span_s
+    }
 }
 
 /// Decimal places to which programs round times, s.

@@ -4,7 +4,7 @@ use super::dialect::{Delimiter, NumberedLine, is_comment};
 use crate::import::error::{ImportError, ImportResult};
 use csv::{ReaderBuilder, StringRecord};
 
-/// A row with its cells, trimmed and without their quotes.
+/// A row of a table. Its cells are trimmed and have no quotation marks around them.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct TextRow {
     pub line: usize,
@@ -19,22 +19,22 @@ impl TextRow {
         self.cells.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1)
     }
 
-    /// Text of a cell; empty after the end of the row.
+    /// Text of the cell with this index; empty if the row has no such cell.
     pub(crate) fn cell(&self, index: usize) -> &str {
         self.cells.get(index).map_or("", String::as_str)
     }
 
-    /// The first cell; empty if there is none.
+    /// Text of the first cell; empty if the row has no cells.
     pub(crate) fn first_cell(&self) -> &str {
         self.cell(0)
     }
 
-    /// Index of the first cell with this text.
+    /// Index of the first cell whose text is `text`.
     pub(crate) fn position(&self, text: &str) -> Option<usize> {
         self.cells.iter().position(|cell| cell == text)
     }
 
-    /// Whether a cell has this text.
+    /// Whether the row has a cell whose text is `text`.
     pub(crate) fn has(&self, text: &str) -> bool {
         self.position(text).is_some()
     }
@@ -44,7 +44,7 @@ impl TextRow {
     }
 }
 
-/// A row whose cells are borrowed from the reader.
+/// A row of a table whose cells are borrowed from the reader.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RowView<'r> {
     pub line: usize,
@@ -52,12 +52,13 @@ pub(crate) struct RowView<'r> {
 }
 
 impl<'r> RowView<'r> {
-    /// All cells, trimmed and without their quotes.
+    /// Texts of all cells, trimmed and without the quotation marks around them.
     pub(crate) fn cells(&self) -> Vec<String> {
         self.cells.iter().map(|cell| trim_cell(cell).to_owned()).collect()
     }
 
-    /// Text of a cell, trimmed and without its quotes; empty after the end of the row.
+    /// Text of the cell with this index, trimmed and without the quotation marks around it; empty if the row
+    /// has no such cell.
     pub(crate) fn cell(&self, index: usize) -> &'r str {
         self.cells.get(index).map_or("", trim_cell)
     }
@@ -66,7 +67,7 @@ impl<'r> RowView<'r> {
         self.cells.len()
     }
 
-    /// Whether all cells are empty.
+    /// Whether all cells of the row are empty.
     pub(crate) fn is_empty(&self) -> bool {
         self.cells.iter().all(|cell| trim_cell(cell).is_empty())
     }
@@ -82,11 +83,11 @@ pub(crate) fn count_lines(bytes: &[u8]) -> usize {
     bytes.iter().filter(|byte| **byte == b'\n').count()
 }
 
-/// A cell without the blanks and quotes around it.
+/// Removes the blanks and the quotation marks around the text of a cell.
 fn trim_cell(cell: &str) -> &str {
     let plain = |byte: Option<&u8>| byte.is_some_and(|b| b.is_ascii_graphic() && *b != b'"');
     if plain(cell.as_bytes().first()) && plain(cell.as_bytes().last()) {
-        return cell; // (as for nearly every cell)
+        return cell; // (nearly every cell has nothing to remove)
     }
     let trimmed = cell.trim();
     trimmed.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')).map_or(trimmed, str::trim)
@@ -127,12 +128,13 @@ impl<'t> RecordReader<'t> {
         }
     }
 
-    /// Reads a row and returns its range of bytes, which includes the line ends before it.
+    /// Reads the next row into `record`. Returns the range of bytes that was read, which includes the line
+    /// ends before the row; 0 is the start of this reader's text. `None` after the last row.
     fn read_record(&mut self, record: &mut StringRecord) -> Option<(usize, usize)> {
         match self {
             Self::Csv(reader) => {
                 let from = reader.position().byte() as usize;
-                // (this cannot fail: the text is UTF-8, and rows may differ in length)
+                // (reading cannot fail: the text is UTF-8, and rows may differ in length)
                 reader.read_record(record).unwrap_or(false).then(|| (from, reader.position().byte() as usize))
             }
             Self::Blanks(text, at) => {
@@ -149,7 +151,7 @@ impl<'t> RecordReader<'t> {
 }
 
 impl<'t> RowReader<'t> {
-    /// Reader of the rows from byte `start` of `text` on; errors name `file`.
+    /// Makes a reader of the rows of `text` from byte `start` on. Error messages name `file`.
     pub(crate) fn new(file: &'t str, text: &'t str, delimiter: Delimiter, start: usize) -> Self {
         Self {
             file,
@@ -164,11 +166,12 @@ impl<'t> RowReader<'t> {
         }
     }
 
-    /// The next row. Comments and empty lines are skipped; rows of empty cells are not.
+    /// The next row; `None` after the last one. Comments and empty lines are skipped; rows whose cells are
+    /// all empty are not.
     ///
     /// # Errors
-    /// [`ImportError::Format`] if a quoted cell does not end in its line.
-    #[allow(clippy::should_implement_trait)] // (a row must not outlive the next call)
+    /// [`ImportError::Format`] if a quoted cell continues in the next line.
+    #[allow(clippy::should_implement_trait)] // (no `Iterator`: a row is valid until the next call)
     pub(crate) fn next_row(&mut self) -> ImportResult<Option<RowView<'_>>> {
         let text = self.text;
         while let Some((from, to)) = self.source.read_record(&mut self.record) {
@@ -177,8 +180,8 @@ impl<'t> RowReader<'t> {
             let before = span.as_bytes().iter().take_while(is_end).count();
             let after = span.as_bytes()[before..].iter().rev().take_while(is_end).count();
             self.start = self.base + from + before;
-            // (line ends within the row are not counted: it is refused, or reading restarts after its first
-            // line)
+            // (line ends within a row are not counted: such a row is refused or, if it is a comment, reading
+            // restarts after its first line)
             self.line += count_lines(&text.as_bytes()[self.counted..self.start]);
             self.counted = self.start + span.len() - before - after;
             let row = &span[before..span.len() - after];
@@ -187,7 +190,7 @@ impl<'t> RowReader<'t> {
             }
             if is_comment(row) {
                 if let Some(end) = row.find('\n') {
-                    self.restart_at(self.start + end); // a quotation mark in a comment quotes nothing
+                    self.restart_at(self.start + end); // (a quotation mark in a comment is plain text)
                 }
                 continue;
             }
@@ -205,7 +208,7 @@ impl<'t> RowReader<'t> {
         Ok(None)
     }
 
-    /// Continues reading at a line end, byte `at` of the text.
+    /// Continues reading at byte `at` of the text, which must be a line end.
     fn restart_at(&mut self, at: usize) {
         self.source = RecordReader::new(self.text.get(at..).unwrap_or_default(), self.delimiter);
         (self.base, self.counted) = (at, at);

@@ -1,5 +1,5 @@
-//! Damage to the numbers of a table that a spreadsheet opened and saved: dates, separators of thousands, the
-//! marks of columns that are too narrow, errors of formulas.
+//! Recognises cells in which a spreadsheet has damaged a number when it saved the table. It writes dates,
+//! separators of thousands, `####` in a column that is too narrow, and errors of formulas.
 
 const DATE: &str = "a spreadsheet has made a date of the number, and the number is lost: import the tracking \
     program's own export, which no spreadsheet has saved";
@@ -10,7 +10,7 @@ const HIDDEN: &str = "a spreadsheet wrote the marks of a column that is too narr
 const FAILED: &str = "a spreadsheet wrote the error of a formula: import the tracking program's own export, or save \
     a copy with the values";
 
-/// Beginnings of the names of months in the languages of the supported programs, in lower case.
+/// Beginnings of month names in the languages of the supported programs, in lower case.
 const MONTHS: [&str; 36] = [
     "jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec", // English
     "m\u{e4}r", "mai", "okt", "dez", // German
@@ -21,10 +21,11 @@ const MONTHS: [&str; 36] = [
 ];
 /// Maximum number of letters in an abbreviated name of a month.
 const LONGEST_MONTH: usize = 4;
-/// Separators in a date.
+/// Characters that separate day, month and year in a date.
 const DATE_MARKS: [char; 6] = ['.', '-', '/', ' ', '\'', ','];
 
-/// Damage that a spreadsheet has done to the number in a cell, with advice; `None` for an undamaged number.
+/// Describes how a spreadsheet has damaged the number in a cell, with advice; `None` if the text shows no
+/// such damage.
 pub(crate) fn describe_damage(text: &str) -> Option<&'static str> {
     let signs: [(bool, &str); 4] = [
         (is_hidden(text), HIDDEN),
@@ -43,7 +44,7 @@ pub(crate) fn is_error(text: &str) -> bool {
     text.starts_with('#') && text.ends_with(['!', '?']) && !text.contains(char::is_whitespace)
 }
 
-/// Whether a text is a date with the name of a month: `01.jan`, `Jan 01`, `12.Mai`, `1-Feb-2024`.
+/// Whether a text is a date with the name of a month, such as `01.jan`, `Jan 01`, `12.Mai` or `1-Feb-2024`.
 fn names_month(text: &str) -> bool {
     let plain = |c: char| c.is_ascii_digit() || DATE_MARKS.contains(&c);
     let mut words = text.split(plain).filter(|word| !word.is_empty());
@@ -54,8 +55,8 @@ fn names_month(text: &str) -> bool {
         && MONTHS.iter().any(|month| word.starts_with(month))
 }
 
-/// Whether a text is a date in numbers: `01/05`, `1.5.2024`, `2024-05-01`. With points or hyphens, which also
-/// occur in numbers, a date needs a year.
+/// Whether a text is a date of numbers only, such as `01/05`, `1.5.2024` or `2024-05-01`. A date with points
+/// or hyphens must contain a year, because these characters also occur in numbers.
 fn is_numeric_date(text: &str) -> bool {
     let by = |mark: char| -> Option<Vec<u32>> { text.split(mark).map(|part| part.parse().ok()).collect() };
     let day_and_month = |a: u32, b: u32| (1..=31).contains(&a.max(b)) && (1..=12).contains(&a.min(b));
@@ -69,8 +70,8 @@ fn is_numeric_date(text: &str) -> bool {
     })
 }
 
-/// Whether a text is a number with separators of thousands: `1'234.5`, `1,234.5`, `1.234,5`, `12,34,567`,
-/// `1.234.567`.
+/// Whether a text is a number with separators of thousands, such as `1'234.5`, `1,234.5`, `1.234,5`,
+/// `12,34,567` or `1.234.567`.
 fn is_grouped(text: &str) -> bool {
     let marks = |c: char| text.chars().filter(|other| *other == c).count();
     let digits = text.chars().all(|c| {

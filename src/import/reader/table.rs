@@ -1,4 +1,5 @@
-//! A delimited file: its first rows in memory, a reader of all rows, and the place of a cell.
+//! A table in a text file with delimiters between the cells: its first rows in memory, a reader of all rows,
+//! and the place of a cell for messages.
 
 use super::dialect::{declared_delimiter, is_comment};
 use crate::import::error::{CellProblem, ImportError, ImportResult, TextLocation};
@@ -7,37 +8,38 @@ use crate::import::reader::number::{CellNumber, parse_number};
 use crate::import::reader::rows::{RowReader, RowView, TextRow, count_lines, parse_rows};
 use crate::import::reader::spreadsheet;
 
-/// Number of rows that are kept in memory to find headers; the longest known header has a dozen rows.
+/// Maximum number of rows in [`DelimitedTable::head`], the first rows of a table, which are kept in memory to
+/// find headers. The longest known header has a dozen rows.
 const HEAD_ROWS: usize = 64;
-/// Beginning of a typographic minus sign whose UTF-8 was read as Windows-1252.
+/// Beginning of a typographic minus sign whose UTF-8 bytes were decoded as Windows-1252.
 const BROKEN_MINUS: &str = "\u{e2}\u{2c6}";
-/// Maximum number of header rows after comment marks: names and units.
+/// Maximum number of header rows in comment lines: one with names and one with units.
 const COMMENTED_ROWS: usize = 2;
-/// Tracker's mark of a file with several tracks.
+/// First line that Tracker writes to a file with several tracks.
 const MULTI_TRACK_MARK: &str = "#multi:";
-/// What a cell should contain, depending on the decimal mark of the file.
+/// What a cell should contain in a file with decimal points; `COMMA_NUMBER` says it for decimal commas.
 const POINT_NUMBER: &str = "a number with a decimal point as in the rest of the file, or an empty cell";
 const COMMA_NUMBER: &str = "a number with a decimal comma as in the rest of the file, or an empty cell";
 
-/// A delimited file without its comments.
+/// A table in a text file with delimiters between the cells; comment lines are skipped.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct DelimitedTable<'a> {
-    /// File as named by the user.
+    /// Path of the file as the user gave it.
     pub file: &'a str,
     pub dialect: Dialect,
     /// Whether the file starts with [`MULTI_TRACK_MARK`].
     pub multi: bool,
-    /// The first rows that are not empty, including the header.
+    /// The first rows that are not empty, at most [`HEAD_ROWS`], including the header.
     pub head: Vec<TextRow>,
     text: &'a str,
 }
 
 impl<'a> DelimitedTable<'a> {
-    /// Finds the dialect of a file and reads its first rows.
+    /// Finds the delimiter and the decimal mark of a table, and reads its first rows.
     ///
     /// # Errors
-    /// [`ImportError`] if no delimiter makes columns, if there are no numbers, if the comma is both delimiter
-    /// and decimal mark, or if one of the rows cannot be read.
+    /// [`ImportError`] if no delimiter splits the rows into columns, if there are no numbers, if the comma is
+    /// both delimiter and decimal mark, or if one of the first rows cannot be read.
     pub(crate) fn parse(file: &'a str, text: &'a str) -> ImportResult<Self> {
         let dialect = Dialect::find(file, text)?;
         let multi = text.lines().next().is_some_and(|line| line.trim() == MULTI_TRACK_MARK);
@@ -58,8 +60,9 @@ impl<'a> DelimitedTable<'a> {
         Ok(table)
     }
 
-    /// Column names, perhaps with their units below, after `#` or `%` directly above the first row of
-    /// numbers, as written by numpy's `savetxt` and by scripts for gnuplot and MATLAB.
+    /// Column names, perhaps with units below them, from comment lines (`#` or `%`) directly above the first
+    /// row of numbers. Such lines are written by numpy's `savetxt` and by scripts for gnuplot and MATLAB.
+    /// `first` is the first row that is not a comment.
     fn names_in_comments(&self, first: &TextRow) -> Vec<TextRow> {
         let kind = |cell: &String| self.parse_cell(cell);
         let numbers = first.cells.iter().any(|cell| self.is_value(cell))
@@ -80,7 +83,7 @@ impl<'a> DelimitedTable<'a> {
         rows
     }
 
-    /// Cells of the line that ends before byte `end`, if it starts with a comment mark.
+    /// Cells of the line directly above byte `end` of the text, if this line starts with `#` or `%`.
     fn comment_above(&self, end: usize) -> Option<TextRow> {
         let above = self.text.get(..end)?.strip_suffix('\n')?.trim_end_matches('\r');
         let start = above.rfind('\n').map_or(0, |end| end + 1);
@@ -90,32 +93,35 @@ impl<'a> DelimitedTable<'a> {
         Some(TextRow { line, cells, start })
     }
 
-    /// Reader of the rows from row `from` of the head on, including rows of empty cells.
+    /// Reader of the rows from row `from` of [`Self::head`] on. It also returns rows whose cells are all
+    /// empty.
     pub(crate) fn rows(&self, from: usize) -> RowReader<'_> {
         self.rows_from(self.head.get(from).map_or(self.text.len(), |row| row.start))
     }
 
-    /// Reader of the rows from byte `start` of the text on.
+    /// Reader of the rows of the text from byte `start` on.
     fn rows_from(&self, start: usize) -> RowReader<'_> {
         RowReader::new(self.file, self.text, self.dialect.delimiter, start)
     }
 
-    /// Whether the text contains an exponent in the form of spreadsheets, so that it may contain cut numbers.
+    /// Whether the text contains `E+` or `E-`; only then can it contain numbers that were cut to the form
+    /// `1.23E+05`.
     pub(crate) fn may_have_cut_numbers(&self) -> bool {
         self.text.contains("E+") || self.text.contains("E-")
     }
 
-    /// Line number of the first row.
+    /// Line number in the file of the first row of the table.
     pub(crate) fn first_line(&self) -> usize {
         self.head.first().map_or(1, |row| row.line)
     }
 
-    /// Cells of the first row.
+    /// Texts of the cells of the first row.
     pub(crate) fn first_texts(&self) -> Vec<&str> {
         self.head.first().map(TextRow::texts).unwrap_or_default()
     }
 
-    /// The first row, among the `most` first ones, for which `accepts` returns true, with its index.
+    /// The first row for which `accepts` returns true, with its index. Only the first `most` rows of
+    /// [`Self::head`] are tried.
     pub(crate) fn find_row(
         &self,
         most: usize,
@@ -129,21 +135,22 @@ impl<'a> DelimitedTable<'a> {
         matches!(self.parse_cell(cell), CellNumber::Value(_))
     }
 
-    /// Reads a cell with the decimal mark of the table.
+    /// Reads the number in a cell, with the decimal mark of the table.
     pub(crate) fn parse_cell(&self, cell: &str) -> CellNumber {
         parse_number(cell, self.dialect.decimal)
     }
 
-    /// Index of the first row of the head, from row `from` on, that has a number in each of `cells`.
+    /// Index in [`Self::head`] of the first row, from row `from` on, that has a number in each of the columns
+    /// `cells`.
     pub(crate) fn first_numeric_row(&self, from: usize, cells: &[usize]) -> Option<usize> {
         let numbers = |row: &TextRow| cells.iter().all(|cell| self.is_value(row.cell(*cell)));
         (from..self.head.len()).find(|&row| numbers(&self.head[row]))
     }
 
-    /// Number in a cell; `None` if it is missing. `name` is the name of the column.
+    /// Number in the cell of a row; `None` if it is missing. `name` is the name of the column in messages.
     ///
     /// # Errors
-    /// [`ImportError::Cell`] for any other text.
+    /// [`ImportError::Cell`] if the cell contains other text.
     pub(crate) fn number_at(&self, record: &RowView, cell: usize, name: &str) -> ImportResult<Option<f64>> {
         match self.parse_cell(record.cell(cell)) {
             CellNumber::Value(value) => Ok(Some(value)),
@@ -152,7 +159,8 @@ impl<'a> DelimitedTable<'a> {
         }
     }
 
-    /// Like [`Self::number_at`], for a column that the table may not have.
+    /// Like [`Self::number_at`], but returns `None` if `cell` is `None`, because the table does not have the
+    /// column.
     pub(crate) fn optional_number_at(
         &self,
         record: &RowView,
@@ -162,7 +170,7 @@ impl<'a> DelimitedTable<'a> {
         cell.map_or(Ok(None), |cell| self.number_at(record, cell, name))
     }
 
-    /// Refuses a row with fewer than `width` cells, or with text after the first `most` cells.
+    /// Refuses a row with fewer than `width` cells, or with text in a cell after the first `most` cells.
     pub(crate) fn check_row_length(&self, record: &RowView, width: usize, most: usize) -> ImportResult<()> {
         if record.len() >= width && (record.len() <= most || record.used_width() <= most) {
             return Ok(());
@@ -170,7 +178,7 @@ impl<'a> DelimitedTable<'a> {
         Err(self.ragged_error(record.line, record.len(), width.max(1)))
     }
 
-    /// Error for a row with another number of cells than the table.
+    /// Error for a row whose number of cells differs from that of the other rows.
     pub(crate) fn ragged_error(&self, line: usize, found: usize, expected: usize) -> ImportError {
         ImportError::Ragged { place: self.location(line, 1), found, expected }
     }
@@ -201,11 +209,11 @@ impl<'a> DelimitedTable<'a> {
         ImportError::cell(place, CellProblem::NotANumber, (name, text), (expected, advice))
     }
 
-    /// Refuses a row that starts like a comment in a table whose first column contains names; the row would
-    /// otherwise be skipped.
+    /// Refuses a table whose first column contains names if one of its rows starts like a comment. Such a row
+    /// would otherwise be skipped.
     ///
     /// # Errors
-    /// [`ImportError`] for the first such line below line `header`.
+    /// [`ImportError`] that names the first such line below line `header`.
     pub(crate) fn refuse_comment_names(&self, header: usize, named: &str, advice: &str) -> ImportResult<()> {
         let Some(above) = self.text.lines().skip(header).position(is_comment) else { return Ok(()) };
         let problem = format!(
@@ -214,7 +222,7 @@ impl<'a> DelimitedTable<'a> {
         Err(ImportError::columns(self.file, header + above + 1, problem, advice))
     }
 
-    /// The place of a cell; `cell` is its index.
+    /// File, line and column of the cell with the index `cell` in line `line`.
     pub(crate) fn cell_location(&self, line: usize, cell: usize) -> TextLocation {
         self.location(line, self.text_column(line, cell))
     }
@@ -223,7 +231,7 @@ impl<'a> DelimitedTable<'a> {
         TextLocation { file: self.file.to_owned(), line, column }
     }
 
-    /// Column number of the first character of a cell, counted from 1.
+    /// Position in its line of the first character of a cell, in characters counted from 1.
     pub(crate) fn text_column(&self, line: usize, cell: usize) -> usize {
         let Some(text) = self.text.lines().nth(line.saturating_sub(1)) else { return 1 };
         let Some(delimiter) = self.dialect.delimiter.byte() else { return column_of_word(text, cell) };
@@ -244,7 +252,8 @@ impl<'a> DelimitedTable<'a> {
     }
 }
 
-/// Column number of a word between runs of blanks, counted from 1.
+/// Position in `text` of the first character of a word, in characters counted from 1. Words are separated by
+/// blanks; `word` is the index of the word, counted from 0.
 pub(crate) fn column_of_word(text: &str, word: usize) -> usize {
     let mut before = ' ';
     let starts = text.chars().enumerate().filter(|(_, c)| {

@@ -1,20 +1,22 @@
-//! Frame numbers of the rows: from the frame column, or else from the grid that fits the times.
+//! Determines the frame number of every row: from the column of frame numbers, or else from the grid of
+//! equally spaced frames that fits the times.
 
 use crate::import::error::{CellProblem, ImportError, ImportResult};
 use crate::import::reader::rate::{RATE_AGREEMENT, find_quantum_s};
 use crate::import::reader::track_file::{Clock, TrackFile};
 use crate::recording::clock::{self, FrameFit, MAX_FRAMES, OFF_GRID_LIMIT_FRAMES};
 
-/// Largest `--frame-step` that an error suggests, if the ratio of the two rates is a whole number.
+/// Largest `--frame-step` that an error message suggests. It suggests one if the declared rate is a whole
+/// multiple of the rate that the times imply.
 const LARGEST_STEP: f64 = 10.0;
-/// Largest frame number; no camera counts that far.
+/// Largest frame number that is accepted; a larger number is damaged.
 const LARGEST_FRAME: f64 = 1e12;
 
-/// Maximum number of frames per row, on average. If there are more, a number is damaged rather than frames
-/// lost.
+/// Maximum number of frames per row, averaged over a recording. If there are more, the cause is a damaged
+/// number and not lost frames.
 pub(crate) const MOST_SPREAD: i64 = 1000;
 
-/// Timing as declared by the user.
+/// Timing that the user declares with options.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct DeclaredTiming {
     pub rate_hz: f64,
@@ -28,30 +30,31 @@ pub(crate) struct DeclaredTiming {
 /// Frame numbers of the rows of a clock.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct RowFrames {
-    /// Frame number of every row: that of the file, or counted from the first row.
+    /// Frame number of every row: the number in the file, or the number of frames since the first row.
     pub frames: Vec<i64>,
-    /// Whether the frame numbers are those of the file.
+    /// Whether the frame numbers are those in the file; otherwise they are derived from the times.
     pub numbered: bool,
-    /// Time of the first row, s, in the time of the recording.
+    /// Time of the first row, s, in real time and not in playback time.
     pub start_s: f64,
-    /// Rate that the times imply, 1/s: frames per second if the file numbers them, otherwise rows per second.
+    /// Rate that the times imply, 1/s: frames per second if the file has frame numbers, otherwise rows per
+    /// second.
     pub implied_hz: Option<f64>,
 }
 
-/// A clock and the export that contains it.
+/// A clock (frame numbers and times of rows), and the file that contains it.
 #[derive(Clone, Copy)]
 pub(crate) struct ClockRows<'e> {
     pub export: &'e TrackFile<'e>,
     pub clock: &'e Clock,
 }
 
-/// Determines the frame number of every row.
+/// Determines the frame number of every row of a clock.
 pub(crate) fn place_rows(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<RowFrames> {
     let (file, clock) = (rows.export.file, rows.clock);
     match clock.len() {
         0 => return Err(ImportError::header_only(file, 1)),
-        // (for a point that was digitised once while others are tracked, one row with a frame number is
-        // enough)
+        // (one row is enough if it has a frame number and another clock of the file has more rows: a point
+        // may be digitised in one frame only)
         1 if clock.frame.is_none() || rows.export.clocks.iter().all(|clock| clock.len() < 2) => {
             let place = format!("{file}:{}:1", clock.line_number(0));
             let (found, expected) = ("a single row of numbers", "one a frame and at least two");
@@ -70,8 +73,8 @@ pub(crate) fn place_rows(rows: ClockRows, declared: DeclaredTiming) -> ImportRes
     Ok(placed)
 }
 
-/// Refuses rows that are so far apart that a number must be damaged. This also limits memory by the file's
-/// size.
+/// Refuses rows that are so far apart that one of their numbers must be damaged. The size of the file then
+/// also limits the memory that the frames need.
 fn refuse_sparse(rows: ClockRows, placed: &RowFrames) -> ImportResult<()> {
     let jump = |row: usize| placed.frames[row] - placed.frames[row - 1];
     let span = placed.frames.last().zip(placed.frames.first()).map_or(0, |(last, first)| last - first);
@@ -84,7 +87,7 @@ fn refuse_sparse(rows: ClockRows, placed: &RowFrames) -> ImportResult<()> {
     Err(cell_error(rows, row, CellProblem::FarAway, found))
 }
 
-/// Refuses two clocks of a file whose frame 0 is at different times.
+/// Refuses two clocks of one file that give different times for frame 0.
 pub(crate) fn refuse_clock_mismatch(
     rows: ClockRows,
     placed: [&RowFrames; 2],
@@ -96,7 +99,8 @@ pub(crate) fn refuse_clock_mismatch(
     };
     let [Some(first_s), Some(other_s)] = placed.map(zero_s) else { return Ok(()) };
     let rounding_s = find_quantum_s(&rows.clock.times()).unwrap_or(0.0);
-    // (rates that differ within their tolerance drift apart over many frames)
+    // (the rates of the two clocks may differ within the tolerance, and then their times drift apart over
+    // many frames)
     let [first, other] = placed.map(|placed| placed.frames.first().copied().unwrap_or(0));
     let drift_s = RATE_AGREEMENT * (other - first).abs() as f64 / rate_hz;
     if (first_s - other_s).abs() <= 0.5 / rate_hz + rounding_s + drift_s {
@@ -107,8 +111,8 @@ pub(crate) fn refuse_clock_mismatch(
     Err(ImportError::grid_mismatch(rows.export.file, &found, &expected, "the other track"))
 }
 
-/// Number to add to the frames of `other` so that they count like those of `first`; refuses a fraction of a
-/// frame.
+/// Number to add to the frame numbers of `other` so that they mean the same frames as those of `first`. An
+/// offset that is not a whole number of frames is refused.
 pub(crate) fn frame_offset(
     first: (&TrackFile, &RowFrames),
     other: (&TrackFile, &RowFrames),
@@ -134,7 +138,8 @@ pub(crate) fn frame_offset(
     }
 }
 
-/// Takes the frame numbers from the file; the times only check the rate and give the start time.
+/// Takes the frame numbers from the file. The times are only used to check the rate and to give the time of
+/// the first row.
 fn place_by_number(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<RowFrames> {
     let clock = rows.clock;
     let mut frames: Vec<i64> = Vec::with_capacity(clock.len());
@@ -157,7 +162,7 @@ fn place_by_number(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<Ro
     let implied_hz =
         span_s.map(|span| (last - first) as f64 / span).filter(|rate| rate.is_finite() && *rate > 0.0);
     if let Some(implied) = implied_hz.filter(|_| !declared.playback) {
-        // the rounding of the first and last time of a short record changes the implied rate
+        // in a short recording, the rounding of the first and last time changes the implied rate
         let rounding_s = find_quantum_s(&clock.times()).unwrap_or(0.0);
         let expected_s = (last - first) as f64 / declared.rate_hz;
         if span_s.is_none_or(|span| (span - expected_s).abs() > rounding_s) {
@@ -169,7 +174,8 @@ fn place_by_number(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<Ro
     Ok(RowFrames { frames, numbered: true, start_s, implied_hz })
 }
 
-/// Multiplies frame numbers that count only the tracked frames by `--frame-step`.
+/// Multiplies frame numbers by `--frame-step`. They must increase by 1 from row to row, which shows that they
+/// count only the tracked frames.
 fn apply_frame_step(frames: &mut [i64], step: usize) -> ImportResult<()> {
     if step == 1 {
         return Ok(());
@@ -196,7 +202,8 @@ fn place_by_time(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<RowF
     Ok(RowFrames { frames, numbered: false, start_s, implied_hz: Some(1.0 / fit.frame_s) })
 }
 
-/// Fits the declared grid first, because coarsely rounded times do not show their own grid.
+/// Fits a frame grid to the times. A grid with the declared rate is tried first, because coarsely rounded
+/// times do not show their own rate. If it does not fit, a grid with the rate that the times show is fitted.
 fn fit_declared_grid(
     rows: ClockRows,
     times: &[f64],
@@ -222,14 +229,15 @@ fn fit_declared_grid(
     Ok(fit)
 }
 
-/// Refuses times that follow the declared rate but are rounded too coarsely to number the frames.
+/// Refuses times that agree with the declared rate on average, but are rounded too coarsely to number the
+/// frames.
 fn refuse_coarse_times(
     rows: ClockRows,
     times: &[f64],
     row_s: f64,
     declared: DeclaredTiming,
 ) -> ImportResult<()> {
-    let limit_s = 2.0 * OFF_GRID_LIMIT_FRAMES * row_s; // rounding moves a time by half a quantum
+    let limit_s = 2.0 * OFF_GRID_LIMIT_FRAMES * row_s; // (rounding changes a time by half a quantum at most)
     let quantum_s = find_quantum_s(times).filter(|quantum| *quantum > limit_s);
     let Some(quantum_s) = quantum_s else { return Ok(()) };
     let steps = times.windows(2).map(|w| w[1] - w[0]);
@@ -238,7 +246,7 @@ fn refuse_coarse_times(
     let span_s = times[times.len() - 1] - times[0];
     let mean_agrees =
         ((times.len() - 1) as f64 * row_s / span_s - 1.0).abs() <= RATE_AGREEMENT + quantum_s / span_s;
-    // (even steps mean that the rate differs, not that the times are rounded)
+    // (equal steps from time to time mean that the rate differs, not that the times are rounded)
     if most - least > quantum_s / 2.0 && mean_agrees {
         let problem = format!(
             "the times are rounded to {quantum_s} s, too coarsely to number the frames at {} frames/s; expected \
@@ -251,7 +259,7 @@ fn refuse_coarse_times(
     Ok(())
 }
 
-/// Fits the grid that the times themselves show.
+/// Fits a frame grid whose rate is taken from the times, not from the user.
 fn fit_shown_grid(rows: ClockRows, times: &[f64]) -> ImportResult<FrameFit> {
     let fit = clock::median_step_s(times).and_then(|seed_s| clock::number_frames(times, seed_s));
     let row = match fit {
@@ -265,7 +273,7 @@ fn fit_shown_grid(rows: ClockRows, times: &[f64]) -> ImportResult<FrameFit> {
     Err(cell_error(rows, row, CellProblem::OffGrid, Some(times[row])))
 }
 
-/// Formats a number for a message, without an exponent if that is short.
+/// Formats a number for a message; without an exponent, unless it is very large or very small.
 fn format_number(value: f64) -> String {
     if value == 0.0 || (1e-9..1e15).contains(&value.abs()) { value.to_string() } else { format!("{value:e}") }
 }
@@ -373,7 +381,7 @@ mod tests {
                 "{rate}: {message}"
             );
         }
-        // evenly spaced times imply another rate, with gaps or without
+        // times with equal steps imply another rate than the declared one, with gaps or without
         let gaps: Vec<f64> =
             rounded(1000.0).into_iter().enumerate().filter(|(i, _)| i % 50 != 7).map(|(_, t)| t).collect();
         for times in [rounded(1000.0), gaps] {

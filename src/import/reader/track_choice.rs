@@ -8,13 +8,14 @@ use crate::recording::quality::{Check, Severity};
 use crate::toml_file::suggest_key;
 use std::collections::HashMap;
 
-/// Maximum number of track names in an error message; a file of detections has thousands.
+/// Maximum number of track names in an error message; a file of detections has thousands of tracks.
 const MOST_NAMES: usize = 30;
 
-/// Index of the export of a track, and index of the track in that export.
+/// Index of the file that contains a track, and index of the track in that file.
 pub(crate) type TrackIndex = (usize, usize);
 
-/// Numbers the tracks of a file that share a name, so that each can be chosen.
+/// Adds `#1`, `#2`, ... to the names of tracks of one file that have the same name, so that each can be
+/// chosen. Every such name gives a finding.
 pub(crate) fn number_repeated_names(exports: &mut [TrackFile]) {
     for export in exports {
         let mut count: HashMap<String, usize> = HashMap::new();
@@ -62,14 +63,14 @@ pub(crate) fn choose_tracks(
         return Err(ImportError::point("head", found, expected, list_tracks(exports)));
     }
     let [tip, head] = chosen;
-    // (if several tracks have that name, none is chosen)
+    // (if several tracks are called `point`, none of them is chosen)
     let only =
         |point: &str| Some(tracks_called(exports, point)).filter(|found| found.len() == 1)?.first().copied();
     let left = |point, other: Option<TrackIndex>| only(point).filter(|track| Some(*track) != other);
     Ok([tip.or_else(|| left("tip", head)), head.or_else(|| left("head", tip))])
 }
 
-/// Tracks with that name; if there are none, those whose name differs only in case.
+/// Tracks called `name`; if there are none, those whose name differs from it only in case.
 fn tracks_called(exports: &[TrackFile], name: &str) -> Vec<TrackIndex> {
     let exact = matching_tracks(exports, |_, track| track == name);
     if !exact.is_empty() {
@@ -78,7 +79,7 @@ fn tracks_called(exports: &[TrackFile], name: &str) -> Vec<TrackIndex> {
     matching_tracks(exports, |_, track| track.eq_ignore_ascii_case(name))
 }
 
-/// Chooses the tracks called `tip` and `head`, if no `--point` is given.
+/// Chooses the tracks called `tip` and `head`; used if no `--point` is given.
 fn choose_by_default(exports: &[TrackFile]) -> ImportResult<[Option<TrackIndex>; 2]> {
     let [tip, head] = [tracks_called(exports, "tip"), tracks_called(exports, "head")];
     if tip.len() > 1 || head.len() > 1 || (tip.is_empty() && head.is_empty()) {
@@ -124,13 +125,14 @@ fn matching_tracks(exports: &[TrackFile], accept: impl Fn(&TrackFile, &str) -> b
     accepted.map(|(file, track, _, _)| (file, track)).collect()
 }
 
-/// Question whether the most similar name was meant, followed by a blank; empty if no name is similar.
+/// The question `did you mean ...?` with the most similar of `names`, followed by a blank; empty if no name
+/// is similar to `name`.
 fn suggest_track(name: &str, names: &[&str]) -> String {
     let suggestion = suggest_key(name, names);
     if suggestion.starts_with("did") { suggestion + " " } else { String::new() }
 }
 
-/// Advice if no track was found for `point` and other tracks remain.
+/// Advice for a point (`tip` or `head`) for which no track was found; `None` if no other track remains.
 pub(crate) fn unchosen_advice(
     exports: &[TrackFile],
     chosen: &[Option<TrackIndex>; 2],
@@ -145,7 +147,7 @@ pub(crate) fn unchosen_advice(
     (!free.is_empty()).then(|| format!("{hint}{}: name it with --point {point}=NAME", list_tracks(exports)))
 }
 
-/// Lists the tracks, with their files if there are several.
+/// Text that lists the names of all tracks, each with its file if there are several files.
 fn list_tracks(exports: &[TrackFile]) -> String {
     let full = |export: &TrackFile, name: &str| {
         if exports.len() > 1 { format!("{}:{name}", export.file_name()) } else { name.to_owned() }

@@ -1,4 +1,5 @@
-//! The contents of a file as its format reads them: clocks, tracks, and facts such as units.
+//! The contents of an imported file: clocks (frame numbers and times of the rows), tracks (positions of
+//! points), and facts such as units.
 
 use super::Document;
 use crate::import::error::TextLocation;
@@ -8,22 +9,22 @@ use crate::import::source::base_name;
 use crate::recording::files::YAxis;
 use crate::recording::quality::QualityFinding;
 
-/// Frame numbers and times of the rows of one or more tracks.
+/// Frame number and time of every row of one or more tracks.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Clock {
-    /// Line number of every row, counted from 1.
+    /// Line number of every row in the file, counted from 1.
     pub lines: Vec<u32>,
-    /// Index of the cell with the frame number or the time, for messages.
+    /// Index in each row of the cell with the frame number or the time; messages use it to name the place.
     pub cell: usize,
     /// Frame numbers, if the file has them.
     pub frame: Option<Column>,
-    /// Times, if the file has them, in the unit of [`Facts::time`].
+    /// Times in the unit of [`Facts::time`], if the file has them.
     pub time: Option<Column>,
     /// Value of one unit in the last written digit of the times, in their unit; 0 if it is not known.
     pub digit: f64,
 }
 
-/// Converts line numbers to the type in which a clock stores them.
+/// Converts line numbers to `u32`, the type in which [`Clock`] stores them.
 pub(crate) fn clock_lines(lines: impl IntoIterator<Item = usize>) -> Vec<u32> {
     lines.into_iter().map(|line| u32::try_from(line).unwrap_or(u32::MAX)).collect()
 }
@@ -47,7 +48,7 @@ impl Clock {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Track {
     pub name: String,
-    /// Index of the clock of the track.
+    /// Index of the track's clock in [`TrackFile::clocks`].
     pub clock: usize,
     pub x: Column,
     pub y: Option<Column>,
@@ -56,19 +57,20 @@ pub(crate) struct Track {
     pub units: [Fact<CoordinateUnit>; 2],
 }
 
-/// A fact, and a text on its source.
+/// A fact, and a text on where it was found; `None` if the fact is unknown.
 pub(crate) type Fact<T> = Option<(T, String)>;
 
-/// Facts that the file or the documentation of its format gives. The user has to give the missing ones.
+/// Facts that the file or the documentation of its format gives. The user has to give the facts that are
+/// missing.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Facts {
     pub y_axis: Fact<YAxis>,
-    /// Text on what the direction of y depends on, if the format leaves it open; part of the question to the
-    /// user.
+    /// Text on what the direction of y depends on, if the format does not fix it. The text is part of the
+    /// message that asks the user.
     pub y_axis_open: Option<&'static str>,
     /// Unit of all coordinates, which the file or the documentation of its format gives.
     pub unit: Fact<CoordinateUnit>,
-    /// Rate at which the camera recorded, 1/s; never a rate that may be that of playback.
+    /// Rate at which the camera recorded, 1/s. A rate that may be the playback rate is not stored here.
     pub frame_rate_hz: Fact<f64>,
     /// Exposure time of a frame, s.
     pub exposure_s: Fact<f64>,
@@ -77,26 +79,27 @@ pub(crate) struct Facts {
 }
 
 impl Facts {
-    /// Facts about image pixels with y downwards; `why` is the source of both facts.
+    /// Facts for coordinates in image pixels with y downwards; `why` is the text on where both facts were
+    /// found.
     pub(crate) fn pixels_down(why: &str) -> Self {
         let unit = Some((CoordinateUnit::Pixel, why.to_owned()));
         Self { y_axis: Some((YAxis::Down, why.to_owned())), unit, ..Self::default() }
     }
 }
 
-/// Clocks and tracks of a file, in its own units.
+/// Clocks and tracks of a file, in the units of the file.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct TrackFile<'a> {
     pub file: &'a str,
     pub stem: &'a str,
-    /// The table from which the clocks were read; `None` for XML and for blocks of rows.
+    /// The table from which the clocks were read; `None` if the file is not one table, such as XML.
     pub table: Option<&'a DelimitedTable<'a>>,
     pub clocks: Vec<Clock>,
     pub tracks: Vec<Track>,
     pub facts: Facts,
     pub notes: Vec<String>,
     pub findings: Vec<QualityFinding>,
-    /// Names and titles, in which the mark of synthetic data is sought.
+    /// Names and titles in the file, which are searched for the word that marks simulated data.
     pub texts: Vec<String>,
 }
 
@@ -109,7 +112,7 @@ impl<'a> TrackFile<'a> {
         base_name(self.file)
     }
 
-    /// Place of the frame number or time of a row.
+    /// Place in the file of the frame number or time of a row.
     pub(crate) fn row_location(&self, clock: &Clock, row: usize) -> TextLocation {
         let line = clock.line_number(row);
         let column = self.table.map_or(1, |table| table.text_column(line, clock.cell));
@@ -117,7 +120,7 @@ impl<'a> TrackFile<'a> {
     }
 }
 
-/// Numbers of a column. A missing number is stored as NaN and returned as `None`.
+/// Numbers of a column of a table. A missing number is stored as NaN and returned as `None`.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Column(Vec<f64>);
 
@@ -146,7 +149,7 @@ impl Column {
         self.0.iter().any(|value| !value.is_nan())
     }
 
-    /// The numbers in the order of the row indices `order`.
+    /// The numbers in another order: the new number i is the old number `order[i]`.
     pub(crate) fn reorder(&self, order: &[usize]) -> Self {
         Self(order.iter().filter_map(|row| self.0.get(*row).copied()).collect())
     }

@@ -1,14 +1,14 @@
-//! The flat table of DLTdv and Argus: one row per frame, without frame numbers, and columns `NAME_cam1_X`,
-//! `NAME_cam1_Y`, ...
+//! Reads the flat table of DLTdv and Argus: one row per frame, without frame numbers, and columns
+//! `NAME_cam1_X`, `NAME_cam1_Y`, ...
 
 use super::{FIRST_PIXEL, SEVERAL_CAMERAS, camera_track_name, pixel_facts};
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::reader::{DelimitedTable, Document, Fact, PointCells, TableLayout, TextRow, TrackFile};
 use crate::recording::files::YAxis;
 
-/// Text between the name of a point and its camera.
+/// Text in a column name between the name of the point and the number of the camera.
 const CAMERA: &str = "_cam";
-/// Endings of the names of x and y columns, and the program that writes them.
+/// Endings of the names of the x and y columns of a point, and the program that writes these endings.
 const AXES: [(&str, &str, DltdvWriter); 4] = [
     ("_U", "_V", DltdvWriter::Version8),
     ("_X", "_Y", DltdvWriter::Unknown),
@@ -22,11 +22,11 @@ enum DltdvWriter {
     Version8,
     /// Argus, which counts y upwards.
     Argus,
-    /// Several programs, which differ in the direction of y.
+    /// Several programs write these endings, and they differ in the direction of y.
     Unknown,
 }
 
-/// Parts of a column's name.
+/// Parts of a column name such as `tip_cam1_X`: point, camera and axis.
 #[derive(Clone, Copy, PartialEq)]
 struct DltdvColumn<'t> {
     point: &'t str,
@@ -36,7 +36,7 @@ struct DltdvColumn<'t> {
 }
 
 impl<'t> DltdvColumn<'t> {
-    /// Splits a name at its last `_cam`.
+    /// Splits a column name at its last `_cam`; `None` if it is not the name of a coordinate.
     fn parse(name: &'t str) -> Option<Self> {
         let ends =
             AXES.iter().enumerate().flat_map(|(axes, (x, y, _))| [(axes, *x, true), (axes, *y, false)]);
@@ -87,7 +87,8 @@ pub(crate) fn read_flat_table<'a>(
     Ok(export)
 }
 
-/// The points; the column of each x must be followed by that of its y.
+/// Finds the points of a table. Each x column must be directly followed by the y column of the same point and
+/// camera.
 fn point_columns(
     table: &DelimitedTable,
     row: &TextRow,
@@ -113,7 +114,7 @@ fn point_columns(
     Ok(points)
 }
 
-/// Number of empty rows directly below the header; they count as frames.
+/// Number of rows directly below the header whose cells are all empty; they count as frames.
 fn count_empty_rows(table: &DelimitedTable, header: usize) -> ImportResult<f64> {
     let mut rows = table.rows(header);
     let (mut count, mut in_data) = (0.0, false);

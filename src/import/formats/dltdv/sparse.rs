@@ -1,5 +1,5 @@
-//! The sparse table of DLTdv 8: rows of frame, column and value. The names of the points are in a companion
-//! file.
+//! Reads the sparse table of DLTdv 8, whose rows contain frame, column and value. The names of the points are
+//! in a companion file.
 
 use super::{FIRST_PIXEL, SEVERAL_CAMERAS, camera_track_name, pixel_facts};
 use crate::import::error::{CellProblem, ImportError, ImportResult};
@@ -9,12 +9,12 @@ use crate::import::reader::{
 use crate::recording::files::YAxis;
 use std::collections::BTreeMap;
 
-/// First line of a table of positions in pictures; tables of positions in space and of residuals have other
-/// first lines.
+/// Beginning of the first line of a table of positions in pictures. Tables of positions in space and of
+/// residuals begin differently.
 const TITLE: &str = "sparse format camera coordinates";
 const EXPORT_AGAIN: &str = "the file was cut short or edited: export it again";
 
-/// Positions in a pair of columns, by row number.
+/// Positions of one point in one camera (a pair of columns x and y), by row number from 1.
 type SparseFrames = BTreeMap<u64, SparsePosition>;
 
 #[derive(Default)]
@@ -24,7 +24,8 @@ struct SparsePosition {
     y: Option<f64>,
 }
 
-/// The second line: rows and columns of the full table, and the number of values that follow.
+/// Numbers in the second line of the file: rows and columns of the full table, and the number of values that
+/// follow.
 struct SparseTableSize {
     line: usize,
     rows: u64,
@@ -61,7 +62,7 @@ pub(crate) fn read_sparse_table<'a>(
                     first: entry.line,
                 });
             }
-            // (a zero means a missing value)
+            // (the value 0 means a missing coordinate)
             *coordinate = value.filter(|value| *value != 0.0);
             entry.line = record.line;
             count += 1;
@@ -82,7 +83,7 @@ pub(crate) fn read_sparse_table<'a>(
     Ok(export)
 }
 
-/// Adds the track of a pair of columns; every track has its own clock.
+/// Adds the track of a pair of columns to `export`; every track has its own clock.
 fn add_track(export: &mut TrackFile, name: String, frames: &SparseFrames) {
     let lines = clock_lines(frames.values().map(|entry| entry.line));
     let numbers = frames.keys().map(|row| Some((row - 1) as f64)).collect();
@@ -132,10 +133,10 @@ fn read_triplet(
     Ok((row, column, table.number_at(record, 2, "value")?))
 }
 
-/// Names for the pairs of columns.
+/// Names of the points, from which the names of the pairs of columns are made.
 struct SparsePointNames {
     points: Vec<String>,
-    /// Number of cameras that filmed each point; `None` without a list of names.
+    /// Number of cameras that filmed each point; `None` if there is no list of names.
     cameras: Option<u64>,
     /// Whether DLTdv 8 wrote the list of names.
     version_8: bool,
@@ -166,8 +167,8 @@ impl SparsePointNames {
         Ok(Self { points, cameras: Some(pairs / count), version_8: title.contains("DLTdv8"), pairs })
     }
 
-    /// Name of a pair of columns, counted from 0. The pairs of all cameras for the first point come first,
-    /// then those for the second point.
+    /// Name of the track in a pair of columns; `pair` counts from 0. The pairs of all cameras for the first
+    /// point come first, then those for the second point.
     fn name_of_pair(&self, pair: u64) -> String {
         let Some(cameras) = self.cameras else {
             let columns = format!("columns{}-{}", 2 * pair + 1, 2 * pair + 2);

@@ -1,4 +1,5 @@
-//! Kinovea's text export, made for gnuplot: a block of rows for each track, with its own times.
+//! Reads Kinovea's text export, which is made for gnuplot. It has a block of rows for each track, and each
+//! block has its own times.
 
 use super::{PREFERENCES_NOTE, kinovea_facts};
 use crate::import::error::{CellProblem, ImportError, ImportResult, TextLocation};
@@ -9,13 +10,13 @@ use crate::import::reader::{
 };
 use portable_math as math;
 
-/// First line of the text export.
+/// Beginning of the first line of the text export.
 pub(super) const TITLE: &str = "#Kinovea";
 /// Line that names the columns.
 const COLUMNS: &str = "#T X Y";
-/// Number of cells in a row with one point.
+/// Number of cells in a row with one point: time, x and y.
 const CELLS: usize = 3;
-/// Number of parts of a time code, from hours to fractions of a second.
+/// Number of parts of a time code `h:mm:ss:cc`, from hours to fractions of a second.
 const CODE_PARTS: usize = 4;
 /// Maximum number of digits in a part of a time code.
 const CODE_DIGITS: usize = 9;
@@ -87,7 +88,7 @@ impl NumberStyle {
     }
 }
 
-/// Converts a time code `h:mm:ss:cc` to seconds; the last part is a decimal fraction.
+/// Converts a time code `h:mm:ss:cc` to seconds. The digits of the last part are decimals of a second.
 fn time_code_s(cell: &str) -> Option<f64> {
     let (sign, digits) = cell.strip_prefix('-').map_or((1.0, cell), |rest| (-1.0, rest));
     let parts: Vec<&str> = digits.split(':').collect();
@@ -109,14 +110,14 @@ struct KinoveaTextReader<'f> {
     block: Option<TrackBlock>,
     clocks: Vec<Clock>,
     tracks: Vec<Track>,
-    /// Number of tracks without a name so far.
+    /// Number of tracks without a name that have been read so far.
     unnamed: usize,
 }
 
-/// Rows of one track.
+/// Name and rows of one track.
 struct TrackBlock {
     name: String,
-    /// Number of cells in a row, and the rows; `None` before the first row.
+    /// Number of cells in a row, and the rows of the track; `None` until its first row is read.
     rows: Option<(usize, TrackCollector)>,
 }
 
@@ -124,7 +125,7 @@ impl KinoveaTextReader<'_> {
     fn read_line(&mut self, line: usize, text: &str) -> ImportResult<()> {
         let trimmed = text.trim();
         if trimmed.is_empty() {
-            // (a blank line ends a track, unless it is above the first row)
+            // (a blank line ends a track, unless the track has no rows yet)
             let begun = self.block.as_ref().is_some_and(|block| block.rows.is_some());
             return if begun { self.end_track() } else { Ok(()) };
         }
@@ -186,8 +187,8 @@ impl KinoveaTextReader<'_> {
     }
 }
 
-/// Fields of the rows of a block. The points of an object are numbered, because this export does not name
-/// them.
+/// What the rows of a block contain: a time, and `points` points. If there are several points, they are
+/// numbered, because this export does not name the points of an object.
 fn block_shape(name: &str, points: usize) -> InstanceFields {
     let called = |index: usize| if points == 1 { name.to_owned() } else { format!("{name}/{}", index + 1) };
     let points = (0..points)

@@ -5,7 +5,8 @@ use crate::import::error::{ImportError, ImportResult};
 use crate::import::options::{ColumnMap, ColumnName, ROW_COLUMN};
 use crate::import::reader::layout::ClockDifference;
 use crate::import::reader::{
-    CellNumber, ColumnMeaning, ColumnUnit, CoordinateUnit, DelimitedTable, Fact, PointCells, TextRow, TimeUnit,
+    CellNumber, ColumnMeaning, ColumnUnit, CoordinateUnit, DelimitedTable, Fact, PointCells, TextRow,
+    TimeUnit,
 };
 use crate::toml_file::suggest_key;
 
@@ -52,7 +53,8 @@ pub(super) fn find_header_columns(table: &DelimitedTable) -> ImportResult<TableC
         None
     };
     let units = names.units;
-    let mut columns = TableColumns { by_header: true, header: Some(header), units, start: 0, frame, time, track, points };
+    let mut columns =
+        TableColumns { by_header: true, header: Some(header), units, start: 0, frame, time, track, points };
     let clock = columns.clock().next().unwrap_or(0);
     columns.start = first_data_row(table, header, clock)?;
     Ok(columns)
@@ -287,14 +289,16 @@ impl MappedColumns<'_> {
 
     /// Columns with numbers: the clock, or the first x if every row is a frame, and then the others.
     fn numeric_columns(&self) -> Vec<usize> {
-        let clock = ["frame", "time", "time-ms", "tip-x", "head-x", "x"].into_iter().find_map(|key| self.column(key));
+        let clock =
+            ["frame", "time", "time-ms", "tip-x", "head-x", "x"].into_iter().find_map(|key| self.column(key));
         let others = self.positions.iter().filter(|(key, at)| *key != "track" && Some(*at) != clock);
         clock.into_iter().chain(others.map(|(_, at)| *at)).collect()
     }
 
     /// Whether a row has numbers in the clock and in another column, and no text in any of them.
     fn is_data(&self, row: &TextRow) -> bool {
-        let cells: Vec<CellNumber> = self.numeric_columns().into_iter().map(|at| self.number(row, at)).collect();
+        let cells: Vec<CellNumber> =
+            self.numeric_columns().into_iter().map(|at| self.number(row, at)).collect();
         let is_value = |cell: &CellNumber| matches!(cell, CellNumber::Value(_));
         cells.first().is_some_and(is_value) && !cells.contains(&CellNumber::Text)
     }
@@ -379,7 +383,12 @@ impl MappedColumns<'_> {
             time = Some((at, seconds));
         }
         if let Some((at, why)) = self.column("frame").and_then(|at| Some((at, unit(at)?.1))) {
-            return refuse("frame", at, &format!("a unit ({why})"), "frame numbers; times are named by time=");
+            return refuse(
+                "frame",
+                at,
+                &format!("a unit ({why})"),
+                "frame numbers; times are named by time=",
+            );
         }
         let mut points = vec![];
         for (point, [x, y, confidence]) in POINT_KEYS {

@@ -1,4 +1,4 @@
-//! A project of TrackMate: spots, the edges that link them, and the tracks that passed the filters.
+//! Reads a project of TrackMate: spots, the edges that link them, and the tracks that passed the filters.
 
 use super::{EXPORT_ADVICE, Spot, TrackMateFile, Trajectory};
 use crate::import::error::{ImportError, ImportResult};
@@ -9,14 +9,14 @@ use std::collections::{HashMap, HashSet};
 pub(super) const PROJECT_ROOT: &str = "TrackMate";
 const SAVE_AGAIN: &str = "save the project again in TrackMate";
 
-/// Contents of the elements, before the spots are sorted into tracks.
+/// Contents of the XML elements of a project, before the spots are assigned to tracks.
 #[derive(Default)]
 struct ProjectElements {
     space_unit: Option<String>,
     time_unit: Option<String>,
     spots: HashMap<String, Spot>,
     tracks: Vec<ProjectTrack>,
-    /// Identifiers of the tracks that passed the filters, if the project lists them.
+    /// Identifiers of the tracks that passed the filters; `None` if the project does not list them.
     kept: Option<HashSet<String>>,
     has_quality: bool,
 }
@@ -24,7 +24,7 @@ struct ProjectElements {
 struct ProjectTrack {
     id: String,
     name: String,
-    /// Identifiers of the spots, in the order of their first edge.
+    /// Identifiers of the spots of the track, in the order in which its edges name them.
     spots: Vec<String>,
     seen: HashSet<String>,
 }
@@ -57,7 +57,7 @@ fn read_track(xml: &XmlReader, element: &XmlElement) -> ImportResult<ProjectTrac
 }
 
 impl ProjectTrack {
-    /// Adds the spots at the two ends of an edge.
+    /// Adds the spots at the two ends of an edge to the track, if it does not have them yet.
     fn add_edge(
         &mut self,
         xml: &XmlReader,
@@ -83,7 +83,7 @@ impl ProjectTrack {
 }
 
 impl ProjectElements {
-    /// Reads an element that is neither a track nor an edge.
+    /// Reads an XML element that is neither a track nor an edge.
     fn take_element(&mut self, xml: &XmlReader, element: &XmlElement) -> ImportResult<()> {
         if element.has_name("Model") {
             self.space_unit = xml.attribute(element, "spatialunits")?;

@@ -1,14 +1,16 @@
-//! TrackMate's table of spots: one to four header rows, rows in any order, no quotation marks.
+//! Reads TrackMate's table of spots. It has one to four header rows and no quotation marks, and its rows may
+//! be in any order.
 
 use super::{EXPORT_ADVICE, Spot, TrackMateFile, Trajectory};
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::reader::{CellNumber, DelimitedTable, Document, RowView, TextRow};
 use std::collections::HashMap;
 
-/// Number of rows at the top in which the column names are sought: old versions have one header row, later
+/// Number of rows at the top that are searched for the column names: old versions write one header row, later
 /// ones up to four.
 const HEADER_ROWS: usize = 4;
-/// Columns that occur only in tables of edges or of tracks, each with the name of its table.
+/// Names of columns that occur only in TrackMate's tables of edges or of tracks, each with the name of its
+/// table.
 const OTHER_TABLES: [(&str, &str); 5] = [
     ("SPOT_SOURCE_ID", "edges"),
     ("EDGE_TIME", "edges"),
@@ -20,7 +22,7 @@ const POSITION: [&str; 2] = ["POSITION_X", "POSITION_Y"];
 const FRAME: &str = "FRAME";
 const TRACK: &str = "TRACK_ID";
 
-/// Feature of a table that identifies it as TrackMate's.
+/// Text on the feature that shows that a table is one of TrackMate's; `None` for any other table.
 pub(crate) fn recognise_spots(table: &DelimitedTable) -> Option<String> {
     if let Some(row) = find_header(table) {
         return Some(format!("line {} names POSITION_X and FRAME as TrackMate does", row.1.line));
@@ -35,7 +37,8 @@ fn find_header<'t>(table: &'t DelimitedTable) -> Option<(usize, &'t TextRow)> {
     table.find_row(HEADER_ROWS, named)
 }
 
-/// Row and cell of a column that occurs only in other tables of TrackMate, and the name of that table.
+/// Finds a column that occurs only in TrackMate's tables of edges or tracks. Returns its header row, the
+/// index of its cell, and the name of the table.
 fn find_other_table<'t>(table: &'t DelimitedTable) -> Option<(&'t TextRow, usize, &'static str)> {
     let shows = |row: &'t TextRow| {
         let tracks = row.has(TRACK);
@@ -59,7 +62,7 @@ fn wrong_table_error(table: &DelimitedTable) -> ImportError {
     ImportError::wrong_table(place, found, expected, EXPORT_ADVICE)
 }
 
-/// Columns of a table of spots.
+/// Indices of the columns of a table of spots.
 struct SpotCells {
     id: Option<usize>,
     track: usize,
@@ -162,7 +165,8 @@ fn read_rows(
     Ok(())
 }
 
-/// Refuses a row whose cells are shifted by a comma in a name, because TrackMate does not quote names.
+/// Refuses a row in which a comma within a name has shifted the cells after it. TrackMate writes names
+/// without quotation marks.
 fn check_shift(table: &DelimitedTable, record: &RowView, cells: &SpotCells) -> ImportResult<()> {
     let whole = |cell: usize| record.cell(cell).parse::<i64>().is_ok();
     if record.len() == cells.width && cells.id.is_none_or(whole) {

@@ -1,7 +1,9 @@
-//! XML as opening and closing tags with their places. This is the only file that uses `quick_xml`.
+//! Reads XML as a sequence of opening and closing tags with their places in the file. This is the only file
+//! that uses `quick_xml`.
 //!
-//! Tags are read one by one, so that deep nesting takes no stack. Only the five predefined entities and
-//! character references are resolved; a document type, which could define others, is refused.
+//! Tags are read one by one, so that deeply nested elements cannot overflow the stack. Only character
+//! references and the five predefined entities are resolved. A document type definition, which could define
+//! other entities, is refused.
 
 use crate::import::error::{CellProblem, ImportError, ImportResult, TextLocation};
 use crate::import::reader::rows::count_lines;
@@ -12,24 +14,24 @@ use quick_xml::reader::Reader;
 
 const REMEDY: &str = "save or export it again from TrackMate";
 
-/// Reads the tags of a document in their order.
+/// Reads the tags of a document in the order of the file.
 pub(crate) struct XmlReader<'a> {
     file: &'a str,
     text: &'a str,
     reader: Reader<&'a [u8]>,
-    /// Number of open elements.
+    /// Number of elements that are open, i.e. not yet closed.
     depth: usize,
-    /// Byte offset up to which lines have been counted, and the line number there.
+    /// Byte offset up to which lines have been counted, and the line number at this offset.
     counted: (usize, usize),
 }
 
-/// Start or end of an element; an element without content gives both.
+/// Opening or closing tag of an element. An empty element such as `<a/>` gives both.
 pub(crate) enum XmlTag<'a> {
     Open(XmlElement<'a>),
     Close(BytesEnd<'a>),
 }
 
-/// Start of an element.
+/// Opening tag of an element.
 pub(crate) struct XmlElement<'a> {
     bytes: BytesStart<'a>,
     start: usize,
@@ -43,7 +45,7 @@ impl XmlElement<'_> {
 }
 
 impl XmlTag<'_> {
-    /// Whether this is the end of an element with that name.
+    /// Whether this is the closing tag of an element called `name`.
     pub(crate) fn closes(&self, name: &str) -> bool {
         matches!(self, Self::Close(end) if end.name().as_ref() == name)
     }
@@ -56,7 +58,7 @@ impl<'a> XmlReader<'a> {
         Self { file: document.file, text: document.text, reader, depth: 0, counted: (0, 1) }
     }
 
-    /// Name of the root element, if the text begins like XML.
+    /// Name of the root element; `None` if the text is not XML.
     pub(crate) fn root_name(document: &Document) -> Option<String> {
         if !document.text.trim_start().starts_with('<') {
             return None;
@@ -67,11 +69,11 @@ impl<'a> XmlReader<'a> {
         }
     }
 
-    /// The next tag; `None` after the last one.
+    /// The next opening or closing tag; `None` after the last one.
     ///
     /// # Errors
     /// [`ImportError::WrongTable`] if the text is not well-formed, ends within an element, or has a document
-    /// type.
+    /// type definition.
     pub(crate) fn next_tag(&mut self) -> ImportResult<Option<XmlTag<'a>>> {
         loop {
             let start = self.clamp_offset(self.reader.buffer_position());
@@ -103,7 +105,7 @@ impl<'a> XmlReader<'a> {
         }
     }
 
-    /// Value of an attribute, if the element has it.
+    /// Value of the attribute `name`; `None` if the element does not have it.
     ///
     /// # Errors
     /// [`ImportError::WrongTable`] for attributes that are not well-formed and for entities that are not
@@ -125,7 +127,7 @@ impl<'a> XmlReader<'a> {
     /// Value of an attribute that the element must have.
     ///
     /// # Errors
-    /// [`ImportError::WrongTable`] if it is missing.
+    /// [`ImportError::WrongTable`] if the attribute is missing.
     pub(crate) fn required_attribute(&self, element: &XmlElement, name: &str) -> ImportResult<String> {
         self.attribute(element, name)?.ok_or_else(|| {
             let found = format!("<{}> without {name}", element.bytes.name().as_ref());
@@ -134,10 +136,12 @@ impl<'a> XmlReader<'a> {
         })
     }
 
-    /// Number in an attribute that the element must have; `None` for a word that means a missing value.
+    /// Number in an attribute that the element must have; `None` if the attribute contains a word for a
+    /// missing value.
     ///
     /// # Errors
-    /// [`ImportError::WrongTable`] if the attribute is missing, [`ImportError::Cell`] for any other text.
+    /// [`ImportError::WrongTable`] if the attribute is missing; [`ImportError::Cell`] if it contains other
+    /// text.
     pub(crate) fn number_attribute(&self, element: &XmlElement, name: &str) -> ImportResult<Option<f64>> {
         let text = self.required_attribute(element, name)?;
         match parse_number(text.trim(), '.') {
@@ -151,7 +155,7 @@ impl<'a> XmlReader<'a> {
         }
     }
 
-    /// The place of an element, for messages.
+    /// The place of an element in the file, for messages.
     pub(crate) fn element_location(&self, element: &XmlElement) -> TextLocation {
         self.location_at(element.start)
     }
@@ -164,7 +168,7 @@ impl<'a> XmlReader<'a> {
         usize::try_from(offset).unwrap_or(usize::MAX).min(self.text.len())
     }
 
-    /// Line number at byte `at`, which must not precede the byte of the previous call.
+    /// Line number at byte `at` of the text. From call to call, `at` must not decrease.
     fn line_at(&mut self, at: usize) -> usize {
         let (from, line) = self.counted;
         let line = line + count_lines(self.text.as_bytes().get(from..at).unwrap_or_default());
