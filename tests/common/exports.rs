@@ -299,7 +299,7 @@ fn mtrackj(motion: &Motion) -> String {
 
 fn dippmotion(motion: &Motion) -> String {
     let header = "DIPP-MOTION \
-        XYGraphData\nInfo\n\u{6a2a}\u{8ef8}\u{5358}\u{4f4d},mm\n\u{7e26}\u{8ef8}\u{5358}\u{4f4d},mm\n\u{7cfb}\u{5217}\u{540d},[1]tip,[2]head\n\u{6642}\u{9593},tip(X),tip(Y),head(X),head(Y)\n";
+        XYGraphData\nInfo\n\u{6a2a}\u{8ef8}\u{5358}\u{4f4d},m\n\u{7e26}\u{8ef8}\u{5358}\u{4f4d},m\n\u{7cfb}\u{5217}\u{540d},[1]tip,[2]head\n\u{6642}\u{9593},tip(X),tip(Y),head(X),head(Y)\n";
     wide(motion, header, ",", "*", |frame| time(motion, frame).to_string())
 }
 
@@ -335,7 +335,7 @@ fn trc(motion: &Motion) -> String {
     let rate = motion.rate_hz;
     let frames = motion.frames.len();
     let mut text = format!(
-        "PathFileType\t4\t(X/Y/Z)\trun.trc\nDataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames\n{rate}\t{rate}\t{frames}\t2\tmm\t{rate}\t1\t{frames}\nFrame#\tTime\ttip\t\t\thead\t\t\n\t\tX1\tY1\tZ1\tX2\tY2\tZ2\n\n"
+        "PathFileType\t4\t(X/Y/Z)\trun.trc\nDataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames\n{rate}\t{rate}\t{frames}\t2\tm\t{rate}\t1\t{frames}\nFrame#\tTime\ttip\t\t\thead\t\t\n\t\tX1\tY1\tZ1\tX2\tY2\tZ2\n\n"
     );
     for (frame, v) in motion.frames.iter().enumerate() {
         let z = |point: usize| if v[2 * point].is_some() { "0.5" } else { "" };

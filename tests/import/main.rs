@@ -3,6 +3,7 @@
 #[path = "../common/exports.rs"]
 mod exports;
 
+mod generated_tables;
 mod motion;
 mod one_reading;
 mod particles;
@@ -13,3 +14,4 @@ mod registry;
 mod tables;
 mod trace;
 mod tracker;
+mod units_and_clocks;

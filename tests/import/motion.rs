@@ -44,6 +44,11 @@ fn rate(rate_hz: f64) -> ImportOptions {
     ImportOptions { frame_rate_hz: Some(rate_hz), ..all() }
 }
 
+/// The scale is that of the unit that the file names.
+fn own_unit(options: ImportOptions) -> ImportOptions {
+    ImportOptions { scale: None, ..options }
+}
+
 fn points(tip: &str, head: &str, options: ImportOptions) -> ImportOptions {
     ImportOptions { tip: Some(tip.to_owned()), head: Some(head.to_owned()), ..options }
 }
@@ -98,6 +103,7 @@ fn every_fixture_is_recognised_as_its_own_program() {
     ];
     for (format, file) in kinovea.map(|file| ("kinovea", file)).into_iter().chain(others) {
         let options = points("nobody", "none", time(TimeColumn::Playback, rate(1000.0)));
+        let options = if format == "dippmotion" { own_unit(options) } else { options };
         let message = refusal(read(file, &options));
         contains(&message, &["--point tip: found `nobody`", "tracks found: "]);
         let names = message
@@ -333,21 +339,20 @@ fn dippmotion_has_its_unit_its_names_and_stars_for_lost_points() {
 
 #[test]
 fn dippmotion_tells_positions_that_are_relative_to_a_point() {
-    let found = read(ORIGIN, &points("P 2", "P 1", ImportOptions { scale: None, ..rate(1000.0) })).unwrap();
+    let found = read(ORIGIN, &points("P 2", "P 1", own_unit(rate(1000.0)))).unwrap();
     assert_eq!(found.recording.traces().tip_x_m, some(&[-0.265, -0.2625, -0.26]));
     assert!(warns(&found, "relative-positions", Severity::Caution));
-    let said = read(
-        ORIGIN,
-        &points("P 2", "P 1", ImportOptions { scale: Some(CoordinateScale::Unit(1e-3)), ..rate(1000.0) }),
-    )
-    .unwrap();
-    assert!(warns(&said, "unit", Severity::Caution), "{:?}", said.report.findings);
+    let other = ImportOptions { scale: Some(CoordinateScale::Unit(1e-3)), ..rate(1000.0) };
+    contains(
+        &refusal(read(ORIGIN, &points("P 2", "P 1", other))),
+        &["--scale: found `units of 0.001 m`, expected units of 0.01 m (line 5 names the unit cm)"],
+    );
 }
 
 #[test]
 fn dippmotion_tables_of_tabs_are_read() {
     let bytes: Vec<u8> = STARS.1.iter().map(|byte| if *byte == b',' { b'\t' } else { *byte }).collect();
-    let options = points("\u{5148}\u{7aef}", "P 2", ImportOptions { scale: None, ..rate(1000.0) });
+    let options = points("\u{5148}\u{7aef}", "P 2", own_unit(rate(1000.0)));
     let found = import(&[ImportSource::without_companions("a.csv", bytes)], &options);
     assert_eq!(traces(found), traces(read(STARS, &options)));
 }
@@ -365,7 +370,7 @@ fn dippmotion_refusals_name_the_graph_the_unit_and_the_column() {
     );
     let changed = |from: &str, to: &str| {
         let table = format!("{HEADER}\n{ROWS}").replacen(from, to, 1);
-        refusal(text(&table, &points("\u{5148}\u{7aef}", "P 2", rate(1000.0))))
+        refusal(text(&table, &points("\u{5148}\u{7aef}", "P 2", own_unit(rate(1000.0)))))
     };
     contains(
         &changed("\u{7e26}\u{8ef8}\u{5358}\u{4f4d},mm", "\u{7e26}\u{8ef8}\u{5358}\u{4f4d},cm"),
@@ -576,6 +581,7 @@ fn files_that_are_cut_short_or_damaged_are_imported_or_refused() {
     let (mut tried, mut imported) = (0, 0);
     for ((name, bytes), [tip, head]) in files {
         let options = points(tip, head, time(TimeColumn::Playback, rate(1000.0)));
+        let options = if name == STARS.0 { own_unit(options) } else { options };
         for at in (0..bytes.len()).step_by(9) {
             let mut changed = bytes.to_vec();
             changed[at] = [b',', b'"', b'9', b'\n', b'#', b':', 0xe3][at % 7];

@@ -364,7 +364,7 @@ fn names_behind_a_comment_mark_above_the_numbers_are_names() {
         "# saved by a script\n# frame,x,y\n0,1.5,2.5\n1,1.75,2.75\n",
         "#frame;x;y\r\n0;1,5;2,5\r\n1;1,75;2,75\r\n",
         "% t x y\n0.0 1.5 2.5\n0.1 1.75 2.75\n",
-        "# time,x,y\n# ms,px,px\n0,1.5,2.5\n100,1.75,2.75\n",
+        "# time,x,y\n# ms,m,m\n0,1.5,2.5\n100,1.75,2.75\n",
     ] {
         let found =
             import(&[ImportSource::without_companions("a.csv", text.as_bytes().to_vec())], &options).unwrap();
@@ -485,9 +485,9 @@ fn a_table_of_a_kinematics_window_stays_one_when_its_columns_are_named() {
 #[test]
 fn headers_in_other_languages_and_scripts_are_read() {
     let texts = [
-        "Zeit [s];Tip X [mm];Tip Y [mm]\n0,0;1,5;2\n0,5;1,75;2\n",
-        "Temps (s);tip x (mm);tip y (mm)\n0,0;1,5;2\n0,5;1,75;2\n",
-        "\u{6642}\u{9593}(s),\u{5148}\u{7aef}X(mm),\u{5148}\u{7aef}Y(mm)\n0.0,1.5,2\n0.5,1.75,2\n",
+        "Zeit [s];Tip X [m];Tip Y [m]\n0,0;1,5;2\n0,5;1,75;2\n",
+        "Temps (s);tip x (m);tip y (m)\n0,0;1,5;2\n0,5;1,75;2\n",
+        "\u{6642}\u{9593}(s),\u{5148}\u{7aef}X(m),\u{5148}\u{7aef}Y(m)\n0.0,1.5,2\n0.5,1.75,2\n",
         "Bild;TipX;TipY\n0;1,5;2\n1;1,75;2\n",
         "\u{30d5}\u{30ec}\u{30fc}\u{30e0},x1,y1\n0,1.5,2\n1,1.75,2\n",
     ];

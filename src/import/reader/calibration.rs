@@ -244,6 +244,7 @@ fn coordinate_scales(
         .iter()
         .enumerate()
         .flat_map(|(file, export)| (0..export.tracks.len()).map(move |at| (file, at)));
+    let declared = options.scale.filter(|_| chosen.is_ok());
     let chosen = chosen.as_ref().map_or_else(|_| all.map(Some).collect(), |chosen| chosen.to_vec());
     // (a column whose header has no unit takes that of the other coordinate of its point)
     let stated = |(file, track): TrackIndex| {
@@ -255,7 +256,7 @@ fn coordinate_scales(
     let known = || units.as_flattened().iter().flatten();
     let lengths = || known().filter(|(unit, _)| *unit != CoordinateUnit::Pixel);
     let used = chosen.iter().flatten().count();
-    if let Some(scale) = options.scale {
+    if let Some(scale) = declared {
         // (a length a pixel is that of the columns in pixels, if there are any)
         let of_pixels = matches!(scale, CoordinateScale::MetresPerPixel(_)) && lengths().count() < 2 * used;
         let in_header = |stated: &(CoordinateUnit, String)| {

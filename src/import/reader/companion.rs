@@ -57,6 +57,9 @@ fn record_finding(severity: Severity, value: (f64, &str), found: String) -> Qual
     new_finding(Check::CameraRecord, severity, value, found, "--frame-rate-hz counts")
 }
 
+/// Rates up to this one, 1/s, are placeholders: software that converts videos writes 1 where it knows none.
+const PLACEHOLDER_HZ: f64 = 1.0;
+
 /// Settings in a camera's record. Rate and exposure time are stored with their line numbers in the record.
 struct CameraSettings {
     rate_hz: (f64, usize),
@@ -89,6 +92,13 @@ fn take_settings(
 ) -> ImportResult<()> {
     let name = || format!("the camera's record {}", base_name(record.name));
     let (rate_hz, _) = settings.rate_hz;
+    if rate_hz <= PLACEHOLDER_HZ {
+        let found = format!("{} says {rate_hz} frames/s, a placeholder that no video of a blade has", name());
+        let advice = "give the rate at which the camera recorded as --frame-rate-hz";
+        let value = (rate_hz, "1/s");
+        export.findings.push(new_finding(Check::CameraRecord, Severity::Caution, value, found, advice));
+        return Ok(());
+    }
     if settings.step.frames > 1 {
         let finding = saved_step_finding(record, export, options, rate_hz, &settings.step)?;
         export.findings.push(finding);

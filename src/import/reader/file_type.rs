@@ -96,7 +96,15 @@ const C3D_BLOCK: usize = 512;
 const C3D_PROCESSORS: std::ops::RangeInclusive<u8> = 84..=86;
 
 /// Kinds of files that are recognised by the beginning of their text, here in lower case.
-const BY_TEXT: [(&str, (&str, &str)); 5] = [
+const BY_TEXT: [(&str, (&str, &str)); 6] = [
+    (
+        "labview measurement",
+        (
+            "a measurement file of LabVIEW (.lvm)",
+            "write the channels as CSV with a column of times (in LabVIEW: Write Delimited Spreadsheet; in Python: \
+             lvm_read and numpy.savetxt)",
+        ),
+    ),
     ("<!doctype html", ("a web page", "save the table itself, not the page around it")),
     ("<html", ("a web page", "save the table itself, not the page around it")),
     ("#camera information header", CAMERA_RECORD),
@@ -109,6 +117,10 @@ const BY_TEXT: [(&str, (&str, &str)); 5] = [
     ),
     ("%!ps", ("a PostScript document", "export the numbers from the tracking program")),
 ];
+const UNIVERSAL_FILE: FileKind = (
+    "a universal file of vibration measurements (.uff, .unv)",
+    "write the channels as CSV with a column of times (in Python: pyuff and numpy.savetxt)",
+);
 /// Kinds of XML files that are recognised by a text near their start, here in lower case. The first entry of
 /// this list whose text occurs decides; the text of the last entry occurs in every XML file.
 const IN_MARKUP: [(&str, (&str, &str)); 6] = [
@@ -204,12 +216,21 @@ pub(crate) fn refuse_text(file: &str, text: &str) -> Option<ImportError> {
     let start = start.take(SEARCHED_CHARACTERS).collect::<String>().to_lowercase();
     let inside =
         |kinds: &[(&str, FileKind)]| kinds.iter().find(|kind| start.contains(kind.0)).map(|kind| kind.1);
-    let found = BY_TEXT.iter().find(|kind| start.starts_with(kind.0)).map(|kind| kind.1);
+    let mut lines = start.lines().map(str::trim);
+    let universal = lines.next() == Some("-1") && lines.next().is_some_and(is_dataset_number);
+    let found = universal.then_some(UNIVERSAL_FILE);
+    let found = found.or_else(|| BY_TEXT.iter().find(|kind| start.starts_with(kind.0)).map(|kind| kind.1));
     let found = found.or_else(|| if start.starts_with('<') { inside(&IN_MARKUP) } else { None });
     let json = start.starts_with('{')
         || start.strip_prefix('[').is_some_and(|rest| rest.trim_start().starts_with(['{', '[']));
     let found = found.or_else(|| if json { inside(&IN_JSON) } else { None });
     found.map(|kind| wrong_kind_error(file, 1, kind))
+}
+
+/// Whether a text is the number of a data set of a universal file, such as `58` or `58b`.
+fn is_dataset_number(text: &str) -> bool {
+    let digits = text.split_whitespace().next().unwrap_or_default().trim_end_matches('b');
+    !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit())
 }
 
 /// Error for a text with a zero byte; `before` is the text before that byte.

@@ -56,6 +56,7 @@ impl<'a> DelimitedTable<'a> {
         }
         let names = head.first().map(|first| table.names_in_comments(first)).unwrap_or_default();
         head.splice(..0, names);
+        table.split_aligned_names(&mut head);
         table.head = head;
         Ok(table)
     }
@@ -81,6 +82,20 @@ impl<'a> DelimitedTable<'a> {
         }
         rows.reverse();
         rows
+    }
+
+    /// Splits a row of names that blanks separate, above rows of numbers with another delimiter, into as many
+    /// cells as the rows have.
+    fn split_aligned_names(&self, head: &mut [TextRow]) {
+        let numbers =
+            |row: &&TextRow| row.cells.len() > 1 && row.cells.iter().all(|cell| self.is_value(cell));
+        let Some(width) = head.iter().find(numbers).map(|row| row.cells.len()) else { return };
+        for row in head.iter_mut().take_while(|row| !row.cells.iter().any(|cell| self.is_value(cell))) {
+            let words: Vec<String> = row.first_cell().split_whitespace().map(str::to_owned).collect();
+            if row.used_width() == 1 && words.len() == width {
+                row.cells = words;
+            }
+        }
     }
 
     /// Cells of the line directly above byte `end` of the text, if this line starts with `#` or `%`.
@@ -196,8 +211,7 @@ impl<'a> DelimitedTable<'a> {
                  hyphen"
             }
             _ if text.contains(':') => {
-                "export times as seconds, or use a column of frame numbers (--columns frame=...; frame=row \
-                 if every row is a frame)"
+                "export times as seconds, or name a column that counts frames (--columns frame=...)"
             }
             _ => spreadsheet::describe_damage(text).unwrap_or(
                 "correct the cell from what the tracking program shows, or export again; a lost point is an \

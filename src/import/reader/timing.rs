@@ -3,7 +3,7 @@
 
 use crate::import::error::{CellProblem, ImportError, ImportResult};
 use crate::import::reader::rate::{RATE_AGREEMENT, find_quantum_s};
-use crate::import::reader::track_file::{Clock, TrackFile};
+use crate::import::reader::track_file::{Clock, Column, Track, TrackFile};
 use crate::recording::clock::{self, FrameFit, MAX_FRAMES, OFF_GRID_LIMIT_FRAMES};
 
 /// Largest `--frame-step` that an error message suggests. It suggests one if the declared rate is a whole
@@ -197,6 +197,7 @@ fn place_by_time(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<RowF
     } else {
         fit_declared_grid(rows, &times, row_s, declared)?
     };
+    refuse_stray_first_row(rows, &times, &fit)?;
     let start_s = if declared.playback { (times[0] / fit.frame_s).round() * row_s } else { times[0] };
     let frames = fit.frames.iter().map(|&row| (row * declared.step) as i64).collect();
     Ok(RowFrames { frames, numbered: false, start_s, implied_hz: Some(1.0 / fit.frame_s) })
@@ -290,6 +291,45 @@ fn read_times(rows: ClockRows) -> ImportResult<Vec<f64>> {
     Ok(times)
 }
 
+/// Whether a row has the same positions as the row above it.
+fn repeats_row_above(rows: ClockRows, row: usize) -> bool {
+    let same = |column: &Column| column.get(row) == column.get(row - 1);
+    let of_clock = |track: &&Track| {
+        rows.export.clocks.get(track.clock).is_some_and(|clock| std::ptr::eq(clock, rows.clock))
+    };
+    let mut tracks = rows.export.tracks.iter().filter(of_clock);
+    tracks.all(|track| same(&track.x) && track.y.as_ref().is_none_or(same))
+}
+
+/// Number of frames before the others from which a first row stands alone.
+const FRAMES_ALONE: usize = 10;
+/// Ratio of the first row's distance from the grid to the largest distance of the others, from which it is
+/// between two frames.
+const OFF_THE_OTHERS: f64 = 3.0;
+
+/// Refuses a first row that stands alone before the others and is off their grid, such as one whose time has
+/// another unit.
+fn refuse_stray_first_row(rows: ClockRows, times: &[f64], fit: &FrameFit) -> ImportResult<()> {
+    let gap = |row: usize| fit.frames[row] - fit.frames[row - 1];
+    let alone = times.len() > 3
+        && gap(1) >= FRAMES_ALONE
+        && (2..times.len()).all(|row| OFF_THE_OTHERS * gap(row) as f64 <= gap(1) as f64);
+    if !alone {
+        return Ok(());
+    }
+    let Some(others) = clock::number_frames(&times[1..], fit.frame_s) else { return Ok(()) };
+    let ahead = (times[1] - times[0]) / others.frame_s;
+    let off = (ahead - ahead.round()).abs();
+    let rounding = rows.clock.digit / others.frame_s;
+    if off > OFF_THE_OTHERS * others.worst_frames.max(rounding) && off > FEW_PARTS {
+        return Err(cell_error(rows, 0, CellProblem::OffGrid, Some(times[0])));
+    }
+    Ok(())
+}
+
+/// Smallest distance from the grid, frames, that is not the error of the fitted rate over a gap.
+const FEW_PARTS: f64 = 0.02;
+
 fn refuse_disorder(rows: ClockRows, row: usize, last: Option<f64>, next: f64) -> ImportResult<()> {
     match last {
         Some(last) if next == last => Err(cell_error(rows, row, CellProblem::Duplicate, Some(next))),
@@ -321,10 +361,23 @@ fn cell_error(rows: ClockRows, row: usize, problem: CellProblem, found: Option<f
             "a whole number, at most 10 million after the first",
             "correct the cell, name the column that counts frames, or use the time column",
         ),
+        CellProblem::Duplicate if repeats_row_above(rows, row) => (
+            "a value after that of the row above, whose positions are the same: the row is there twice",
+            "delete one of the two lines in a copy of the file, or export again from the tracking program",
+        ),
+        CellProblem::Duplicate if rows.clock.frame.is_none() => (
+            "a value after that of the row above",
+            "export again from the tracking program, with more digits if the times are rounded more coarsely than \
+             the frames, or name a column that counts frames (--columns frame=...)",
+        ),
         CellProblem::Duplicate => (
             "a value after that of the row above",
-            "export again from the tracking program; if the times are rounded more coarsely than the frames, \
-             export more digits or use a frame column (--columns frame=...; frame=row if every row is a frame)",
+            "see in the tracking program which of the two rows is right, and export again",
+        ),
+        CellProblem::OffGrid if row == 0 => (
+            "a time on the frame grid of the other rows: the first row stands alone before them, between two frames",
+            "correct its time from what the tracking program shows (its unit may be another), or delete the line in a \
+             copy of the file",
         ),
         CellProblem::Backwards => (
             "a value after that of the row above",

@@ -303,15 +303,12 @@ impl MappedColumns<'_> {
         cells.first().is_some_and(is_value) && !cells.contains(&CellNumber::Text)
     }
 
-    /// The row of names above the numbers: the first row with different words in all used columns above a row
-    /// of data. Lines of settings above it may contain numbers, but no block of data.
+    /// The row of names above the numbers: the first row with words in all used columns, not all the same. Lines of settings above it may contain numbers, but no block of data.
     fn find_header(&self) -> Option<usize> {
         let columns = self.numeric_columns();
         let names = |row: &TextRow| {
-            let mut words: Vec<&str> = columns.iter().map(|at| row.cell(*at)).collect();
-            let all_words = columns.iter().all(|at| self.number(row, *at) == CellNumber::Text);
-            words.sort_unstable();
-            all_words && words.windows(2).all(|pair| pair[0] != pair[1])
+            let differ = columns.len() < 2 || columns.iter().any(|at| row.cell(*at) != row.cell(columns[0]));
+            differ && columns.iter().all(|at| self.number(row, *at) == CellNumber::Text)
         };
         let (header, _) = self.table.find_row(HEADER_ROWS, names)?;
         let above = self.table.head[..header].iter().rev().take_while(|row| self.is_data(row)).count();

@@ -1,0 +1,313 @@
+//! Units and clocks of columns are read alike by every route: a header that names the columns, and columns that
+//! are named or numbered. All files are made here.
+
+use std::fmt::Write;
+use wiperlab::import::source::{Import, ImportSource};
+use wiperlab::import::{ColumnMap, CoordinateScale, ImportOptions, TimeColumn, import};
+use wiperlab::recording::files::YAxis;
+
+/// A blade that moves at 100 mm/s while its tip oscillates at 61 Hz: tip x and y, head x and y, m.
+fn position_m(time_s: f64) -> [f64; 4] {
+    let head = 0.1 * time_s;
+    [head + 2e-4 * (std::f64::consts::TAU * 61.0 * time_s).sin(), 1e-5, head, 0.012]
+}
+
+/// A table with `rows` rows; `time` writes the clock of a row, and the points have the given lengths of a unit, m.
+fn table(
+    header: &str,
+    rows: usize,
+    time: impl Fn(usize) -> String,
+    units_m: [f64; 2],
+    rate_hz: f64,
+) -> String {
+    let mut text = format!("{header}\n");
+    for row in 0..rows {
+        let [tip_x, tip_y, head_x, head_y] = position_m(row as f64 / rate_hz);
+        let [tip, head] = units_m;
+        writeln!(
+            text,
+            "{},{:.6},{:.6},{:.6},{:.6}",
+            time(row),
+            tip_x / tip,
+            tip_y / tip,
+            head_x / head,
+            head_y / head
+        )
+        .unwrap();
+    }
+    text
+}
+
+fn options(columns: Option<&str>) -> ImportOptions {
+    ImportOptions {
+        name: "made".to_owned(),
+        y_axis: Some(YAxis::Up),
+        columns: columns.map(|text| ColumnMap::parse(text).unwrap()),
+        ..ImportOptions::default()
+    }
+}
+
+fn at_rate(rate_hz: f64, columns: Option<&str>) -> ImportOptions {
+    ImportOptions { frame_rate_hz: Some(rate_hz), ..options(columns) }
+}
+
+fn in_mm(options: ImportOptions) -> ImportOptions {
+    ImportOptions { scale: Some(CoordinateScale::Unit(1e-3)), ..options }
+}
+
+fn read(text: &str, options: &ImportOptions) -> Import {
+    read_as("run.csv", text, options)
+}
+
+fn read_as(name: &str, text: &str, options: &ImportOptions) -> Import {
+    let source = ImportSource::without_companions(name, text.as_bytes().to_vec());
+    import(&[source], options).unwrap_or_else(|error| panic!("{error}\n{}", &text[..text.len().min(300)]))
+}
+
+fn refused(text: &str, options: &ImportOptions) -> String {
+    let source = ImportSource::without_companions("run.csv", text.as_bytes().to_vec());
+    import(&[source], options).map_or_else(|error| error.to_string(), |found| panic!("{:?}", found.report))
+}
+
+/// The recording holds the motion at `rate_hz` to the rounding of the file.
+fn assert_positions(found: &Import, rate_hz: f64) {
+    let (grid, traces) = (found.recording.grid(), found.recording.traces());
+    assert!((grid.frame_rate_hz / rate_hz - 1.0).abs() < 1e-9, "{}", grid.frame_rate_hz);
+    for frame in 0..grid.frames {
+        let made = [&traces.tip_x_m, &traces.tip_y_m, &traces.head_x_m, &traces.head_y_m];
+        for (column, expected) in made.into_iter().zip(position_m(frame as f64 / rate_hz)) {
+            assert!((column[frame].unwrap() - expected).abs() < 2e-8, "frame {frame}: {:?}", column[frame]);
+        }
+    }
+}
+
+const BY_NUMBER: &str = "time=1,tip-x=2,tip-y=3,head-x=4,head-y=5";
+
+#[test]
+fn columns_of_different_units_are_each_converted_by_every_route() {
+    let seconds = |row: usize| format!("{:.4}", row as f64 / 2000.0);
+    let names = "time (s),tip x (mm),tip y (mm),head x (cm),head y (cm)";
+    let text = table(names, 200, seconds, [1e-3, 1e-2], 2000.0);
+    let by_name = "time=time (s),tip-x=tip x (mm),tip-y=tip y (mm),head-x=head x (cm),head-y=head y (cm)";
+    for columns in [None, Some(BY_NUMBER), Some(by_name)] {
+        assert_positions(&read(&text, &at_rate(2000.0, columns)), 2000.0);
+        let says = refused(&text, &in_mm(at_rate(2000.0, columns)));
+        assert!(
+            says.starts_with("--scale: found `units of 0.001 m`") && says.contains("head x (cm)"),
+            "{says}"
+        );
+    }
+    // a length a pixel is that of the columns in pixels
+    let names = "time (s),tip x (px),tip y (px),head x (cm),head y (cm)";
+    let text = table(names, 200, seconds, [2e-5, 1e-2], 2000.0);
+    let scale = Some(CoordinateScale::MetresPerPixel(2e-5));
+    for columns in [None, Some(BY_NUMBER)] {
+        assert_positions(&read(&text, &ImportOptions { scale, ..at_rate(2000.0, columns) }), 2000.0);
+        let says = refused(&text, &in_mm(at_rate(2000.0, columns)));
+        assert!(says.contains("--scale"), "{says}");
+        let says = refused(&text, &at_rate(2000.0, columns));
+        assert!(says.contains("--scale S"), "{says}");
+    }
+}
+
+#[test]
+fn a_header_says_the_unit_of_the_times_to_every_route() {
+    let text = |name: &str| {
+        let names = format!("{name},tip x [mm],tip y [mm],head x [mm],head y [mm]");
+        table(&names, 300, |row| format!("{:.1}", row as f64 * 0.5), [1e-3; 2], 2000.0)
+    };
+    let real = |columns| ImportOptions { time: Some(TimeColumn::Real), ..options(columns) };
+    for name in ["Time [ms]", "time_ms", "t (ms)"] {
+        for columns in [None, Some(BY_NUMBER), Some("time-ms=1,tip-x=2,tip-y=3,head-x=4,head-y=5")] {
+            assert_positions(&read(&text(name), &real(columns)), 2000.0);
+            let stated = ImportOptions { time: Some(TimeColumn::Milliseconds), ..options(columns) };
+            assert_positions(&read(&text(name), &stated), 2000.0);
+        }
+    }
+    // statements that contradict each other
+    let says = refused(&text("time (s)"), &real(Some("time-ms=1,tip-x=2,head-x=4")));
+    assert!(
+        says.contains("--columns time-ms=1: found another unit (column 1 is called `time (s)`)"),
+        "{says}"
+    );
+    let stated = ImportOptions { time: Some(TimeColumn::Milliseconds), ..options(None) };
+    let says = refused(&text("time (s)"), &stated);
+    assert!(says.starts_with("--time: found `ms`, expected the unit that run.csv gives"), "{says}");
+}
+
+#[test]
+fn a_quantity_that_is_no_position_is_no_position() {
+    let seconds = |row: usize| format!("{:.4}", row as f64 / 2000.0);
+    for (unit, at) in [("m/s^2", 2), ("mm/s", 2), ("deg", 2), ("N", 2), ("s", 2), ("Hz", 2)] {
+        let names = format!("time (s),tip x ({unit}),tip y (mm),head x (mm),head y (mm)");
+        let says =
+            refused(&table(&names, 20, seconds, [1e-3; 2], 2000.0), &in_mm(at_rate(2000.0, Some(BY_NUMBER))));
+        assert!(
+            says.contains(&format!("--columns tip-x={at}: found a unit that is no length")),
+            "{unit}: {says}"
+        );
+    }
+    let names = "time (mm),tip x (mm),tip y (mm),head x (mm),head y (mm)";
+    let says = refused(&table(names, 20, seconds, [1e-3; 2], 2000.0), &at_rate(2000.0, Some(BY_NUMBER)));
+    assert!(says.contains("--columns time=1: found another unit"), "{says}");
+}
+
+#[test]
+fn a_row_of_units_below_the_names_is_read_by_every_route() {
+    let seconds = |row: usize| format!("{:.1}", row as f64 * 0.5);
+    let names = "t,tip_x,tip_y,head_x,head_y\nms,mm,mm,cm,cm";
+    let text = table(names, 100, seconds, [1e-3, 1e-2], 2000.0);
+    for columns in [None, Some(BY_NUMBER), Some("time=t,tip-x=tip_x,tip-y=tip_y,head-x=head_x,head-y=head_y")]
+    {
+        assert_positions(&read(&text, &at_rate(2000.0, columns)), 2000.0);
+    }
+}
+
+#[test]
+fn settings_stray_cells_and_aligned_names_are_no_obstacle() {
+    let seconds = |row: usize| format!("{:.4}", row as f64 / 2000.0);
+    let plain = table("time,ax,ay,bx,by", 60, seconds, [1e-3; 2], 2000.0);
+    let numbered = in_mm(at_rate(2000.0, Some(BY_NUMBER)));
+    for settings in ["Interval,0.0005,,,\n", "Version 3,,,,\nInterval,0.0005,,,\nFrames,60,2,,\n\n"] {
+        assert_positions(&read(&format!("{settings}{plain}"), &numbered), 2000.0);
+    }
+    // a column whose first cell is blank
+    let mut speed = String::from("time,x,y,speed\n");
+    for row in 0..40 {
+        let [x, y, ..] = position_m(f64::from(row) / 2000.0);
+        let last = if row == 0 { String::new() } else { format!("{:.3}", 100.0) };
+        writeln!(speed, "{:.4},{:.6},{:.6},{last}", f64::from(row) / 2000.0, 1e3 * x, 1e3 * y).unwrap();
+    }
+    for columns in ["time=1,tip-x=2,tip-y=3", "time=time,tip-x=x,tip-y=y"] {
+        let found = read(&speed, &in_mm(at_rate(2000.0, Some(columns))));
+        assert_eq!(found.recording.grid().frames, 40);
+    }
+    // names that blanks align, above numbers between tabs
+    let mut tracker = String::from("weight\nt       x       y\n");
+    for row in 0..60 {
+        let [x, y, ..] = position_m(f64::from(row) / 2000.0);
+        writeln!(tracker, "{:.9E}\t{:.9E}\t{:.9E}", f64::from(row) / 2000.0, x, y).unwrap();
+    }
+    let metres = ImportOptions {
+        scale: Some(CoordinateScale::Unit(1.0)),
+        tip: Some("weight".to_owned()),
+        ..at_rate(2000.0, None)
+    };
+    let found = read_as("run.txt", &tracker, &metres);
+    assert_eq!((found.report.format.as_str(), found.recording.grid().frames), ("tracker", 60));
+    // names of columns behind the name of their data set
+    let names = "Film: Time (s),Film: X Lip (m),Film: Y Lip (m),Film: X Arm (m),Film: Y Arm (m),Film: X Velocity Lip (m/s)";
+    let text: String = table(names, 60, seconds, [1.0; 2], 2000.0);
+    let text: String = text
+        .lines()
+        .enumerate()
+        .map(|(row, line)| if row == 0 { format!("{line}\n") } else { format!("{line},0.1\n") })
+        .collect();
+    let points =
+        ImportOptions { tip: Some("Lip".to_owned()), head: Some("Arm".to_owned()), ..at_rate(2000.0, None) };
+    let found = read(&text, &points);
+    assert_eq!(found.recording.traces().head_y_m[3], Some(0.012));
+}
+
+#[test]
+fn rates_that_differ_by_more_than_their_errors_are_a_caution_with_both() {
+    let seconds = |row: usize| format!("{:.6}", row as f64 / 2000.0);
+    let names = "t,tip_x,tip_y,head_x,head_y";
+    let text = table(names, 600, seconds, [1e-3; 2], 2000.0);
+    let rate_caution = |found: &Import| {
+        let rates = found.report.findings.iter().filter(|finding| finding.check.name() == "implied-rate");
+        let said: Vec<String> = rates
+            .filter(|f| f.severity > wiperlab::recording::quality::Severity::Note)
+            .map(|f| f.found.clone())
+            .collect();
+        said.join("; ")
+    };
+    let found = read(&text, &in_mm(at_rate(1983.0, None)));
+    let said = rate_caution(&found);
+    assert!(
+        said.contains("1983 +- 0.09915") && said.contains("2000 +- 2") && said.contains("0.85 %"),
+        "{said}"
+    );
+    assert!(!found.report.lines().join("\n").contains("rounded"), "{:?}", found.report.lines());
+    assert_eq!(rate_caution(&read(&text, &in_mm(at_rate(2000.0, None)))), "");
+    let refusal = refused(&text, &in_mm(at_rate(1900.0, None)));
+    assert!(refusal.contains("imply 2000.000000 frames/s, but --frame-rate-hz says 1900"), "{refusal}");
+}
+
+#[test]
+fn equal_steps_of_few_digits_know_their_rate_coarsely() {
+    // a camera of 30 frames/s whose program adds up steps of 33 ms
+    let text = table(
+        "t,tip_x,tip_y,head_x,head_y",
+        300,
+        |row| format!("{:.3}", row as f64 * 0.033),
+        [1e-3; 2],
+        30.0,
+    );
+    let found = read(&text, &in_mm(at_rate(30.0, None)));
+    assert_positions(&found, 30.0);
+    assert!(
+        found.report.findings.iter().all(|f| !f.found.contains("differ by")),
+        "{:?}",
+        found.report.findings
+    );
+    let real = ImportOptions { time: Some(TimeColumn::Real), ..in_mm(options(None)) };
+    let said = read(&text, &real).report.lines().join("\n");
+    assert!(
+        said.contains("caution: the times of run.csv imply 30.30303 frames/s") && said.contains("1.5 % only"),
+        "{said}"
+    );
+    // another rate is not within half of the last digit
+    assert!(refused(&text, &in_mm(at_rate(25.0, None))).contains("--frame-rate-hz says 25"));
+}
+
+#[test]
+fn a_row_that_is_there_twice_is_said_to_be() {
+    let text = table("frame,tip_x,tip_y,head_x,head_y", 90, |row| row.to_string(), [1e-3; 2], 1000.0);
+    let mut lines: Vec<&str> = text.lines().collect();
+    lines.insert(41, lines[40]);
+    let says = refused(&(lines.join("\n") + "\n"), &in_mm(at_rate(1000.0, None)));
+    assert!(says.starts_with("run.csv:42:1: column frame: found `39`"), "{says}");
+    assert!(says.contains("the row is there twice; delete one of the two lines"), "{says}");
+    assert!(!says.contains("frame=row"), "{says}");
+}
+
+#[test]
+fn a_first_row_in_another_unit_of_time_is_refused() {
+    let time = |row: usize| if row == 0 { "0.2".to_owned() } else { format!("{:.1}", 200.0 + row as f64) };
+    let text = table("time_ms,tip_x,tip_y,head_x,head_y", 200, time, [1e-3; 2], 1000.0);
+    let says = refused(&text, &in_mm(at_rate(1000.0, None)));
+    assert!(says.starts_with("run.csv:2:1: ") && says.contains("the first row stands alone"), "{says}");
+    // a point that was digitised some frames before the others is on their grid
+    let time = |row: usize| if row == 0 { "0.0".to_owned() } else { format!("{:.1}", 200.0 + row as f64) };
+    let text = table("time_ms,tip_x,tip_y,head_x,head_y", 200, time, [1e-3; 2], 1000.0);
+    assert_eq!(read(&text, &in_mm(at_rate(1000.0, None))).recording.grid().frames, 400);
+}
+
+#[test]
+fn a_clock_that_is_passed_over_for_rows_is_named_if_it_is_uneven() {
+    let uneven = |row: usize| format!("{:.4}", row as f64 * 0.02 + 0.004 * (row as f64 * 0.3).sin());
+    let even = |row: usize| format!("{:.4}", row as f64 * 0.02);
+    let rows = Some("frame=row,tip-x=2,tip-y=3,head-x=4,head-y=5");
+    let names = "time_s,tip_x,tip_y,head_x,head_y";
+    let found = |time: &dyn Fn(usize) -> String| {
+        let text = table(names, 300, time, [1e-3; 2], 50.0);
+        read(&text, &in_mm(at_rate(50.0, rows))).report.lines().join("\n")
+    };
+    assert!(
+        found(&uneven).contains("serious: --columns frame=row takes every row for a frame"),
+        "{}",
+        found(&uneven)
+    );
+    assert!(!found(&even).contains("frame=row"), "{}", found(&even));
+}
+
+#[test]
+fn files_of_measurements_are_refused_by_name() {
+    let metres = in_mm(at_rate(1000.0, None));
+    let labview =
+        "LabVIEW Measurement\t\nWriter_Version\t2\nReader_Version\t2\n***End_of_Header***\n0\t1\t2\n";
+    assert!(refused(labview, &metres).contains("a measurement file of LabVIEW (.lvm)"));
+    let universal = "    -1\n    58\nNONE\n         1    100    1\n    -1\n";
+    assert!(refused(universal, &metres).contains("a universal file of vibration measurements"));
+}
