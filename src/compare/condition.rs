@@ -1,4 +1,5 @@
-//! A condition of a job: its recording, and the model at the estimates as the same camera would record it.
+//! Compares, for one condition of a job, the recording with the model. The model runs with the estimated
+//! parameters and is recorded by a simulated camera like that of the recording.
 
 use super::model_run::{ModelRun, RunSummary, summarize_run};
 use super::ridge::RidgePair;
@@ -46,8 +47,8 @@ pub struct ConditionComparison<'a> {
     pub model: &'a ModelRun,
     /// Shifts of time and position that align the model with the recording; zero without a recording.
     pub alignment: Alignment,
-    /// Indices of later conditions with the same run of the model; `None` if an earlier condition has the
-    /// same run.
+    /// Indices of the later conditions in which the model runs the same scene; `None` if an earlier condition
+    /// already has this scene.
     pub same_run: Option<Vec<usize>>,
     /// Measured minus aligned model, in every frame of the recording.
     pub residual: Option<MotionTraces>,
@@ -70,7 +71,7 @@ pub struct TimedRecording<'a> {
 }
 
 impl<'a> ConditionComparison<'a> {
-    /// Intervals in which the model's tip sticks, s, on the clock of the recording.
+    /// Start and end of each interval in which the tip of the model sticks, s, on the clock of the recording.
     pub(crate) fn sticks_on_clock(&self) -> Vec<(f64, f64)> {
         let shift_s = self.alignment.shift_s;
         self.model.view.stick_s.iter().map(|[from, to]| (from + shift_s, to + shift_s)).collect()
@@ -136,9 +137,10 @@ impl<'a> ConditionComparison<'a> {
         self.measured_side().unwrap_or_else(|| self.model_side())
     }
 
-    /// Standard deviation of the noise of a recorded channel, m, measured as in a fit to traces: along the
-    /// sweep from the head, whose motion is smooth, and in height from the tip on the glass. If that is not
-    /// possible, it is the scatter between frames. `None` without a recording or without noise.
+    /// Standard deviation of the noise of a recorded channel, m. As in a fit to traces, the noise along the
+    /// sweep is measured on the head, whose motion is smooth, and the noise in height on the tip, which stays
+    /// on the glass. If this fails, the scatter from frame to frame is used. `None` without a recording or
+    /// without noise.
     pub(crate) fn noise_m(&self, channel: Channel) -> Option<f64> {
         let noise = self.noise.as_ref()?;
         let along_m = noise.along_sweep.as_ref().map(|found| found.noise.sd());
@@ -190,7 +192,8 @@ impl<'a> ConditionComparison<'a> {
     }
 }
 
-/// Indices of later conditions with the same run; `None` if an earlier condition has the same run.
+/// Indices of the later conditions whose scene equals that of `condition`; `None` if an earlier condition has
+/// the same scene.
 fn later_same_runs(runs: &[ModelRun], condition: usize) -> Option<Vec<usize>> {
     let scene = &runs.get(condition)?.scene;
     let mut same = (0..runs.len()).filter(|i| runs.get(*i).is_some_and(|other| other.scene == *scene));
@@ -198,7 +201,7 @@ fn later_same_runs(runs: &[ModelRun], condition: usize) -> Option<Vec<usize>> {
 }
 
 impl TimedRecording<'_> {
-    /// Time of the given kind of instant at the first reversal, s.
+    /// Time, s, at which an instant of the given kind occurs at the first reversal.
     pub(crate) fn instant_s(&self, anchor: InstantKind) -> Option<f64> {
         self.instants.time_s(anchor, 1).ok()
     }
@@ -208,7 +211,7 @@ impl TimedRecording<'_> {
         channel.samples(self.recording)
     }
 
-    /// Frames of a window; `None` if the recording does not contain it.
+    /// Frame indices of a window; `None` if the recording does not contain the window.
     pub(crate) fn window_frames(&self, window: &Window) -> Option<Range<usize>> {
         window.resolve_frames(self.recording, self.instants).ok()
     }
@@ -222,14 +225,15 @@ impl TimedRecording<'_> {
     }
 }
 
-// The windows of a job's targets, and their frequencies.
+// The windows of a job's targets, and the target frequencies in each window.
 
 /// A window of a channel, with the targets that are read from this window.
 #[derive(Debug, Clone)]
 pub(crate) struct FitWindow<'a> {
     pub channel: Channel,
     pub window: Window,
-    /// The first frequency band of a target in the window; it also determines the trend that is removed.
+    /// The first frequency band that a target in the window has. It also determines which trend is removed
+    /// from the samples of the window.
     pub band: Option<&'a FeatureBand>,
     /// The targets in the window, in the order of the job.
     pub targets: Vec<&'a FitTarget>,

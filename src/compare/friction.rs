@@ -38,17 +38,18 @@ pub(crate) struct MeasuredFriction {
 const STEADY_BLOCK_S: f64 = 5e-3;
 /// Minimum number of frames in a block.
 const MIN_BLOCK_FRAMES: usize = 8;
-/// Smallest length of a block of stick-slip cycles, s: a dozen cycles of the fast frequency.
+/// Smallest allowed length of a block of stick-slip cycles, s: a dozen cycles of the fast frequency.
 const CYCLE_BLOCK_S: f64 = 0.02;
 /// Length of a block of stick-slip cycles, in cycles of the slowest target frequency.
 const SLOW_CYCLES: f64 = 2.0;
 /// The tip counts as sliding steadily if the scatter of its positions about a parabola, divided by the
 /// standard deviation of the noise, is at most this value.
 const MAX_SCATTER_OVER_NOISE: f64 = 1.2;
-/// Largest change of the speed within a block, as a fraction of the mean speed in the block.
+/// Largest allowed change of the speed of the tip within a block, as a fraction of the mean speed in the
+/// block.
 const MAX_SPEED_CHANGE: f64 = 0.4;
-/// Smallest speed at which the tip counts as moving, in standard deviations of the measured speed of a tip at
-/// rest.
+/// The tip counts as moving if its speed exceeds this number of standard deviations of the speed that would
+/// be measured for a tip at rest.
 const MIN_SPEED_SD: f64 = 5.0;
 /// Maximum number of points in each list of [`MeasuredFriction`].
 const MAX_POINTS: usize = 60;
@@ -95,7 +96,8 @@ struct FrictionBlock {
 
 impl FrictionBlock {
     /// The coefficient of friction for which the mean deflection of the block is in static equilibrium. It is
-    /// interpolated in `deflections`: coefficients with their static deflections, m, in ascending order.
+    /// interpolated in `deflections`, which lists pairs (coefficient of friction, static deflection in m) in
+    /// ascending order.
     fn friction_point(&self, deflections: &[(f64, f64)]) -> Option<FrictionPoint> {
         let after = deflections.partition_point(|(_, deflection_m)| *deflection_m < self.deflection_m);
         let (a, b) = (deflections.get(after.checked_sub(1)?)?, deflections.get(after)?);

@@ -23,7 +23,8 @@ pub struct ModelRun {
     pub motion: RunMotion,
 }
 
-/// Runs the model at the estimates in every condition, with the tolerance of its scene.
+/// Runs the model at the estimates in every condition, with the integration tolerance that the scene of the
+/// condition states.
 ///
 /// # Errors
 /// [`RunFailure`] if a run ends before its camera has taken two frames.
@@ -62,7 +63,7 @@ pub struct RunSummary {
     pub sticks: usize,
     /// Duration of the longest stick, s.
     pub longest_stick_s: Option<f64>,
-    /// Fraction of the run for which the tip sticks.
+    /// Fraction of the duration of the run in which the tip sticks, 0 to 1.
     pub stick_share: Option<f64>,
     /// Number of losses of contact.
     pub contact_losses: usize,
@@ -77,9 +78,9 @@ pub struct RunSummary {
     /// Whether the head in the recording turns in the opposite direction to the head of the model.
     #[serde(rename = "opposed")]
     pub opposite_turn: bool,
-    /// Smallest normal force in contact, N.
+    /// Smallest normal force on the tip in the run while the tip is in contact, N.
     pub least_normal_force_n: Option<f64>,
-    /// Smallest Painlevé indicator in slip.
+    /// Smallest Painlevé indicator in the run while the tip slips.
     pub least_painleve_indicator: Option<f64>,
 }
 

@@ -14,8 +14,8 @@ const SEGMENT_LENGTH_FACTORS: [f64; 8] = [0.15, 0.2, 0.3, 0.45, 0.7, 1.0, 1.4, 2
 /// Minimum number of adjoining segments in a record, which limits the length of a segment. With fewer
 /// segments, the ridge has no part that follows one component.
 const MIN_SEGMENTS: f64 = 3.0;
-/// A segment length is good enough if the fraction of its segments that follow one component is at least this
-/// multiple of the largest such fraction for any length.
+/// For each segment length, the fraction of the segments that follow one component is computed. A length is
+/// good enough if its fraction is at least this multiple of the largest fraction found for any length.
 const NEARLY_BEST: f64 = 0.95;
 /// Maximum number of points of a ridge that are plotted against speed; more would overlap in a figure.
 const MAX_SPEED_POINTS: usize = 40;
@@ -41,7 +41,7 @@ pub struct TrackedRidge {
     pub ridge: Ridge,
     /// Parts of the ridge that follow one component.
     pub courses: Vec<Vec<RidgePoint>>,
-    /// Frequency band in which the ridge was searched, Hz.
+    /// Frequency band that was searched for the ridge, Hz.
     pub band_hz: (f64, f64),
     /// A selection of the points in `courses`, each with the speed of the tip.
     pub over_speed: Vec<SpeedPoint>,
@@ -70,8 +70,9 @@ fn release_window(side: &TimedRecording) -> Window {
     Window { from: end(InstantKind::Release, 1), to: end(InstantKind::Hold, 2) }
 }
 
-/// Frames of the model from the release of its tip on. If there is a recording without a release, the frames
-/// at the times of that recording.
+/// Frames of the model that are analysed: those after the release of the tip in the model. If a recording
+/// exists but shows no release, they are instead the frames at the same times as the analysed frames of the
+/// recording.
 fn model_frames(case: &ConditionComparison, model: &TimedRecording) -> Option<Range<usize>> {
     let Some(side) = case.measured_side().filter(|side| side.instant_s(InstantKind::Release).is_none())
     else {
@@ -82,7 +83,7 @@ fn model_frames(case: &ConditionComparison, model: &TimedRecording) -> Option<Ra
     Some(model.frames_between((model_s(frames.start), model_s(frames.end))))
 }
 
-/// The highest band in which the job targets a frequency of the deflection.
+/// Of the bands in which the job targets a frequency of the deflection, the band with the highest lower end.
 fn fastest_band<'a>(case: &ConditionComparison<'a>) -> Option<&'a FeatureBand> {
     case.targets()
         .filter(|aim| matches!(aim.feature.reading, Reading::Frequency(_) | Reading::CycleFrequency { .. }))
@@ -99,8 +100,8 @@ fn job_segment_s(case: &ConditionComparison) -> Option<f64> {
     })
 }
 
-/// Smallest length of a segment, s: two cycles of the slowest target frequency. In a segment as short as one
-/// cycle, an oscillation would appear as a slower component.
+/// Smallest allowed length of a segment, s: two cycles of the slowest target frequency. In a segment as short
+/// as one cycle, an oscillation would appear as a slower component.
 fn min_segment_s(case: &ConditionComparison) -> f64 {
     const CYCLES: f64 = 2.0;
     case.frequency_comparisons().map(|sought| CYCLES / sought.target.frequency_hz).fold(0.0, f64::max)
@@ -169,8 +170,8 @@ fn choose_ridge(
 /// to a damping ratio of 0.22.
 const MAX_DECAY_PER_CYCLE: f64 = 1.4;
 
-/// The record, m, without its trend, without oscillations below a frequency, and without those that die out
-/// within a cycle.
+/// The record, m, from which three parts are removed: the trend, oscillations with a frequency below
+/// `low_hz`, and oscillations that die out within a cycle.
 fn remove_slow_components(analysis: &SpectralAnalysis, rate_hz: f64, low_hz: f64) -> Vec<Option<f64>> {
     // an oscillation that dies out within a cycle belongs to the flip of the blade
     let rings =

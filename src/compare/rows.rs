@@ -28,13 +28,15 @@ pub struct TargetComparison {
     pub without_camera: Option<f64>,
     /// `model / target - 1`.
     pub relative_error: Option<f64>,
-    /// Largest relative error that passes; `None` if the 95 % interval of the target decides.
+    /// Largest allowed relative error; `None` if the 95 % interval of the target decides whether the target
+    /// is met.
     pub tolerance_relative: Option<f64>,
     /// Whether the target is met.
     pub pass: bool,
     /// Standard deviation of the value of the model over its twins (synthetic data sets), if there are twins.
     pub twin_sd: Option<f64>,
-    /// Scatter of the value of the model between neighbouring parameter values, if there is any.
+    /// Scatter of the value of the model between neighbouring parameter values; `None` if there is no
+    /// scatter.
     pub model_scatter: Option<f64>,
     /// How far the peak of the model is below the strongest peak in its band, dB.
     pub below_db: Option<f64>,

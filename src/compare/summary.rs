@@ -81,7 +81,7 @@ pub struct RidgeSummaries {
 pub struct RidgeSummary {
     /// Length of a segment, s.
     pub segment_s: f64,
-    /// Frequency band in which the ridge was searched, Hz.
+    /// Frequency band that was searched for the ridge, Hz.
     pub band_hz: [f64; 2],
     /// Number of segments.
     pub segments: usize,

@@ -42,8 +42,9 @@ pub(crate) fn comparison_tables(cases: &[ConditionComparison]) -> Vec<Comparison
     ]
 }
 
-/// Table of every recording and of the model in the same frames, in the order of the job. The model is
-/// aligned with the clock and the origin of each recording. `None` without a recording.
+/// Table with the positions in every frame of every recording, and the positions of the model at the same
+/// times. The recordings are in the order of the job. The model is aligned with the clock and the origin of
+/// each recording. `None` without a recording.
 pub(crate) fn comparison_table(
     job: &Job,
     measured: &[FittedRecording<'_>],
@@ -91,7 +92,7 @@ fn trace_cell(traces: &MotionTraces, channel: Channel, i: usize) -> String {
     value_m.map_or_else(String::new, |m| format!("{m:e}"))
 }
 
-/// Rows of measured minus model.
+/// Table rows with the residuals (measured minus model), one row per frame.
 fn residual_rows(case: &ConditionComparison) -> Vec<Vec<String>> {
     let Some(residual) = &case.residual else { return Vec::new() };
     let row = |(i, time_s): (usize, &f64)| {

@@ -109,13 +109,13 @@ fn window_ends_s(window: &Window, reader: &FeatureReader, run: &RunRecord) -> Re
     Ok([end(window.from, start_s, frames.start)?, end(window.to, stop_s, frames.end)?])
 }
 
-/// Lengths of the parts of the stick intervals that are in a window, s.
+/// For each stick interval, the length of the part that is within the window, s.
 fn stick_lengths_s(run: &RunRecord, [from, to]: [f64; 2]) -> impl Iterator<Item = f64> {
     run.stick_s.iter().map(move |[start, end]| end.min(to) - start.max(from)).filter(|length| *length > 0.0)
 }
 
-/// Time of the first transition for which `is` is true, s. If there is none and the run ended with the status
-/// `end`, the time at which the run ended.
+/// Time, s, of the first transition that satisfies the condition `is`. If no transition does and the run
+/// ended with the status `end`, the time at which the run ended.
 fn first_time_s(
     run: &RunRecord,
     is: impl Fn(&Transition) -> bool,

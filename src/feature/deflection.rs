@@ -20,7 +20,7 @@ pub(super) fn read_mean_deflection(
 }
 
 /// Mean deflection over the frames of a window in which the speed of the head differs from `speed_m_per_s` by
-/// at most the fraction `width_relative` of it.
+/// at most `width_relative * speed_m_per_s`.
 pub(super) fn read_deflection_at_speed(
     window: &Window,
     speed_m_per_s: f64,
@@ -53,14 +53,16 @@ pub(crate) const SPEED_BLOCK_S: f64 = 0.02;
 /// Minimum number of tracked frames in a block.
 const FEWEST_IN_BLOCK: usize = 5;
 
-/// The speed of the head in every frame, m/s; `None` with fewer than two blocks. The slopes of blocks that
-/// overlap by half are interpolated linearly, and extrapolated before the first and after the last block. The
+/// The speed of the head in every frame, m/s; `None` with fewer than two blocks. The frames are divided into
+/// blocks that overlap by half, and the slope of the path is measured in each block. These slopes are
+/// interpolated linearly between the blocks, and extrapolated before the first and after the last block. The
 /// result is exact if the path of the head is a parabola.
 pub(super) fn head_speeds_m_per_s(head: &[Option<f64>], frame_rate_hz: f64) -> Option<Vec<f64>> {
     let half = ((SPEED_BLOCK_S * frame_rate_hz / 2.0).round() as usize).max(FEWEST_IN_BLOCK.div_ceil(2));
     let block = |k: usize| block_slope(head, k * half..((k + 2) * half).min(head.len()), frame_rate_hz);
     let mut blocks: Vec<(f64, f64)> = (0..(head.len() / half).saturating_sub(1)).filter_map(block).collect();
-    // two blocks with the same mean index contain the same tracked frames, those between two gaps
+    // if two blocks have the same mean index, they contain the same tracked frames, and one of them is
+    // removed
     blocks.dedup_by(|later, earlier| later.0 <= earlier.0);
     let mut pairs = blocks.windows(2).peekable();
     let mut pair = pairs.next()?;

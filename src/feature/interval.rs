@@ -9,13 +9,13 @@ use serde::Serialize;
 /// A time interval between two instants of a reversal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum ReversalInterval {
-    /// From the head's turn to the tip's release.
+    /// Time from the turn of the head to the release of the tip.
     ReleaseAfterReversal,
-    /// From the tip's stop to its release.
+    /// Time from the stop of the tip to the release of the tip.
     StickDuration,
-    /// From the head's turn to the start of the flip; may be negative.
+    /// Time from the turn of the head to the start of the flip of the blade; may be negative.
     FlipAfterReversal,
-    /// From the start of the flip to its end.
+    /// Time from the start to the end of the flip of the blade.
     FlipDuration,
 }
 

@@ -97,7 +97,8 @@ impl ReadingEntry<'_> {
         refuse_key(self.describe_key(key), problem)
     }
 
-    /// Checks that the entry has only keys from `known`, those that have a meaning for its kind of reading.
+    /// Checks that the entry has only keys from `known`, which lists the keys that have a meaning for this
+    /// kind of reading.
     pub(crate) fn check_keys(&self, known: &[&str]) -> Result<(), KeyRefusal> {
         let Some(key) = self.keys.given_keys().find(|key| !known.contains(key)) else { return Ok(()) };
         let takes = if known.is_empty() { "none of its own".to_owned() } else { known.join(", ") };

@@ -38,7 +38,7 @@ pub enum MissingValue {
         amplitude_m: f64,
         /// Frequency of the component, Hz.
         frequency_hz: f64,
-        /// Smallest amplitude requested, m.
+        /// Smallest amplitude that the feature accepts, m.
         least_m: f64,
     },
     /// The component does not decay.
@@ -77,7 +77,7 @@ pub enum MissingValue {
         /// Number of cycles of the component in half of the window.
         cycles: f64,
     },
-    /// A segment is longer than the window, or too short.
+    /// A segment is longer than the window, or has too few frames.
     #[error(
         "a segment of {segment_s} s has {frames} frames, expected {} to the {window} of the window",
         short_spectra::MIN_SAMPLES

@@ -13,11 +13,11 @@ use crate::toml_file::{KeyRefusal, suggest_key};
 use portable_math as math;
 use serde::Serialize;
 
-/// Scale of the difference between two times that may be zero or negative, s: a tenth of the duration of a
-/// long stick, 0.5 s.
+/// A difference of this size, s, between two values of a time interval counts as large, if the interval may
+/// be zero or negative. It is a tenth of a long stick, which lasts 0.5 s.
 pub(crate) const TIME_SCALE_S: f64 = 0.05;
-/// Default number of bands of a log-spectrum. If the bands span an octave, the width of each is about the
-/// amount by which friction changes a stick-slip frequency.
+/// Default number of bands of a log-spectrum. If the bands span an octave, the width of each band is about
+/// the change of a stick-slip frequency that friction causes.
 const DEFAULT_LINES: usize = 12;
 /// Maximum number of bands of a log-spectrum and of speeds of a friction curve: each becomes a separate
 /// feature.

@@ -10,12 +10,13 @@ use serde::Serialize;
 use short_spectra::{Component, Detrend, SpectrumError, SpectrumSettings, WindowedTransform};
 use std::f64::consts::TAU;
 
-/// Distance `ln(f / target)` of a frequency from its target that counts as much as a level of [`ASSIGN_DB`]
-/// below the strongest component, when a component is assigned to the target. Near the best point of a fit,
-/// the model's peak is within 10 % of its target.
+/// Scale of the logarithmic distance `ln(f / target)` when a component is assigned to a target: this distance
+/// counts as much against a component as being [`ASSIGN_DB`] weaker than the strongest component. Near the
+/// best point of a fit, the peak of the model is within 10 % of the target.
 pub const ASSIGN_WIDTH: f64 = 0.1;
-/// Level below the strongest component, dB, that counts as much as a distance of [`ASSIGN_WIDTH`] from the
-/// target, when a component is assigned to the target. At 6 dB, the amplitude is half.
+/// Scale of the level when a component is assigned to a target: being this much weaker than the strongest
+/// component, dB, counts as much against a component as a distance of [`ASSIGN_WIDTH`] from the target. At 6
+/// dB, the amplitude is half.
 pub const ASSIGN_DB: f64 = 6.0;
 
 /// An end of the frequency range of a drifting component.
@@ -112,9 +113,9 @@ fn level_below_strongest_db(inside: &[&Component], component: &Component) -> f64
     20.0 * math::log10(strongest_m / component.amplitude_m)
 }
 
-/// The best and the second-best component for a target: those with the smallest `(ln(f / target) /
-/// ASSIGN_WIDTH)^2 + (dB below the strongest / ASSIGN_DB)^2`. A weaker peak is chosen only if it is much
-/// nearer to the target.
+/// The best and the second-best component for a target: the two components with the smallest `(ln(f / target)
+/// / ASSIGN_WIDTH)^2 + (d / ASSIGN_DB)^2`, where `f` is the frequency of a component and `d` its level below
+/// the strongest component, dB. A weaker peak is chosen only if it is much nearer to the target.
 fn assign_component<'a>(
     inside: &[&'a Component],
     target: Option<f64>,
@@ -139,14 +140,15 @@ pub struct FeatureBand {
     pub band_hz: (f64, f64),
     /// Trend that is removed before the transform.
     pub detrend: Detrend,
-    /// Smallest amplitude of the strongest component, m. In a trace without noise, remains of the trend and
-    /// of an earlier ring-down would otherwise count as components, although no camera resolves them.
+    /// Smallest accepted amplitude of the strongest component, m; a band with only weaker components gives no
+    /// value. In a trace without noise, remains of the trend and of an earlier ring-down would otherwise
+    /// count as components, although no camera resolves them.
     pub least_amplitude_m: f64,
 }
 
 // The frequency of a stick-slip cycle drifts with the speed of the tip, so it is measured in short segments.
-// The frequency in a segment is the mean over the segment. Each end of the measured range therefore lies
-// inside the true range, by the drift within half a segment; this holds for model and measurement alike.
+// The frequency in a segment is the mean over the segment. Each end of the measured range is therefore inside
+// the true range, by the drift within half a segment. The shift is the same for model and measurement.
 
 /// Minimum ratio of a component's amplitude in a segment to its largest amplitude in all segments. At a lower
 /// ratio, the stick-slip cycle has not started or has decayed.
@@ -211,9 +213,9 @@ fn segment_starts(window: usize, frames: usize) -> Option<impl Iterator<Item = u
 // near that of the sinusoid: `d = 2 ln(a1 / a2) / T` and `zeta = d / sqrt(d^2 + (2 pi f)^2)`. Errors come
 // from the trend, neighbouring components and noise.
 
-/// Smallest amplitude of a decaying component in the second half of the window, in standard deviations of the
-/// noise. At 3 standard deviations, the relative error of the amplitude is a third, and noise without a
-/// component seldom reaches that amplitude.
+/// Smallest accepted amplitude of a decaying component in the second half of the window, in standard
+/// deviations of the noise. At 3 standard deviations, the relative error of the amplitude is a third, and
+/// noise without a component seldom reaches that amplitude.
 pub(crate) const LEAST_FINAL_AMPLITUDE: f64 = 3.0;
 
 /// Damping ratio of the strongest component of a band.

@@ -18,8 +18,8 @@ use nalgebra::DMatrix;
 use portable_math as math;
 use rayon::prelude::*;
 
-/// Number of Gauss-Newton steps of a refit. A few suffice, because the features of a twin are only a few
-/// standard deviations away, where the linear model is accurate.
+/// Number of Gauss-Newton steps of a refit. A few suffice, because the features of a twin differ from those
+/// of the best point by only a few standard deviations, and the linear model is accurate there.
 const REFIT_STEPS: usize = 3;
 /// Damping of a refit. It acts as a prior whose standard deviation is the side length of the unit box, and is
 /// negligible in any direction that the features determine.

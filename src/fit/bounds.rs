@@ -106,7 +106,8 @@ impl Bounds {
         clamp_unit(along / self.scaled_length())
     }
 
-    /// Value at the coordinate `unit`, which is clamped to 0 to 1; 0 and 1 give the bounds exactly.
+    /// Value at the coordinate `unit`, which is clamped to the range from 0 to 1; 0 and 1 give the bounds
+    /// exactly.
     pub(crate) fn value_at_unit(&self, unit: f64) -> f64 {
         let unit = clamp_unit(unit);
         if unit == 0.0 {
@@ -122,7 +123,8 @@ impl Bounds {
         value.clamp(self.lower, self.upper)
     }
 
-    /// Derivative of the parameter value by the unit coordinate at `unit`, in the parameter's unit.
+    /// Derivative of the parameter value with respect to the unit coordinate, at the coordinate `unit`, in
+    /// the unit of the parameter.
     pub(crate) fn slope(&self, unit: f64) -> f64 {
         match self.spacing {
             BoundsSpacing::Log => self.scaled_length() * self.value_at_unit(unit),
@@ -130,8 +132,8 @@ impl Bounds {
         }
     }
 
-    /// Derivative of the logarithm of the parameter value by the unit coordinate at `unit`; `None` where the
-    /// value is zero.
+    /// Derivative of the logarithm of the parameter value with respect to the unit coordinate, at the
+    /// coordinate `unit`; `None` where the value is zero.
     pub(crate) fn log_slope(&self, unit: f64) -> Option<f64> {
         match self.spacing {
             BoundsSpacing::Log => Some(self.scaled_length()),
@@ -150,8 +152,8 @@ impl Bounds {
     }
 }
 
-/// Clamps `unit` to 0 to 1. Minus zero becomes zero, so that equal points have equal bits; NaN becomes one
-/// half.
+/// Clamps `unit` to the range from 0 to 1. Minus zero becomes zero, so that equal points have equal bits; NaN
+/// becomes one half.
 pub(crate) fn clamp_unit(unit: f64) -> f64 {
     if unit.is_nan() { 0.5 } else { unit.clamp(0.0, 1.0) + 0.0 }
 }

@@ -1,11 +1,12 @@
 //! Calibration errors of cameras and their effect on features.
 //!
-//! A camera measures a deflection `d` as `(1 + scale) d + offset`: its scale is known to half a percent, and
-//! a marker is never exactly on the hinge. Scale and offset are unknowns with priors, common to all features
-//! of a recording. Their effect is computed without a run of the model, so they are not parameters of the
-//! search. At every point of the search, `CameraFit::estimate` chooses the values that minimise the cost, and
-//! the Jacobian is projected onto the complement of their derivatives (variable projection, Golub and
-//! Pereyra, SIAM J. Numer. Anal. 10 (1973) 413, in the form of Kaufman, BIT 15 (1975) 49).
+//! A camera measures a deflection `d` as `(1 + scale) * d + offset`: the scale is known only to half a
+//! percent, and a marker is never exactly on the hinge. Scale and offset are unknowns with priors, common to
+//! all features of a recording. Their effect is computed without a run of the model, so they are not
+//! parameters of the search. At every point of the search, `CameraFit::estimate` chooses the values that
+//! minimise the cost, and the Jacobian is projected onto the complement of their derivatives (variable
+//! projection, Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973) 413, in the form of Kaufman, BIT 15 (1975)
+//! 49).
 
 use super::evaluation::{Observation, Observed};
 use super::objective::{LOSS_KNEE, residual, robust_loss, total_sd};
@@ -124,9 +125,9 @@ impl CameraFit {
         observed.observation().map(|observation| self.apply(target, observation).value)
     }
 
-    /// Projects the columns of `jacobian` onto the complement of the derivatives by the camera unknowns, with
-    /// the weights of the cost. The first rows of `jacobian` belong to the features, the last rows to the
-    /// camera unknowns.
+    /// Projects the columns of `jacobian` onto the orthogonal complement of the derivatives with respect to
+    /// the camera unknowns. The projection uses the weights of the cost. The first rows of `jacobian` belong
+    /// to the features, the last rows to the camera unknowns.
     pub(crate) fn project_jacobian(
         &self,
         jacobian: DMatrix<f64>,
@@ -186,8 +187,8 @@ impl CameraFit {
         Some((jacobian.ncols()..all.ncols()).map(|at| covariance[(at, at)].sqrt()).collect())
     }
 
-    /// Derivatives of all residuals by the camera unknowns in prior standard deviations, and the weights of
-    /// the residuals in the cost; `rows` is the number of residuals.
+    /// Derivatives of all residuals with respect to the camera unknowns, which are in units of their prior
+    /// standard deviations, and the weights of the residuals in the cost. `rows` is the number of residuals.
     fn jacobian(
         &self,
         rows: usize,
@@ -238,8 +239,8 @@ fn weight_rows(matrix: &DMatrix<f64>, weights: &[f64]) -> DMatrix<f64> {
     weighted
 }
 
-/// Weight of a squared residual in the normal equations: the derivative of [`robust_loss`] by the squared
-/// residual.
+/// Weight of a squared residual in the normal equations: the derivative of [`robust_loss`] with respect to
+/// the squared residual.
 fn robust_weight(residual: f64) -> f64 {
     math::powi(LOSS_KNEE / residual.abs().max(LOSS_KNEE), 2)
 }
@@ -247,8 +248,8 @@ fn robust_weight(residual: f64) -> f64 {
 /// A target, how it depends on the calibration of its camera, and the feature of the model.
 type TargetObservation<'a> = (&'a TargetValue, TargetCalibration, Observation);
 
-/// Residual of a feature, and the derivatives of the residual by the scale and offset `place`, which are
-/// given in prior standard deviations.
+/// Residual of a feature, and the derivatives of this residual with respect to scale and offset. `place` is
+/// the scale and the offset, each in prior standard deviations.
 fn linearize_residual(
     (target, calibration, observation): &TargetObservation,
     place: [f64; 2],

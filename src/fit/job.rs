@@ -78,7 +78,8 @@ pub struct Job {
 }
 
 impl Job {
-    /// Reads and checks a job on the parameters of a scene; `file` is its name in error messages.
+    /// Reads and checks a job that fits parameters of a scene; `file` is the name of the job file in error
+    /// messages.
     ///
     /// # Errors
     /// [`JobError`] at the first problem.

@@ -19,7 +19,7 @@ use std::collections::BTreeMap;
 /// Step of the finite differences in the unit box. For a parameter whose bounds are one decade apart, it is
 /// about 2 % of the value.
 pub(crate) const DIFFERENCE_STEP: f64 = 0.01;
-/// Longest step in the unit box for which the linear model is trusted.
+/// Largest allowed length of a step in the unit box; the linear model is not trusted for longer steps.
 const MAX_STEP: f64 = 0.2;
 
 /// The points that [`FeatureSlopes::from_differences`] needs: for each parameter, one step below and one step
@@ -31,9 +31,10 @@ pub(crate) fn difference_points(unit: &[f64]) -> Vec<Vec<f64>> {
     (0..unit.len()).flat_map(|axis| [moved(axis, -DIFFERENCE_STEP), moved(axis, DIFFERENCE_STEP)]).collect()
 }
 
-/// Derivative of the distance of each feature from its target by each coordinate `u` of the unit box, one row
-/// per feature. The feature is taken as its camera shows it. `None` if the feature has a value at fewer than
-/// two of the three points of the difference.
+/// Derivatives of the distances of the features from their targets with respect to the coordinates of the
+/// unit box: one row per feature, one column per coordinate. Each feature includes the estimated errors of
+/// its camera. An entry is `None` if the feature has a value at fewer than two of the three points of the
+/// difference.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FeatureSlopes(pub Vec<Vec<Option<f64>>>);
 
@@ -68,9 +69,10 @@ fn feature_slope(target: &TargetValue, below: (f64, f64), above: (f64, f64)) -> 
     (width > 0.0 && change.is_finite()).then(|| change / width)
 }
 
-/// Scatter of each feature about a straight line through neighbouring points, as a standard deviation in the
-/// unit of the feature: the variance of `f(+) + f(-) - 2 f(0)` of independent values is six times that of one
-/// value. `None` where the feature is missing at the centre, or on a side of every pair.
+/// Scatter of each feature about a straight line through neighbouring points: a standard deviation, in the
+/// unit of the feature. It is computed from `f(+) + f(-) - 2 f(0)`; if the three values scatter
+/// independently, the variance of this sum is six times the variance of one value. `None` where the feature
+/// is missing at the centre, or at one or both points of every pair of neighbours.
 pub(crate) fn feature_scatter(
     targets: &[TargetValue],
     centre: &Evaluation,
@@ -226,8 +228,8 @@ pub(crate) fn step_in_box(unit: &[f64], step: &[f64]) -> Vec<f64> {
 pub(crate) const Z_95: f64 = 1.96;
 /// Rise in cost at the ends of a 95 % interval (chi-squared with one degree of freedom).
 pub(crate) const CHI_SQUARED_95: f64 = 3.84;
-/// Smallest singular value of an informative direction, per length of the unit box. At this value the 95 %
-/// interval along the direction is as wide as the box.
+/// A direction is informative if its singular value, per side length of the unit box, is at least this value.
+/// At this value the 95 % interval along the direction is as wide as the box.
 pub(crate) const MIN_INFORMATIVE: f64 = 2.0 * Z_95;
 /// A singular value below this fraction of the largest singular value counts as a rounding error.
 pub(crate) const ROUNDING_SHARE: f64 = 1e-9;
@@ -298,8 +300,9 @@ impl SingularDirections {
         }
     }
 
-    /// Standard deviation of a coordinate of the unit box from the informative directions, and squared
-    /// projection of its unit vector onto the uninformative directions.
+    /// Two numbers for the coordinate `axis` of the unit box: its standard deviation within the informative
+    /// directions, and the squared projection of the unit vector of this coordinate onto the uninformative
+    /// directions.
     pub(crate) fn coordinate_sd(&self, axis: usize) -> (f64, f64) {
         let component = |direction: &Vec<f64>| math::powi(direction.get(axis).copied().unwrap_or(0.0), 2);
         let (known, open) = self.all.split_at(self.rank);

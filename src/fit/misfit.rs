@@ -22,8 +22,8 @@ const NOISE_SD_RELATIVE: f64 = 0.04;
 const MAX_GROWTH: f64 = 0.03;
 /// Half width of a two-sided 95 % interval, in standard deviations of a normal variable.
 const Z_95: f64 = 1.96;
-/// Largest distance of a nuisance parameter from the mean of its prior, in standard deviations. With twenty
-/// nuisance parameters, one in a hundred fits of a right model exceeds this limit.
+/// Largest allowed distance of a nuisance parameter from the mean of its prior, in standard deviations of the
+/// prior. With twenty nuisance parameters, one in a hundred fits of a right model exceeds this limit.
 const MAX_PRIOR_DISTANCE_SD: f64 = 3.5;
 /// Number of significant digits of a ratio in a sentence.
 const DIGITS: usize = 3;

@@ -21,7 +21,7 @@ pub trait FeaturePredictor: Sync {
     /// draw number `draw`.
     ///
     /// # Errors
-    /// As [`Self::predict_features`].
+    /// The errors of [`Self::predict_features`].
     fn simulate_twin(&self, values: &[f64], draw: u64) -> Result<Vec<Observed>, RunFailure>;
 }
 
@@ -46,10 +46,11 @@ pub trait Model: Sync {
     fn record_condition(&self, values: &[f64], condition: usize, draw: Draw)
     -> Result<Recording, RunFailure>;
 
-    /// Simulated recording of a run that starts as `restart` says.
+    /// Simulated recording of a run whose start is changed by `restart`.
     ///
     /// # Errors
-    /// As [`Self::record_condition`]; also if the model cannot start in this way.
+    /// The errors of [`Self::record_condition`]; in addition, [`RunFailure`] if the model cannot start in
+    /// this way.
     fn record_restarted(
         &self,
         values: &[f64],
@@ -67,7 +68,7 @@ pub trait Model: Sync {
         None
     }
 
-    /// Longest time by which a run can start earlier than its scene says, s.
+    /// Largest time, s, by which a run can start before the start time of its scene.
     fn max_lead_s(&self, condition: usize) -> f64 {
         let _ = condition;
         f64::INFINITY
@@ -124,7 +125,8 @@ impl<'a> ModelFeatures<'a> {
         Self::new(model, &features, targets.iter().map(|target| target.value).collect(), members)
     }
 
-    /// All features of one simulated measurement, given by `draw`.
+    /// All features of one simulated measurement; `draw` selects the starting state, the noise and the lost
+    /// frames.
     ///
     /// # Errors
     /// [`RunFailure`] of the first condition that fails.

@@ -109,7 +109,8 @@ fn is_constant(parameter: &ModelParameter) -> bool {
 /// # Errors
 /// [`NuisanceError`] with the names of the parameters.
 pub(crate) fn check_scaling(job: &Job, scenes: &[Scene]) -> Result<(), NuisanceError> {
-    // a fixed value or a prior of any such parameter determines the common scale of masses and forces
+    // the common scale of masses and forces is determined if any parameter whose unit contains a mass is
+    // fixed or has a prior
     let is_held = |(name, _): (&str, f64)| match find_free_parameter(job, name) {
         // the form in which the job writes the parameter decides: a stiffness that is written as a frequency
         // has no unit of mass

@@ -2,7 +2,8 @@
 //! and a finite cost.
 //!
 //! The cost is twice the negative log-likelihood, up to a constant. The constant makes the cost zero if the
-//! model reproduces all targets: `sum [ rho(r) + 2 ln(s / s0) + (d / 6 dB)^2 ] + sum of the priors`.
+//! model reproduces all targets: the cost is the sum of `rho(r) + 2 ln(s / s0) + (d / 6 dB)^2` over all
+//! features, plus the costs of the priors.
 //!
 //! - The residual of a feature is `r = ln(model / target) / s`, or `(model - target) / s` if its
 //!   sign may change.
@@ -150,8 +151,8 @@ pub(crate) fn prior_residuals(axes: &[SearchAxis], values: &[f64]) -> impl Itera
     axes.iter().zip(values).filter_map(|(axis, value)| Some(axis.prior.as_ref()?.residual(*value)))
 }
 
-/// Two costs: that of the features and of the priors of their cameras, and that of a run in which all
-/// features are missing.
+/// Two costs: first, the cost of the features plus the cost of the priors of their cameras; second, the cost
+/// of a run in which all features are missing.
 fn feature_costs(targets: &[TargetValue], features: &[Observed]) -> (f64, f64) {
     let cameras = CameraFit::estimate(targets, features);
     let one = |(at, target): (usize, &TargetValue)| {
@@ -175,7 +176,7 @@ fn first_stage_targets(targets: &[TargetValue], features: &[Observed]) -> (Vec<T
 /// Limit of the residual of a prior, in standard deviations. It keeps costs finite.
 const MAX_PRIOR_RESIDUAL: f64 = 1e6;
 
-/// Ratio of the distance of a feature from its target to [`total_sd`].
+/// Distance of a feature from its target, divided by [`total_sd`].
 pub(crate) fn residual(observation: &Observation, target: &TargetValue) -> f64 {
     target.distance(observation.value) / total_sd(observation, target)
 }

@@ -178,7 +178,8 @@ impl PosteriorParameter {
         if self.is_log { math::ln(value) } else { value }
     }
 
-    /// Ends of the range of the coordinate as distances from the mean of its prior, in standard deviations.
+    /// Distances of the two ends of the coordinate's range from the mean of the prior, in standard deviations
+    /// of the prior.
     fn standardized_bounds(&self, [mean, sd]: [f64; 2]) -> [f64; 2] {
         self.bounds.map(|end| (self.coordinate(end) - mean) / sd)
     }
@@ -209,7 +210,7 @@ impl PosteriorParameter {
         if !(low..=high).contains(&value) {
             return f64::NEG_INFINITY;
         }
-        // logarithm of the derivative of the coordinate by the value
+        // logarithm of the derivative of the coordinate with respect to the value
         let slope = if self.is_log { -math::ln(value) } else { 0.0 };
         let along = match self.prior {
             None => -math::ln(self.coordinate(high) - self.coordinate(low)),

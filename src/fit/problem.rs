@@ -213,7 +213,7 @@ impl Problem {
     /// Fits the job within its budgets, without a journal.
     ///
     /// # Errors
-    /// As [`fit_features`].
+    /// The errors of [`fit_features`].
     pub fn fit(&self) -> Result<FitResult, FitError> {
         self.fit_with(&self.new_context(), &mut NullSink, &mut |_: &FitProgress| ControlFlow::Continue(()))
     }
@@ -221,7 +221,7 @@ impl Problem {
     /// Fits the job with at most `evaluations` evaluations of the model, without a journal.
     ///
     /// # Errors
-    /// As [`fit_features`].
+    /// The errors of [`fit_features`].
     pub fn fit_within(&self, evaluations: usize) -> Result<FitResult, FitError> {
         let context = FitContext { max_evaluations: Some(evaluations), ..self.new_context() };
         self.fit_with(&context, &mut NullSink, &mut |_: &FitProgress| ControlFlow::Continue(()))
@@ -230,7 +230,7 @@ impl Problem {
     /// Fits the job in a context (see [`Self::new_context`]), with a journal and a progress callback.
     ///
     /// # Errors
-    /// As [`fit_features`].
+    /// The errors of [`fit_features`].
     pub fn fit_with(
         &self,
         context: &FitContext,
@@ -438,8 +438,8 @@ mod tests {
         assert_eq!(refused(vec![scene], vec![]), ProblemError::Recordings { found: 0, expected: 1 });
     }
 
-    /// A job that fits the trace of its recording, with the further keys `top` at its top and `trace` in its
-    /// trace.
+    /// A job that fits the trace of its recording. The text `top` is added before the first table, and the
+    /// text `trace` is added to the table `[[trace]]`.
     fn traced_job(top: &str, trace: &str) -> String {
         let parameters =
             JOB.split("[[parameter]]").skip(1).map(|p| p.split("\n[").next().unwrap_or_default());

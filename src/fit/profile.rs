@@ -31,18 +31,18 @@ const FOLLOWED_GAIN: f64 = 0.08;
 /// Maximum number of places that a walker visits. With a poor linear model a walker needs about eight places,
 /// plus one for each probe beyond a crossing.
 const MAX_PLACES: usize = 20;
-/// Distances of the probes beyond a crossing from the best point, divided by the distance of the crossing
-/// from the best point. The walk ends only if the cost exceeds the threshold at the probes too, so a ridge as
-/// wide as a quarter of the interval does not end it.
+/// The probes beyond a crossing are at these multiples of the distance from the best point to the crossing.
+/// The walk ends only if the cost exceeds the threshold at the probes too, so a ridge as wide as a quarter of
+/// the interval does not end it.
 const PROBE_FACTORS: [f64; 2] = [1.25, 1.6];
 /// A known point is tried at a place if its coordinate along the walk differs from the place by at most this
-/// length of the unit box.
+/// distance in the unit box.
 const NEAR_COORDINATE: f64 = 0.01;
 /// Maximum number of times that walkers continue from a point beyond their crossings.
 const MAX_RESUMPTIONS: usize = 3;
 /// Length of the first step, as a fraction of the distance at which the linear model crosses the threshold.
 const FIRST_STEP_SHARE: f64 = 0.6;
-/// Smallest and largest length of the first step in the unit box.
+/// Smallest and largest allowed length of the first step in the unit box.
 const FIRST_STEP_RANGE: (f64, f64) = (0.003, 0.25);
 /// A step aims at a place where the square root of the rise in cost is this factor times the square root of
 /// the threshold, so that the crossing is between the two places.
@@ -50,10 +50,10 @@ const OVERSHOOT: f64 = 1.1;
 /// A bracket of the crossing is narrow enough if the square root of the rise in cost at its outer end is at
 /// most this factor times the square root of the threshold.
 const NARROW_BRACKET: f64 = 1.35;
-/// Largest distance from a bound, in the unit box, at which a point counts as at the bound. It is the
-/// resolution of a search.
+/// A point counts as at a bound if its distance from the bound, in the unit box, is below this value, which
+/// is the resolution of a search.
 pub(crate) const AT_BOUND: f64 = 1e-3;
-/// Largest ratio of the length of a step to that of the previous step.
+/// Largest allowed ratio of the length of a step to the length of the previous step.
 const MAX_STEP_GROWTH: f64 = 3.0;
 
 /// The profile of one parameter.
@@ -181,7 +181,8 @@ struct ProfileWalker {
     /// Coordinate of the current place; `here` is the best point found at this place.
     at: f64,
     here: Option<ProfilePoint>,
-    /// Best known point near the current place, with the coordinate along the walk set to that of the place.
+    /// Best known point near the current place; its coordinate along the walk is replaced by the coordinate
+    /// of the place.
     near: Option<Vec<f64>>,
     /// Whether the inner minimisation at the current place has ended.
     followed: bool,
@@ -268,7 +269,8 @@ impl ProfileWalker {
         steps.map(|d| step_in_box(&here.evaluation.unit, &d)).collect()
     }
 
-    /// Best known point near the current place, with the coordinate along the walk set to that of the place.
+    /// Best known point near the current place; its coordinate along the walk is replaced by the coordinate
+    /// of the place.
     fn nearest_known_point(&self, ledger: &Ledger) -> Option<Vec<f64>> {
         let near =
             |e: &&Evaluation| e.unit.get(self.axis).is_some_and(|u| (u - self.at).abs() <= NEAR_COORDINATE);
@@ -362,7 +364,8 @@ impl ProfileWalker {
         self.next_step = (self.start.0 + factor * (crossing - self.start.0) - self.base_coordinate()).abs();
     }
 
-    /// Whether a parameter other than the walker's is at a bound here but not at the best point.
+    /// Whether any parameter except the one along which the walker moves is at a bound at `unit` but is not
+    /// at a bound at the best point.
     fn pins_another_parameter(&self, unit: &[f64]) -> bool {
         let bound = |u: &f64| !(AT_BOUND..=1.0 - AT_BOUND).contains(u);
         let mut pairs = unit.iter().zip(&self.start_unit).enumerate();

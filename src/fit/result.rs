@@ -56,8 +56,8 @@ pub struct ParameterResult {
     /// In a fit of features, the 95 % interval by the linear model at the estimates, if this model determines
     /// the parameter. In a trace fit, the 95 % interval from curvature, scatter of the segments and profile.
     pub linear_95: Option<[f64; 2]>,
-    /// Values below and above the estimate at which the profile of the cost crosses the threshold; `None` if
-    /// it does not cross it within the bounds.
+    /// Values below and above the estimate at which the profile of the cost crosses the threshold; `None`
+    /// without a crossing within the bounds.
     pub profile_95: [Option<f64>; 2],
     /// 95 % interval from refits to twins (recordings simulated with the best model).
     pub bootstrap_95: Option<[f64; 2]>,
@@ -153,7 +153,7 @@ pub struct ComponentResult {
     pub model_hz: Option<f64>,
     /// `model / target - 1`.
     pub relative_error: Option<f64>,
-    /// Largest relative error, in absolute value, that passes.
+    /// Largest allowed absolute value of the relative error.
     pub tolerance_relative: f64,
     /// Whether the relative error is within the tolerance.
     pub pass: bool,
@@ -240,7 +240,7 @@ pub struct FitResult {
     pub title: String,
     /// Outcome of the fit.
     pub status: FitStatus,
-    /// How well the model explains the traces; `None` in a fit of features alone.
+    /// How well the model explains the traces; `None` in a fit of features.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub misfit: Option<TraceMisfit>,
     /// Results of the parameters, by key in the scene file preceded by its table.

@@ -22,9 +22,9 @@ use super::uncertainty::stored_verdicts;
 use crate::recording::Recording;
 use serde_json::Value;
 
-/// Largest relative difference between a stored and a recomputed number that count as equal. On a processor
-/// without AVX2 and FMA, the numbers of the committed reports change by up to 4e-11; on the same machine they
-/// do not change. Features are measured to 1e-3 at best.
+/// A stored and a recomputed number count as equal if their relative difference is at most this value. On a
+/// processor without AVX2 and FMA, the numbers of the committed reports change by up to 4e-11; on the same
+/// machine they do not change. Features are measured to 1e-3 at best.
 const RELATIVE_TOLERANCE: f64 = 1e-6;
 /// Absolute differences below this value are rounding errors of numbers near zero.
 const ABSOLUTE_TOLERANCE: f64 = 1e-12;
@@ -32,8 +32,8 @@ const ABSOLUTE_TOLERANCE: f64 = 1e-12;
 const MOST_NAMED: usize = 8;
 
 impl Problem {
-    /// Checks a result against the model at its estimates, and its numbers against each other; `file` is its
-    /// name in error messages.
+    /// Checks a result against the model at the estimates, and the numbers of the result against each other;
+    /// `file` is the name of the result file in error messages.
     ///
     /// # Errors
     /// [`ResultError`] with the entries that differ: key, stored value and computed value.

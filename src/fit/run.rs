@@ -151,7 +151,7 @@ fn add_reservations(
     // the last descent only polished the best point and does not count as a separate search
     let others = searched.descents.split_last().map_or(&[][..], |(_, others)| others);
     let ends: Vec<Evaluation> = others.iter().map(|descent| descent.end.clone()).collect();
-    // optima are compared with the stated standard deviations, which the misfit does not inflate
+    // for the comparison of optima, the standard deviations of the targets are not inflated by the misfit
     let plain = ledger.objective().with_feature_scatter(&weighed.roughness);
     found.with_search_doubts(searched.termination == SearchTermination::Converged, &plain, &ends)
 }

@@ -18,8 +18,8 @@ const MIN_VISIBLE_SHIFT_SD: f64 = 1.0;
 /// Shift of a feature between two starts, in standard deviations of its target, up to which the error of the
 /// start counts as decayed.
 const MAX_FORGOTTEN_SHIFT_SD: f64 = 0.3;
-/// Longest time by which a start is moved earlier, in decay times. After five decay times less than 1 % of an
-/// error remains.
+/// Largest time by which a start is moved earlier, in decay times of the slowest mode. After five decay times
+/// less than 1 % of an error remains.
 const MAX_LEAD_DECAYS: usize = 5;
 /// Relative change of the starting angles if the start cannot be moved earlier.
 const ANGLE_CHANGE: f64 = 0.05;

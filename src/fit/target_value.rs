@@ -8,8 +8,9 @@ use portable_math as math;
 /// feature.
 pub(crate) const MAX_RATIO: f64 = 100.0;
 
-/// Smallest relative standard deviation in the first stage. Far from the targets all residuals are many
-/// standard deviations, and the most precise features would otherwise dominate the cost.
+/// Lower limit of the relative standard deviation of a target in the first stage of the search. Far from the
+/// targets all residuals are many standard deviations, and the most precise features would otherwise dominate
+/// the cost.
 pub(crate) const FIRST_STAGE_SD_RELATIVE: f64 = 0.05;
 
 /// The target value of a feature, with its standard deviation.
@@ -33,14 +34,15 @@ pub struct TargetValue {
 }
 
 impl TargetValue {
-    /// Standard deviation of [`Self::distance`] from the target's standard deviation and the scatter of the
-    /// model, in units of [`Self::reference_size`].
+    /// Standard deviation of [`Self::distance`] (dimensionless). It combines the standard deviation of the
+    /// target and the scatter of the model.
     pub(crate) fn relative_sd(&self) -> f64 {
         math::hypot(self.sd, self.scatter) / self.reference_size()
     }
 
-    /// Distance of `value` from the target in units of [`Self::reference_size`], with an absolute value of at
-    /// most the logarithm of [`MAX_RATIO`].
+    /// Dimensionless distance of `value` from the target: the logarithm of their ratio or, if values are
+    /// compared by differences, the difference divided by [`Self::reference_size`]. Its absolute value is
+    /// limited to the logarithm of [`MAX_RATIO`].
     pub(crate) fn distance(&self, value: f64) -> f64 {
         let most = math::ln(MAX_RATIO);
         match self.measure {
@@ -52,7 +54,8 @@ impl TargetValue {
         }
     }
 
-    /// Distance between two values, in the units of [`Self::distance`]; zero if the logarithm is undefined.
+    /// Distance of `value` from the value `from`, defined like [`Self::distance`] but without a limit; zero
+    /// if the logarithm is undefined.
     pub(crate) fn distance_between(&self, value: f64, from: f64) -> f64 {
         match self.measure {
             ValueComparison::Log => {
@@ -69,8 +72,9 @@ impl TargetValue {
         (!self.last).then(|| Self { sd, ..self.clone() })
     }
 
-    /// Unit of distances, in the feature's own unit: the absolute value of the target or, for differences,
-    /// the difference that counts as large.
+    /// Difference, in the unit of the feature, that corresponds to a distance of 1 (for logarithms: near the
+    /// target). It is the absolute value of the target or, if values are compared by differences, the
+    /// difference that counts as large.
     pub(crate) fn reference_size(&self) -> f64 {
         match self.measure {
             ValueComparison::Log => self.value.abs(),
@@ -79,8 +83,8 @@ impl TargetValue {
     }
 }
 
-/// How a feature depends on the calibration errors of its camera. A position, for example, is shown as `(1 +
-/// scale) value + offset`.
+/// How a feature depends on the calibration errors of its camera. For example, the camera shows a position as
+/// `(1 + scale) * value + offset`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TargetCalibration {
     /// Index of the condition to which the camera belongs, from 0.
@@ -105,7 +109,8 @@ impl TargetCalibration {
         }
     }
 
-    /// Derivatives of the value that the camera shows by the scale and by the offset (m).
+    /// Derivatives of the value that the camera shows, m, with respect to the scale and with respect to the
+    /// offset, m.
     pub(crate) fn derivatives(&self, value: f64, [scale, offset_m]: [f64; 2]) -> [f64; 2] {
         match self.length {
             LengthCalibration::Position => [value, 1.0],
@@ -116,7 +121,7 @@ impl TargetCalibration {
         }
     }
 
-    /// Standard deviation of the value that the camera shows due to the calibration errors, m.
+    /// Standard deviation, m, that the calibration errors cause in the value shown by the camera.
     pub(crate) fn sd_m(&self, value: f64) -> f64 {
         let [by_scale, by_offset] = self.derivatives(value, [0.0; 2]);
         math::hypot(self.scale_sd * by_scale, self.offset_sd_m * by_offset)

@@ -13,8 +13,8 @@ use portable_math as math;
 /// Number of copies of a recording with additional noise from which the standard deviation of a feature is
 /// estimated. A standard deviation from 12 values is accurate to a fifth.
 const NOISE_COPIES: u64 = 12;
-/// Smallest relative standard deviation of a measured target: neither features of sampled traces nor the
-/// model are more precise.
+/// Lower limit of the relative standard deviation of a measured target: features of sampled traces and of the
+/// model are not more precise.
 const MIN_SD_RELATIVE: f64 = 1e-3;
 
 /// Targets in the order of the job; `measured` has one entry per condition, `None` for a condition
@@ -47,8 +47,8 @@ pub fn measure_targets(job: &Job, measured: &[Option<Recording>]) -> Result<Vec<
     job.targets.iter().zip(read).zip(scatter).map(target).collect()
 }
 
-/// Splits the targets of the job: the fitted entries, the target values of these, and the held-out entries
-/// with their target values.
+/// Splits the targets of the job into three lists: the fitted entries, the target values of the fitted
+/// entries, and the held-out entries with their target values.
 pub(super) fn split_held_out(
     job: &Job,
     all: Vec<TargetValue>,

@@ -28,8 +28,8 @@ fn observed(values: &[f64]) -> Vec<Observed> {
     values.iter().map(|value| Observed::from_value(*value)).collect()
 }
 
-/// Targets: three positions and a size as a camera with the scale and offset `numbers` shows them. Features:
-/// their true values.
+/// Targets and features for three positions and a size. The features are the true values; the targets are the
+/// values that a camera with the scale and offset `numbers` shows.
 fn filmed(numbers: [f64; 2], sd_relative: f64) -> (Vec<TargetValue>, Vec<Observed>) {
     let model = [3e-3, -2e-3, 6e-3, 1e-3];
     let of = [FREE, FREE, FREE, SIZE];

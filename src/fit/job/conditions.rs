@@ -184,13 +184,13 @@ pub(super) fn check_not_set(conditions: &[JobCondition], free: &str) -> Result<(
 /// Default relative standard deviation of the scale, for a scale bar of 20 mm read to a tenth
 /// of a millimetre.
 pub(super) const DEFAULT_SCALE_SD: f64 = 0.005;
-/// Largest relative standard deviation of the scale; a picture with a less certain scale counts as not
-/// calibrated.
+/// Largest allowed relative standard deviation of the scale; a picture with a less certain scale counts as
+/// not calibrated.
 pub(super) const MAX_SCALE_SD: f64 = 0.1;
 /// Default standard deviation of the position of a marker, m, for a marker placed on its hinge
 /// to a millimetre.
 pub(super) const DEFAULT_OFFSET_SD_M: f64 = 1e-3;
-/// Largest standard deviation of the position of a marker, m: the length of a blade.
+/// Largest allowed standard deviation of the position of a marker, m: the length of a blade.
 pub(super) const MAX_OFFSET_SD_M: f64 = 0.1;
 
 /// Standard deviations of scale and offset of a camera, for a fit of features; 0 fixes the scale or offset at

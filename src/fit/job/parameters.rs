@@ -100,9 +100,10 @@ fn check_prior(
 // Constants of the scene that are free within a prior. They are freed because a mass or a damping is never
 // known exactly.
 
-/// Smallest standard deviation of a constant, %; a more precisely known constant must be left fixed.
+/// Smallest allowed standard deviation of a constant, %; a more precisely known constant must be left fixed.
 const LEAST_PERCENT: f64 = 1e-4;
-/// Largest standard deviation of a constant, %; a less precisely known quantity must be a free parameter.
+/// Largest allowed standard deviation of a constant, %; a less precisely known quantity must be a free
+/// parameter.
 const MOST_PERCENT: f64 = 50.0;
 
 /// Constants of the scene that are free within a prior.
@@ -126,7 +127,8 @@ pub enum Constants {
 pub struct NuisanceParameter {
     /// Key in the scene file, preceded by its table.
     pub name: String,
-    /// Standard deviation of the constant's natural logarithm about the logarithm of the scene's value.
+    /// Standard deviation of the prior of the constant's natural logarithm; the mean of this prior is the
+    /// logarithm of the value in the scene.
     pub sd_relative: f64,
 }
 

@@ -15,7 +15,8 @@ pub(super) const STARTS: usize = 6;
 /// Maximum number of local searches; with more, each search would get too few of the evaluations, which all
 /// searches share.
 const MOST_STARTS: usize = 64;
-/// Maximum number of evaluations in a stage. It limits the memory; such a run would take weeks.
+/// Maximum number of evaluations in a stage. The limit bounds the memory; a run with so many evaluations
+/// would take weeks.
 const MOST_EVALUATIONS: usize = 10_000_000;
 /// Maximum number of starting states in an ensemble. Eight states reduce the error of a friction coefficient
 /// from 20 % to 1-3 %, and each state needs a run of the model.

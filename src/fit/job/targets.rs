@@ -185,8 +185,9 @@ fn target_source(
     }
 }
 
-/// Source of a measured target. `relative` is the smallest standard deviation of the target, divided by the
-/// target or, if differences are compared, by the difference that counts as large.
+/// Source of a measured target. `relative` is the lower limit of the standard deviation of the target. It is
+/// a fraction of the target if values are compared by logarithms, or else a fraction of the difference that
+/// counts as large.
 fn measured_source(measure: ValueComparison, relative: f64) -> TargetSource {
     match measure {
         ValueComparison::Log => TargetSource::Measured { least_sd: 0.0, least_sd_relative: relative },
@@ -213,7 +214,7 @@ pub struct FitTarget {
     pub feature: Feature,
     /// Source of the target and its standard deviation.
     pub source: TargetSource,
-    /// Largest relative error of a component that passes; `None` for other features.
+    /// Largest allowed relative error of a component; `None` for other features.
     pub tolerance_relative: Option<f64>,
     /// Whether the target is only predicted, never fitted.
     pub held_out: bool,
@@ -245,15 +246,15 @@ pub enum TargetSource {
     /// `least_sd_relative` times the target; if both are 0, the standard deviation follows from the noise of
     /// the recording.
     Measured {
-        /// Smallest standard deviation, in the unit of the feature.
+        /// Lower limit of the standard deviation, in the unit of the feature.
         least_sd: f64,
-        /// Smallest standard deviation, as a fraction of the target.
+        /// Lower limit of the standard deviation, as a fraction of the target.
         least_sd_relative: f64,
     },
 }
 
-/// Smallest standard deviation relative to a target: smaller than the error of any camera, but large enough
-/// that squared residuals do not overflow.
+/// Smallest allowed standard deviation of a target, as a fraction of the target. It is smaller than the error
+/// of any camera, but large enough that squared residuals do not overflow.
 const MIN_SD_RELATIVE: f64 = 1e-9;
 
 /// The name of an entry of a job, for error messages.
@@ -300,8 +301,8 @@ impl JobEntry {
         )
     }
 
-    /// The recording or condition with the number (counted from 1) or name `which`, and its index; the first
-    /// one if the entry names none.
+    /// Index of a recording or condition, and the recording or condition itself. `which` is a number, counted
+    /// from 1, or a name; without `which`, the first recording or condition is used.
     pub(super) fn find_condition<'a>(
         &self,
         which: Option<&ConditionReference>,

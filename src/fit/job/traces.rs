@@ -14,18 +14,18 @@ use std::f64::consts::PI;
 const MOST_STAGES: usize = 8;
 /// Default standard deviation of the camera's tilt, degrees, for a camera levelled with a spirit level.
 const TILT_SD_DEG: f64 = 0.3;
-/// Largest standard deviation of the tilt, degrees; a recording with a larger tilt must be levelled
+/// Largest allowed standard deviation of the tilt, degrees; a recording with a larger tilt must be levelled
 /// before the fit.
 const MOST_TILT_SD_DEG: f64 = 10.0;
-/// Largest standard deviation of the speed at which a marker drifts, m/s; a faster motion must be tracked
-/// instead.
+/// Largest allowed standard deviation of the speed at which a marker drifts, m/s; a faster motion must be
+/// tracked instead.
 const MOST_DRIFT_SD_M_PER_S: f64 = 0.01;
 /// Default standard deviation of the camera's clock against the clock of the drive, s, for a camera that is
 /// started by a trigger. It applies if the drive of the scene moves the head; a recorded head motion is
 /// already on the clock of the camera.
 const CLOCK_SD_S: f64 = 1e-3;
-/// Largest standard deviation of the camera's clock relative to the clock of the drive, s; a larger shift
-/// must be removed before the fit.
+/// Largest allowed standard deviation of the camera's clock relative to the clock of the drive, s; a larger
+/// shift must be removed before the fit.
 const MOST_CLOCK_SD_S: f64 = 0.1;
 
 /// A recording whose trace is fitted.

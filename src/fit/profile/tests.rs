@@ -41,8 +41,9 @@ impl FeaturePredictor for CurvedPredictor {
     }
 }
 
-/// Profiles of two parameters with the best values 1, from two features with the standard deviations `sds`,
-/// and the number of evaluations. The points `met` are evaluated before the profiles.
+/// Returns the profiles of two parameters, whose best values are 1, and the number of evaluations. Two
+/// features with the standard deviations `sds` are fitted. The points `met` are evaluated before the
+/// profiles.
 fn walked(model: &dyn FeaturePredictor, sds: [f64; 2], met: &[Vec<f64>]) -> (Vec<ProfileLikelihood>, usize) {
     let target = |sd| TargetValue {
         name: format!("sd {sd}"),

@@ -5,13 +5,14 @@ use super::{FitResult, ParameterResult, ResultError};
 use crate::fit::job::{FreeParameter, Job};
 use std::collections::BTreeSet;
 
-/// Largest relative rounding error of an estimate at a bound, caused by taking a logarithm and its inverse.
+/// Largest allowed relative rounding error of an estimate at a bound. The error arises because the logarithm
+/// of the bound is taken and inverted.
 const BOUND_ROUNDING: f64 = 1e-12;
 
 impl FitResult {
     /// Checks the result against its job: both must have the same parameters, components and features.
     /// Estimates must be within their bounds, the ends of intervals in ascending order, and standard
-    /// deviations not negative. `file` is its name in error messages.
+    /// deviations not negative. `file` is the name of the result file in error messages.
     ///
     /// # Errors
     /// [`ResultError`] with the first key that does not match.

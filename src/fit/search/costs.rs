@@ -38,7 +38,7 @@ impl Slab {
 /// this cost.
 pub(super) const STOPPED_COST: f64 = 1e100;
 
-/// Costs of points of the unit box for the solvers of a stage.
+/// Computes the costs of points in the unit box, for the solvers of one stage of the search.
 pub(super) struct StageCosts<'l, 'a> {
     pub(super) ledger: &'l mut Ledger<'a>,
     pub(super) stage: EvaluationStage,

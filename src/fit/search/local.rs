@@ -12,7 +12,7 @@ use super::termination::{
 use crate::fit::evaluation::{Evaluation, EvaluationStage};
 use crate::fit::ledger::{Ledger, StopReason};
 
-/// Number of descents, the best first, whose ends are refined with a population.
+/// Number of the best descents whose end points are refined with a population.
 const REFINED_ENDS: usize = 3;
 
 /// Descends from each start, refines the best ends with populations, then polishes the best point of all.
@@ -107,8 +107,8 @@ fn descend_from(ledger: &mut Ledger, start: Evaluation) -> (LocalDescent, Option
     (LocalDescent { start, end, evaluations: ledger.run_evaluations().len() - made }, stop)
 }
 
-/// Polishes the best point by Gauss-Newton descents and simplices, until simplices of all sizes, one after
-/// the other, no longer lower the cost.
+/// Polishes the best point by Gauss-Newton descents and simplices. It ends when simplices of every size have
+/// been tried one after the other without lowering the cost.
 pub(crate) fn polish_best(ledger: &mut Ledger) -> SearchTermination {
     let mut barren = 0;
     while let Some(edge) = SIMPLEX_EDGES.get(barren).filter(|_| !is_exact_fit(ledger)) {

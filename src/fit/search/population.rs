@@ -70,8 +70,8 @@ pub(super) struct PopulationExtent {
     last: f64,
 }
 
-/// Extent of a population for the whole unit box: three initial lengths from the middle reach every corner.
-/// Below the final length, damped Gauss-Newton steps are more efficient.
+/// Extent of a population for the whole unit box: along each coordinate, three initial lengths reach from the
+/// middle to beyond the bounds. Below the final length, damped Gauss-Newton steps are more efficient.
 pub(super) const WIDE_EXTENT: PopulationExtent = PopulationExtent { first: 0.3, last: 0.01 };
 /// Extent of a population for the neighbourhood of a point at which ripples of the cost trap Gauss-Newton
 /// steps.

@@ -42,8 +42,8 @@ pub(crate) const SIMPLEX_EDGES: [f64; 3] = [0.05, 0.2, 0.01];
 /// A simplex has converged if the standard deviation of the costs at its vertices is below this value. A
 /// residual of a hundredth of a standard deviation has this cost.
 pub const SIMPLEX_COST_SPREAD: f64 = 1e-4;
-/// Decrease of the cost below which another step is not worthwhile: 2 % of the rise in cost (1) at the ends
-/// of a 68 % interval.
+/// Decrease of the cost below which another step is not worthwhile: 2 % of the rise in cost at the ends of a
+/// 68 % interval, which is 1.
 pub const MIN_WORTHWHILE_GAIN: f64 = 0.02;
 /// Cost below which a fit counts as exact. A single residual of a thousandth of a standard deviation has this
 /// cost.

@@ -12,8 +12,8 @@ use nalgebra::DMatrix;
 use portable_math as math;
 use std::collections::BTreeSet;
 
-/// Smallest eigenvalue of the scaled information matrix whose direction counts as determined. Smaller
-/// eigenvalues are rounding errors.
+/// Smallest eigenvalue of the scaled information matrix that counts as different from zero. A direction with
+/// a smaller eigenvalue is not determined, because such an eigenvalue is a rounding error.
 const MIN_EIGENVALUE: f64 = 1e-10;
 
 /// Estimate of an unknown at the end of a search.
@@ -83,8 +83,8 @@ impl TraceAssessment {
     }
 }
 
-/// Assesses the end of the descent with index `best`. `runs` are the uncertainty runs from this end, each
-/// with its last iterate.
+/// Assesses the end of the descent with index `best`. `runs` lists the uncertainty runs that start at this
+/// end, each with its last iterate.
 pub(super) fn assess_end(
     end: &SearchEnd<'_>,
     descents: &[TraceDescent],
@@ -145,7 +145,7 @@ fn count_determined(model: &TraceModel, information: &DMatrix<f64>) -> usize {
     scaled.symmetric_eigenvalues().iter().filter(|value| **value > MIN_EIGENVALUE).count() + priors.len()
 }
 
-/// All reasons to doubt every parameter, except the comparison of segment lengths.
+/// Reasons to doubt all parameters together. The comparison of segment lengths is not included.
 fn shared_doubts(at: &SearchEnd<'_>, descents: &[TraceDescent], best: usize, rank: usize) -> Vec<String> {
     let SearchEnd { model, settings, at: end, sd, .. } = at;
     let mut doubts = Vec::new();
@@ -194,12 +194,12 @@ fn shared_doubts(at: &SearchEnd<'_>, descents: &[TraceDescent], best: usize, ran
 /// this difference.
 const LENGTHS_AGREE_SD: f64 = 3.0;
 
-/// Compares the estimates at the best end with those of the fit with shorter segments; `sd` are the standard
-/// deviations at `end`.
+/// Compares the estimates at the best end `end` with the estimates of the fit with shorter segments. `sd` are
+/// the standard deviations of the coordinates at `end`.
 ///
 /// Returns the bias of every unknown, in its coordinate: the difference of the two estimates, from which
-/// twice the standard deviation of this difference is subtracted in quadrature. The bias falls with the
-/// segment length, so this difference is an upper limit of the bias at `end`. Also returns a reason for doubt
+/// twice the standard deviation of this difference is subtracted in quadrature. The longer the segments, the
+/// smaller the bias, so the result is an upper limit of the bias at `end`. Also returns a reason for doubt
 /// that names the parameter with the largest difference, if this difference is implausible: one wrong
 /// parameter casts doubt on all.
 fn compare_segment_lengths(
@@ -222,10 +222,12 @@ fn compare_segment_lengths(
     Some((bias, disagreement))
 }
 
-/// Number of starts that end at a different point from the best end with nearly the same cost: the costs
-/// differ by less than the cost of a correct model scatters from recording to recording.
+/// Number of starts that end at a different point from the best end, but with nearly the same cost. Two costs
+/// are nearly the same if they differ by less than `NEARLY` standard deviations of chi2, because noise can
+/// cause such a difference.
 fn count_rivals(end: &Iterate, descents: &[TraceDescent], sd: &[f64]) -> usize {
-    /// Largest cost difference that counts as nearly the same, in standard deviations of chi2.
+    /// Two costs count as nearly the same if they differ by less than this number of standard deviations of
+    /// chi2.
     const NEARLY: f64 = 2.0;
     let (widening, dof) = chi2_per_dof(end);
     let limit = end.cost + NEARLY * widening.max(1.0) * (2.0 * dof as f64).sqrt();

@@ -134,11 +134,12 @@ fn channel_noise(
     AutoregressiveNoise::new(sd_m, noise.coefficients().to_vec()).unwrap_or_else(|_| white(sd_m))
 }
 
-/// Largest share of common noise in the noise of tip or head. Above it, the remaining noise of the two points
-/// cannot be equal.
+/// Largest share of common noise that is subtracted from the noise of tip and head. With a larger share, the
+/// remaining noise of the two points cannot be equal.
 const MAX_SHARED_NOISE: f64 = 0.9;
 
-/// Smallest standard deviation of the noise, m: the rounding error of simulated traces without noise.
+/// Lower limit of the standard deviation of the noise, m: the rounding error of simulated traces without
+/// noise.
 const MIN_NOISE_M: f64 = 1e-9;
 
 fn parameter_unknown(free: &FreeParameter) -> TraceUnknown {

@@ -86,9 +86,10 @@ impl CameraObservation {
     /// Initial guesses of the offsets of position and drop, m. They assume that a blade leans equally far to
     /// both sides and that its head is highest when the blade is upright.
     pub(super) fn guess_offsets_m(&self, tilt_rad: f64) -> [f64; 2] {
-        /// Fraction of the frames that is ignored at either end of the sorted leans.
+        /// The leans (tip position minus head position) are sorted, and this fraction of them is ignored at
+        /// each end.
         const TAIL: f64 = 0.1;
-        /// Fraction of the frames with the smallest drops, in which the blade is nearly upright.
+        /// The blade counts as nearly upright in this fraction of the frames: those with the smallest drops.
         const UPRIGHT: f64 = 0.005;
         let [first, last] = self.settings.frames;
         let sorted = |mut values: Vec<f64>| {
@@ -102,8 +103,8 @@ impl CameraObservation {
         let level = |i: usize| Some(self.drop_m[i]? + tilt_rad * (self.head_m[i] - self.centre_m));
         let drops = sorted((first..last).filter_map(level).collect());
         let [low, high] = [at(&leans, TAIL), at(&leans, 1.0 - TAIL)];
-        // (if the offset is larger than the lean, the leans all have one sign although the blade changes
-        // sides)
+        // (if the offset is larger than the lean, all measured leans have the same sign, although the blade
+        // leans to both sides)
         let both_sides = (low < 0.0 && high > 0.0) || self.reverses();
         let middle = if both_sides { 0.5 * (low + high) } else { 0.0 };
         let upright =
@@ -113,8 +114,8 @@ impl CameraObservation {
 
     /// Whether the head reverses its motion within the fitted frames, so that the blade leans to both sides.
     fn reverses(&self) -> bool {
-        /// Smallest value of `beyond`, as a fraction of the head's travel, that makes the blade lean to the
-        /// other side.
+        /// The blade leans to the other side if `beyond`, divided by the distance between the extreme
+        /// positions of the head, exceeds this value.
         const LEAST: f64 = 0.05;
         let [first, last] = self.settings.frames;
         let heads = &self.head_m[first..last];
@@ -149,7 +150,7 @@ impl CameraObservation {
         [&self.tip_x_m, &self.drop_m].map(|column| (first..last).filter(|&i| column[i].is_some()).collect())
     }
 
-    /// The map from the residuals of a segment, m, to uncorrelated residuals of unit variance.
+    /// The linear map that turns the residuals of a segment, m, into uncorrelated residuals of unit variance.
     pub(super) fn segment_whitening(&self, segment: [usize; 2]) -> SegmentWhitening {
         let frames = self.data_frames(segment);
         let maps = [0, 1].map(|k| {
@@ -163,9 +164,9 @@ impl CameraObservation {
         SegmentWhitening { tips: frames[0].len(), maps }
     }
 
-    /// Derivatives of the whitened data of a segment by the coefficients of the recorded head's curve: the
-    /// index of the first coefficient with an effect, and one column per coefficient. `None` if the scene
-    /// drives the head.
+    /// Derivatives of the whitened data of a segment with respect to the coefficients of the curve through
+    /// the recorded head positions. Returns the index of the first coefficient with an effect, and one column
+    /// per coefficient. `None` if the scene drives the head.
     pub(super) fn head_curve_derivatives(&self, [first, last]: [usize; 2]) -> Option<(usize, DMatrix<f64>)> {
         let curve = self.own_curve.as_ref()?;
         let from = curve.position_weights(first).0;
@@ -180,7 +181,7 @@ impl CameraObservation {
     }
 }
 
-/// The map from the residuals of a segment, m, to uncorrelated residuals of unit variance.
+/// The linear map that turns the residuals of a segment, m, into uncorrelated residuals of unit variance.
 pub(super) struct SegmentWhitening {
     tips: usize,
     maps: [ChannelWhitening; 2],

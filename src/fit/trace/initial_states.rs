@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector, Matrix4};
 use rayon::prelude::*;
 use std::borrow::Cow;
 
-/// Which segments are fitted again from other starting states, and from which states.
+/// Selects the segments that are fitted again, and the starting states from which they are fitted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum RescuePolicy {
     Never,
@@ -26,7 +26,8 @@ const MAX_RESCUED_SHARE: f64 = 0.4;
 /// chi2 and the number of residuals.
 const MIN_CHI2_GAIN: f64 = 1e-3;
 
-/// A starting state with the residuals of its segment and, where needed, their derivatives by the state.
+/// A starting state with the residuals of its segment and, where needed, the derivatives of the residuals
+/// with respect to the state.
 struct StateTrial {
     state: LinkState,
     residuals: DVector<f64>,

@@ -82,7 +82,7 @@ pub fn next_iterate(model: &TraceModel, settings: &TraceSearchSettings, before: 
 /// too little.
 fn rescue_segments(model: &TraceModel, before: &Iterate) -> Option<Iterate> {
     const MOST_TIMES: usize = 3;
-    /// Smallest decrease of the cost by the restarts for which the stage continues.
+    /// The stage continues only if the restarts lower the cost by more than this amount.
     const LEAST_GAIN: f64 = 1.0;
     if before.rescues == MOST_TIMES {
         return None;

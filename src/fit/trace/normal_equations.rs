@@ -12,13 +12,14 @@ use rayon::prelude::*;
 /// state do not dominate the cost.
 const ROBUST_CHI2: f64 = 10.0;
 
-/// Weight of a segment: the derivative of the segment's robust cost by its chi2.
+/// Weight of a segment: the derivative of the segment's robust cost with respect to the segment's chi2.
 fn segment_weight(segment: &SegmentState, plain: bool) -> f64 {
     if plain { 1.0 } else { 1.0 / (1.0 + segment.chi2 / (segment.data.max(1) as f64 * ROBUST_CHI2)) }
 }
 
-/// Cost of all segments: in the robust phase the sum over the segments of `n c ln(1 + chi2 / (n c))`, with
-/// `n` measured values in a segment and `c` = [`ROBUST_CHI2`]; in the plain phase the sum of chi2.
+/// Cost of all segments: in the robust phase the sum over the segments of `n * c * ln(1 + chi2 / (n * c))`,
+/// where `n` is the number of measured values in a segment and `c` is [`ROBUST_CHI2`]; in the plain phase the
+/// sum of chi2.
 pub(super) fn segments_cost(segments: &[SegmentState], plain: bool) -> f64 {
     /// Chi2 per datum that is assigned to a segment whose run fails.
     const FAILED: f64 = 1e6;
@@ -80,8 +81,8 @@ pub(super) fn damped_step(
     at: &NormalEquations,
     damping: f64,
 ) -> Option<Vec<f64>> {
-    /// Largest change of a parameter's coordinate in one step: a factor of 1.6 in the value of a logarithmic
-    /// parameter, half of the range of a linear parameter.
+    /// Largest allowed change of a parameter's coordinate in one step: a factor of 1.6 in the value of a
+    /// logarithmic parameter, half of the range of a linear parameter.
     const LONGEST: f64 = 0.5;
     let mut damped = at.matrix.clone();
     for i in 0..z.len() {
@@ -103,7 +104,8 @@ pub(super) fn carry_states(
     at: &NormalEquations,
     moved: &DVector<f64>,
 ) -> Vec<SegmentState> {
-    /// Largest changes of an angle (rad) and of a rate (rad/s) of a starting state in one step.
+    /// Largest allowed changes of a starting state in one step: `ANGLE` for an angle, rad, and `RATE` for an
+    /// angular velocity, rad/s.
     const ANGLE: f64 = 0.05;
     const RATE: f64 = 200.0;
     let mut segments = segments.to_vec();
@@ -178,8 +180,9 @@ fn head_curve_covariance(model: &TraceModel, at: &Iterate) -> Option<DMatrix<f64
     Some(total)
 }
 
-/// Derivatives of the gradient of a segment's cost by the coefficients of the curve of the recorded head: the
-/// index of the first coefficient with an effect, and one column per coefficient.
+/// Derivatives of the gradient of a segment's cost with respect to the coefficients of the curve through the
+/// recorded head positions. Returns the index of the first coefficient with an effect, and one column per
+/// coefficient.
 fn head_curve_slopes(point: &RecordingModel<'_>, segment: &SegmentState) -> Option<(usize, DMatrix<f64>)> {
     let (from, columns) = point.observation.head_curve_derivatives(segment.frames())?;
     let mut linear = point.linearize(segment.frames(), &segment.start_state())?;

@@ -116,8 +116,8 @@ pub fn undersampled_mode(model: &TraceModel, at: &Iterate) -> Option<[f64; 2]> {
     recording_models(model, &at.point)?.into_iter().find_map(one)
 }
 
-/// Index of the best descent: descents that reached the latest stage come first; among them, those that end
-/// with the plain chi2 as cost; among those, the descent with the lowest cost.
+/// Index of the best descent. Of the descents that reached the latest stage, those that end with the plain
+/// chi2 as cost are preferred; of these, the descent with the lowest cost is the best.
 fn best_descent(descents: &[TraceDescent]) -> usize {
     let rank = |descent: &TraceDescent| match descent.last_iterate() {
         Some(end) => (Reverse(end.stage), !end.plain, end.cost),
@@ -145,8 +145,8 @@ pub(super) fn is_same_end(end: &Iterate, other: &Iterate, sd: &[f64]) -> bool {
 
 // Search from one start.
 
-/// Largest difference in any unknown between two end points that count as the same point, in standard
-/// deviations of that unknown.
+/// Two end points count as the same point if every unknown differs between them by at most this number of
+/// standard deviations of that unknown.
 pub(crate) const SAME_END_SD: f64 = 1.0;
 
 /// Result of the search from one start.

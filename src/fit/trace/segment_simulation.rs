@@ -101,7 +101,8 @@ impl TangentObserver for ShutterAverage<'_> {
     }
 }
 
-/// Residuals of a segment with their derivatives by the starting state and by the unknowns.
+/// Residuals of a segment, and the derivatives of the residuals with respect to the starting state and with
+/// respect to the unknowns.
 pub(super) struct LinearizedSegment {
     pub residuals: DVector<f64>,
     pub by_state: DMatrix<f64>,
@@ -124,12 +125,14 @@ pub(super) struct RecordingModel<'a> {
 enum UnknownEffect {
     /// No effect, because the unknown belongs to another recording.
     Nowhere,
-    /// The unknown changes the run: index of the direction along which the run is differentiated, and
-    /// derivative, by the coordinate of the unknown, of the quantity that varies along this direction.
+    /// The unknown changes the run. Fields: index of the direction along which the run is differentiated, and
+    /// derivative of the quantity that varies along this direction with respect to the coordinate of the
+    /// unknown.
     Run(usize, f64),
-    /// The unknown changes the picture: kind of camera error, and derivative of its value by the coordinate
-    /// of the unknown. For a scale error that also changes the run: index of the direction of the run, and
-    /// derivative, by the scale error, of the quantity that varies along this direction.
+    /// The unknown changes the picture. Fields: kind of camera error, and derivative of the value of this
+    /// error with respect to the coordinate of the unknown. A scale error that also changes the run has a
+    /// third field: index of the direction along which the run is differentiated, and derivative of the
+    /// quantity that varies along this direction with respect to the scale error.
     Picture(CameraUnknown, f64, Option<(usize, f64)>),
 }
 
@@ -242,12 +245,13 @@ impl<'a> RecordingModel<'a> {
         Some(residuals).filter(|r| r.iter().all(|x| x.is_finite()))
     }
 
-    /// Whitened residuals with their derivatives by the starting state only; `by_unknown` is empty.
+    /// Whitened residuals, and their derivatives with respect to the starting state only; `by_unknown` is
+    /// empty.
     pub(super) fn linearize_state(&self, frames: [usize; 2], state: &LinkState) -> Option<LinearizedSegment> {
         self.linearize_by(frames, state, &self.states, &[])
     }
 
-    /// Whitened residuals with their derivatives by the starting state and by all unknowns.
+    /// Whitened residuals, and their derivatives with respect to the starting state and to all unknowns.
     pub(super) fn linearize(&self, frames: [usize; 2], state: &LinkState) -> Option<LinearizedSegment> {
         self.linearize_by(frames, state, &self.all, &self.effects)
     }
@@ -336,7 +340,7 @@ impl<'a> RecordingModel<'a> {
         }
     }
 
-    /// Adds the derivative of the residuals by a direction of the run, multiplied by `slope`, to a column.
+    /// Adds the derivative of the residuals along a direction of the run, multiplied by `slope`, to a column.
     fn add_run_derivative(
         &self,
         shot: &SegmentObservation,
@@ -354,7 +358,8 @@ impl<'a> RecordingModel<'a> {
         });
     }
 
-    /// Adds the derivative of the residuals by a camera error, multiplied by `slope`, to a column.
+    /// Adds the derivative of the residuals with respect to a camera error, multiplied by `slope`, to a
+    /// column.
     fn add_picture_derivative(
         &self,
         shot: &SegmentObservation,

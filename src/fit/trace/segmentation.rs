@@ -64,8 +64,8 @@ pub(super) fn segment_boundaries(
     found
 }
 
-/// State of the blade when the shutter opens for a frame, from parabolas fitted to the neighbouring frames,
-/// and speed of the tip over the glass, m/s.
+/// State of the blade, and speed of the tip over the glass, m/s, at the instant when the shutter opens for a
+/// frame. Both are computed from parabolas fitted to the neighbouring frames.
 fn recorded_state(
     scene: &Scene,
     film: &CameraObservation,
@@ -94,7 +94,8 @@ fn recorded_state(
             LinkState::new(theta, phi, theta_rate, phi_rate)
         }
         None => {
-            /// Relative step of the lean for the numerical derivative of the static pose by the lean.
+            /// Relative step of the lean for the numerical derivative of the static pose with respect to the
+            /// lean.
             const NEXT: f64 = 0.02;
             let [theta, phi] = equilibrium_angles(linkage, lean)?;
             let [theta_next, phi_next] = equilibrium_angles(linkage, lean * (1.0 + NEXT))?;
@@ -110,8 +111,8 @@ fn half_width_frames(film: &CameraObservation) -> usize {
     ((HALF_WIDTH_S * film.rate_hz).round() as usize).max(1)
 }
 
-/// Value and slope (per second), when the shutter opens for a frame, of the parabola (or line) fitted to the
-/// neighbouring frames.
+/// Value and slope (per second) of a parabola, or of a line, that is fitted to the frames around `frame`.
+/// Both are taken at the instant when the shutter opens for `frame`.
 fn fit_parabola(
     film: &CameraObservation,
     frame: usize,
@@ -162,7 +163,8 @@ fn link_rates(linkage: &Linkage, [theta, phi]: [f64; 2], lean_rate: f64, drop_ra
 /// Angles of neck and lip of a blade at rest, with whatever friction force equilibrium requires, for which
 /// the tip is at the distance `lean` from the head along the sweep. They are used if the drop is not tracked.
 fn equilibrium_angles(linkage: &Linkage, lean: f64) -> Option<[f64; 2]> {
-    /// Largest neck angle of the search, rad, and number of angles that are tried.
+    /// `LARGEST_RAD` is the largest neck angle that is tried, rad, and `POINTS` the number of neck angles
+    /// that are tried.
     const LARGEST_RAD: f64 = 0.7;
     const POINTS: usize = 140;
     let side = 1f64.copysign(lean);

@@ -30,7 +30,7 @@ pub(crate) const MAX_TWINS: usize = 1000;
 pub(crate) enum UncertaintyRun {
     /// A fit to the data of the twin with this number.
     Twin(usize),
-    /// A fit with the segments of the previous stage.
+    /// A fit with the shorter segments of the previous stage.
     Shorter,
     /// A fit in which one unknown is held at a fixed distance from its estimate.
     Side {
@@ -87,11 +87,11 @@ pub(crate) struct SearchEnd<'a> {
     pub seed: u64,
     pub at: &'a Iterate,
     pub covariance: TraceCovariance,
-    /// Factor on all variances: chi2 per degree of freedom, but at least 1. The noise may be larger than
-    /// measured.
+    /// Factor on the measured variance of the noise: chi2 per degree of freedom, but at least 1, because the
+    /// noise may be larger than measured.
     pub widening: f64,
-    /// Standard deviation of each coordinate: the larger of the estimates from curvature and from the
-    /// sandwich formula.
+    /// Standard deviation of each coordinate: the larger of two estimates, one from the curvature of the cost
+    /// (with `widening`) and one from the sandwich formula.
     pub sd: Vec<f64>,
 }
 
@@ -110,8 +110,8 @@ impl<'a> SearchEnd<'a> {
         Some(Self { model, settings, seed, at, covariance, widening, sd })
     }
 
-    /// The uncertainty runs from this end. The list is empty if the search did not reach its plain phase, for
-    /// example because of bad segments.
+    /// Lists the uncertainty runs that start at the end of this search. The list is empty if the search did
+    /// not reach its plain phase, for example because of bad segments.
     pub(super) fn uncertainty_runs(&self) -> Vec<UncertaintyRun> {
         if !self.at.plain {
             return Vec::new();
@@ -122,7 +122,8 @@ impl<'a> SearchEnd<'a> {
         shorter.into_iter().chain(sides).chain((0..self.settings.twins).map(UncertaintyRun::Twin)).collect()
     }
 
-    /// Distance from the estimate, in the coordinate of the unknown, at which the unknown is held.
+    /// Signed distance from the estimate, in the coordinate of the unknown, at which a profile run holds the
+    /// unknown.
     fn profile_offset(&self, unknown: usize, above: bool) -> f64 {
         let far = Z_95 * self.sd.get(unknown).copied().unwrap_or_default();
         if above { far } else { -far }
@@ -237,12 +238,12 @@ pub(super) fn follow_runs(
 /// Standard deviation of the prior that holds an unknown in place, divided by the standard deviation of its
 /// estimate.
 const PIN_SD: f64 = 1e-3;
-/// Largest factor by which the profile may widen an interval.
+/// Largest allowed factor by which the profile widens an interval.
 const MAX_STRETCH: f64 = 3.0;
 
 /// Distances below and above each estimate, in the coordinate of the unknown, at which the cost reaches the
-/// 95 % threshold. Each distance is at least 1.96 standard deviations; it has this value if the unknown has
-/// no side runs. `sides` gives the last iterate of a run.
+/// 95 % threshold. Each distance is at least 1.96 standard deviations; it is exactly 1.96 standard deviations
+/// if no run holds the unknown on that side. `sides` returns the last iterate of a run.
 pub(super) fn profile_distances<'s>(
     end: &SearchEnd<'_>,
     sides: impl Fn(UncertaintyRun) -> Option<&'s Iterate>,
@@ -295,7 +296,8 @@ const TWIN_STATE_STEPS: usize = 3;
 /// Number of frames after which simulated correlated noise no longer depends on its first values.
 const NOISE_WARM_UP_FRAMES: usize = 400;
 
-/// The model with the data of twin number `draw`: a recording simulated at the end of a search.
+/// The model with the data of twin number `draw`: recordings that are simulated with the estimates at the end
+/// of a search.
 fn simulate_twin(end: &SearchEnd<'_>, draw: usize) -> TraceModel {
     let SearchEnd { model, at, .. } = end;
     let mut generator = Xoshiro256PlusPlus::seed_from_u64(end.seed ^ ((draw as u64 + 1) << 40));

@@ -88,13 +88,13 @@ impl TraceUnknown {
         self.unit().map_or_else(|| math::ln(value), |unit| value / unit)
     }
 
-    /// Derivative of the value by the coordinate.
+    /// Derivative of the value with respect to the coordinate, at `coordinate`.
     pub(crate) fn slope(&self, coordinate: f64) -> f64 {
         self.unit().unwrap_or_else(|| math::exp(coordinate))
     }
 
-    /// Distance of a coordinate from the mean of the prior, in standard deviations, and derivative of this
-    /// distance by the coordinate; `None` without a prior.
+    /// Distance of a coordinate from the mean of the prior, in standard deviations of the prior, and
+    /// derivative of this distance with respect to the coordinate; `None` without a prior.
     pub(super) fn prior_residual(&self, coordinate: f64) -> Option<[f64; 2]> {
         self.prior.map(|[mean, sd]| [(coordinate - mean) / sd, 1.0 / sd])
     }

@@ -3,21 +3,23 @@
 use super::segment_simulation::{LinearizedSegment, LinkState};
 use nalgebra::{DMatrix, DVector};
 
-/// Smallest singular value of the scaled Jacobian columns of the starting state that is kept, relative to the
-/// largest singular value.
+/// Singular values of the scaled Jacobian columns of the starting state are ignored if they are below this
+/// fraction of the largest singular value.
 const MIN_SINGULAR: f64 = 1e-4;
 
 /// Normal equations of one segment for the unknowns, and the step of the starting state as a linear function
 /// of the step of the unknowns.
 #[derive(Debug, Clone)]
 pub(super) struct ProjectedSegment {
-    /// `J^T J` of the Jacobian `J` from which the state has been projected out.
+    /// `J^T J`, where `J` is the Jacobian with respect to the unknowns after the starting state is projected
+    /// out.
     pub matrix: DMatrix<f64>,
-    /// `J^T r` with the residuals `r`.
+    /// `J^T r`, where `J` is the Jacobian as in `matrix` and `r` are the residuals after the starting state
+    /// is projected out.
     pub slope: DVector<f64>,
     /// Minus the step of the starting state while the unknowns are held fixed.
     pub move_held: LinkState,
-    /// Minus the derivative of the step of the starting state by the step of the unknowns.
+    /// Minus the derivative of the step of the starting state with respect to the step of the unknowns.
     pub move_by_unknown: DMatrix<f64>,
 }
 

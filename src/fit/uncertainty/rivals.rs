@@ -14,8 +14,8 @@ use crate::fit::search::{MIN_WORTHWHILE_GAIN, SearchSettings, Slab};
 use crate::fit::search::{best_in_slab, search_excluded_region};
 use crate::text::format_number;
 
-/// Smallest distance of a rival value from the best value, in half widths of the 95 % interval. At this
-/// distance a parabolic cost has risen by 15.
+/// Smallest distance from the best value at which another value counts as a rival, in half widths of the 95 %
+/// interval. At this distance a parabolic cost has risen by 15.
 const DISTANCE_FACTOR: f64 = 2.0;
 /// Rise in cost above which a rival value is excluded: the 99.9 % quantile of chi-squared with one degree of
 /// freedom. It is larger than the rise of 3.84 at the ends of a 95 % interval, because a search rarely
@@ -24,7 +24,7 @@ const MIN_RIVAL_RISE: f64 = 10.8;
 /// Width of the narrowest range that is searched, in the unit box; narrower ranges are covered by the
 /// profiles.
 const MIN_SLAB_WIDTH: f64 = 0.02;
-/// Smallest width of a gap that splits an interval in two, as a fraction of the width of the interval.
+/// A gap splits an interval in two only if the gap is wider than this fraction of the width of the interval.
 const MIN_GAP_SHARE: f64 = 0.5;
 /// Number of evaluations of all searches for rival values together, as a fraction of the budget of the first
 /// search.
@@ -62,8 +62,9 @@ fn has_point_outside(found: &FitUncertainty, ledger: &Ledger) -> bool {
     })
 }
 
-/// For each identified parameter, two ranges: values below and above the best value that are farther from it
-/// than `times` the distance of the interval's end on the same side.
+/// For each identified parameter, two ranges of values: one below and one above the best value. Each range
+/// begins at `times` the distance from the best value to the end of the interval on the same side, and
+/// extends to the bound.
 fn excluded_slabs(found: &FitUncertainty, ledger: &Ledger, times: f64) -> Vec<Slab> {
     let axes = ledger.objective().axes().iter().zip(&found.best.unit).zip(&found.intervals);
     let sides =

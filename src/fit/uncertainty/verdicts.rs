@@ -16,10 +16,10 @@ use crate::fit::target_value::TargetValue;
 use nalgebra::DMatrix;
 use portable_math as math;
 
-/// Smallest correlation with which a parameter at its bound makes another estimate unreliable. If the optimum
-/// is `k` standard deviations outside the bound, the other estimate shifts by `k` times the correlation, in
-/// its own standard deviations. At this correlation, `k` = 10 gives a shift of half the width of the 95 %
-/// interval.
+/// A parameter at its bound makes the estimate of another parameter unreliable if the absolute value of their
+/// correlation is at least this value. If the optimum is `k` standard deviations outside the bound, the other
+/// estimate shifts by `k` times the correlation, in its own standard deviations. At this correlation, `k` =
+/// 10 gives a shift of half the width of the 95 % interval.
 const MIN_CORRELATION: f64 = 0.2;
 
 /// Whether a coordinate of the unit box is at an end of the box.
@@ -27,8 +27,8 @@ pub(super) fn is_at_bound(unit: f64) -> bool {
     !(AT_BOUND..=1.0 - AT_BOUND).contains(&unit)
 }
 
-/// Index of the parameter at a bound that is most strongly correlated with parameter `axis`, and the
-/// correlation; `None` if no correlation reaches [`MIN_CORRELATION`].
+/// Of the parameters at a bound, the index of the one that is most strongly correlated with parameter `axis`,
+/// and this correlation; `None` if no correlation reaches [`MIN_CORRELATION`].
 pub(super) fn strongest_bound_correlation(
     axis: usize,
     unit: &[f64],
@@ -40,8 +40,9 @@ pub(super) fn strongest_bound_correlation(
         .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
 }
 
-/// Index of the parameter at a bound whose optimum outside the bound would lower the cost most, and the
-/// decrease of the cost by the linear model; `None` if no decrease exceeds [`MIN_WORTHWHILE_GAIN`].
+/// Of the parameters at a bound, the index of the one whose optimum outside the bound would lower the cost
+/// most, and the decrease of the cost that the linear model predicts; `None` if no decrease exceeds
+/// [`MIN_WORTHWHILE_GAIN`].
 pub(super) fn best_excluded_gain(
     unit: &[f64],
     jacobian: &DMatrix<f64>,
@@ -170,8 +171,9 @@ pub(super) fn check_best_point(
     ))
 }
 
-/// The 99.9 % quantile of the standard normal distribution. It gives that of chi-squared, whose cube root is
-/// nearly normal (Wilson and Hilferty, Proc. Natl. Acad. Sci. 17 (1931) 684).
+/// The 99.9 % quantile of the standard normal distribution. The 99.9 % quantile of chi-squared is computed
+/// from it, because the cube root of chi-squared is nearly normal (Wilson and Hilferty, Proc. Natl. Acad.
+/// Sci. 17 (1931) 684).
 const CHI2_TAIL_SD: f64 = 3.09;
 
 /// Sum of the squared residuals, and the number of degrees of freedom of this sum.

@@ -120,7 +120,7 @@ fn something_has_to_be_fitted() {
     );
 }
 
-/// The error message for the job `MEASURED` with one more feature, which consists of these lines only.
+/// The error message for the job `MEASURED` with one more feature, whose table consists of `lines` only.
 fn refused_feature(lines: &str) -> String {
     refusal(
         MEASURED,
@@ -236,7 +236,7 @@ fn the_problem_is_what_decides_a_cost_and_nothing_else() {
         ("bootstrap = 0", "bootstrap = 9"),
         ("profile = false", "profile = true"),
         ("local_evaluations = 0", "local_evaluations = 9"),
-        // the fingerprint covers the contents of the recordings elsewhere, so paths do not change it
+        // the fingerprint depends on the contents of the recordings but not on their paths
         ("data/x", "data/z"),
         ("t.toml", "u.toml"),
     ]) {
