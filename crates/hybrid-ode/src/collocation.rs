@@ -1,5 +1,6 @@
-//! Linear equations of second order, `M(t) y'' + D(t) y' + K(t) y = g(t)`, by collocation at the nodes of
-//! Gauss and Legendre (Hairer, Lubich and Wanner, *Geometric Numerical Integration*, section II.1.3).
+//! Solves linear differential equations of second order, `M(t) y'' + D(t) y' + K(t) y = g(t)`, by collocation
+//! at the Gauss-Legendre nodes (Hairer, Lubich and Wanner, *Geometric Numerical Integration*, section
+//! II.1.3).
 //!
 //! The unknowns of a step of length `h` are the accelerations `a_j` at its nodes `c_j`. With the polynomials
 //! `l_j`, each 1 at node `j` and 0 at the others,
@@ -36,8 +37,8 @@ pub struct CollocationRule {
     pub positions: NodeArray<f64>,
     /// Quadrature weights of the nodes for the integral over [0, 1].
     pub weights: NodeArray<f64>,
-    /// Coefficients `(2 m + 1) b_j P_m(2 c_j - 1)` of `l_j` in Legendre polynomials, by node `j` and degree
-    /// `m`; `c_j` is the position and `b_j` the weight of the node.
+    /// Coefficients of the expansion of `l_j` in Legendre polynomials: `(2 m + 1) b_j P_m(2 c_j - 1)` for
+    /// node `j` and degree `m`, where `c_j` is the position and `b_j` the weight of the node.
     legendre: NodeArray<NodeArray<f64>>,
     /// Integral (`once`) and double integral (`twice`) of each `l_j` from 0 to each node.
     once: NodeArray<NodeArray<f64>>,
@@ -278,7 +279,7 @@ impl<const D: usize> CollocationStep<D> {
     }
 }
 
-/// Subtracts the product `block row` from `sum`.
+/// Subtracts the product `block * row` from `sum`.
 #[inline(always)]
 fn subtract_product<const D: usize, R: LaneNumber>(sum: &mut [R; D], block: &SquareMatrix<D>, row: &[R; D]) {
     for r in 0..D {
@@ -288,7 +289,7 @@ fn subtract_product<const D: usize, R: LaneNumber>(sum: &mut [R; D], block: &Squ
     }
 }
 
-/// The product `block row`.
+/// The product `block * row`.
 #[inline(always)]
 pub fn multiply_row<const D: usize, R: LaneNumber>(block: &SquareMatrix<D>, row: &[R; D]) -> [R; D] {
     from_fn(|r| {
@@ -369,7 +370,7 @@ mod tests {
         }
     }
 
-    /// Error at the end of one step of `y'' + 0.2 y' + y = 0` from (1, 0).
+    /// Error at the end of one step of `y'' + 0.2 y' + y = 0` that starts from `y = 1`, `y' = 0`.
     fn error(nodes: usize, length: f64) -> f64 {
         let [mass, damping, stiffness] = [1.0, 0.2, 1.0].map(|x| [[[x]]; MOST_NODES]);
         let equations = CollocationEquations::<1> { mass, damping, stiffness };
@@ -386,7 +387,7 @@ mod tests {
         (value - left * (cos + decay / omega * sin)).hypot(rate + left / omega * sin)
     }
 
-    /// The error of a step is proportional to its length to the power `2 nodes + 1`.
+    /// The error of a step of length `h` is proportional to `h^(2 nodes + 1)`.
     #[test]
     fn the_end_of_a_step_is_of_twice_the_order_of_the_nodes() {
         for (nodes, length) in [(3, 0.8), (4, 0.4)] {

@@ -6,10 +6,10 @@ use portable_math as math;
 
 /// Exponent of the step control: the error estimate of a step is of order 8, `err ~ h^8`.
 pub(crate) const ERROR_EXPONENT: f64 = 1.0 / 8.0;
-/// Number of right-hand sides of a step. The first stage is not counted, because it is the last one of the
-/// previous step.
+/// Number of evaluations of the right-hand side in a step. The first stage is not counted, because it is the
+/// last stage of the previous step.
 pub(crate) const EVALUATIONS_PER_STEP: u64 = 12;
-/// Number of additional right-hand sides for the dense output.
+/// Number of additional evaluations of the right-hand side for the dense output.
 pub(crate) const EVALUATIONS_FOR_DENSE: u64 = 3;
 /// Weight of the order 3 estimate relative to the order 5 estimate in the combined error (Hairer's code).
 const ORDER_3_WEIGHT: f64 = 0.01;
@@ -27,7 +27,7 @@ pub(crate) struct StepStages<const N: usize> {
     k: [[f64; N]; 16],
 }
 
-/// `y + h * sum(a_j k_j)` over the nonzero entries of a row.
+/// `y + h * sum(a_j k_j)` over the nonzero coefficients `a_j` in a row of the tableau.
 #[inline(always)]
 fn combine_stages<const N: usize, const M: usize>(
     y: &[f64; N],
@@ -320,7 +320,7 @@ mod tests {
         }
     }
 
-    /// Quadrature conditions `sum b_i c_i^(q-1) = 1/q` up to order 8, and their failure at order 9.
+    /// The quadrature conditions `sum b_i c_i^(q-1) = 1/q` hold up to order 8 and fail at order 9.
     #[test]
     fn the_weights_integrate_powers_to_order_eight() {
         for q in 1..=8 {

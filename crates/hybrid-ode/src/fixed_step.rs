@@ -29,8 +29,8 @@ pub struct FixedStepOptions {
 }
 
 /// Integrates `phase` from `start` in steps of fixed length until `stop` or until a guard falls to zero; the
-/// last step is shortened. `observe` is called with every step. The zero orders of the start are ignored: a
-/// guard ends the phase only if it falls during a step.
+/// last step is shortened. `observe` is called with every step. `zero_order` of `start` is ignored: a guard
+/// ends the phase only if it falls during a step.
 pub fn integrate_fixed<const N: usize, const G: usize, P: HybridPhase<N, G>, A: ObserverReply>(
     phase: &P,
     start: PhaseStart<N, G>,
@@ -83,7 +83,8 @@ const SHORTEST_LAST_STEP: f64 = 1e-6;
 /// of a step is below the rounding error of the time.
 const MOST_HALVINGS: usize = 50;
 
-/// Number of right-hand sides that [`runge_kutta_4_step`] evaluates; the derivative at the start is given.
+/// Number of times that [`runge_kutta_4_step`] evaluates the right-hand side; the derivative at the start is
+/// given.
 pub(super) const RUNGE_KUTTA_4_EVALUATIONS: u64 = 3;
 
 /// One classical Runge-Kutta step; `k1` is the derivative at its start.

@@ -77,7 +77,7 @@ pub struct PhaseStart<const N: usize, const G: usize> {
     /// Order of each guard's zero at the start: 0 if the guard is positive there, 1 for a simple zero, 2 for
     /// a double zero.
     pub zero_order: [u8; G],
-    /// First step to try, s; `None` estimates one.
+    /// First step to try, s; with `None` it is estimated.
     pub step: Option<f64>,
 }
 
@@ -123,7 +123,7 @@ pub struct WorkCounters {
 }
 
 impl WorkCounters {
-    /// Whether the limit on right-hand sides is exceeded.
+    /// Whether more right-hand sides have been evaluated than the limit allows.
     #[inline]
     pub fn is_spent(&self) -> bool {
         self.most_rhs_evaluations.is_some_and(|most| self.rhs_evaluations > most)

@@ -15,8 +15,8 @@ pub const TERMS: usize = MOST_ORDER + 1;
 /// use are unspecified.
 pub(crate) type TaylorSeries = [f64; TERMS];
 
-/// Maximum number of halvings. Two roots that are still not separated then count as one point where the guard
-/// touches zero, which is no root: 2^-30 of a step is below every tolerance.
+/// Maximum number of halvings of the interval. Two roots that are not separated by then count as one point
+/// where the guard touches zero, and such a point is not a root: 2^-30 of a step is below every tolerance.
 const MOST_HALVINGS: u32 = 30;
 /// Terms below this fraction of the sum of all absolute terms are rounding errors. They do not decide whether
 /// a guard starts at a zero.
@@ -76,7 +76,7 @@ fn is_root_free(c: &[f64]) -> bool {
     /// Degree of the polynomial of the first few terms, which is written in the Bernstein basis. Higher terms
     /// decrease faster with the step length.
     const HEAD: usize = 4;
-    /// Reciprocals of the binomial coefficients of degree `HEAD`.
+    /// Reciprocals of the binomial coefficients of degree 4.
     const SHARES: [f64; HEAD + 1] = [1.0, 1.0 / 4.0, 1.0 / 6.0, 1.0 / 4.0, 1.0];
     let Some((head, tail)) = c.split_first_chunk::<{ HEAD + 1 }>() else { return false };
     let others: f64 = tail.iter().map(|c| c.abs()).sum();
@@ -143,9 +143,9 @@ fn first_crossing(search: &RootSearch, b: &mut [f64; TERMS], low: f64, high: f64
         .or_else(|| first_crossing(search, b, middle, high, depth + 1))
 }
 
-/// The single root between `low`, where the polynomial is positive, and `high`, where it is not, by Newton's
-/// method from a starting value by false position. A step that leaves the bracket or does not converge fast
-/// is replaced by bisection.
+/// The single root between `low`, where the polynomial is positive, and `high`, where it is zero or negative.
+/// Newton's method starts from the result of false position; a step that leaves the bracket or does not
+/// converge fast is replaced by bisection.
 fn single_root(c: &[f64], mut low: f64, mut high: f64, at_low: f64, at_high: f64) -> f64 {
     /// More rounds than Newton's method and bisection together need in double precision.
     const ROUNDS: usize = 80;
@@ -226,7 +226,8 @@ mod tests {
             assert_eq!(fall(1.0, &roots, order, 1.0), GuardFall::Nowhere);
             roots.push(0.01);
             assert_falls(fall(-1.0, &roots, order, 1.0), 0.01, 1e-16);
-            // without a given `zero_order`, the first coefficient above rounding shows it
+            // with a `zero_order` of 0, the first coefficient above rounding error shows the zero at the
+            // start
             assert_falls(fall(-1.0, &roots, 0, 1.0), 0.01, 1e-16);
         }
     }
@@ -259,7 +260,7 @@ mod tests {
         assert_eq!(first_fall(&c, 4, 0, 1.0), GuardFall::Undefined);
         c[0] = f64::INFINITY;
         assert_eq!(first_fall(&c, 4, 0, 1.0), GuardFall::Nowhere);
-        // a guard that does not apply, although a zero at the start is announced
+        // a guard that does not apply (infinity), although `zero_order` states a zero at the start
         assert_eq!(first_fall(&c, 4, 1, 1.0), GuardFall::Nowhere);
     }
 }

@@ -12,8 +12,8 @@ pub(crate) const COARSE_SAMPLES: usize = 5;
 /// Number of samples of the full search, at the fractions 0, 1/8, ..., 1 of the step.
 pub(crate) const FINE_SAMPLES: usize = 9;
 
-/// Maximum number of halvings. Two roots that are still not separated then count as one point where the guard
-/// touches zero, which is no root: 2^-30 of a step is below every tolerance.
+/// Maximum number of halvings of the interval. Two roots that are not separated by then count as one point
+/// where the guard touches zero, and such a point is not a root: 2^-30 of a step is below every tolerance.
 const MOST_HALVINGS: u32 = 30;
 /// A part of the step on which no Bernstein coefficient exceeds this fraction of the largest one counts as
 /// zero throughout: the signs of its coefficients are rounding errors, and halving it further would take a

@@ -86,8 +86,8 @@ pub fn integrate_with_locator<const N: usize, const G: usize, P: HybridPhase<N, 
     }
 }
 
-/// Largest and smallest factor by which the step size changes (Hairer's code), and the safety factor by which
-/// the predicted step is multiplied.
+/// Largest and smallest allowed factor between two successive step sizes (Hairer's code), and the safety
+/// factor by which the predicted step size is multiplied.
 const GROWTH: (f64, f64, f64) = (6.0, 1.0 / 3.0, 0.9);
 /// Exponent of the last step's error in the formula for the step size (the beta of Hairer's code, section
 /// IV.2).
@@ -95,8 +95,8 @@ const STABILISATION: f64 = 0.04;
 /// Lower limit of the error in the step size control, so that one step with a very small error does not make
 /// the next step too long.
 const NEGLIGIBLE: f64 = 1e-4;
-/// Smallest estimate of the first step, in units of the rounding error of the time; error control shortens
-/// the step where necessary.
+/// Smallest allowed estimate of the first step, in units of the rounding error of the time; error control
+/// shortens the step where necessary.
 const SHORTEST_START: f64 = 1e3;
 /// Factor by which a step is multiplied if it leaves the domain of the right-hand side or of the guards.
 const OUT_OF_DOMAIN: f64 = 0.1;
@@ -105,8 +105,9 @@ const STRETCH: f64 = 1.01;
 /// Step length, in units of the rounding error of the time, up to which a guard that starts at zero is
 /// ignored.
 const SLIVER_STEP: f64 = 64.0;
-/// Largest value of a guard at its located zero, as a fraction of its largest sample. If the value is larger,
-/// the polynomial through the samples has a root where the guard has none, and a shorter step is taken.
+/// Largest allowed absolute value of a guard at its located zero, as a fraction of its largest absolute
+/// sample in the step. If the value is larger, the polynomial through the samples has a root where the guard
+/// has none, and a shorter step is taken.
 const MOST_GUARD_REMAINDER: f64 = 1e-3;
 /// Step length, in units of the rounding error of the time, at or below which a shorter step reveals nothing
 /// more about a guard: over this length, a guard that starts at a double zero changes by less than the
@@ -286,8 +287,8 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> AdaptiveRun<'a, N
         EventLocation::At { guard, t, y }
     }
 
-    /// Time and state at the event, by integration in the slack variable. This descent begins at the start of
-    /// the step, or closer to the zero if the guard rises before it falls. `None` if the guard turns too
+    /// Time and state at the event, by integration in the slack variable. The integration begins at the start
+    /// of the step, or closer to the zero if the guard rises before it falls. `None` if the guard turns too
     /// close to its zero.
     fn land_by_slack(
         &mut self,

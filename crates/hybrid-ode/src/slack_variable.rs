@@ -28,15 +28,15 @@ const MOST_DESCENTS: usize = 40;
 /// If a descent covers less than this fraction of the time from the start to the zero, the state that it
 /// gives is accurate enough for any integration method.
 const SHORT: f64 = 1e-3;
-/// Largest error of the time after a short descent, as a fraction of the time that the descent covers. The
-/// zero is reached once this error is below the rounding error of the time.
+/// Upper limit of the error of the time after a short descent, as a fraction of the time that the descent
+/// covers. The zero is reached once this error is below the rounding error of the time.
 const MOST_REMAINDER: f64 = 1e-4;
 /// Half width of the central difference for the rate of the guard, as a fraction of the step. The relative
 /// error of the rate, about 1e-10, shifts the end of a descent; the next descent removes this shift.
 const PROBE: f64 = 1e-5;
-/// Smallest rate at which the guard falls at the start of a descent, relative to its mean rate down to the
-/// zero; near a maximum of the guard the slopes in `s` have a pole. The relative rate is 1 for a linear fall
-/// and 2 for the fall to a double zero.
+/// Smallest allowed rate at which the guard falls at the start of a descent, relative to its mean rate down
+/// to the zero; near a maximum of the guard the slopes in `s` have a pole. The relative rate is 1 for a
+/// linear fall and 2 for the fall to a double zero.
 const LEAST_FALL: f64 = 0.5;
 /// Maximum number of times that the start of a descent is moved half of the way to the zero; after that, the
 /// guard counts as only grazing zero.
@@ -78,8 +78,8 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> SlackVariable<'a,
         (along(probe) - along(-probe)) / (2.0 * probe)
     }
 
-    /// Whether a descent may start at `at`, a time `ahead_s` before the zero: the guard must fall there at no
-    /// less than `LEAST_FALL` times its mean rate.
+    /// Whether a descent may start at `at`, a time `ahead_s` before the zero: the guard must fall there at
+    /// `LEAST_FALL` times its mean rate or faster.
     pub(super) fn can_descend(&mut self, at: &StatePoint<N>, ahead_s: f64) -> bool {
         let value = self.guard_value(at);
         let flow = self.derivative(at);

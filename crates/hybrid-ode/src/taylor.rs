@@ -33,7 +33,7 @@ pub struct TaylorExpansion<const N: usize, const G: usize> {
     pub states: [[f64; N]; TERMS],
     /// Coefficients of the guards, one row per power; the first is infinity for a guard that does not apply.
     pub guards: [[f64; G]; TERMS],
-    /// Absolute values of the last two coefficients, the last but one first, of further quantities that
+    /// Absolute values of the last but one and of the last Taylor coefficient of further quantities that
     /// follow from the states, divided by the scale of these quantities. They limit the step length, too.
     pub followers: [f64; 2],
     /// Series of the exponent `x >= 0`, if the equations contain a term in `exp(-x)` that may vary much over
@@ -80,8 +80,8 @@ impl<const N: usize, const G: usize> TaylorExpansion<N, G> {
     /// would otherwise be missed: the terms of `exp(x)` increase up to the order `x`.
     #[inline]
     fn limit_by_exponential(&self, h: f64) -> f64 {
-        /// Largest change of the exponent over the step, as a fraction of the order: at the end of the series
-        /// each term is then at most this fraction of the term before it.
+        /// Largest allowed change of the exponent over the step, as a fraction of the order: at the end of
+        /// the series each term is then at most this fraction of the term before it.
         const SHARE: f64 = 0.25;
         /// Exponent above which the exponential is below rounding.
         const NEGLIGIBLE: f64 = 40.0;
@@ -143,7 +143,7 @@ impl<const N: usize, const G: usize> DenseOutput<N> for TaylorExpansion<N, G> {
 /// oscillations decrease faster. The optimum is flat: for an oscillation, adding 2 to 6 takes the same time.
 pub(crate) fn order_for_tolerance(relative: f64) -> usize {
     const MORE: f64 = 3.0;
-    /// Smallest order; a lower order would derive the step length from too few coefficients.
+    /// Smallest allowed order; a lower order would derive the step length from too few coefficients.
     const LEAST_ORDER: usize = 6;
     ((1.0 + MORE - 0.5 * math::ln(relative)).ceil() as usize).clamp(LEAST_ORDER, MOST_ORDER)
 }
@@ -209,8 +209,8 @@ pub fn integrate_taylor<const N: usize, const G: usize, P: TaylorPhase<N, G>, A:
 }
 
 /// Corrects the root of a guard's series to the root of the guard itself, which is evaluated on the
-/// polynomials of the states. The correction is needed for a guard that contains a force: it follows from
-/// second derivatives, so its series ends one order before those of the states.
+/// polynomials of the states. The correction is needed for a guard that contains a force: the force follows
+/// from second derivatives, so its series ends one order before those of the states.
 fn correct_root<const N: usize, const G: usize, P: TaylorPhase<N, G>>(
     phase: &P,
     expansion: &TaylorExpansion<N, G>,

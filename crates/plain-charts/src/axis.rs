@@ -97,8 +97,8 @@ pub(super) struct CanvasAxis {
 
 /// Margin beyond the data at each end of a linear axis, as a fraction of the range of the data.
 const LINEAR_ROOM: f64 = 0.05;
-/// Smallest margin at each end of a linear axis, as a fraction of the largest absolute value. Smaller
-/// differences between values are rounding errors, which tick labels could not show.
+/// Smallest allowed margin at each end of a linear axis, as a fraction of the largest absolute value of the
+/// data. Smaller differences between values are rounding errors, which tick labels could not show.
 const MIN_RELATIVE_SPAN: f64 = 1e-4;
 /// Margin at each end of a linear axis whose data are all zero, in axis units.
 const SINGLE_VALUE_ROOM: f64 = 1.0;
@@ -108,8 +108,8 @@ const LOG_ROOM: f64 = 1.4;
 /// are rounding errors.
 const MOST_DECADES: i32 = 6;
 
-/// Largest distance of a point from the low end, in axis lengths. Points farther away are moved to this
-/// distance, so that clipping a line cannot overflow.
+/// Largest allowed distance of a point from the low end of an axis, in axis lengths. Points farther away are
+/// moved to this distance, so that clipping a line cannot overflow.
 const FARTHEST_POSITION: f64 = 1e6;
 
 /// Ends of an axis: the given ones, or those of the data with a margin. They are finite, ordered and
@@ -166,7 +166,7 @@ impl CanvasAxis {
         }
     }
 
-    /// Ticks whose labelled ones are about `apart` canvas units or more apart.
+    /// Ticks of the axis. Neighbouring labelled ticks are at least about `apart` canvas units apart.
     pub(crate) fn ticks(&self, apart: f64) -> Vec<Tick> {
         let most = ((self.to - self.from).abs() / apart).clamp(2.0, 12.0) as usize;
         let length = (self.to - self.from).abs();
@@ -180,7 +180,7 @@ impl CanvasAxis {
     }
 }
 
-/// Smallest distance of minor ticks, canvas units, at which they are distinct in print.
+/// Smallest distance between minor ticks, canvas units, at which they are distinct in print.
 const MIN_MINOR_TICK_SPACING: f64 = 1.0 * UNITS_PER_MM;
 
 /// Adds minor ticks to the labelled ticks of a linear axis if there is room: four between two neighbouring
@@ -207,8 +207,8 @@ pub(super) fn category_ticks(axis: &ChartAxis, shown: impl Fn(&str) -> String) -
     axis.categories.iter().map(|(value, name)| Tick { value: *value, label: Some(shown(name)) }).collect()
 }
 
-/// Smallest tick distance relative to the requested distance; if a step gives less, the next coarser step is
-/// chosen.
+/// Smallest allowed ratio of the tick distance to the requested distance. If a step gives a smaller ratio,
+/// the next coarser step is chosen.
 const TICK_SPACING_SLACK: f64 = 0.8;
 
 /// Ticks at the multiples of a step of 1, 2 or 5 times a power of ten.

@@ -10,7 +10,7 @@ use plotters::prelude::{DrawingBackend, IntoFont, RGBColor};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color as _, FontStyle, FontTransform, ShapeStyle, TextStyle};
 
-/// Point of the box around a text that is placed at the given position.
+/// Which point of a text's bounding box lies at the position where the text is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum TextAnchor {
     /// Middle of the left edge.

@@ -15,19 +15,19 @@ use std::collections::BTreeMap;
 const MIN_GRID_SIZE: usize = 4;
 /// Approximate maximum number of contours of a map.
 const MOST_LEVELS: f64 = 6.0;
-/// Largest range of the four corner values of a cell, as a fraction of the colour range. A larger range is a
-/// jump, which contours do not cross. For a plane on the coarsest map, four by four, the fraction is one
-/// third.
+/// Largest allowed range of the four corner values of a cell, as a fraction of the colour range. A larger
+/// range is a jump, which contours do not cross. For a plane on the coarsest map, four by four, the fraction
+/// is one third.
 const MAX_CELL_SPREAD: f64 = 0.35;
-/// Largest ratio of the number of cells with a jump to the number of cells without one. Above this ratio a
-/// map is not smooth and has no contours.
+/// Largest allowed ratio of the number of cells with a jump to the number of cells without one. Above this
+/// ratio a map is not smooth and has no contours.
 const MOST_JUMPS: f64 = 0.15;
 /// Width of a contour line, canvas units.
 const CONTOUR_WIDTH: u32 = 3;
 /// Lengths, mm, of the shortest contour line that is drawn and of the shortest that is labelled.
 const MIN_CONTOUR_MM: f64 = 2.5;
 const MIN_LABELLED_MM: f64 = 10.0;
-/// Smallest distances, mm, of a contour label from another contour label and from a symbol.
+/// Smallest allowed distances, mm, of a contour label from another contour label and from a symbol.
 const LABELS_APART_MM: f64 = 8.0;
 const SYMBOL_APART_MM: f64 = 4.0;
 
@@ -112,7 +112,7 @@ struct ContourGrid<'a> {
 }
 
 impl<'a> ContourGrid<'a> {
-    /// `None` if the heat map is too coarse or not smooth.
+    /// The grid of a heat map; `None` if the heat map is too coarse or not smooth.
     fn new(heat: &'a HeatMap, placed: &PanelLayout, ends: (f64, f64)) -> Option<Self> {
         let places = |values: &[f64], axis: &CanvasAxis| {
             values.iter().map(|value| axis.canvas_position(*value)).collect::<Option<Vec<f64>>>()

@@ -102,9 +102,9 @@ pub(super) fn colour_at(heat: &HeatMap, (x, y): (AxisScale, AxisScale), at: (f64
 // Cells as vector graphics: each run of one colour along a row is a thick line over a background of the most
 // common colour.
 
-/// Maximum numbers of columns, rows and colours, from fine to coarse. The first entry is used with which a
-/// map takes at most [`MAX_CELL_BYTES`]. Finer cells are merged into one with their largest value, so that
-/// thin lines stay visible.
+/// Maximum numbers of columns, rows and colours, from fine to coarse. A map uses the first entry with which
+/// its SVG takes at most [`MAX_CELL_BYTES`]. Finer cells are merged into one with their largest value, so
+/// that thin lines stay visible.
 const CELL_RESOLUTIONS: [(usize, usize, u32); 6] =
     [(480, 240, 96), (320, 180, 64), (240, 135, 48), (200, 110, 32), (160, 90, 24), (120, 68, 16)];
 const MAX_CELL_BYTES: usize = 150_000;
@@ -157,8 +157,8 @@ fn cell_blocks(middles: &[f64], axis: &CanvasAxis, most: usize) -> Vec<CellBlock
     resample_cells(middles, &edges, axis, most)
 }
 
-/// The cells under each of `count` equal steps along an axis: those with centres in the step, or the cell at
-/// its middle.
+/// The cells under each of `count` equal steps along an axis: those with centres in the step or, if there are
+/// none, the cell at the middle of the step.
 fn resample_cells(middles: &[f64], edges: &[f64], axis: &CanvasAxis, count: usize) -> Vec<CellBlock> {
     let step = (axis.to - axis.from) / count as f64;
     let place = |k: usize| axis.from + k as f64 * step;

@@ -70,9 +70,9 @@ impl<'a> FigureLayout<'a> {
 
 // Reduction of panel heights so that a figure fits on a page.
 
-/// Smallest height of axes, mm: room for two labelled ticks and for equal margins beyond them.
+/// Smallest allowed height of axes, mm: room for two labelled ticks and for equal margins beyond them.
 const MIN_AXES_HEIGHT_MM: f64 = 16.0;
-/// Smallest height per name along a y axis, mm: a line of text and a gap.
+/// Smallest allowed height per name along a y axis, mm: a line of text and a gap.
 const MIN_CATEGORY_HEIGHT_MM: f64 = 3.0;
 /// Maximum number of rounds in which heights are reduced. One round may not be enough, because labels of
 /// lower panels wrap to more lines and need height again.
@@ -102,7 +102,7 @@ fn spare_height_mm(panel: &Panel) -> f64 {
 
 // Panels side by side.
 
-/// Smallest width, mm, of the axes of a panel in a row, and of a panel without axes.
+/// Smallest allowed width, mm, of the axes of a panel in a row, and of a panel without axes.
 const MIN_PANEL_WIDTH_MM: f64 = 30.0;
 const MIN_BARE_WIDTH_MM: f64 = 18.0;
 

@@ -379,16 +379,16 @@ fn count_lines_in(placed: &PanelLayout, area: &CanvasArea) -> usize {
 
 // SVG attributes that the script of a web page reads: axes and series of panels with a time axis.
 
-/// Class of the group of everything inside the axes. The script moves the group when the ends of the axes
-/// change.
+/// Class of the SVG group that contains everything inside the axes. The script moves the group when the ends
+/// of the axes change.
 pub(super) const WITHIN_AXES_CLASS: &str = "class=\"within\"";
-/// Class of the group of the ticks of the time axis.
+/// Class of the SVG group that contains the ticks of the time axis.
 pub(super) const TICKS_CLASS: &str = "class=\"ticks\"";
-/// Class of the group of the labels above the axes, whose positions are times.
+/// Class of the SVG group that contains the labels above the axes. The positions of these labels are times.
 pub(super) const OVER_AXES_CLASS: &str = "class=\"over\"";
 
-/// Attributes of the group of a time panel: canvas edges and ends of its axes, and the label of the y axis;
-/// `None` for other panels.
+/// Attributes of the SVG group of a panel with a time axis: canvas coordinates of the edges of its axes,
+/// values at the ends of both axes, and the label of the y axis. `None` for other panels.
 pub(super) fn panel_attributes(placed: &PanelLayout) -> Option<String> {
     let (panel, area, x, y) = (placed.panel, &placed.area, &placed.x, &placed.y);
     let timed =
@@ -420,8 +420,8 @@ pub(super) fn series_attributes(index: usize, series: &Series, placed: &PanelLay
     format!("class=\"series\" data-label=\"{label}\"{detail}")
 }
 
-/// Number of equal steps of the range of the y axis. Values are rounded to such a step, which is fine enough
-/// for an enlarged curve on a screen.
+/// Number of equal steps into which the range of the y axis is divided. Values are rounded to these steps,
+/// which are fine enough for an enlarged curve on a screen.
 const VALUE_STEPS: f64 = 1e4;
 
 /// SVG attributes with the full data: start and step of the sampling on the x axis, offset and unit of the

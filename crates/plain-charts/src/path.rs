@@ -67,8 +67,9 @@ pub(super) fn split_at_gaps(points: impl Iterator<Item = Option<CanvasPoint>>) -
     runs
 }
 
-/// Keeps only the first, lowest, highest and last point in every column of width `width` with more than four
-/// points. The line looks the same, and its number of points is bounded by the width of the canvas.
+/// Thins a line: in every column of the given width that has more than four points, only the first, lowest,
+/// highest and last point stay. The line looks the same, and its number of points is bounded by the width of
+/// the canvas.
 pub(super) fn thin_points(run: &[CanvasPoint], width: f64) -> Vec<CanvasPoint> {
     let column = |p: &CanvasPoint| (p.0 / width).floor();
     let mut kept = Vec::new();

@@ -221,7 +221,7 @@ pub(super) const UNITS_PER_MM: f64 = 15.0;
 pub const FULL_WIDTH_MM: f64 = 170.0;
 /// Width of a figure in one column, mm.
 pub const COLUMN_WIDTH_MM: f64 = 85.0;
-/// Largest height of a figure in print, mm: Springer's journals, among the strictest, allow 234 mm.
+/// Largest allowed height of a figure in print, mm: Springer's journals, among the strictest, allow 234 mm.
 pub const MAX_HEIGHT_MM: f64 = 230.0;
 /// Font size of labels, mm (7.4 pt, readable at print size).
 pub(super) const TEXT_MM: f64 = 2.6;
@@ -230,10 +230,10 @@ pub(super) const SMALL_MM: f64 = 2.3;
 pub(super) const LINE_MM: f64 = 4.0;
 pub(super) const EDGE_MM: f64 = 2.0;
 pub(super) const TICK_MM: f64 = 1.0;
-/// Smallest distance of labelled ticks along the x axis and along the y axis, mm.
+/// Smallest allowed distance between labelled ticks along the x axis and along the y axis, mm.
 pub(super) const X_TICKS_MM: f64 = 18.0;
 pub(super) const Y_TICKS_MM: f64 = 5.5;
-/// Smallest distance of labelled ticks along a logarithmic x axis and a logarithmic y axis, mm.
+/// Smallest allowed distance between labelled ticks along a logarithmic x axis and a logarithmic y axis, mm.
 pub(super) const X_LOG_TICKS_MM: f64 = 7.0;
 pub(super) const Y_LOG_TICKS_MM: f64 = 3.6;
 /// Opacity of shaded areas: pale enough for lines and grid to stay readable.

@@ -59,7 +59,7 @@ impl Figure {
         }
     }
 
-    /// Height in a medium, mm. In print, panel heights are reduced until the figure is at most
+    /// Height of the figure in a medium, mm. In print, panel heights are reduced until the figure is at most
     /// [`MAX_HEIGHT_MM`] high, or until panels cannot be reduced further and stay legible.
     #[must_use]
     pub fn height_mm(&self, medium: Medium) -> f64 {

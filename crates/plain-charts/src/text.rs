@@ -11,7 +11,7 @@ pub(super) const LETTER: f64 = 0.58;
 pub(super) const WIDE_LETTER: f64 = 0.63;
 pub(super) const WIDE_BOLD_LETTER: f64 = 0.7;
 const ELLIPSIS: char = '\u{2026}';
-/// Largest fraction of the width of a text that goes into the first of two lines.
+/// Largest allowed width of the first of two lines, as a fraction of the width of the whole text.
 const NEAR_MIDDLE: f64 = 0.65;
 
 /// Estimated width of a text, mm. An ideograph or emoji counts as two letters, a combining mark as none.

@@ -106,8 +106,8 @@ impl std::fmt::Display for RemovedTrend {
     }
 }
 
-/// Largest number of columns of a smooth trend. With more, a trend bends as fast as a component, so the
-/// frames after a step are tried instead.
+/// Largest allowed number of columns of a smooth trend. With more, a trend bends as fast as a component, so
+/// the frames after a step are tried instead.
 const MAX_SMOOTH_TREND_COLUMNS: usize = 20;
 
 impl SpectralAnalysis {
@@ -178,9 +178,9 @@ impl SpectralAnalysis {
     }
 
     /// Analyses each stretch between the steps of a piece. The result for a stretch is that of the first
-    /// range of frames whose fit leaves only noise, or else of the first range whose trend has no fast waves.
-    /// Fitting a trend through a step would take many times as long as fitting the oscillation that the step
-    /// starts.
+    /// range of frames whose fit leaves only noise, or else of the first range whose trend has no waves as
+    /// fast as a component. Fitting a trend through a step would take many times as long as fitting the
+    /// oscillation that the step starts.
     fn analyse_between_steps(record: &SampledRecord, settings: &SpectrumSettings) -> Vec<Self> {
         let of_stretch = |tries: &Vec<Range<usize>>| {
             let mut parts =
@@ -196,7 +196,8 @@ impl SpectralAnalysis {
         step_detection::stretches_between_steps(record.samples).iter().filter_map(of_stretch).collect()
     }
 
-    /// Analyses some frames of a record; `None` if that fails or if their trend has fast waves.
+    /// Analyses some frames of a record; `None` if that fails or if their trend has waves as fast as a
+    /// component.
     fn read_part(
         record: &SampledRecord,
         settings: &SpectrumSettings,
@@ -247,7 +248,7 @@ impl SpectralAnalysis {
     }
 
     /// Adds the power density, the noise floor and, for each component without a drift range, the probability
-    /// that noise alone produces as steady a line.
+    /// that noise alone produces a line at least as steady.
     fn with_densities(mut self, frame_rate_hz: f64) -> Self {
         let padded = 2 * (self.spectrum.amplitude_m.len() - 1);
         let density = |samples: &[Option<f64>]| {

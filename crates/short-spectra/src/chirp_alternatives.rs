@@ -11,13 +11,13 @@ use std::f64::consts::{PI, TAU};
 /// Maximum number of steps of the search for the best frequency, drift and decay of an alternative; each
 /// halving of the step sizes counts as a step.
 const MOST_STEPS: usize = 40;
-/// Initial step sizes of the search: of the frequency and of its change over the record, cycles, and of the
-/// decay, nepers.
+/// Initial step sizes of the search: for the frequency and for its change over the record, both in cycles in
+/// the record, and for the decay, in nepers.
 const FIRST_STEPS: [f64; 3] = [0.3, 1.0, 1.0];
 /// Number of parameters of a term of the fit, and number of additional parameters of an alternative.
 const TERM_PARAMETERS: f64 = 4.0;
 const EXTRA_PARAMETERS: f64 = 1.0;
-/// Distance in frequency, resolutions, within which terms may be parts of one oscillation.
+/// Distance in frequency, in resolutions, within which terms may be parts of one oscillation.
 const NEARBY_RESOLUTIONS: f64 = 5.0;
 /// Number of blocks that represent the record: a shift of the frequency by a few cycles in the record hardly
 /// changes the phase within a block.
@@ -72,8 +72,8 @@ impl ModelSelector<'_> {
         (0..terms.len()).filter(leaves).collect()
     }
 
-    /// The terms around which the residual exceeds noise. Each has the Bayesian information criterion below
-    /// which that of its replacement must be.
+    /// The terms around which the residual exceeds noise. Each is stored with a limit: a replacement of the
+    /// term must have a Bayesian information criterion below it.
     pub(super) fn doubtful_terms(&self, fit: &ModelFit) -> Vec<DoubtfulTerm> {
         let least = self.bic_of(&fit.model);
         let criterion = |k: usize| self.alternatives_criterion(fit, k).min(least);
@@ -81,8 +81,8 @@ impl ModelSelector<'_> {
         terms.map(|k| DoubtfulTerm { index: k, criterion: criterion(k) }).collect()
     }
 
-    /// Indices of terms that may be parts of one oscillation: a single oscillation with a constant drift or a
-    /// linear fall in their place has a lower Bayesian information criterion.
+    /// Indices of terms that may be parts of one oscillation: a single oscillation in their place, with a
+    /// constant frequency drift or a linearly falling amplitude, has a lower Bayesian information criterion.
     pub(super) fn unsteady_terms(&self, fit: &ModelFit) -> Vec<usize> {
         let terms = fit.model.terms();
         let steady = self.bic_of(&fit.model);
@@ -94,8 +94,9 @@ impl ModelSelector<'_> {
         fit.model.oscillations().into_iter().filter(is_piece).collect()
     }
 
-    /// The Bayesian information criterion if one oscillation with a constant drift or a linear fall replaces
-    /// term `k` alone, or `k` and its neighbours, whichever is lower.
+    /// The Bayesian information criterion after one oscillation, with a constant frequency drift or a
+    /// linearly falling amplitude, has replaced term `k`, or `k` and its neighbours. The lowest of these
+    /// criteria is returned.
     pub(super) fn alternatives_criterion(&self, fit: &ModelFit, k: usize) -> f64 {
         let group = nearby_terms(fit.model.terms(), k);
         let alone = self.replacement_criterion(fit, k, &[k]);

@@ -7,26 +7,26 @@ use super::relations::{describe_relations, find_relations};
 use super::settings::{CLEAR_DB, MIN_CYCLES, SpectrumSettings};
 use crate::sampling::{aliased_frequencies_hz, exposure_gain};
 
-/// Exposure gain below which a component counts as attenuated: a loss of 10 % exceeds the uncertainty of a
-/// scale.
+/// Exposure gain below which a component counts as attenuated: a loss of 10 % exceeds the uncertainty of the
+/// scale (m per pixel) of a recording.
 const ATTENUATED_BELOW: f64 = 0.9;
-/// Largest shift of a frequency by a richer trend, in standard deviations.
+/// Largest allowed shift of a frequency by a richer trend, in standard deviations.
 const MOST_TREND_SHIFT: f64 = 3.0;
-/// Largest ratio of the residual around a component to its amplitude; above it, a second line or a drift
-/// explains as much.
+/// Largest allowed ratio of the residual around a component to its amplitude; above it, a second line or a
+/// drift explains as much.
 const MOST_RESIDUAL: f64 = 0.25;
-/// Distance of two oscillations, resolutions, below which they may be a single one. At half a resolution and
-/// 50 dB, a single oscillation fits a pair of equal amplitudes as well as two oscillations do.
+/// Distance in frequency, in resolutions, below which two oscillations may be a single one. At half a
+/// resolution and 50 dB, a single oscillation fits a pair of equal amplitudes as well as two oscillations do.
 const LEAST_SEPARATION: f64 = 0.5;
-/// Range of a drift, resolutions, that two steady lines cannot imitate: pairs up to 1.7 resolutions apart
-/// looked like one component that drifts by up to five.
+/// Smallest range of a drift, in resolutions, that two steady lines cannot imitate: pairs up to 1.7
+/// resolutions apart looked like one component that drifts by up to five resolutions.
 const LEAST_CLEAR_DRIFT: f64 = 5.0;
 /// Damping ratio above which an oscillation is over within a cycle: at this ratio its amplitude falls to a
 /// quarter in one cycle.
 pub(super) const SINGLE_CYCLE_DAMPING: f64 = 0.22;
-/// Largest distance of a drifting frequency from the value extrapolated with its rate, resolutions of its
-/// segments. For noise in bands of 5 to 40 resolutions this distance is 0.35 or more, for a measured
-/// oscillation up to 0.26.
+/// Largest allowed median distance, in resolutions of the segments, of a drifting frequency from the value
+/// extrapolated with its rate. For noise in bands of 5 to 40 resolutions this distance is 0.35 or more, for a
+/// measured oscillation up to 0.26.
 const MOST_STRAY: f64 = 0.3;
 /// Ratio of an amplitude to its standard deviation from which the amplitude is significant.
 const LEAST_DEVIATIONS: f64 = 3.0;
@@ -56,11 +56,12 @@ pub(super) struct Evidence {
     /// Ratio of the largest residual peak within the lobe around the component to its amplitude; only peaks
     /// that stand out from the noise count.
     pub residual_ratio: f64,
-    /// Whether an oscillation with a constant frequency drift or a linearly falling amplitude explains more.
+    /// Whether an oscillation with a constant frequency drift or a linearly falling amplitude explains more
+    /// than this component does.
     pub unsteady: bool,
-    /// Distance to the nearest other oscillation, resolutions.
+    /// Distance from the nearest other oscillation, in resolutions.
     pub nearest: Option<f64>,
-    /// Distance to another oscillation, resolutions, if one of the two may be a part of the other.
+    /// Distance from another oscillation, in resolutions, if one of the two may be a part of the other.
     pub fragment_distance: Option<f64>,
     /// Fraction of the segments in which a drifting component was followed.
     pub followed_share: Option<f64>,
@@ -68,10 +69,10 @@ pub(super) struct Evidence {
     pub slow: bool,
     /// Whether the component and two others near it begin late or end soon.
     pub crowded: bool,
-    /// Median distance of a drifting frequency from the value extrapolated with its rate, resolutions of its
-    /// segments.
+    /// Median distance, in resolutions of the segments, of a drifting frequency from the value extrapolated
+    /// with its rate.
     pub median_stray: Option<f64>,
-    /// Range of the drift, resolutions.
+    /// Range of the drift, in resolutions.
     pub drift: Option<f64>,
     /// Whether the component changes over a record that is too long for a fit.
     pub changes: bool,
@@ -79,7 +80,8 @@ pub(super) struct Evidence {
     pub keeps_peak: bool,
 }
 
-/// Judges components, sorted by falling amplitude, each with its evidence.
+/// Sets the verdict and the reasons of each component from its evidence. The components are sorted by falling
+/// amplitude.
 pub(super) fn classify_components(components: &mut [Component], evidence: &[Evidence], at: &RecordContext) {
     find_relations(components, at);
     for (c, evidence) in components.iter_mut().zip(evidence) {
@@ -174,8 +176,8 @@ fn describe_ambiguities(c: &Component, evidence: &Evidence) -> [Option<String>; 
 
 /// Effect of the exposure as text; near a zero of its response the amplitude before exposure is unknown.
 fn describe_attenuation(c: &Component, passes: f64) -> String {
-    /// Smallest gain by which an amplitude may be divided; below it, even a tenth of the result would be
-    /// uncertain.
+    /// Smallest gain by which an amplitude may be divided. A smaller gain is so close to a zero of the
+    /// response that a small error of the exposure would change the result by a large fraction.
     const LEAST: f64 = 0.02;
     let before = || format!(", {:.3} um before it", c.amplitude_m * 1e6 / passes);
     let before = if passes < LEAST { String::new() } else { before() };

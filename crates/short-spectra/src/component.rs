@@ -29,7 +29,7 @@ pub struct Component {
     pub damping_ratio: Option<f64>,
     /// Standard deviation of the damping ratio.
     pub damping_ratio_sd: Option<f64>,
-    /// Ratio of the amplitude in the spectrum to its noise floor, `20 log10`, dB.
+    /// Ratio of the amplitude in the spectrum to the noise floor of the spectrum, dB (`20 log10`).
     pub snr_db: f64,
     /// Cramér-Rao bound of the frequency, Hz, for this component alone in a record without gaps, in white
     /// noise of the size found around it.
@@ -237,7 +237,8 @@ mod tests {
 
     #[test]
     fn a_fast_decay_has_the_bound_of_an_endless_record() {
-        // in an endless record spread = 1 / (8 a^3 dt) for a decay of a per second
+        // in an endless record the spread is 1 / (8 a^3 dt), with the decay a, 1/s, and the frame interval
+        // dt, s
         let (frames, rate, decay) = (100_000, 1e5, 40.0);
         let tone = DecayingTone { amplitude_m: 1.0, nepers: decay * frames as f64 / rate, noise_m: 0.1 };
         let closed = (2.0 * 8.0 * f64::powi(decay, 3) / rate).sqrt() * 0.1 / TAU;

@@ -15,7 +15,7 @@ pub(super) fn find_stride(samples: &[Option<f64>]) -> Option<(usize, usize)> {
     (stride > 1).then_some((first, stride))
 }
 
-/// The kept frames of a record, from the first kept frame and the distance between kept frames.
+/// The kept frames of a record: the frame `first` and every `stride`-th frame after it.
 pub(super) fn decimate(samples: &[Option<f64>], (first, stride): (usize, usize)) -> Vec<Option<f64>> {
     samples.iter().skip(first).step_by(stride).copied().collect()
 }

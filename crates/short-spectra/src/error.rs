@@ -13,7 +13,7 @@ pub enum SpectrumError {
     TooFew {
         /// Number of frames with a value.
         found: usize,
-        /// Minimum number for this trend and a spectrum.
+        /// Minimum number of frames with a value for this trend and a spectrum.
         least: usize,
     },
     /// A sample is not a finite number, or its square overflows.
@@ -80,8 +80,8 @@ pub enum SpectrumError {
 
 // Checks before a record is analysed.
 
-/// Largest padding factor of records whose requested padded length is too long: bins half a resolution apart
-/// still show every peak of a Hann window, which is four resolutions wide.
+/// Largest allowed padding factor of records whose requested padded length is too long: bins half a
+/// resolution apart still show every peak of a Hann window, which is four resolutions wide.
 const LONG_PADDING: usize = 2;
 
 /// Checks that a band contains a frequency of the spectrum.

@@ -11,31 +11,33 @@ use portable_math as math;
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
 /// The largest component is slow if every component above four times its frequency has less than a quarter of
-/// its amplitude. The drifting component is sought above the slow one.
+/// its amplitude. The drifting component is searched for above the slow one.
 const SLOW_COMPONENT: (f64, f64) = (4.0, 0.25);
 /// The lower end of the band is the frequency of the lowest strong component divided by this margin, because
 /// the window hides lower frequencies near the ends of a record.
 const BAND_MARGIN: f64 = 2.0;
-/// Fraction of the segments from which a component that was followed in them counts as followed everywhere.
+/// A component counts as followed everywhere if it was followed in at least this fraction of the segments.
 pub(super) const FULLY_FOLLOWED: f64 = 0.9;
 /// Fractions of the best segment length that are tried if less than `FULLY_FOLLOWED` was followed. A shorter
 /// length is used only if it increases the followed fraction by more than `LEAST_GAIN`, because noise hides a
 /// component in short segments.
 const SHORTER_SEGMENTS: [f64; 3] = [0.8, 0.65, 0.5];
 const LEAST_GAIN: f64 = 0.1;
-/// Standard deviation of the start of a cycle that is measured from the phase of the fundamental, cycles: the
+/// Standard deviation, in cycles, of the start of a cycle as measured from the phase of the fundamental. The
 /// shape of a cycle changes with its frequency, so this phase moves relative to the start of the cycle.
 const CYCLE_INSTANT_SD: f64 = 0.05;
-/// Distance of points, segments, at which they share so few frames that their noise is independent.
+/// Distance of two points, in segment lengths, at which their segments share so few frames that the noise of
+/// the points is independent.
 const INDEPENDENT_SEGMENTS: f64 = 0.5;
 /// A drift counts only if it was followed in more than this fraction of the segments.
 const LEAST_FOLLOWED: f64 = 0.08;
-/// Smallest range of a drift, resolutions; a smaller range is that of a slightly broadened line.
+/// Smallest range of a drift, in resolutions; a smaller range is that of a slightly broadened line.
 const LEAST_RANGE: f64 = 2.0;
-/// Number of sinusoids within the range from which they count as pieces of one oscillation.
+/// If at least this number of sinusoids lie within the frequency range of a drift, they count as pieces of
+/// one oscillation.
 const FRAGMENTS: usize = 3;
-/// Ratio of the largest residual peak within the range to the largest sinusoid there. Above this ratio,
-/// sinusoids do not explain the oscillation.
+/// Ratio of the largest residual peak within the frequency range of a drift to the largest sinusoid there.
+/// Above this ratio, sinusoids do not explain the oscillation.
 const LARGE_RESIDUAL: f64 = 0.25;
 
 /// The frequency over time of the strongest component above the slow components.
@@ -48,8 +50,8 @@ pub(super) struct DriftCourse {
 }
 
 impl DriftCourse {
-    /// Median distance of a frequency from the value extrapolated from a point half a segment away,
-    /// resolutions of the segments.
+    /// Median distance, in resolutions of the segments, of a frequency from the value extrapolated from a
+    /// point half a segment away.
     pub(super) fn median_stray(&self) -> f64 {
         let ridge = &self.ridge;
         let apart = ((INDEPENDENT_SEGMENTS * ridge.segment_s / ridge.hop_s).round() as usize).max(1);

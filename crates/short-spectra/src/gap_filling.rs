@@ -9,9 +9,10 @@
 //! Measured on 0.15 s at 5,000 frames/s (78.4 Hz at 20 um, 900 Hz at 8 um, a step, frames lost at random),
 //! the rms errors of the two frequencies are: with 20 % lost, 0.014 and 0.022 Hz with filling, 0.077 and 0.31
 //! Hz without; with 40 % lost, 0.083 and 0.093 Hz with filling, 0.11 and 0.42 Hz without. At 3 um and with 40
-//! % lost, the fast component is always found with filling, and missed in two of three records without. The
-//! cost is its amplitude, which is 2 % too small with 20 % lost and 9 % too small with 40 %. The components
-//! of such records are therefore refined without filling (`gap_refinement.rs`); the spectrum is not.
+//! % lost, the fast component is always found with filling, and missed in two of three records without. With
+//! filling, the amplitude of the fast component is 2 % too small with 20 % lost and 9 % too small with 40 %
+//! lost. The components of such records are therefore refined without filling (`gap_refinement.rs`); the
+//! spectrum is not.
 
 use rayon::prelude::*;
 
@@ -20,7 +21,8 @@ use rayon::prelude::*;
 pub(crate) const LONGEST_FILLED_GAP: usize = 4;
 const DIFFERENCE: [f64; 5] = [1.0, -4.0, 6.0, -4.0, 1.0];
 const ORDER: usize = DIFFERENCE.len() - 1;
-/// Maximum number of frames that are solved for together; a denser cluster is split.
+/// Maximum number of missing frames in a cluster whose values are solved for together; a larger cluster is
+/// split.
 const MOST_UNKNOWNS: usize = 64;
 
 /// Number of frames from which clusters are solved in parallel; for fewer, all clusters take only a few
@@ -55,7 +57,7 @@ pub(crate) fn fill_short_gaps(samples: &[Option<f64>]) -> Vec<Option<f64>> {
     filled
 }
 
-/// Runs of missing frames, each from its first frame to the one after its last.
+/// Runs of missing frames, each as the first missing frame and the frame after the last missing one.
 fn missing_runs(samples: &[Option<f64>]) -> Vec<(usize, usize)> {
     let mut runs: Vec<(usize, usize)> = Vec::new();
     for (frame, _) in samples.iter().enumerate().filter(|(_, sample)| sample.is_none()) {

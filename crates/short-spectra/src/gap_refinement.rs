@@ -36,8 +36,8 @@ const FRAMES_PER_UNKNOWN: usize = 4;
 const WHITE_RATIO: f64 = 2.0;
 /// Minimum number of fourth differences that can distinguish noise from an oscillation.
 const FEWEST_DIFFERENCES: usize = 20;
-/// Number of times that the residual is filled: the second fill changes the result by a tenth of what the
-/// first does.
+/// Number of times that the residual is filled: the second fill changes the result by a tenth of the change
+/// that the first fill makes.
 const FILL_ROUNDS: usize = 2;
 
 /// A component as estimated from the transform.
@@ -73,8 +73,8 @@ pub(super) struct RefinedDeviations {
 pub(super) enum Refinement {
     /// The component stays as estimated from the transform.
     Unchanged,
-    /// The component stays as estimated from the transform. A fit to the frames present with this fixed
-    /// frequency has this amplitude, m.
+    /// The component stays as estimated from the transform. The number is the amplitude, m, that a fit to the
+    /// frames present finds at this fixed frequency; it shows whether the component is absent.
     FixedFrequency(f64),
     Refined(RefinedComponent),
 }

@@ -16,28 +16,30 @@ use portable_math as math;
 use std::f64::consts::{PI, TAU};
 use std::rc::Rc;
 
-/// Largest shift of a steady frequency in a fit, resolutions: half way down the lobe of a Hann window (-6 dB
-/// at one resolution; the lobe ends at two).
+/// Largest allowed shift of the frequency of a steady term during a fit, in resolutions: half way down the
+/// lobe of a Hann window (-6 dB at one resolution; the lobe ends at two).
 const MOST_FREQUENCY_SHIFT: f64 = 1.0;
 /// Maximum number of halvings of a step that raises the misfit.
 const MOST_HALVINGS: i32 = 8;
 /// The fit ends with a step that changes all cycles and nepers by less than this.
 const SMALLEST_STEP: f64 = 1e-6;
-/// Ratio of an eigenvalue of the normal matrix, scaled to a unit diagonal, to the largest eigenvalue, below
-/// which the data do not determine its direction.
+/// If the ratio of an eigenvalue of the normal matrix, scaled to a unit diagonal, to its largest eigenvalue
+/// is at most this, the data do not determine the direction of the eigenvector.
 const SINGULAR_DIRECTION: f64 = 1e-10;
-/// Smallest squared pivot of the normal matrix, scaled to a unit diagonal, above which the data determine all
-/// directions: each column then keeps at least a thousandth of its length perpendicular to the columns before
-/// it.
+/// The data determine all directions if every squared pivot of the normal matrix, scaled to a unit diagonal,
+/// exceeds this: each column then keeps at least a thousandth of its length perpendicular to the columns
+/// before it.
 const WELL_POSED_PIVOT: f64 = 1e-6;
-/// Largest growth over the record, nepers: a growth by a factor of 400 is a transient at the end of the
-/// record.
+/// Largest allowed growth of an oscillation over the record, nepers: a growth by a factor of 400 is a
+/// transient at the end of the record.
 const MOST_GROWTH: f64 = 6.0;
-/// Largest damping ratio of an oscillation: above a half, almost nothing is left of it after one cycle.
+/// Largest allowed damping ratio of an oscillation: above a half, almost nothing is left of it after one
+/// cycle.
 const MOST_DAMPING: f64 = 0.5;
-/// Largest decay of a relaxation over the record, nepers: it is over within a hundredth of the record.
+/// Largest allowed decay of a relaxation over the record, nepers: the relaxation is over within a hundredth
+/// of the record.
 const MOST_RELAXED: f64 = 500.0;
-/// Largest growth of a relaxation at the end of the record, nepers; the squares of a larger growth would come
+/// Largest allowed growth of a relaxation over the record, nepers; the squares of a larger growth would come
 /// near the largest floating-point number.
 const MOST_RELAXED_AT_END: f64 = 330.0;
 
@@ -47,7 +49,7 @@ pub(super) enum FreeSet {
     Amplitude,
     Cycles,
     Both,
-    /// The decay alone; a relaxation, which has no cycles, moves only this.
+    /// Only the decay, in addition to the amplitude; for example for a relaxation, which has no cycles.
     Nepers,
 }
 
@@ -60,7 +62,7 @@ impl FreeSet {
         matches!(self, Self::Nepers | Self::Both)
     }
 
-    /// Number of moving parameters besides the amplitudes.
+    /// Number of parameters that the fit moves, not counting the amplitudes.
     pub(super) fn count(self) -> usize {
         usize::from(self.moves_cycles()) + usize::from(self.moves_nepers())
     }
@@ -216,7 +218,7 @@ impl SineProblem {
         Some(SineSolution { terms, amplitudes, misfit })
     }
 
-    /// The solution after the step, halved until the misfit falls; `None` if it does not fall.
+    /// The solution after a step that is halved until the misfit falls; `None` if it does not fall.
     fn halve_until_descent(&self, from: &SineSolution, step: &[[f64; 2]]) -> Option<SineSolution> {
         (0..MOST_HALVINGS).find_map(|halvings| {
             let share = math::powi(0.5, halvings);

@@ -16,15 +16,15 @@ use std::f64::consts::TAU;
 const BLOCKS: usize = 60;
 /// Maximum number of exponentials: the peak, its mirror image, a residue of the trend and their neighbours.
 const MOST_POLES: usize = 8;
-/// Largest distance of a pole from its peak, cycles in the record.
+/// Largest allowed distance of a pole from its peak, cycles in the record.
 const FARTHEST_POLE: f64 = 2.0;
 /// Relative precision of a decomposition.
 const PRECISION: f64 = 5.0 * f64::EPSILON;
 /// Maximum number of iterations of a decomposition. One that converges takes a few per row; with gaps in the
 /// record it may not converge.
 const MOST_ITERATIONS: usize = 2000;
-/// Largest growth over the record, nepers. With a larger growth, which a record of mostly gaps may give,
-/// powers of a pole come near the largest floating-point number.
+/// Largest allowed growth over the record, nepers. With a larger growth, which a record of mostly gaps may
+/// give, powers of a pole come near the largest floating-point number.
 const MOST_NEPERS: f64 = 200.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pole {

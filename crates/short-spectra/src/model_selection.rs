@@ -102,7 +102,7 @@ impl SineModel {
         (0..self.terms().len()).filter(|k| self.terms()[*k].cycles == 0.0).collect()
     }
 
-    /// The terms except those with the indices `out`, followed by new ones.
+    /// The terms except those with the indices `out`, followed by the terms `new`.
     pub(super) fn swap_terms(&self, out: &[usize], new: impl IntoIterator<Item = SineTerm>) -> Vec<SineTerm> {
         let kept = (0..self.terms().len()).filter(|k| !out.contains(k)).map(|k| self.terms()[k]);
         kept.chain(new).collect()
@@ -387,7 +387,7 @@ impl<'a> ModelSelector<'a> {
         self.fit_model(problem, parts.terms(), Tolerance::Fine)
     }
 
-    /// Bayesian information criterion: `N ln(misfit) + k ln N`.
+    /// Bayesian information criterion: `N ln(misfit) + k ln N` for `N` frames with a value and `k` unknowns.
     pub(super) fn bic_of(&self, parts: &SineModel) -> f64 {
         self.bic_with(parts, parts.solution.misfit, 0.0)
     }

@@ -22,13 +22,14 @@ use std::ops::RangeInclusive;
 /// Default number of tapers: a density with 14 degrees of freedom scatters by 38 %, and a line is 8
 /// resolutions wide, 53 Hz in 0.15 s, so that 78 Hz is still separate from zero and from 900 Hz.
 pub const TAPERS: usize = 7;
-/// Smallest and largest number of tapers: a single taper has no scatter, and more than fifty smooth away
-/// every feature.
+/// Smallest and largest allowed number of tapers: a single taper has no scatter, and more than fifty smooth
+/// away every feature.
 pub(crate) const TAPER_RANGE: RangeInclusive<usize> = 2..=50;
-/// Smallest width of the running median that gives a noise floor, in widths of a line, so that a line does
-/// not raise the floor under itself.
+/// Smallest allowed width of the running median that gives a noise floor, in widths of a line, so that a line
+/// does not raise the floor under itself.
 pub(crate) const FLOOR_LINES: f64 = 5.0;
-/// Longest padded record, samples, limited by memory because every taper keeps its transform.
+/// Largest allowed length of a padded record, samples; memory limits it, because every taper keeps its
+/// transform.
 const MOST_PADDED: usize = 1 << 24;
 /// Number of values from which threads share the work; fewer take a millisecond or two.
 const PARALLEL_FROM: usize = 1 << 17;
@@ -51,7 +52,7 @@ pub struct Multitaper {
     /// more than half the width of a line from 0 and from half the frame rate. Infinite if the sine leaves no
     /// residual.
     pub line_f: Vec<f64>,
-    /// Amplitude of the sine that explains the bin best, m.
+    /// Amplitude, m, of the steady sine that best explains the transforms of all tapers in the bin.
     pub line_amplitude_m: Vec<f64>,
     /// Number of tapers used; long gaps may leave room for fewer than requested.
     pub tapers: usize,
@@ -310,8 +311,8 @@ pub(super) fn noise_floor_curve(density: &[f64], window: usize, degrees: f64) ->
     (0..FLOOR_PASSES).fold(all, without_lines).into_iter().map(|m| m * mean_over_median).collect()
 }
 
-/// Running median over the bins that `counts` selects. A window in which fewer of these bins lie than half
-/// its width is widened until it has enough; at the ends of the spectrum it is cut off.
+/// Running median over the bins that `counts` selects. A window that contains fewer of these bins than half
+/// its width is widened until it contains enough; at the ends of the spectrum it is cut off.
 fn running_median(density: &[f64], window: usize, counts: impl Fn(usize) -> bool + Sync) -> Vec<f64> {
     let Some(last) = density.len().checked_sub(1) else { return Vec::new() };
     let (half, step) = ((window / 2).max(1), (window / KNOTS_PER_WINDOW).max(1));

@@ -19,22 +19,22 @@ const LOBE: f64 = 2.0;
 /// Factor by which the sidelobes of a component are assumed to exceed those of the window, because a real
 /// component is neither steady nor alone.
 const SIDELOBE_MARGIN: f64 = 1.5;
-/// Factor as [`SIDELOBE_MARGIN`] for a peak below [`MIN_CYCLES`]: such a peak is a residue of the trend, not
-/// a sine, and its sidelobes fall more slowly.
+/// The same factor as [`SIDELOBE_MARGIN`], for a peak with fewer than [`MIN_CYCLES`] cycles in the record:
+/// such a peak is a residue of the trend, not a sine, and its sidelobes fall more slowly.
 const TREND_MARGIN: f64 = 4.0;
-/// Smallest ratio of a listed amplitude to that of the largest resolvable component: -50 dB. The part of a
-/// tone of twelve cycles that a cubic absorbs appears 56 dB below the tone.
+/// Smallest allowed ratio of the amplitude of a listed component to that of the largest resolvable component:
+/// -50 dB. The part of a tone of twelve cycles that a cubic absorbs appears 56 dB below the tone.
 const DYNAMIC_RANGE: f64 = 3.2e-3;
 /// A maximum counts if, on the way to every larger maximum, the spectrum falls below this fraction of its
 /// height: 3 dB, half the power.
 const VALLEY_RATIO: f64 = FRAC_1_SQRT_2;
-/// Smallest width, resolutions, of the band whose median gives the noise floor, so that a component does not
-/// raise the floor under itself.
+/// Smallest allowed width, in resolutions, of the band whose median gives the noise floor, so that a
+/// component does not raise the floor under itself.
 const FLOOR_RESOLUTIONS: f64 = 40.0;
 /// Ratio of the standard deviation of the frequency of a spectral maximum to the Cramér-Rao bound; 1.5 to 1.8
 /// was measured at 20 dB.
 const OVER_BOUND: f64 = 1.6;
-/// Error of a frequency after removal of a cubic, resolutions: 0.03 Hz at 78 Hz in 0.15 s.
+/// Error of a frequency after removal of a cubic, in resolutions: 0.03 Hz at 78 Hz in 0.15 s.
 const TREND_SHARE: f64 = 0.005;
 
 impl WindowedSpectrum<'_> {
@@ -159,8 +159,9 @@ fn detection_threshold(spectrum: &WindowedSpectrum, (low, high): (f64, f64)) -> 
 
 /// Local maxima, except those that cannot reach `least_m`.
 fn local_maxima(spectrum: &WindowedSpectrum, least_m: f64) -> Vec<Peak> {
-    /// Largest ratio of the vertex of a parabola through logarithms to its middle point. It is at most the
-    /// eighth root of the ratio of this point to its lower neighbour: 9 % if the neighbour is half as high.
+    /// Upper limit of the ratio of the vertex of a parabola, through the logarithms of three amplitudes, to
+    /// the middle amplitude. The ratio is at most the eighth root of the ratio of the middle amplitude to the
+    /// lower of the other two: 1.09 if the lower one is half as high.
     const RISE: f64 = 1.1;
     let a = spectrum.amplitude_m;
     let is_top = |k: &usize| {

@@ -27,12 +27,13 @@ const SIDEBANDS: usize = 2;
 /// Number of standard deviations within which a relation counts. Of five thousand records with three true
 /// relations, all but one then show all three.
 const MATCH_DEVIATIONS: f64 = 4.0;
-/// Largest deviation of a frequency from a relation, resolutions; a wider tolerance would match by chance.
+/// Largest allowed deviation of a frequency from a relation, in resolutions; a wider tolerance would match by
+/// chance.
 const MATCH_RESOLUTIONS: f64 = 0.5;
 /// Probability of a random match up to which more multiples are tried.
 const CHANCE_MATCHES: f64 = 0.05;
-/// Smallest ratio of the amplitudes, smaller to larger, of two mirror-image sidebands if no component has the
-/// modulation frequency.
+/// Smallest allowed ratio of the amplitudes, smaller to larger, of two mirror-image sidebands if no component
+/// has the modulation frequency.
 const SIDEBAND_RATIO: f64 = 0.5;
 /// Number of standard deviations within which a frequency counts as a multiple of the mains frequency.
 const MAINS_DEVIATIONS: f64 = 3.0;

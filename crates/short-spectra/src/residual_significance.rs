@@ -6,12 +6,12 @@ use super::peaks::Peak;
 use super::periodogram::upper_median;
 use super::settings::MIN_CYCLES;
 
-/// Half width, resolutions, of the neighbourhood of a component in which the noise is estimated from the
+/// Half width, in resolutions, of the neighbourhood of a component in which the noise is estimated from the
 /// residual. The neighbourhood has 48 independent values of the spectrum, which determine the noise to 10 %.
 pub(super) const NEIGHBOURHOOD: f64 = 12.0;
-/// Smallest half width of the neighbourhood of a slow component, resolutions, and the factor by which the
-/// detection level rises there. Six values determine the noise poorly: with a probability of one in 100,000,
-/// noise exceeds 5.8 times their rms, but only 3.4 times the rms of many values.
+/// Smallest allowed half width of the neighbourhood of a slow component, in resolutions, and the factor by
+/// which the detection level rises there. Six values determine the noise poorly: with a probability of one in
+/// 100,000, noise exceeds 5.8 times their rms, but only 3.4 times the rms of many values.
 const FEWEST_RESOLUTIONS: f64 = 3.0;
 const FEW_VALUES_FACTOR: f64 = 1.7;
 /// Largest ratio of the mean square of the residual to that of the noise floor at which the residual counts

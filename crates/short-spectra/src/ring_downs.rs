@@ -1,4 +1,4 @@
-//! Oscillations that end soon or begin inside the record: a window that starts at zero hides them.
+//! Oscillations that end soon or begin inside the record: a window that is zero at its ends hides them.
 //!
 //! The residual `x` is matched with decaying oscillations that begin at any frame: `z = sum x exp(-d s - 2 pi
 //! i n s)` over the frames from the beginning on, where `s` is the time since the beginning in lengths of the
@@ -21,15 +21,15 @@ const DECAYS: [f64; 6] = [6.0, 12.0, 24.0, 48.0, 96.0, 192.0];
 const NEPERS_UNTIL_OVER: f64 = 3.5;
 /// Minimum number of frames in which an amplitude falls by a neper.
 const FRAMES_PER_NEPER: f64 = 4.0;
-/// Number of first frames that are tried per time in which the amplitude falls by a neper.
+/// Number of first frames that are tried in each interval in which the amplitude falls by a neper.
 const STARTS_PER_NEPER: f64 = 3.0;
 /// Probability that noise alone causes an oscillation to be found anywhere in a record.
 const FALSE_ALARM: f64 = 0.01;
-/// Decay over the record, nepers, above which a window that starts at zero shows too little of an
+/// Decay over the record, nepers, above which a window that is zero at its ends shows too little of an
 /// oscillation.
 const TRANSIENT_NEPERS: f64 = 8.0;
-/// Smallest width of a band that is used as an octave, cycles in the record: its noise floor is a median,
-/// which needs enough bins.
+/// Smallest allowed width of a band that is used as an octave, cycles in the record: its noise floor is a
+/// median, which needs enough bins.
 const OCTAVE: f64 = 20.0;
 /// Maximum number of steps of the search for the frequency, decay and first frame of a term; each halving
 /// counts as a step.
@@ -37,16 +37,16 @@ const MOST_MOVES: usize = 30;
 /// Number of cycles in the record up to which a decaying oscillation may be the residue of a step: twice the
 /// number up to which a step causes peaks.
 const SLOW_CYCLES: f64 = 2.0 * STEP_CYCLES;
-/// A term may have begun with the record, its start hidden by other terms, if it would have decayed by at
-/// most this much from the start of the record to its first frame, nepers.
+/// A term may have begun at the start of the record already, hidden there by other terms, if it would have
+/// decayed by at most this, in nepers, from the start of the record to its first frame.
 const MOST_NEPERS_LOST: f64 = 2.0;
 /// Fraction of the sum of squares of a record below which a misfit is rounding error, because the misfit is a
 /// difference of such sums.
 const ROUNDING_SHARE: f64 = 1e-12;
 /// Maximum number of rounds in which the placement of terms is optimised again; each round changes one term.
 const MOST_ROUNDS: usize = 6;
-/// Smallest ratio of the determinant of the normal matrix of cosine and sine to the product of its diagonal
-/// elements. With a smaller ratio, cosine and sine are not independent.
+/// Smallest allowed ratio of the determinant of the normal matrix of cosine and sine to the product of its
+/// diagonal elements. With a smaller ratio, cosine and sine are not independent.
 const SINGULAR: f64 = 1e-3;
 /// Ratio of the length of a transform to that of a decay: the bins are a seventh of the width of a peak
 /// apart.
@@ -72,7 +72,7 @@ struct Trial {
     nepers: f64,
     /// Length of its transform, values.
     padded: usize,
-    /// Distance of the first frames that are tried, frames.
+    /// Distance between two first frames that are tried, in frames.
     step: usize,
     /// Bins of the transform to try, with the standard deviation of the noise there, m.
     bins: Vec<(usize, f64)>,
@@ -88,8 +88,8 @@ struct Decays {
 }
 
 impl Decays {
-    /// Keeps a decaying oscillation if it stands out more or explains more than those before. It lowers the
-    /// sum of squares by twice `square`; `half` is `square` in units of the variance of the noise.
+    /// Keeps a decaying oscillation if it stands out more or explains more than those before. The oscillation
+    /// lowers the sum of squares by twice `square`; `half` is `square` in units of the variance of the noise.
     fn keep_larger(&mut self, term: SineTerm, half: f64, square: f64) {
         if self.stands_out.is_none_or(|(least, _)| half > least) {
             self.stands_out = Some((half, term));

@@ -7,8 +7,8 @@ use super::least_squares::{FreeSet, SineTerm, Tolerance, nepers_from_damping_rat
 use super::model_selection::{LOBE, ModelFit, ModelSelector, STEP_CYCLES, SineModel, lobe_half_width};
 use super::time_frequency::FrequencyRange;
 
-/// Largest frequency range, resolutions, of an apparent drift that two beating lines may cause. The lines lie
-/// at most four resolutions apart, but where they nearly cancel, the frequency swings beyond both.
+/// Largest frequency range, in resolutions, of an apparent drift that two beating lines may cause. The lines
+/// lie at most four resolutions apart, but where they nearly cancel, the frequency swings beyond both.
 const WIDEST_BEAT: f64 = 10.0;
 /// Maximum number of steps by which a trend may grow in the place of a slow ring-down; these steps together
 /// add about as many unknowns as the ring-down has.
@@ -19,14 +19,14 @@ const DECISIVE_DIFFERENCE: f64 = 10.0;
 /// A term around which the residual exceeds noise.
 pub(super) struct DoubtfulTerm {
     pub index: usize,
-    /// The Bayesian information criterion below which that of its replacement must be.
+    /// Limit: a replacement of the term must have a Bayesian information criterion below this value.
     pub criterion: f64,
 }
 
 impl ModelSelector<'_> {
     /// The model with the lowest Bayesian information criterion: the `improved` model, one with another
     /// ring-down, or one with two lines in the place of one. A model that changes a doubtful term must
-    /// explain more than a constant drift or a linear fall of that term would.
+    /// explain more than a constant frequency drift or a linearly falling amplitude of that term would.
     pub(super) fn refine_candidates(&self, fit: &ModelFit, improved: Option<SineModel>) -> Option<SineModel> {
         let parts = &fit.model;
         let terms = parts.terms();
@@ -104,14 +104,14 @@ fn are_adjacent(term: &SineTerm, other: &SineTerm) -> bool {
 }
 
 // Two steady oscillations (a pair) in the place of one, closer together than the width of the lobe of a
-// window that starts at zero. An oscillation whose frequency drifts or whose amplitude falls linearly can
-// also be split into two. A pair is therefore accepted only if it leaves only noise around it, and if neither
-// line explains more by growing or decaying.
+// window that is zero at its ends. An oscillation whose frequency drifts or whose amplitude falls linearly
+// can also be split into two. A pair is therefore accepted only if it leaves only noise around it, and if
+// neither line explains more by growing or decaying.
 
 /// Initial distances of the lines of a pair from the single term, resolutions; the single term lies between
 /// the two lines or has converged to one of them.
 const PAIR_STARTS: [[f64; 2]; 5] = [[-0.35, 0.35], [-0.6, 0.6], [-0.9, 0.9], [0.0, 1.6], [-1.6, 0.0]];
-/// Largest distance of a line of the pair from the single term, resolutions.
+/// Largest allowed distance of a line of the pair from the single term, in resolutions.
 const PAIR_REACH: f64 = 2.0;
 
 impl ModelSelector<'_> {

@@ -45,7 +45,7 @@ pub const MIN_SAMPLES: usize = 8;
 /// Minimum number of cycles of a resolvable component: with fewer, the lobe of the window, two resolutions
 /// wide on either side, reaches its own mirror image and the trend.
 pub(crate) const MIN_CYCLES: f64 = 3.0;
-/// Longest padded record, samples, limited by memory.
+/// Largest allowed length of a padded record, samples; memory limits it.
 pub(super) const MOST_PADDED: usize = 1 << 26;
 /// Longest padded length for which the padding of the settings is used, samples. A transform of this length
 /// takes some 50 ms; one of a million samples padded eight times takes half a second.

@@ -9,8 +9,9 @@ const TRANSITION_BOUNDS: (f64, f64) = (0.25, 0.75);
 /// Distances after a step, in widths of its transition, at which a fit is started. If the step is
 /// exponential, relaxations can describe the tail that remains.
 const STEP_WIDTHS_AFTER: [f64; 5] = [1.0, 2.0, 3.0, 5.0, 8.0];
-/// Smallest ratio of the length of a record to the duration of the return from a dip. Before and after a dip
-/// the record is at about the same level, and it returns to this level in a jump, faster than any slow wave.
+/// Smallest allowed ratio of the length of a record to the duration of the return from a dip. Before and
+/// after a dip the record is at about the same level, and it returns to this level in a jump, faster than any
+/// slow wave.
 const DIP_FRACTION: usize = 20;
 
 /// First frames to try after a step, earliest first. Empty if the record changes sides repeatedly, as an
@@ -30,10 +31,11 @@ pub(super) fn starts_after_step(samples: &[Option<f64>]) -> Vec<usize> {
 const STEP_WIDTHS_BESIDE: [f64; 2] = [1.0, 5.0];
 /// Maximum number of steps of a piece of a record; a piece with more changes of side is an oscillation.
 const MAX_STEPS: usize = 4;
-/// Ratio of the length of a record to the distance of the two frames from which a slope is measured, and
-/// smallest ratio of it to the duration of a step. A trend describes slower changes.
+/// Ratio of the length of a record to the distance between the two frames from which a slope is measured. It
+/// is also the smallest allowed ratio of the length of a record to the duration of a step; a trend describes
+/// slower changes.
 const SLOPE_FRACTION: usize = 16;
-/// Largest ratio of the length of a record to the length of a stretch that is tried.
+/// Largest allowed ratio of the length of a record to the length of a stretch that is tried.
 const LEAST_STRETCH_FRACTION: usize = 8;
 
 /// The stretches between the steps of a record, in order, each with the ranges of frames to try: first the

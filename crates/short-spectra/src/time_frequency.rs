@@ -90,7 +90,7 @@ pub(super) const FINE_PADDING: usize = 4;
 /// Minimum number of bins per resolution if only the maximum of a column is needed: a Hann lobe sampled at
 /// every half resolution is at most 0.4 dB too low.
 const COARSE_PADDING: usize = 2;
-/// Smallest fraction of the window's weight that must lie on frames with a value.
+/// Smallest allowed fraction of the window's weight that lies on frames with a value.
 const LEAST_PRESENT: f64 = 0.5;
 
 /// The frequency bins of the transform of a segment.

@@ -110,9 +110,10 @@ const LINE_COLUMNS: usize = 2;
 /// The columns of a trend.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Trend {
-    /// This many Legendre polynomials from degree 0 on; they are orthogonal over a record without gaps.
+    /// The given number of Legendre polynomials, from degree 0 on; they are orthogonal over a record without
+    /// gaps.
     Polynomial(usize),
-    /// A line and this many cosines of one, two, three ... half-waves over the record.
+    /// A line and the given number of cosines, with one, two, three ... half-waves over the record.
     Cosines(usize),
 }
 

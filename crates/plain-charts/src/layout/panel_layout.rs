@@ -29,7 +29,7 @@ pub(crate) struct PanelLayout<'a> {
     pub column_mm: f64,
     /// Height of the labels below the axes, mm.
     pub(super) under_mm: f64,
-    /// Largest width of names along the y axis, mm.
+    /// Largest allowed width of the names along the y axis, mm.
     pub(super) names_mm: f64,
 }
 
@@ -156,8 +156,8 @@ impl<'a> PanelLayout<'a> {
 pub(super) const MOST_NAMES: f64 = 0.4;
 /// Half the width of a label of five digits, mm; a label may be centred on the end of the axis.
 pub(super) const HALF_LABEL_MM: f64 = 2.0;
-/// Smallest distance of labelled ticks, mm, on a y axis that would otherwise have fewer than two: the height
-/// of a line of text.
+/// Smallest allowed distance between labelled ticks, mm, on a y axis that would otherwise have fewer than two
+/// labelled ticks: the height of a line of text.
 const CROWDED_Y_TICKS_MM: f64 = LINE_MM;
 /// Height of each line of a name that is wrapped to two lines of small letters, mm.
 pub(crate) const SMALL_LINE_MM: f64 = SMALL_MM + 0.1;

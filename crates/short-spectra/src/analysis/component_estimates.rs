@@ -16,27 +16,30 @@ use crate::{Component, Detrend, Estimator, Spectrum, SpectrumSettings};
 use portable_math as math;
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
-/// Ratio of a decay to its standard deviation from which it is significant; a smaller decay is held at zero.
+/// Ratio of a decay to its standard deviation from which the decay is significant; a smaller decay is held at
+/// zero.
 const SIGNIFICANT_DECAY: f64 = 3.0;
 
-/// If the trend could not grow further, an oscillation with fewer cycles than this multiple of the waves of
-/// the trend may be a part of a step.
+/// An oscillation may be a part of a step if the trend could not grow further and the oscillation has fewer
+/// cycles than this multiple of the number of waves of the trend.
 const EXHAUSTED_TREND_WAVES: f64 = 2.0;
-/// An oscillation of fewer cycles than this may be a part of what the trend describes, such as the shaking of
-/// a camera. Applies only if the trend has more than `FEWEST_COLUMNS` columns, the number of a cubic.
+/// An oscillation of fewer cycles than this may be a part of the motion that the trend describes, such as the
+/// shaking of a camera. Applies only if the trend has more than `FEWEST_COLUMNS` columns, the number of
+/// columns of a cubic.
 const SLOW_CYCLES: f64 = 6.5;
 const FEWEST_COLUMNS: usize = 4;
-/// Number of other short-lived oscillations near a short-lived one from which it counts as crowded.
+/// A short-lived oscillation counts as crowded if at least this number of other short-lived oscillations are
+/// near it.
 const CROWD_NEIGHBOURS: usize = 2;
-/// Distance, resolutions, within which two oscillations that are not both steady may be parts of one: the
-/// window hardly separates them, and their errors cancel.
+/// Distance in frequency, in resolutions, within which two oscillations that are not both steady may be parts
+/// of one oscillation: the window hardly separates them, and their errors cancel.
 const FRAGMENT_RESOLUTIONS: f64 = 2.0;
-/// Standard deviation of the shift of a frequency by an unresolved second oscillation, resolutions, per unit
-/// of the ratio of residual to amplitude. In fifty pairs of equal amplitudes, half a resolution to one
-/// resolution apart, the largest shift was 4.6 in the same unit.
+/// An unresolved second oscillation shifts the frequency of the first. This is the standard deviation of the
+/// shift, in resolutions, divided by the ratio of the residual to the amplitude. In fifty pairs of equal
+/// amplitudes, half a resolution to one resolution apart, the largest quotient was 4.6.
 const COMPANION_SHIFT: f64 = 2.0;
-/// Standard deviation of a frequency that no oscillation explains, resolutions: uniform within one resolution
-/// of its peak.
+/// Standard deviation, in resolutions, of a frequency that no oscillation explains: the frequency is
+/// uniformly distributed within one resolution of its peak.
 const UNEXPLAINED_SD: f64 = 0.577;
 
 /// A fitted record with the covariances of its terms.
@@ -52,7 +55,8 @@ pub(super) struct FitReading<'a> {
     /// estimated.
     decomposition: ModelFit,
     covariance: SineCovariance,
-    /// Indices of terms that may be parts of one oscillation with a constant drift or linear fall.
+    /// Indices of terms that may be parts of one oscillation whose frequency drifts at a constant rate or
+    /// whose amplitude falls linearly.
     unsteady_terms: Vec<usize>,
 }
 
@@ -234,8 +238,9 @@ impl<'a> FitReading<'a> {
         terms[k].is_transient() && terms.iter().filter(near).count() > CROWD_NEIGHBOURS
     }
 
-    /// The nearest other oscillation within two resolutions or the width of the broader peak, if one of the
-    /// two decays or begins inside the record. Two steady oscillations are a pair, not parts of one.
+    /// The nearest other oscillation within two resolutions of oscillation `k` or within the width of the
+    /// broader peak, if one of the two decays or begins inside the record. Two steady oscillations are a
+    /// pair, not parts of one oscillation.
     fn nearest_fragment(&self, k: usize) -> Option<Fragment> {
         let (parts, terms) = (&self.decomposition.model, self.decomposition.model.terms());
         let steady = |term: &SineTerm| term.nepers == 0.0 && term.first == 0;
@@ -251,7 +256,7 @@ impl<'a> FitReading<'a> {
             .min_by(|a, b| a.distance.total_cmp(&b.distance))
     }
 
-    /// Distance to the nearest other oscillation, resolutions.
+    /// Distance of oscillation `k` from the nearest other oscillation, in resolutions.
     fn distance_to_nearest(&self, k: usize) -> Option<f64> {
         let terms = self.decomposition.model.terms();
         let others = terms.iter().enumerate().filter(|(j, t)| *j != k && t.cycles > 0.0);
@@ -299,7 +304,7 @@ impl<'a> FitReading<'a> {
         Some((component, evidence))
     }
 
-    /// A peak that no decaying oscillation explains, as the windowed spectrum shows it.
+    /// The component for a peak that no decaying oscillation explains, estimated from the windowed spectrum.
     fn peak_component(&self, peak: &Peak) -> (Component, Evidence) {
         let (selector, cycles) = (self.selector, self.selector.cycles_of_peak(peak));
         let noise_m = self.noise_sd_near(cycles);

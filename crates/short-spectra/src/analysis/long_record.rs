@@ -20,12 +20,14 @@ use transients::Transient;
 /// Number of pieces of the record, which overlap by half, and number of independent values among them.
 const PHASE_SEGMENTS: usize = 31;
 const INDEPENDENT_SEGMENTS: f64 = 16.0;
-/// Largest scatter of a steady line over the pieces, as a fraction of its amplitude or of the noise.
+/// Largest allowed scatter of a steady line over the pieces: as a fraction of its amplitude
+/// (`STEADY_SCATTER`) or of the noise in a piece (`STEADY_SCATTER_IN_NOISE`), whichever limit is larger.
 const STEADY_SCATTER: f64 = 0.25;
 const STEADY_SCATTER_IN_NOISE: f64 = 1.7;
 /// Ratio of the width of a uniform distribution to its standard deviation, the square root of 12.
 const UNIFORM_WIDTH_IN_SD: f64 = 3.464_101_615_137_754_6;
-/// Half width of the neighbourhood whose median is the noise, resolutions.
+/// Half width, in resolutions, of the band around a frequency in which the noise is measured: the noise
+/// follows from the median of the spectrum in this band.
 const NEIGHBOURHOOD: f64 = 40.0;
 /// Ratio of a peak to the noise of its neighbourhood above which it is a component; noise alone reaches this
 /// ratio in one of a hundred spectra of a million frames.
@@ -172,7 +174,7 @@ mod tests {
         }
     }
 
-    /// The components of a record in 1 um of noise.
+    /// The components of a record with noise of standard deviation 1 um.
     fn components(value: impl Fn(usize) -> f64) -> Vec<Component> {
         let mut seed = 5_u64;
         let mut draw = || {
@@ -224,7 +226,7 @@ mod tests {
         assert_eq!(list.len(), 2, "{list:?}");
         assert_read(near(&list, 600.0), &Rings(600.0, 0.05, 3e-5, 0));
         assert_eq!(near(&list, 600.0).begins_s, None);
-        // the ring-down ends after twenty frames, which a window that starts at zero hides
+        // the ring-down ends after twenty frames, which a window that is zero at its ends hides
         let list = listed(&[Rings(1200.0, 0.08, 3e-5, 0)]);
         assert!((near(&list, 1200.0).frequency_hz - 1200.0).abs() < 30.0, "{list:?}");
     }

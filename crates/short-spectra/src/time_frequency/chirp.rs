@@ -46,7 +46,7 @@ pub(super) struct ChirpFit<const N: usize> {
 }
 
 impl Chirp {
-    /// Start of a fit, from a frequency, cycles in the segment, and its change over the segment, cycles.
+    /// Start of a fit from a frequency and its change over the segment, both in cycles in the segment.
     pub(super) fn from_cycles(cycles: f64, change: f64) -> Self {
         Self([0.0, 0.0, 0.0, PI * cycles, PI * change / 4.0, 0.0])
     }
@@ -62,8 +62,8 @@ impl Chirp {
         4.0 * self.0[4] / PI
     }
 
-    /// The same parameters with a rate that changes by `cycles` cycles per segment from one segment to the
-    /// next.
+    /// The same parameters, but with a rate that changes by `cycles` from one segment to the next. The rate
+    /// is the change of the frequency, cycles in the segment, over one segment.
     pub(super) fn with_curvature(mut self, cycles: f64) -> Self {
         self.0[5] = PI * cycles / 24.0;
         self
@@ -105,8 +105,8 @@ impl Chirp {
         (1.0 + self.0[2] * x) * (self.0[0] * cosine + self.0[1] * sine)
     }
 
-    /// Whether the amplitude falls to zero within the segment: the component then begins or ends near its
-    /// middle.
+    /// Whether the amplitude falls to zero within the segment: the component then begins or ends near the
+    /// middle of the segment.
     pub(super) fn vanishes(&self) -> bool {
         self.0[2].abs() >= 1.0
     }
@@ -214,7 +214,7 @@ const LOBE: f64 = 2.0;
 /// Number of multiples of the frequency that do not count as noise, because the oscillation need not be a
 /// sine.
 const HARMONICS: usize = 3;
-/// Smallest width of the band from whose median the noise is estimated, resolutions.
+/// Smallest allowed width, in resolutions, of the band from whose median the noise is estimated.
 const FEWEST_RESOLUTIONS: f64 = 20.0;
 /// Minimum number of bins of a median; if fewer remain without the multiples, the multiples count as noise
 /// too.

@@ -10,13 +10,14 @@
 use super::{Ridge, RidgePoint, Spectrogram};
 use portable_math as math;
 
-/// Range of amplitudes below the largest that a course includes, and range of the colours of a spectrogram,
-/// dB.
+/// A course includes amplitudes down to this number of dB below the largest amplitude of the spectrogram. The
+/// colours of a spectrogram cover the same range.
 pub const DYNAMIC_RANGE_DB: f64 = 60.0;
-/// Largest difference of frequency between segments that share three quarters of their frames, after the
-/// change by the fitted rates is subtracted, resolutions. The neighbours that determine a frequency range
-/// must agree equally well. Noise in the weakest component of a ridge causes less than a tenth of this
-/// difference, and a single component has no other reason to jump.
+/// Largest allowed difference, in resolutions (1 / segment duration), between the frequencies of two segments
+/// that share three quarters of their frames. The change that follows from the fitted rates is subtracted
+/// first. Neighbouring points that determine a frequency range must agree within the same limit. Noise in the
+/// weakest component of a ridge causes less than a tenth of this difference, and a single component has no
+/// other reason to jump.
 const MAX_FREQUENCY_STEP: f64 = 0.25;
 /// Distance between segments that share three quarters of their frames, in segment lengths.
 const USUAL_HOP: f64 = 0.25;

@@ -11,8 +11,9 @@ pub struct RidgePoint {
     pub time_s: f64,
     /// Frequency at that time, Hz.
     pub frequency_hz: f64,
-    /// Standard deviation of the frequency, Hz: from the noise next to the component or from the residual of
-    /// the fit, whichever is larger, and a five-hundredth of the resolution for leakage of other components.
+    /// Standard deviation of the frequency, Hz. It combines two parts: the effect of the noise next to the
+    /// component or of the residual of the fit, whichever is larger, and a five-hundredth of the resolution
+    /// for leakage of other components.
     pub frequency_sd_hz: f64,
     /// Change of the frequency, Hz/s.
     pub rate_hz_per_s: f64,
@@ -55,12 +56,12 @@ pub struct Ridge {
     pub hop_s: f64,
 }
 
-/// Largest difference of two neighbouring frequencies, resolutions, at which they agree.
+/// Two neighbouring frequencies agree if they differ by at most this, in resolutions.
 const AGREEMENT_RESOLUTIONS: f64 = 0.25;
 /// Two neighbouring frequencies also agree if they differ by at most this many standard deviations of the
 /// difference.
 const AGREEMENT_DEVIATIONS: f64 = 4.0;
-/// Distance of points with nearly independent noise, segments.
+/// Distance of two points, in segment lengths, at which their noise is nearly independent.
 const INDEPENDENT_SEGMENTS: f64 = 0.5;
 /// Number of standard deviations that a normal number exceeds once in a thousand draws.
 const ONCE_IN_A_THOUSAND: f64 = 3.09;

@@ -17,13 +17,13 @@ const FALSE_ALARM: f64 = 0.01;
 /// Number of independent trials per resolution of each segment: overlapping columns have more maxima than
 /// independent values.
 const TRIALS: f64 = 10.0;
-/// Largest distance of a fitted frequency from the path, resolutions: half way down the lobe of a Hann
-/// window.
+/// Largest allowed distance of a fitted frequency from the path, in resolutions: half way down the lobe of a
+/// Hann window.
 const FARTHEST_FROM_PATH: f64 = 1.0;
-/// Standard deviation of a frequency due to leakage of other components into a fit, resolutions.
+/// Standard deviation, in resolutions, of a frequency due to leakage of other components into a fit.
 const LEAKAGE_SD: f64 = 0.002;
-/// Standard deviation of a frequency due to leakage at the end of a fit whose rate may change, resolutions of
-/// that fit.
+/// Standard deviation of a frequency due to leakage, in resolutions of the fit, at the end of a fit whose
+/// rate may change.
 const END_LEAKAGE_SD: f64 = 0.01;
 /// Lengths of the fits at an end of the record, segments: to estimate the change of the rate takes a longer
 /// stretch than to estimate the rate.
@@ -40,8 +40,8 @@ const CURVATURE_BIAS: f64 = 0.4154 / 24.0;
 /// Ratio of the bias of a frequency due to a changing rate to its standard deviation. Above this ratio, a
 /// point is fitted with a changing rate.
 const SIGNIFICANT_CURVATURE: f64 = 0.5;
-/// Largest difference, resolutions, between the frequency of the ridge at the centre of its outermost segment
-/// and that of a fit at the end of the record. Applies to fits of at least one segment.
+/// Largest allowed difference, in resolutions, between the frequency of the ridge at the centre of its
+/// outermost segment and that of a fit at the end of the record. Applies to fits of at least one segment.
 const END_AGREEMENT: f64 = 0.25;
 
 #[derive(Clone, Copy)]
@@ -341,9 +341,9 @@ fn remove_short_runs(mut points: Vec<Option<RidgePoint>>) -> Vec<Option<RidgePoi
 
 // The best path through the columns (Viterbi): it maximises the sum of the levels minus the costs of jumps.
 
-/// Standard deviation of the change of frequency over a quarter of a segment, resolutions. A drift of half a
-/// resolution in a quarter of a segment moves the frequency by two resolutions within the segment, about the
-/// maximum for a segment of the chosen length.
+/// Standard deviation, in resolutions, of the change of frequency over a quarter of a segment. A drift of
+/// half a resolution in a quarter of a segment moves the frequency by two resolutions within the segment,
+/// about the maximum for a segment of the chosen length.
 const JUMP_SD: f64 = 0.5;
 /// Farthest jump, in standard deviations: six resolutions within a segment.
 const LONGEST_JUMP: f64 = 3.0;

@@ -17,21 +17,22 @@ struct SegmentScale {
     length: usize,
     /// Maximum number of pieces that are analysed.
     most: usize,
-    /// Whether the first piece is always analysed: a window that starts at zero hides an oscillation that
-    /// ends soon after the start of the record.
+    /// Whether the first piece is always analysed: a window that is zero at its ends hides an oscillation
+    /// that ends soon after the start of the record.
     first: bool,
 }
 
-/// An oscillation shows best in pieces that are as long as it lasts. The longest pieces take most of the
-/// computing time.
+/// The lengths of the pieces that are analysed. An oscillation shows best in pieces that are as long as it
+/// lasts. The longest pieces take most of the computing time.
 const SCALES: [SegmentScale; 3] = [
     SegmentScale { length: 4096, most: 2, first: false },
     SegmentScale { length: 1024, most: 4, first: true },
     SegmentScale { length: 256, most: 4, first: true },
 ];
-/// Distance, resolutions of a piece, within which two components count as one.
+/// Distance in frequency, in resolutions of a piece, within which two components count as the same component.
 const SAME_WITHIN_RESOLUTIONS: f64 = 2.0;
-/// Distance, standard deviations, within which two components count as one.
+/// Distance in frequency, in standard deviations of the difference, within which two components count as the
+/// same component.
 const SAME_WITHIN_DEVIATIONS: f64 = 3.0;
 /// Decay, nepers, after which an oscillation is over: a twentieth of its amplitude is left.
 const NEPERS_UNTIL_OVER: f64 = 3.0;
@@ -70,8 +71,8 @@ impl Transient {
         self.matches_component(other) || (c.frequency_hz - other.frequency_hz).abs() < width_hz
     }
 
-    /// Adds a doubt to a component that does not decay within the stretch: outside it may have another
-    /// frequency.
+    /// Adds a doubt to a component that does not decay within the stretch: outside the stretch, the component
+    /// may have another frequency.
     fn with_persistence_doubt(mut self) -> Self {
         if self.nepers < NEPERS_OF_DECAY {
             let words = "it goes on outside the part of the window in which it was read, and may drift or \
@@ -84,8 +85,8 @@ impl Transient {
         self
     }
 
-    /// Whether the piece describes the component better than the whole window, over which the component
-    /// changes.
+    /// Whether the piece describes the component better than the whole record does, because the component
+    /// changes over the record.
     pub(super) fn is_more_specific(&self) -> bool {
         self.nepers > NEPERS_OF_DECAY || self.component.range_hz.is_some()
     }
@@ -175,14 +176,15 @@ fn decay_nepers(c: &Component, lasts_s: f64) -> f64 {
 
 /// Probability that noise alone exceeds the level of any piece anywhere in a record.
 const FALSE_ALARM: f64 = 0.01;
-/// The normal power is the quantile 1 / `NORMAL_POWER_QUANTILE` of the powers of the pieces, divided by
-/// `QUARTER_OF_NOISE`, the ratio of this quantile to the mean power for noise.
+/// The normal power follows from the quantile 1 / `NORMAL_POWER_QUANTILE` of the powers of the pieces. This
+/// quantile is divided by `QUARTER_OF_NOISE`, which is the ratio of the quantile to the mean power for noise.
 const NORMAL_POWER_QUANTILE: usize = 4;
 const QUARTER_OF_NOISE: f64 = 0.287_682_072_451_780_9;
 /// Half width, bins, of the neighbourhood whose median is a lower limit of the normal power in a bin. The
 /// limit is needed because the quartile of a few pieces is inaccurate.
 const NEIGHBOURHOOD: usize = 8;
-/// Number of cycles in a piece below which a step, not an oscillation, exceeds the normal power.
+/// Smallest number of cycles in a piece at which the power is compared with the normal power: at fewer
+/// cycles, a step, not an oscillation, would exceed it.
 const FEWEST_CYCLES: usize = 8;
 /// Half width of the main lobe of a Hann window, bins.
 const LOBE: usize = 2;
