@@ -156,8 +156,8 @@ impl Command {
     }
 }
 
-/// Like [`run`], for the process of another program, such as Python; `path` is the program that is started
-/// for further tasks.
+/// Like [`run`], but for a call from within the process of another program, such as Python. `path` is the
+/// executable that is started for further tasks.
 #[must_use]
 pub fn run_embedded(path: PathBuf, arguments: Vec<OsString>) -> u8 {
     submit::set_executable_path(path);

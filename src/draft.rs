@@ -17,7 +17,7 @@ pub(crate) use scene::{FittedScene, YOURS_MARK, write_fitted_scene, write_scene,
 use serde::Serialize;
 pub(crate) use stroke::KnownStroke;
 
-/// Maximum width of a comment line, characters.
+/// Maximum width of a comment line, in characters.
 const WIDTH: usize = 100;
 
 /// Builder of a TOML file with comments.
@@ -83,15 +83,16 @@ impl CommentedToml {
 /// Role of a parameter of the blade in a first job.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum ParameterRole {
-    /// Measured on the blade by the user. Free with a prior of this relative standard deviation; held
-    /// constant if there is none.
+    /// Must be measured on the blade by the user. In the job, the parameter is free with a prior of this
+    /// relative standard deviation; for `None`, it is held constant.
     Yours(Option<f64>),
     /// Poorly known before a fit. Free with a prior of this relative standard deviation around the value of
     /// the example.
     Guessed(f64),
     /// Fitted between two bounds.
     Fitted([f64; 2]),
-    /// Fitted between two bounds. Each bound is this number divided by the maximum head speed, m/s.
+    /// Fitted between two bounds. Each bound is one of these two numbers divided by the maximum head speed in
+    /// m/s.
     FittedOverSpeed([f64; 2]),
 }
 
@@ -110,16 +111,16 @@ const NECK_HZ: [f64; 2] = [60.0, 600.0];
 /// Bounds of the ratio of shoulder stiffness to neck stiffness: from a negligible shoulder to a nearly rigid
 /// one.
 const SHOULDER: [f64; 2] = [4.0, 60.0];
-/// Mass or inertia of a part, weighed or computed from its cross section.
+/// Role of a mass or an inertia of a part, which is weighed or computed from the cross section of the part.
 const WEIGHED: ParameterRole = ParameterRole::Yours(Some(0.05));
-/// Preload, read from a scale on which the blade is pressed.
+/// Role of the preload, which is read from a scale on which the blade is pressed.
 const PRELOAD: ParameterRole = ParameterRole::Yours(Some(0.05));
-/// Length, measured on a picture of the cross section; a fit holds it constant.
+/// Role of a length, which is measured on a picture of the cross section; a fit holds it constant.
 const MEASURED: ParameterRole = ParameterRole::Yours(None);
-/// Natural frequency or angle, known from a blade of the same kind.
+/// Role of a natural frequency or an angle, which is known from a blade of the same kind.
 const SIMILAR: ParameterRole = ParameterRole::Guessed(0.2);
-/// Damping ratio, with the largest standard deviation that a job allows: the damping ratios of different
-/// rubbers differ severalfold.
+/// Role of a damping ratio. Its prior has the largest standard deviation that a job allows, because the
+/// damping ratios of different rubbers differ severalfold.
 const UNKNOWN: ParameterRole = ParameterRole::Guessed(0.5);
 
 /// Parameters of the blade, the shoulder and the friction in the order of a draft, with their roles.

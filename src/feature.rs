@@ -34,7 +34,7 @@ pub use value::{FeatureUnit, FeatureValue, LengthCalibration, RunnerUpComponent,
 /// in the window, and those of the model differ from those of the recording.
 pub(crate) const FREQUENCY_SD_FLOOR: f64 = 1e-3;
 
-/// A reading with its name in a job, and the condition of the job in whose recording it is evaluated.
+/// A reading that a job names, and the condition of the job in whose recording the reading is evaluated.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Feature {
     /// Name of the feature in the job.

@@ -90,7 +90,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-#![cfg_attr(not(test), warn(clippy::disallowed_methods))] // tests may use them
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))] // tests may use the disallowed methods
 
 pub mod camera;
 pub mod checkpoint;

@@ -40,15 +40,15 @@ pub struct Linkage {
     pub l1_m: f64,
     /// Length of the lip `l2`, m.
     pub l2_m: f64,
-    /// First moment of the mass of neck and lip about the upper hinge of the neck, with the lip's mass at its
-    /// own upper hinge: `m_a = m1 g1 + m2 l1`, kg m.
+    /// First moment of the mass of neck and lip about the upper hinge of the neck, with the mass of the lip
+    /// concentrated at the hinge between neck and lip: `m_a = m1 g1 + m2 l1`, kg m.
     pub m_a: f64,
     /// First moment of the mass of the lip about its upper hinge, `m_b = m2 g2`, kg m.
     pub m_b: f64,
     /// Inertial coupling of neck and lip, `m_c = m2 l1 g2`, kg m2.
     pub m_c: f64,
-    /// Moment of inertia of the neck about its upper hinge, with the lip's mass at the lower hinge: `m_theta
-    /// = J1 + m1 g1^2 + m2 l1^2`, kg m2.
+    /// Moment of inertia of the neck about its upper hinge, with the mass of the lip concentrated at the
+    /// hinge between neck and lip: `m_theta = J1 + m1 g1^2 + m2 l1^2`, kg m2.
     pub m_theta: f64,
     /// Moment of inertia of the lip about its upper hinge, `m_phi = J2 + m2 g2^2`, kg m2.
     pub m_phi: f64,
@@ -125,8 +125,9 @@ impl LinkDirections {
     }
 }
 
-/// Response of the blade to a friction force `f` at one instant: `qdd = free + f per_force`, `v3dd = a_free +
-/// kappa f`, `N = n_free + nu f`.
+/// How the blade responds to a friction force `f` at one instant. Angular accelerations:
+/// `qdd = free + f * per_force`; tip acceleration: `v3dd = a_free + f * kappa`; normal force:
+/// `N = n_free + f * nu`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrictionResponse {
     /// Angular accelerations without friction, rad/s2.
@@ -213,8 +214,8 @@ impl Linkage {
         }
     }
 
-    /// Stiffness of the neck, its damping, and its moment at zero angle and rate; all include the shoulder if
-    /// the neck leans on it.
+    /// Three numbers for the neck: its stiffness, its damping, and its moment at zero angle and rate. All
+    /// include the shoulder if the neck leans on it.
     fn neck_spring(&self, lean: ShoulderContact) -> [f64; 3] {
         let Spring { stiffness, damping } = self.neck;
         match (lean, &self.shoulder) {
@@ -303,7 +304,7 @@ impl Linkage {
         self.power_with_drop_w(pose, d, head, lean, force, accelerations, drop_rate)
     }
 
-    /// Power as in [`Self::power_w`], W, for a given rate of the head's drop, m/s; valid in flight too.
+    /// Power as in [`Self::power_w`], W, for a given rate of the head's drop, m/s. It is valid in flight too.
     #[allow(clippy::too_many_arguments)] // a state and its forces, named as in the equations
     #[must_use]
     pub fn power_with_drop_w(

@@ -43,7 +43,7 @@ pub struct Report {
     pub parameters: Vec<ParameterLine>,
     /// Friction of the best model at rest and at the largest speed of the tip.
     pub friction: Vec<FrictionLine>,
-    /// Products of powers of the parameters, each with whether the features determine it.
+    /// Products of powers of the parameters. Each line says whether the features determine the product.
     pub combinations: Vec<CombinationLine>,
     /// Advice on additional measurements, one sentence each.
     pub advice: Vec<String>,

@@ -1,5 +1,5 @@
-//! The stick-slip model run event by event: integrate a step, locate an event, decide the next mode, accept
-//! it.
+//! Runs the stick-slip model event by event: integrates a step, locates an event, decides the next mode of
+//! contact, and accepts it.
 //!
 //! Each mode of contact is a smooth phase ([`phases`]), which is integrated until one of its guards falls to
 //! zero. The next mode is a pure function of the forces ([`mode`]). Observers receive every accepted piece of
@@ -144,8 +144,9 @@ impl Observer for () {
 /// Accuracy, work limit and method of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SolverOptions {
-    /// Relative error allowed in a Runge-Kutta step. In a Taylor step, a fraction of it is allowed, so that
-    /// the errors of transition times, in s, are about as large as the tolerance. Fixed steps ignore it.
+    /// Relative error allowed in a Runge-Kutta step. A Taylor step is allowed only a fraction of this error,
+    /// so that the errors of transition times, in s, are about as large as the tolerance. Fixed steps ignore
+    /// it.
     pub relative_tolerance: f64,
     /// Number of evaluations of the right-hand side after which the run ends ([`RunStatus::WorkLimit`]).
     pub most_evaluations: u64,

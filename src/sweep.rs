@@ -28,7 +28,8 @@ use rayon::prelude::*;
 use std::ops::ControlFlow;
 use std::sync::mpsc::{Receiver, sync_channel};
 
-/// Maximum number of finished points that wait to be written, so that a slow disk does not fill the memory.
+/// Maximum number of finished points that may wait to be written. It keeps a slow disk from filling the
+/// memory.
 const WAITING: usize = 4096;
 
 /// Reason why a study stopped.

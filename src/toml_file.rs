@@ -80,7 +80,8 @@ pub(crate) fn schema_of<T: JsonSchema>() -> serde_json::Value {
     schema_for!(T).to_value()
 }
 
-/// The schema of a table: the schemas of its keys, and the required keys.
+/// Makes the schema of a table from its keys, each with the schema of its value, and from the names of the
+/// required keys.
 pub(crate) fn table_schema(
     keys: impl IntoIterator<Item = (String, serde_json::Value)>,
     required: &[&str],
@@ -101,7 +102,7 @@ pub(crate) fn parse_table(file: &str, text: &str) -> Result<toml::Table, TomlErr
     toml::from_str(text).map_err(|error| error_from_toml(file, text, &error))
 }
 
-/// One line per problem; quoted control characters are escaped.
+/// The messages of all problems, one line for each problem; control characters in quoted text are escaped.
 fn lines(problems: &[TomlError]) -> String {
     problems.iter().map(|problem| escape_controls(&problem.to_string())).collect::<Vec<_>>().join("\n")
 }
@@ -133,7 +134,8 @@ impl TryFrom<Vec<f64>> for NumberPair {
     }
 }
 
-/// A refusal that does not name the file: the key; and what was found, what was expected and what to do.
+/// A refusal of a key, without the name of the file. The first string is the key; the second says what was
+/// found, what was expected and what to do.
 pub(crate) type KeyRefusal = (String, String);
 
 pub(crate) fn refuse_key<T>(key: impl Into<String>, problem: impl Into<String>) -> Result<T, KeyRefusal> {

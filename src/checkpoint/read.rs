@@ -156,7 +156,7 @@ pub(super) struct RawLine<'a> {
     pub bytes: &'a [u8],
     /// Whether the line has a line end; the last line of a file may lack it.
     pub ended: bool,
-    /// Offset of the next line from the start of the file, bytes.
+    /// Offset of the next line from the start of the file, in bytes.
     pub end_offset: usize,
 }
 
@@ -190,7 +190,7 @@ pub fn sample_records(records: usize, seed: u64) -> Vec<usize> {
     (0..parts).map(draw).collect()
 }
 
-/// Maximum length of a line that is read, bytes. It is far above the length of any line that the program
+/// Maximum length of a line that is read, in bytes. It is far above the length of any line that the program
 /// writes, and prevents a file of another kind from filling the memory.
 const LONGEST_LINE: u64 = 1 << 28;
 
@@ -284,7 +284,7 @@ struct LineReader<S> {
     /// The bytes that were read last, up to a line feed. They are several lines if the lines of the file end
     /// in CR only.
     chunk: Vec<u8>,
-    /// Offset of the chunk from the start of the file, bytes.
+    /// Offset of the chunk from the start of the file, in bytes.
     start: usize,
     /// Number of bytes of the chunk that have been returned.
     used: usize,

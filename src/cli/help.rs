@@ -17,7 +17,7 @@ use clap_mangen::Man;
 use markdown::{find_section, render_for_terminal};
 use serde_json::Value;
 
-/// Maximum length of a line of a page, characters.
+/// Maximum length of a line of a page, in characters.
 const WIDTH: usize = 96;
 
 #[derive(Debug, Args)]

@@ -255,7 +255,7 @@ fn print_preview(imported: &Import, sources: &[ImportSource]) {
     }
 }
 
-/// Maximum length of a line of an exported table, bytes: enough for a hundred thousand columns.
+/// Maximum length of a line of an exported table, in bytes: enough for a hundred thousand columns.
 const LONGEST_LINE: usize = 1_000_000;
 /// Number of bytes at the start of a refused line that the error message shows.
 const LINE_SHOWN: usize = 40;

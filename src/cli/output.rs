@@ -52,7 +52,7 @@ pub(crate) fn print_lines(text: &str) {
 
 /// Writes filtered text to standard error.
 pub(crate) fn write_stderr(text: &str) {
-    let _ = io::stderr().lock().write_all(text.as_bytes()); // there is no other place to report it
+    let _ = io::stderr().lock().write_all(text.as_bytes()); // a failure here cannot be reported anywhere
 }
 
 /// Fails if something could not be written to standard output.

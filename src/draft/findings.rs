@@ -67,9 +67,9 @@ pub(crate) struct DraftFindings {
     pub(super) head: DraftHead,
 }
 
-/// Smallest fraction of the frames in which a point must be tracked to be used.
+/// A tracked point is used only if it is tracked in at least this fraction of the frames.
 const LEAST_TRACKED_SHARE: f64 = 0.5;
-/// Smallest travel of the head, m: a few pixels of the usual 20 um.
+/// A head that travels less than this distance, m, is refused: a few pixels of the usual 20 um.
 const LEAST_TRAVEL_M: f64 = 5e-5;
 /// Interval between the sampled speeds, s. Each speed is averaged over twice this time, a few cycles of
 /// chatter.
@@ -80,15 +80,15 @@ const MOST_FITTED: usize = 12_000;
 const SHARE_BEFORE_REVERSAL: f64 = 0.3;
 /// Lower and upper limit of the band of a component in a job, divided by the frequency of the component.
 const BAND_FACTORS: [f64; 2] = [0.6, 1.5];
-/// Highest frequency used, divided by the Nyquist frequency; above it, the exposure and the tracker attenuate
-/// too much.
+/// Upper limit of the frequencies of a draft, divided by the Nyquist frequency; above it, the exposure and
+/// the tracker attenuate too much.
 const HIGHEST_SHARE: f64 = 0.8;
 /// Frequency that separates the ring-down of the head (78 Hz in the paper) from the stick-slip cycle (about
 /// 900 Hz), Hz.
 const BETWEEN_HZ: f64 = 250.0;
-/// Largest relative standard deviation of the frequency of a component in a job.
+/// Largest relative standard deviation allowed for the frequency of a component in a job.
 const MOST_RELATIVE_SD: f64 = 0.05;
-/// Lowest frequency of a component, Hz; the frequency of the stroke is lower.
+/// Lower limit of the frequency of a component, Hz; the frequency of the stroke is lower.
 const LOWEST_HZ: f64 = 10.0;
 
 /// Maximum number of reversals that the findings list one by one.

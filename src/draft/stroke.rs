@@ -40,7 +40,7 @@ const COARSE: usize = 200;
 const REFINED: usize = 60;
 /// Averaging time of the speed of the tip, s.
 const SPEED_S: f64 = 0.01;
-/// Fraction of the maximum speed of the tip above which it counts as sliding.
+/// The tip counts as sliding if its speed is above this fraction of its maximum speed.
 const SLIDING: f64 = 0.3;
 
 /// Estimates the stroke that the tip follows; `None` if the tip does not slide enough.

@@ -247,7 +247,7 @@ pub struct PlaybackPart {
     pub from_s: f64,
     /// End of the part, on the clock of the motion, s.
     pub to_s: f64,
-    /// Slow-down factor.
+    /// Slow-down factor: playback time divided by the duration of the motion.
     pub slower: f64,
 }
 

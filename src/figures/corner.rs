@@ -31,7 +31,8 @@ pub struct CornerParameter {
     pub truth: Option<f64>,
     /// Values of the parameter, each with the ratio of its profile likelihood to the largest likelihood.
     pub profile: Vec<(f64, f64)>,
-    /// Values at which local searches ended with a cost within the threshold of the least cost.
+    /// Values at which local searches ended. The cost of each exceeds the least cost by at most the
+    /// threshold.
     pub optima: Vec<f64>,
 }
 
@@ -52,7 +53,7 @@ pub struct CornerPlot {
 const ROW_MM: f64 = 24.0;
 /// Maximum number of parameters drawn; of a longer list only the first ones are drawn.
 const MOST: usize = 8;
-/// Half widths of the joint regions, standard deviations: square roots of the 95.4 and 68.3 % quantiles of
+/// Half widths of the joint regions, in standard deviations: square roots of the 95.4 and 68.3 % quantiles of
 /// chi-square with two degrees of freedom.
 const REGIONS: [(&str, Colour, Mark, f64); 2] = [
     ("95 % of a pair", Colour::Blue, Mark::Thin, 2.486),
@@ -65,13 +66,13 @@ const POINTS: u32 = 48;
 const HALF: f64 = 0.5;
 const INSIDE: f64 = 0.44;
 const CURVE: f64 = 0.72;
-/// Smallest range that a cell shows on either side of the estimate, standard deviations; then the margin on
-/// either side of the shown range, as a fraction of that range.
+/// Each cell shows at least this range on either side of the estimate, in standard deviations. The second
+/// constant is the margin on either side of the shown range, as a fraction of that range.
 const SHOWN_SD: f64 = 2.8;
 const ROOM: f64 = 0.06;
-/// Smallest margin of a cell, in the unit scale of the search; a smaller range is rounding error.
+/// Smallest margin that a cell may have, in the unit scale of the search; a smaller range is rounding error.
 const LEAST: f64 = 1e-9;
-/// Half width of a two-sided 95 % interval, standard deviations.
+/// Half width of a two-sided 95 % interval, in standard deviations.
 const Z_95: f64 = 1.96;
 
 impl CornerPlot {

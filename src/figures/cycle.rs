@@ -39,8 +39,8 @@ const AXIS_MARGIN: f64 = 1.12;
 const LABEL_POSITIONS: [f64; 3] = [0.24, 0.52, 0.79];
 /// Number of letters after which the name of a target is cut.
 const MAX_LABEL_LETTERS: usize = 12;
-/// Lines closer than this have names at different positions along the lines; a fraction of the height of the
-/// axes.
+/// Two lines that are closer than this fraction of the height of the axes have their names at different
+/// positions along the lines.
 const CLOSE_LEVELS: f64 = 0.09;
 /// Distance of a name from its line, as a fraction of the height of the axes.
 const LABEL_OFFSET: f64 = 0.022;

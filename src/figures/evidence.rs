@@ -55,7 +55,7 @@ pub(crate) const NOTHING_LEFT: f64 = 1.1;
 /// Heights of the panels, mm.
 const HEIGHT_MM: f64 = 30.0;
 const RESIDUAL_HEIGHT_MM: f64 = 15.0;
-/// Half width of the interval that contains 95 % of the noise, standard deviations.
+/// Half width of the interval that contains 95 % of the noise, in standard deviations.
 const NOISE_95: f64 = 1.96;
 
 /// Draws the figure.

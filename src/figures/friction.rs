@@ -34,7 +34,7 @@ pub struct FrictionPlot {
     pub synthetic: bool,
     /// Fitted law: speeds, ascending, and coefficients.
     pub curve: Vec<(f64, f64)>,
-    /// Smallest and largest speed of the tip while it slips during the run.
+    /// Smallest and largest speed of the tip while it slips during the run, m/s.
     pub visited: Option<(f64, f64)>,
     /// Speeds, each with the lower and upper end of the coefficient's 95 % interval; empty if there is no
     /// interval.
@@ -49,7 +49,7 @@ pub struct FrictionPlot {
     pub of_model: Vec<(f64, f64)>,
     /// Speed bins: lower edge, upper edge, and fraction of the slip time.
     pub shares: Vec<(f64, f64, f64)>,
-    /// Mean speed of the head.
+    /// Mean speed of the head, m/s.
     pub head: Option<f64>,
 }
 

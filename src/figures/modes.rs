@@ -15,7 +15,7 @@ const BEYOND: f64 = 4.0;
 /// Heights of the panels of the compliance and of a mode shape, mm.
 const ANSWER_MM: f64 = 52.0;
 const SHAPE_MM: f64 = 44.0;
-/// Largest angle of a link from the vertical in a drawn mode shape, rad.
+/// Angle from the vertical, rad, of the more inclined link in a drawn mode shape.
 const SWING: f64 = 0.35;
 /// Half width of the panel of a mode shape, in lengths of the blade.
 const HALF_WIDTH: f64 = 0.5;

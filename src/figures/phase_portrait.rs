@@ -94,10 +94,10 @@ fn deflection_limits_mm(part: &PortraitPart) -> (f64, f64) {
 /// Upper limit of the ratio of the velocity noise (standard deviation) to the velocity range of a part, so
 /// that neighbouring cycles remain distinct.
 pub(crate) const MAX_VELOCITY_NOISE: f64 = 0.1;
-/// Longest time between the two frames of a central difference, in periods of the fastest component. A fifth
-/// of a period reduces the velocity amplitude by 6 %, in recording and model alike; at 900 Hz with 2 um of
-/// position noise, the velocity noise is 13 mm/s. With a twentieth of a period, the reduction would be only
-/// 0.4 %, but the velocity noise 51 mm/s, a quarter of a typical velocity range.
+/// Longest time allowed between the two frames of a central difference, in periods of the fastest component.
+/// A fifth of a period reduces the velocity amplitude by 6 %, in recording and model alike; at 900 Hz with 2
+/// um of position noise, the velocity noise is 13 mm/s. With a twentieth of a period, the reduction would be
+/// only 0.4 %, but the velocity noise 51 mm/s, a quarter of a typical velocity range.
 const MAX_DIFFERENCE_PERIODS: f64 = 0.2;
 
 /// Central difference: the velocity in a frame, from the positions in one frame before it and one equally far
@@ -116,10 +116,11 @@ impl CentralDifference {
         Self { half_frames: 1, frame_rate_hz }
     }
 
-    /// The shortest difference whose velocity noise is below [`MAX_VELOCITY_NOISE`] times the velocity range
-    /// `swing_m_per_s`; `noise_m` is the standard deviation of the white position noise. The time between the
-    /// two frames is at most a fifth of a period of `fastest_hz`, even if the noise is then larger. If
-    /// `fastest_hz` is unknown, it is the difference between neighbouring frames.
+    /// The central difference over the shortest time for which the velocity noise is below
+    /// [`MAX_VELOCITY_NOISE`] times the velocity range `swing_m_per_s`; `noise_m` is the standard deviation
+    /// of the white position noise. The time between the two frames is at most a fifth of a period of
+    /// `fastest_hz`, even if the noise is then larger. For an unknown `fastest_hz`, returns the difference
+    /// between neighbouring frames.
     pub(crate) fn for_noise(rate_hz: f64, noise_m: f64, swing_m_per_s: f64, fastest_hz: Option<f64>) -> Self {
         let shortest = Self::of_neighbouring_frames(rate_hz);
         let least = (shortest.noise_m_per_s(noise_m) / (MAX_VELOCITY_NOISE * swing_m_per_s)).ceil();
@@ -180,12 +181,13 @@ pub(crate) fn swing_m_per_s(states: &[PhasePoint]) -> Option<f64> {
 /// component, whose loops repeat.
 const LOW_CYCLES: f64 = 3.0;
 const HIGH_CYCLES: f64 = 12.0;
-/// Longest part, s, and length of a part if no frequency is known: some tens of cycles of the high component.
+/// Longest duration that a part may have, s; a part has this duration if no frequency is known: some tens of
+/// cycles of the high component.
 const LONGEST_S: f64 = 0.06;
 /// Minimum number of samples of the model in half the time between the two frames of a difference, so that
 /// linear interpolation follows the path of the model.
 const SAMPLES_APART: f64 = 2.0;
-/// Largest fraction of a part for which the tip may stick.
+/// The tip may stick for at most this fraction of a part.
 const MOST_STUCK: f64 = 0.8;
 
 /// Noise below this, m, is rounding error: it is far below the resolution of a camera.

@@ -27,7 +27,7 @@ pub struct ReversalPose {
     pub head_m_per_s: f64,
 }
 
-/// Largest time between a hold and the reversal, as a fraction of the duration of the run.
+/// Longest time allowed between a hold and the reversal, as a fraction of the duration of the run.
 const NEAR_TURN: f64 = 0.05;
 /// Ratio of the deflection at the pose `half way` to the deflection at the start of the hold.
 const HALF_WAY: f64 = 0.5;
@@ -244,8 +244,8 @@ const FRICTION_AT: f64 = -0.13;
 /// lengths of the upright blade.
 const TEXT_AT: f64 = -0.28;
 const TEXT_APART: f64 = 0.13;
-/// Largest length of the scale bar, its height, and the distance of its label above it, in lengths of the
-/// upright blade.
+/// Maximum length of the scale bar, its height above the glass, and the distance of its label above it, in
+/// lengths of the upright blade.
 const SCALE_BAR: (f64, f64, f64) = (0.4, 0.55, 0.09);
 /// Spacing and depth of the hatching of the glass, in lengths of the upright blade.
 const HATCHING: (f64, f64) = (0.08, 0.06);
@@ -271,7 +271,7 @@ pub fn draw_figure(shown: &PoseSequence) -> Figure {
     }
 }
 
-/// Velocity and force of the longest arrows.
+/// Speed of the head, m/s, and friction force, N, that the longest arrows show.
 pub(super) struct ArrowScale {
     pub speed_m_per_s: f64,
     pub force_n: f64,

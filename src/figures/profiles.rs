@@ -68,7 +68,7 @@ const INTERVALS: [(&str, Colour, MarkerShape, f64); 3] = [
     ("linear model", Colour::Orange, MarkerShape::Square, 2.05),
     ("bootstrap", Colour::Green, MarkerShape::Diamond, 2.5),
 ];
-/// Margin on either side of the x axis, fraction of its width.
+/// Margin on either side of the x axis, as a fraction of its width.
 const ROOM: f64 = 0.06;
 
 impl ProfilePlot {

@@ -29,14 +29,14 @@ pub struct PullPlot {
     pub without: Vec<String>,
 }
 
-/// Height of a row, and smallest height of the axes, mm.
+/// Height of a row, and minimum height of the axes, mm.
 const ROW_MM: f64 = 5.0;
 const LEAST_MM: f64 = 14.0;
-/// Half width of the interval that contains 95 % of the pulls of a correct model, standard deviations.
+/// Half width of the interval that contains 95 % of the pulls of a correct model, in standard deviations.
 const WITHIN_95: f64 = 1.96;
 /// Number of letters after which a name is cut in the heading.
 const LETTERS: usize = 16;
-/// Smallest value at which the axis ends, standard deviations.
+/// The axis extends at least to this value, in standard deviations of the target.
 const LEAST_END: f64 = 3.0;
 
 impl PullPlot {

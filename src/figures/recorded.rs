@@ -11,7 +11,7 @@ use plain_charts::{Colour, Figure, ShadedSpan};
 const MOST_NAMED: usize = 6;
 /// Maximum number of gaps that are marked; these are the longest ones.
 const MOST_GAPS: usize = 20;
-/// Shortest marked gap, frames; a shorter one would not be seen.
+/// A gap is marked if it has at least this number of frames; a shorter gap would not be visible.
 const LEAST_GAP: usize = 3;
 
 /// Draws the figure; `reversals` are instants, s, and `said` is the end of the line under the heading.

@@ -117,10 +117,11 @@ fn draw_growth(shown: &ResidualDiagnostics) -> Option<Panel> {
 
 // Comparison of the residual of a condition with white noise.
 
-/// Number of bins of the histogram, and minimum half width of its range, standard deviations of the noise.
+/// Number of bins of the histogram; and minimum half width of its range, in standard deviations of the noise.
 const HISTOGRAM_BINS: usize = 40;
 const MIN_HISTOGRAM_RANGE: f64 = 4.0;
-/// Longest lag of the autocorrelation: the smaller of a number of frames and a fraction of the recording.
+/// Upper limits of the lag of the autocorrelation: a number of frames, and a fraction of the length of the
+/// recording; the smaller one applies.
 const MAX_LAGS: usize = 60;
 const MAX_LAG_FRACTION: f64 = 0.25;
 /// Minimum number of frames that a figure needs.
@@ -129,7 +130,7 @@ const MIN_FRAMES: usize = 50;
 const MAX_SPECTRUM_POINTS: usize = 300;
 /// Number of tapers of the spectrum.
 const TAPERS: usize = 9;
-/// Half width of a two-sided 95 % interval, standard deviations.
+/// Half width of a two-sided 95 % interval, in standard deviations.
 const Z_95: f64 = 1.96;
 /// A residual counts as white noise if its root mean square, divided by that of the noise, is below 1 plus
 /// this value, and the absolute correlation of neighbouring frames is below this value.

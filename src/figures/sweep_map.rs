@@ -301,7 +301,7 @@ const COLOUR_QUANTILES: [f64; 2] = [0.02, 0.98];
 /// The smallest or largest value counts as an outlier if its distance from the nearer quantile exceeds this
 /// multiple of the range between the quantiles.
 const OUTLIER_DISTANCE: f64 = 0.25;
-/// Minimum number of values for which outliers are sought.
+/// Minimum number of values that a map needs before any of them can count as an outlier.
 const MIN_OUTLIER_SAMPLES: usize = 8;
 
 /// Values of the first and the last colour. `None` means the full range: there are too few values, or nearly

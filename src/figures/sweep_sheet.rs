@@ -13,7 +13,7 @@ use plain_charts::{
 /// Heights of a panel and of a row of the table of correlations, mm.
 const PANEL_MM: f64 = 42.0;
 const ROW_MM: f64 = 7.0;
-/// Smallest height of the table of correlations, in rows; the label of the colour bar needs this height.
+/// Minimum height of the table of correlations, in rows; the label of the colour bar needs this height.
 const FEWEST_ROWS: usize = 5;
 /// Number of letters that fit above a panel.
 const CLAIM_LETTERS: usize = 34;

@@ -51,8 +51,8 @@ impl Frame {
     }
 }
 
-/// A frame of the recording with the pose of the model. Each position, m, is relative to the head of the
-/// model along the sweep, and above the glass in height.
+/// A frame of the recording with the pose of the model. Each position is a pair, m: the distance along the
+/// sweep from the model's head, and the height above the glass.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Instant {
     /// Name of the event, such as `upright`.

@@ -54,7 +54,7 @@ pub enum ParameterScale {
 
 /// The physical quantity that a parameter describes; several parameters may describe the same quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[allow(missing_docs)] // the rows of the table say what each is
+#[allow(missing_docs)] // the rows of the table describe each of them
 pub enum ParameterQuantity {
     HeadMass,
     NeckMass,
@@ -179,8 +179,8 @@ pub(crate) fn stiffness_from_frequency(frequency_hz: f64, inertia: f64) -> f64 {
     inertia * math::powi(TAU * frequency_hz, 2)
 }
 
-/// Damping constant that gives a damping ratio: `ratio` times the critical damping `2 sqrt(stiffness
-/// inertia)`.
+/// Damping constant that gives a damping ratio: `ratio` times the critical damping
+/// `2 * sqrt(stiffness * inertia)`.
 pub(crate) fn damping_from_ratio(ratio: f64, stiffness: f64, inertia: f64) -> f64 {
     2.0 * ratio * (stiffness * inertia).sqrt()
 }

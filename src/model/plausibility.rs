@@ -34,7 +34,7 @@ impl std::fmt::Display for PlausibilityFinding {
 /// A usual mistake with a unit.
 #[derive(Debug, Clone, Copy)]
 pub struct UnitSlip {
-    /// Factor that corrects the value.
+    /// Factor by which the value must be multiplied to correct the mistake.
     pub factor: f64,
     /// The mistake in words, for example "millimetres written as metres".
     pub words: &'static str,

@@ -36,8 +36,8 @@ use std::fmt::Write;
 const DIGITS: usize = 4;
 /// Number of entries in the `[blade]` table.
 const COUNT: usize = 15;
-/// Smallest value of an input in a finite difference, as a fraction of the input: the limit keeps a dimension
-/// above zero even if the standard deviation exceeds the dimension.
+/// Lower limit of an input that is varied in a finite difference, as a fraction of its given value. It keeps
+/// a dimension above zero even if the standard deviation exceeds the dimension.
 const LEAST_SHARE: f64 = 0.1;
 
 /// A number of the `[blade]` table.
@@ -142,7 +142,7 @@ fn compute_entries(section: &BladeSection) -> [(&'static str, f64, &'static str)
     ]
 }
 
-/// Change of the entry with index `at` if an input changes by one standard deviation, from a central
+/// Change of the entry with index `at` if an input changes by one standard deviation; computed by a central
 /// difference.
 fn entry_change(section: &BladeSection, input: &SectionKey, at: usize) -> f64 {
     let value = section.number(input.name);

@@ -92,7 +92,8 @@ pub struct MotionSeries<const K: usize> {
     pub(super) drop_rate: [f64; K],
     pub(super) left: [LeftFactors; K],
     pub(super) right: [RightFactors; K],
-    /// Coefficients of `p = cos(angle) rate` and `q = sin(angle) rate` of the highest order computed so far.
+    /// Coefficients of `p = cos(angle) * rate` and `q = sin(angle) * rate`, of the highest order computed so
+    /// far.
     pub(super) p: LinkPair,
     pub(super) q: LinkPair,
 }
@@ -133,8 +134,8 @@ struct ProductSums {
 pub(super) struct RecurrenceConstants {
     pub l: LinkPair,
     pub m: LinkPair,
-    /// `m_a - M l1` and `m_b - M l2`, kg m: coefficients of `q' = (sin(angle) rate)'` of neck and lip in the
-    /// normal force.
+    /// `m_a - M * l1` and `m_b - M * l2`, kg m: coefficients of the rates `q'` of neck and lip in the
+    /// equation for the normal force, where `q = sin(angle) * rate`.
     pub arm: LinkPair,
     /// Inverse of the coefficient matrix of the angular accelerations, including friction in slip.
     pub inverse: [LinkPair; 2],
@@ -152,22 +153,23 @@ pub(super) struct RecurrenceConstants {
     /// from coefficients of lower orders.
     pub per_normal: LinkPair,
     pub per_slip: LinkPair,
-    /// Cosines and sines at the instant, times `m_c` and times `m`.
+    /// Cosines and sines of both angles at the instant: in the first two fields times `m_c`, in the last two
+    /// times `m`.
     pub cos_m_c: LinkPair,
     pub sin_m_c: LinkPair,
     pub cos_m: LinkPair,
     pub sin_m: LinkPair,
     /// Friction coefficient with the sign of the friction force.
     pub mu: f64,
-    /// Stiffness of the neck, its damping, and its moment at zero angle and rate; all include the shoulder if
-    /// the neck leans on it.
+    /// Three numbers for the neck: its stiffness, its damping, and its moment at zero angle and rate. All
+    /// include the shoulder if the neck leans on it.
     pub neck: [f64; 3],
     /// Painlevé indicator of slip; 1 in stick and in flight.
     pub indicator: f64,
 }
 
 impl<const K: usize> MotionSeries<K> {
-    /// Computes the coefficients of the motion from `pose` up to `x^order`; `self.head_velocity` must hold
+    /// Computes the coefficients of the motion from `pose` up to `x^order`; `self.head_velocity` must contain
     /// the coefficients of the head's velocity.
     pub(crate) fn expand(
         &mut self,

@@ -73,8 +73,8 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         [self.linkage.m_a, self.linkage.m_b]
     }
 
-    /// `m_a - M l1` and `m_b - M l2`, kg m: coefficients of `q' = (sin(angle) rate)'` of neck and lip in the
-    /// normal force.
+    /// `m_a - M * l1` and `m_b - M * l2`, kg m: coefficients of the rates `q'` of neck and lip in the
+    /// equation for the normal force, where `q = sin(angle) * rate`.
     pub(super) fn arms(&self) -> [f64; 2] {
         let (l, m) = (self.lengths(), self.moments());
         [m[0] - self.linkage.mass_kg * l[0], m[1] - self.linkage.mass_kg * l[1]]

@@ -23,7 +23,7 @@ impl Report {
     }
 }
 
-/// Largest size of a page with additional figures for telephones, bytes.
+/// Maximum size of a page with additional figures for telephones, in bytes.
 const MOST_BYTES: usize = 1_000_000;
 
 /// The page; the same report always gives the same bytes. If it would be too large, the additional figures

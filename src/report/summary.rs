@@ -17,7 +17,8 @@ use serde::Serialize;
 
 /// A run visibly deviates from the recording if the ratio of its residual to the noise exceeds this value.
 const SEEN: f64 = 3.0;
-/// Number of standard deviations from a met target above which the deviation of the model is mentioned.
+/// The deviation of the model from a met target is mentioned if it exceeds this number of standard deviations
+/// of the target.
 const FAR_SD: f64 = 1.96;
 
 /// The answer of a report.

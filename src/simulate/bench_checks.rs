@@ -21,12 +21,12 @@ pub struct BenchChecks {
     pub weight_n: f64,
     /// Masses and preload per metre of blade; `None` if the length is unknown.
     pub per_metre: Option<ChecksPerMetre>,
-    /// Force on the tip at which the displacements are given, N.
+    /// Force `F` on the tip for which the displacements are computed, N.
     pub tip_force_n: f64,
     /// Displacement of the tip along the glass under the force `F` on the tip, in free air with the head
-    /// held, m: `F ((l1 + l2)^2/k1 + l2^2/k2)`.
+    /// held, m: `F * ((l1 + l2)^2 / k1 + l2^2 / k2)`.
     pub tip_displacement_m: f64,
-    /// Displacement of the tip under the force `F` if head and neck are held, m: `F l2^2/k2`.
+    /// Displacement of the tip under the force `F` if head and neck are held, m: `F * l2^2 / k2`.
     pub lip_displacement_m: f64,
     /// Displacement of the support under the preload, m: `N0/k0`.
     pub preload_displacement_m: f64,

@@ -25,7 +25,7 @@ pub enum Drive {
         #[serde(skip_serializing_if = "is_zero")]
         delay_s: f64,
     },
-    /// Uniform motion `v = speed t`, for tests with exact solutions; a scene file cannot select it.
+    /// Uniform motion `v = speed * t`, for tests with exact solutions; a scene file cannot select it.
     Uniform {
         /// Speed of the head, m/s.
         speed_m_per_s: f64,
@@ -136,7 +136,7 @@ const FEWEST_FRAMES: usize = 10;
 /// Time at either end of a recording in which the acceleration of the head is ten times less certain than in
 /// the middle, s. A run avoids these times.
 pub(crate) const UNCERTAIN_END_S: f64 = 0.01;
-/// Fraction of the head's top speed above which a run may start in steady slip.
+/// Smallest speed of the head at which a run may start in steady slip, as a fraction of the head's top speed.
 pub(crate) const EVEN_SPEED_SHARE: f64 = 0.2;
 
 /// Why a recording does not give the head's motion.
@@ -177,8 +177,8 @@ pub fn smooth_head_motion(recording: &Recording) -> Result<HeadSpline, HeadMotio
     Ok(HeadSpline::from_points(&grid, &points, block, &knots))
 }
 
-/// First time at which the head is fast enough for a start in steady slip, s; it is after the uncertain start
-/// of the recording.
+/// First time at which the head is fast enough for a start in steady slip, s. It is later than the uncertain
+/// part at the start of the recording.
 pub(crate) fn even_motion_start_s(motion: &HeadSpline) -> f64 {
     const STEP_S: f64 = 1e-3;
     let [first_s, last_s] = motion.span_s();

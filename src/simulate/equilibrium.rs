@@ -36,12 +36,12 @@ pub fn steady_slip_pose(linkage: &Linkage, speed_m_per_s: f64) -> Option<Pose> {
     (is_pressed && is_upright).then_some(pose)
 }
 
-/// Largest trial coefficient of friction; it is reached from 0 in [`FRICTIONS`] equal steps.
+/// Largest coefficient of friction that is tried; it is reached from 0 in [`FRICTIONS`] equal steps.
 const MOST_FRICTION: f64 = 1.5;
 const FRICTIONS: u32 = 300;
 
-/// Equilibria in slow slip, in order of deflection. Each has a coefficient of friction with the sign of the
-/// tip's velocity, and the deflection `tip_x - head_x`, m.
+/// Equilibria in slow slip, in order of deflection. Each is a pair: the coefficient of friction, with the
+/// sign of the tip's velocity, and the deflection `tip_x - head_x`, m.
 ///
 /// In each direction, the list ends where no equilibrium exists or where a larger coefficient no longer
 /// increases the deflection.

@@ -41,7 +41,7 @@ pub(super) struct EventLoop<'a> {
     /// First trial steps of the next stick, slip and flight phase, s.
     steps: [Option<f64>; 3],
     recent: ChatterDetector,
-    /// Shortest period of the links, s.
+    /// Shortest natural period of the links, without preload and damping, s.
     shortest_period_s: f64,
     /// Number of consecutive short rebounds up to now.
     short_rebounds: u32,
@@ -324,9 +324,9 @@ impl<'a> EventLoop<'a> {
             }
             Ended::StepTooSmall => NextPhase::End(RunStatus::Diverged),
             Ended::Guard(JAMS) if self.is_at_pole(&phase, &pose) => self.resolve_jam(&pose, mode),
-            // the Painlevé indicator is not near zero in this pose, so slip continues from it; a step past
-            // the instant at which the tip stops evaluates friction at negative speed, where a steeply
-            // falling law grows without bound and may make the indicator negative
+            // the Painlevé indicator is not near zero in this pose, so slip continues from this pose; the
+            // indicator seemed negative because the step went past the instant at which the tip stops: there,
+            // friction is evaluated at negative speed, at which a steeply falling law grows without bound
             Ended::Guard(JAMS) => {
                 self.recent.note_event(self.t);
                 self.shorten_slip_step();
@@ -354,7 +354,7 @@ impl<'a> EventLoop<'a> {
     }
 
     fn shorten_slip_step(&mut self) {
-        /// Factor by which the next first step of slip is shortened.
+        /// Factor on the first step of the next slip phase; it shortens this step.
         const SHORTER: f64 = 0.1;
         self.steps[1] = self.steps[1].map(|step| SHORTER * step);
     }
@@ -388,8 +388,8 @@ impl<'a> EventLoop<'a> {
 /// Order of the zero of the tip's velocity when slip starts from rest: 1 if the holding force exceeds the
 /// static limit, 2 if both are equal up to rounding, as at the end of stick.
 fn release_order(contact: &FrictionResponse, mu: f64) -> u8 {
-    /// Largest relative excess of the holding force over the limit at which the two count as equal: far above
-    /// rounding, far below the resolution of a step.
+    /// The holding force counts as equal to the static limit if its relative excess over the limit is below
+    /// this value, which is far above rounding errors and far below the resolution of a step.
     const EQUAL: f64 = 1e-11;
     let force = holding_force(contact);
     let limit = mu * (contact.n_free + contact.nu * force);

@@ -57,7 +57,7 @@ pub(crate) struct StabilisedStickPhase<'a> {
 }
 
 impl<'a> StabilisedStickPhase<'a> {
-    /// Stick that holds the tip at its position in a pose.
+    /// Stick that holds the tip at the position that it has in `pose`.
     pub(crate) fn from_pose(
         system: &'a DrivenBlade,
         t: f64,
@@ -70,8 +70,8 @@ impl<'a> StabilisedStickPhase<'a> {
         Self { system, place_m, lean, gain_per_s }
     }
 
-    /// Forces on the tip with which it returns to its target position: `v3dd = a_free + kappa f = -2 a Phi' -
-    /// a^2 Phi`.
+    /// Forces on the tip that return it to its target position; the friction force `f` satisfies
+    /// `a_free + kappa * f = -2 * a * Phi' - a^2 * Phi`.
     #[inline]
     pub(super) fn stabilised_forces(&self, pose: &Pose, at: &ContactInstant) -> TipForces {
         let ContactInstant { head, directions, contact } = at;

@@ -9,8 +9,8 @@ use hybrid_ode::HybridPhase;
 use hybrid_ode::taylor::TaylorPhase;
 use portable_math as math;
 
-/// Index of the guard of landing, the gap, which falls to zero. The guards of the shoulder and of level links
-/// are the same as in contact; the other guards of contact do not apply.
+/// Index of the guard of landing: the gap between tip and glass, which falls to zero. The guards of the
+/// shoulder and of level links are the same as in contact; the other guards of contact do not apply.
 pub(crate) const LANDING: usize = 0;
 
 /// The phase of flight; the states are `(theta, phi, gap, theta_rate, phi_rate, gap_rate)`.

@@ -67,10 +67,10 @@ pub fn holding_force(contact: &FrictionResponse) -> f64 {
 
 /// Decides the next mode of a tip at rest; `mu` is the static friction coefficient `A + C`.
 ///
-/// If `1 + sigma mu nu` is positive in both directions, exactly one mode is consistent: stick if the holding
-/// force is within the static limit and the glass presses on the tip, lift-off if the glass would have to
-/// pull, otherwise slip against the holding force. Otherwise (the Painlevé region), the consistency of every
-/// mode is tested.
+/// If `1 + sigma * mu * nu` is positive in both directions of slip (`sigma` = +1 and -1), exactly one mode is
+/// consistent: stick if the holding force is within the static limit and the glass presses on the tip,
+/// lift-off if the glass would have to pull, otherwise slip against the holding force. If it is not (the
+/// Painlevé region), the consistency of every mode is tested.
 pub(crate) fn decide_mode_at_rest(contact: &FrictionResponse, mu: f64) -> RestDecision {
     let force = holding_force(contact);
     let normal = contact.n_free + contact.nu * force;
@@ -114,7 +114,7 @@ mod tests {
 
     #[test]
     fn the_holding_force_within_the_limit_sticks_and_beyond_it_slips_against_it() {
-        // holding the tip needs 0.5 N of at most 0.6 N
+        // a force of 0.5 N holds the tip, and static friction can give up to 0.6 N
         assert_eq!(decide_mode_at_rest(&contact(1.0, 1.0, 0.0), 0.6), RestDecision::Becomes(TipMode::Stick));
         assert_eq!(
             decide_mode_at_rest(&contact(1.0, 1.0, 0.0), 0.4),

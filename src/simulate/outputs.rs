@@ -75,10 +75,11 @@ impl Observer for StickIntervals {
     }
 }
 
-/// Largest angle of a link from the vertical.
+/// Largest angle of neck or lip from the vertical in a run.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct LargestTilt {
-    /// The largest angle, rad, taken only at the ends of the pieces of the solution; a swing has many pieces.
+    /// The largest angle at the ends of the pieces of the solution, rad. Between these ends, the angle is not
+    /// sampled; a swing of a link has many pieces.
     pub largest_rad: f64,
     /// Time of the largest angle, s.
     pub at_s: f64,
@@ -137,7 +138,7 @@ pub struct EnergyAudit {
     exchanged_j: f64,
     largest_energy_j: f64,
     largest_residual_j: f64,
-    /// Largest drift of the tip from its position in stick, m.
+    /// Largest distance of the tip, during stick, from the position at which it is held, m.
     pub max_constraint_drift_m: f64,
     /// Smallest normal force on the tip while it is in contact, N.
     pub min_normal_force_n: Option<f64>,

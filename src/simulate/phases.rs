@@ -116,7 +116,7 @@ pub(crate) struct TipForces {
     pub friction_n: f64,
     /// Normal force on the tip, N.
     pub normal_n: f64,
-    /// Painlevé indicator `1 + sigma mu nu` of slip; 1 in stick.
+    /// Painlevé indicator of slip, `1 + sigma * mu * nu`; 1 in stick.
     pub indicator: f64,
     /// Angular accelerations of neck and lip, rad/s^2.
     pub accelerations: [f64; 2],
@@ -140,8 +140,8 @@ pub(crate) fn pose_from_states(y: &[f64; 4]) -> Pose {
 }
 
 impl SlipPhase<'_> {
-    /// Speed of the tip in the direction of slip, m/s, and the forces `f = -sigma mu N` with
-    /// `N = n_free / (1 + sigma mu nu)`.
+    /// Speed of the tip in the direction of slip, m/s, and the forces on the tip: the friction force
+    /// `f = -sigma * mu * N` with the normal force `N = n_free / (1 + sigma * mu * nu)`.
     #[inline]
     pub(super) fn slip_forces(&self, pose: &Pose, at: &ContactInstant) -> (f64, TipForces) {
         let speed = self.direction * self.system.linkage.tip_velocity_m_per_s(pose, &at.directions, &at.head);
@@ -243,7 +243,7 @@ impl<'a> StickPhase<'a> {
     /// has lost about nine bits of precision.
     const LEAST_COSINE: f64 = 1e-3;
 
-    /// Stick that holds the tip at its position in a pose with both links above level.
+    /// Stick that holds the tip at the position that it has in `pose`; both links must be above level.
     #[must_use]
     pub fn from_pose(system: &'a DrivenBlade, t: f64, pose: &Pose, lean: ShoulderContact) -> Self {
         let directions = LinkDirections::from_pose(pose);
@@ -289,7 +289,8 @@ impl<'a> StickPhase<'a> {
         }
     }
 
-    /// The forces that hold the tip: `v3dd = a_free + kappa f = 0`.
+    /// The forces that hold the tip: the friction force `f` makes the tip acceleration `a_free + kappa * f`
+    /// zero.
     #[inline]
     pub(super) fn holding_forces(&self, at: &ContactInstant) -> TipForces {
         let friction = super::mode::holding_force(&at.contact);

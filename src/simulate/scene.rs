@@ -51,7 +51,8 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Reads and validates a scene that needs no other file; error messages name the scene `file`.
+    /// Reads and validates a scene that needs no other file; `file` is the name of the scene in error
+    /// messages.
     ///
     /// # Errors
     /// [`SceneError`] with file, line, key, finding and advice; also for a scene with `drive.recording`,
@@ -202,7 +203,7 @@ impl Scene {
         Err(key_error(&self.file, name, found, expected, advice))
     }
 
-    /// Names and values of all parameters that the scene gives, under the names as written.
+    /// Names and values of all parameters that the scene file gives, under the names that the file uses.
     pub fn written_values(&self) -> impl Iterator<Item = (&'static str, f64)> {
         self.values.iter().map(|(name, value)| (*name, *value))
     }

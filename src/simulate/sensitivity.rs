@@ -1,5 +1,5 @@
-//! Derivatives of a run with respect to parameters, initial state and drive. They are as accurate as the
-//! tolerance and are computed along the steps of the run and through its transitions.
+//! Derivatives of a run with respect to parameters, initial state and drive. Their relative error is about
+//! the tolerance of the run. They are computed along the steps of the run and through its transitions.
 //!
 //! Between transitions, the derivatives obey the linear equations of [`crate::model::tangent`] along the
 //! series of each step. These are solved by collocation ([`hybrid_ode::collocation`]); all directions share
@@ -53,9 +53,9 @@ pub struct TangentRunner {
 }
 
 impl TangentRunner {
-    /// A runner whose derivatives have the relative accuracy `relative` within a step and are far more
-    /// accurate at its ends; for searches that need no higher accuracy. The default accuracy is the tolerance
-    /// of the run, which `relative` does not change.
+    /// Returns a runner for searches that need no high accuracy. Within a step, its derivatives have the
+    /// relative error `relative`; at the ends of a step they are far more accurate. Without this call, the
+    /// relative error is the tolerance of the run. `relative` does not change the tolerance of the run.
     #[must_use]
     pub fn with_accuracy(relative: f64) -> Self {
         Self { room: TangentWorkspace::default(), accuracy: Some(relative) }

@@ -20,7 +20,7 @@ use std::fmt::Write;
 pub struct TrackingModel {
     /// Scale of the image, m per pixel.
     pub metres_per_pixel: f64,
-    /// Standard deviation of a tracked coordinate, pixels.
+    /// Standard deviation of a tracked coordinate, in pixels.
     pub noise_px: f64,
     /// Probability that a point is lost in a frame, 0 to 1.
     pub dropout_fraction: f64,
@@ -193,7 +193,7 @@ mod tests {
         let seen = add_tracking_noise(&view, "noisy", &tracking).unwrap();
         let present: Vec<f64> = seen.traces().tip_x_m.iter().flatten().copied().collect();
         let sd = (present.iter().map(|x| (x - 1.0).powi(2)).sum::<f64>() / present.len() as f64).sqrt();
-        assert!((sd / 2e-6 - 1.0).abs() < 0.03, "{sd}"); // 6 standard errors of a standard deviation
+        assert!((sd / 2e-6 - 1.0).abs() < 0.03, "{sd}"); // the limit is 6 standard errors of `sd`
         let lost = 1.0 - present.len() as f64 / frames as f64;
         assert!((lost - 0.05).abs() < 6.0 * (0.05 * 0.95 / frames as f64).sqrt(), "{lost}");
         assert_eq!(

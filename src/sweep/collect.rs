@@ -25,7 +25,7 @@ pub struct AddedPoints {
     pub points: usize,
     /// Number of points that no earlier journal contained.
     pub new: usize,
-    /// The end of the journal, which may be a torn line.
+    /// How the journal ends, for example with an incomplete line.
     pub end: CheckpointEnd,
 }
 

@@ -84,7 +84,8 @@ impl PointOutcome {
         flow: impl Fn() -> ControlFlow<()>,
     ) -> Result<Self, (EarlyEnd, Option<f64>)> {
         let scene = scene().map_err(|error| (EarlyEnd::new(MissingReason::NoStart, error), None))?;
-        // a study may set a preload or a friction for which the scene has no steady equilibrium to start in
+        // a study may set a preload or a friction with which the scene has no steady slip from which the run
+        // could start
         let speed = scene.drive.motion_at(scene.start_s).velocity_m_per_s;
         if scene.start == StartKind::SteadySlide && steady_slip_pose(&scene.linkage, speed).is_none() {
             return Err((EarlyEnd::new(MissingReason::NoStart, ""), None));

@@ -64,8 +64,8 @@ pub(crate) fn format_signed_percent(share: f64) -> String {
     format!("{} %", typeset(written))
 }
 
-/// Smallest standard deviation of an angle that is shown, degrees; 0.0001 degrees move a point at 6 mm by
-/// 0.01 um.
+/// A standard deviation of an angle that is smaller than this value, degrees, is shown as this value; 0.0001
+/// degrees move a point at 6 mm by 0.01 um.
 const LEAST_SHOWN_DEGREES: f64 = 1e-4;
 
 /// An angle with its standard deviation, both in rad, as degrees in ASCII: `0.300(1) degrees`.

@@ -19,7 +19,7 @@ const TOML_LIMIT: ReadLimit =
 const JSON_LIMIT: ReadLimit =
     ReadLimit { largest: FileSize(16_000_000), advice: "this program writes none so large; make it again" };
 
-/// Size limit of a data file, bytes; the option `--max-file-size` sets it.
+/// Size limit of a data file, in bytes; the option `--max-file-size` sets it.
 static MAX_DATA_BYTES: AtomicU64 = AtomicU64::new(FileSize::DEFAULT.0);
 
 /// A number of bytes.

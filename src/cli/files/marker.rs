@@ -76,7 +76,7 @@ impl FolderMarker {
     }
 }
 
-/// Size limit of a marker, description or summary, bytes; the files of this program are smaller.
+/// Size limit of a marker, description or summary, in bytes; the files of this program are smaller.
 const MAX_MARKER_BYTES: u64 = 16_000_000;
 
 /// Reads a marker, description or summary, if it is a file of at most [`MAX_MARKER_BYTES`].

@@ -6,7 +6,7 @@ use crate::cli::report;
 use crate::report::assembly;
 use crate::report::fit_comparison::{ComparisonInput, compare_fits, comparison_json, render_page};
 
-/// Maximum length, bytes, of a folder name that is made from the names of fits; file systems allow longer
+/// Maximum length, in bytes, of a folder name that is made from the names of fits; file systems allow longer
 /// names.
 const LONGEST_NAME: usize = 100;
 

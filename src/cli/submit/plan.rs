@@ -15,7 +15,8 @@ const SHORTEST_S: u64 = 60;
 /// Time by which a task ends before its walltime, as a fraction of the walltime. It allows for points in
 /// progress and for a late start.
 const MARGIN: f64 = 0.05;
-/// Smallest and largest time by which a task ends before its walltime, s.
+/// Limits, s, of the time by which a task ends before its walltime: it is at least the first and at most the
+/// second number.
 const MARGINS_S: (u64, u64) = (30, 300);
 
 /// An array of tasks, and the final job that runs after them.

@@ -10,12 +10,12 @@ use plain_charts::{ChartAxis, Colour, Mark, Panel, Series, TextAnnotation, value
 const MM: f64 = 1e3;
 /// Estimated width of axes that take half of the page, mm; determines the scale of the drawing.
 const AXES_MM: f64 = 70.0;
-/// Smallest and largest height of the drawing, mm.
+/// Smallest and largest height that the drawing may have, mm.
 const HEIGHT_MM: (f64, f64) = (50.0, 80.0);
 /// Margins above the blade (for head and labels) and below the glass, in lengths of the blade.
 const ABOVE: f64 = 0.42;
 const BELOW: f64 = 0.13;
-/// Smallest distance between two pose names in a row, and distance between rows, mm.
+/// Smallest distance allowed between two pose names in one row, and distance between rows of names, mm.
 const LABEL_MM: f64 = 10.0;
 const ROW_MM: f64 = 3.2;
 /// Distance between the middle of a text and the left or right end of the drawing, mm.

@@ -9,21 +9,22 @@ use crate::simulate::mode::TipMode;
 use plain_charts::{Colour, PanelPlacement};
 use std::fmt::Write;
 
-/// Largest position error of a drawn point, canvas units: a fiftieth of a millimetre, less than a line width.
+/// Largest position error allowed for a drawn point, in canvas units: a fiftieth of a millimetre, less than a
+/// line width.
 const TOLERANCE: f64 = 0.3;
-/// Half widths of the tip's symbol and of the cross at a measured point, canvas units.
+/// Half widths of the tip's symbol and of the cross at a measured point, in canvas units.
 const TIP_HALF_WIDTH: f64 = 20.0;
 const CROSS_HALF_WIDTH: f64 = 15.0;
-/// Distance of the mode symbol below the tip, canvas units.
+/// Distance of the mode symbol below the tip, in canvas units.
 const SYMBOL_OFFSET: f64 = 40.0;
-/// Distance of a link's name from the middle of the link, canvas units.
+/// Distance of a link's name from the middle of the link, in canvas units.
 const NAME_OFFSET: f64 = 52.0;
 /// Background colour of the figure.
 const BACKGROUND: &str = "#FFFFFF";
-/// Font size, canvas units.
+/// Font size, in canvas units.
 const TEXT_SIZE: f64 = 44.0;
-/// Shortest time for which a measured point is shown, as a fraction of the playback time; a screen cannot
-/// show anything shorter.
+/// A measured point is shown for at least this fraction of the playback time; a screen cannot show anything
+/// shorter.
 const MIN_CROSS_FRACTION: f64 = 1.0 / 2000.0;
 
 /// A contact mode, its name, and the colour and outline of its symbol. The outline is an SVG path in units of
@@ -62,7 +63,8 @@ fn pose_key_frames(animation: &Animation, plot: &PanelPlacement) -> KeyFrames<6>
     animation.samples.iter().filter_map(point).collect()
 }
 
-/// Key frames of `N` consecutive numbers of each pose, beginning at index `from`; simplified.
+/// Key frames of `N` consecutive numbers of each pose, beginning at index `from`; superfluous key frames are
+/// left out.
 fn select_numbers<const N: usize>(poses: &KeyFrames<6>, from: usize) -> KeyFrames<N> {
     let some: KeyFrames<N> =
         poses.iter().map(|(share, all)| (*share, std::array::from_fn(|k| all[from + k]))).collect();

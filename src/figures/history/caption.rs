@@ -39,7 +39,7 @@ fn build_history(case: &ConditionComparison) -> TimeHistory {
     let whole_s = (grid.start_s, grid.time_s(grid.frames.saturating_sub(1)));
     let zoom_s = release_s(&shown);
     let light = |traces: MotionTraces| thin_frames(traces, whole_s, zoom_s);
-    // thinned one after the other, so that only one full motion is in memory
+    // the motions are thinned one after the other, so that only one full motion is in memory
     let measured = case.recording().map(MotionTraces::from_recording).map(light);
     let model = light(MotionTraces::from_model(&case.model.view.recording, &case.alignment));
     let windows = fit_window_spans(case).into_iter().enumerate();

@@ -13,8 +13,9 @@ use crate::text::{
 };
 use short_spectra::{SampledRecord, SpectralAnalysis, SpectrumSettings};
 
-/// The highest frequency shown is at least this multiple of the upper end of the band of the fit,
-/// `MIN_TOP_HZ` and the frequency of every component. Above it, a fast camera records only noise.
+/// The spectra are shown up to the largest of three frequencies: this multiple of the upper end of the band
+/// of the fit, `MIN_TOP_HZ`, and the highest frequency of a component. Above it, a fast camera records only
+/// noise.
 const BAND_MARGIN: f64 = 10.0;
 
 const MIN_TOP_HZ: f64 = 5e3;

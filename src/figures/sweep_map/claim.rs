@@ -7,9 +7,9 @@ use crate::sweep::{PointOutcome, Study, SweepAxis, SweepMap};
 use crate::text::{capitalise, format_decimals, format_trimmed};
 use portable_math as math;
 
-/// Smallest absolute rank correlation of a clear trend.
+/// A trend is clear if the absolute value of its rank correlation is at least this.
 const CLEAR: f64 = 0.5;
-/// Smallest fraction of points with a value for which trends are stated.
+/// Trends are stated only if at least this fraction of the points has a value.
 const MOSTLY_KNOWN: f64 = 0.5;
 /// Number of significant digits of that end of the range that has the larger absolute value.
 const DIGITS: i32 = 3;

@@ -123,7 +123,8 @@ impl BladeSection {
         section
     }
 
-    /// Cross section of the neck or the lip, as `table` names it.
+    /// Cross section of a link; `table` is the name of its table in the file, which belongs to the neck or
+    /// the lip.
     pub(super) fn link_section(&self, table: &str) -> LinkSection {
         let of = |key: &str| self.values.get(format!("{table}.{key}").as_str()).copied();
         let number = |key: &str| of(key).unwrap_or(0.0); // completeness was checked

@@ -17,8 +17,8 @@ const MICROMETRES: f64 = 1e6;
 /// Note in the subtitle if both synthetic and other recordings are drawn.
 const MIXED: &str = "some recordings are synthetic: no camera took those marked so";
 
-/// What the windows of a group have in common: the channel, the instants at which they begin and end, and
-/// their number among the windows of this kind in a fit.
+/// A kind of windows, which is the same for all windows of a group: the channel, the instants at which the
+/// windows begin and end, and their number among the windows of this kind in a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct WindowKind {
     channel: Channel,

@@ -28,7 +28,7 @@ pub(crate) struct ReferenceRun<'a> {
     pub state_apart: f64,
 }
 
-/// Errors, relative to the reference run, and cost of a run with one solver setting.
+/// Errors and cost of a run with one solver setting. The errors are relative to the reference run.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct AccuracyRow {
     pub setting: SolverSetting,

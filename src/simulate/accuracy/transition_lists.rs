@@ -44,7 +44,8 @@ fn is_of_one_kind(a: &Transition, b: &Transition) -> bool {
     (a.from, a.to) == (b.from, b.to)
 }
 
-/// Number of pairs of transitions; both lists are in order of time.
+/// Number of pairs of transitions with the same modes, whose times differ by less than `apart_s`, s. Both
+/// lists are in order of time.
 fn count_pairs(reference: &[Transition], found: &[Transition], apart_s: f64) -> usize {
     let (mut i, mut j, mut count) = (0, 0, 0);
     while let (Some(a), Some(b)) = (reference.get(i), found.get(j)) {

@@ -7,9 +7,9 @@ use portable_math as math;
 use serde::Serialize;
 use std::sync::Arc;
 
-/// An instant that lies before a knot by less than this number of frames counts as the knot, so that no tiny
-/// piece remains. The jump of the third derivative changes the position over this time by 1e-18 of the change
-/// over a frame.
+/// An instant that is less than this number of frames before a knot counts as the knot, so that no tiny piece
+/// remains. The third derivative jumps at the knot; the effect of the jump on the position is 1e18 times
+/// smaller within this time than within a whole frame.
 const NEAR_FRAMES: f64 = 1e-6;
 
 /// Position of the head as cubics between knots; only the third derivative jumps at a knot. The outermost
@@ -21,7 +21,7 @@ pub struct HeadSpline {
     knots_s: Vec<f64>,
     /// Taylor coefficients of the position about the first knot of each piece, m/s^k, in rising order.
     pieces: Vec<[f64; 4]>,
-    /// Index of the piece of each frame, from the first knot on.
+    /// For each frame from the first knot on: index of the piece that contains the frame.
     piece_of_frame: Vec<usize>,
     /// The smooth curve to which the cubics are fitted, if any.
     #[serde(skip)]
@@ -31,8 +31,8 @@ pub struct HeadSpline {
 impl HeadSpline {
     /// Cubic spline through the values of a smooth curve at the frames `knots`.
     ///
-    /// The curve is fitted to `points`, at least three frames of `grid` in rising order with positions in m,
-    /// averaged in blocks of `block` frames.
+    /// The curve is fitted to `points`: at least three frames of `grid` in rising order, each with a
+    /// position, m. For the fit, the positions are averaged in blocks of `block` frames.
     pub(super) fn from_points(
         grid: &FrameGrid,
         points: &[(usize, f64)],

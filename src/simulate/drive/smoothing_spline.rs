@@ -3,8 +3,8 @@
 //! Generalised cross-validation chooses the number of pieces (Craven and Wahba 1979, *Numerische Mathematik*
 //! 31, 377). Each degree of freedom counts as 1.4, so that noise does not add pieces (Kim and Gu 2004,
 //! *Journal of the Royal Statistical Society* B 66, 337). A crank moves the head smoothly over tenths of a
-//! second, so that a few pieces average the noise of thousands of frames; motion by hand needs more pieces. A
-//! cubic smoothing spline has two to three times the position error on noisy cosines.
+//! second, so that a few pieces average the noise of thousands of frames; motion by hand needs more pieces.
+//! On noisy cosines, the position error of a cubic smoothing spline is two to three times as large.
 //!
 //! Tracking noise is correlated over a few frames (vibration, sub-pixel bias), and cross-validation would
 //! mistake it for motion. Points are therefore averaged in blocks, and each block is compared with the
@@ -240,7 +240,8 @@ fn b_splines<const N: usize>(x: f64) -> [f64; N] {
 struct BandedMatrix(Vec<[f64; BLOCK_WIDTH]>);
 
 impl BandedMatrix {
-    /// Adds `weight row^T row`, where the first element of `row` belongs to column `from`.
+    /// Adds `weight * transpose(row) * row` to the matrix; the first element of `row` belongs to column
+    /// `from`.
     fn add_outer_product(&mut self, from: usize, row: &[f64], weight: f64) {
         for (a, left) in row.iter().enumerate().filter(|(_, left)| **left != 0.0) {
             for (b, right) in row[a..].iter().enumerate() {

@@ -38,11 +38,11 @@ impl EventLoop<'_> {
         self.system.linkage.flight_accelerations(state, &d, &head, self.lean).gap_m_per_s2
     }
 
-    /// Order of the zero of the gap at lift-off: the order of the largest term of the gap's series over a
-    /// short time. The order is 1 after a rebound, 2 after a jump of the forces, and 3 after the normal force
-    /// passes zero, where the gap's acceleration is zero except for errors. A rebound whose gap decelerates
-    /// has order 1 regardless of the other terms. In other cases, a lower-order term may be neglected if it
-    /// is positive and smaller, because it only widens the gap.
+    /// Order of the zero that the gap has at lift-off: the order of that term of the gap's Taylor series that
+    /// is largest over a short time. It is 1 after a rebound, 2 after a jump of the forces, and 3 after the
+    /// normal force has passed zero, where the acceleration of the gap is zero except for errors. A rebound
+    /// always has order 1 if its gap decelerates. Otherwise, a positive term of lower order may be neglected
+    /// if it is smaller, because it only widens the gap.
     pub(super) fn gap_order(&self, state: &FlightState) -> u8 {
         /// Length of the short time over which the terms are compared, as a fraction of the shortest period
         /// of the links.
@@ -57,7 +57,7 @@ impl EventLoop<'_> {
         let [first, second, third] = [state.gap_rate_m_per_s, 0.5 * now * time, change * time / 6.0];
         match () {
             () if first > 0.0 && (now < 0.0 || first > second.max(third)) => 1,
-            // the order is 2 also if the third term is negative: with order 3, a rising tip would look like a
+            // a negative third term does not raise the order to 3, since a rising tip would then look like a
             // landing tip
             () if second.abs() > third => 2,
             () => 3,

@@ -26,8 +26,8 @@ impl SceneReader<'_> {
         numbers.try_for_each(|(key, value)| self.read_number(&format!("{table}.{key}"), Some(value)))
     }
 
-    /// Place and path of the recording that drives the head. `None` for a cosine drive, whose numbers are
-    /// then read.
+    /// Reads the motion of the head. For a recorded head, returns the place of the key in the file and the
+    /// path of the recording. For a cosine, reads its numbers and returns `None`.
     pub(crate) fn read_drive(&mut self, written: &DriveFile) -> Result<Option<(String, String)>, SceneError> {
         let numbers = [("amplitude_m", &written.amplitude_m), ("frequency_hz", &written.frequency_hz)];
         let Some(recording) = &written.recording else {

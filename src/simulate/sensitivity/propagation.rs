@@ -34,7 +34,7 @@ struct TriggeredGuard {
 enum TangentStatus {
     /// The derivatives are valid at the end of the last piece of the solution.
     Current,
-    /// The derivatives were moved to a transition time; the next piece has not begun.
+    /// The derivatives are those at a transition time, which itself varies; the next piece has not begun.
     AtTransition,
     /// The derivatives are unknown from here to the end of the run.
     Lost,
@@ -58,7 +58,8 @@ pub(super) struct TangentPropagator<'a, O> {
     place: Option<StretchPlace>,
     /// End of the last piece, s.
     end_s: f64,
-    /// A guard grazes zero if its rate is below this fraction of the sum of the absolute terms of the rate.
+    /// Limit for a guard that grazes zero: its rate, divided by the sum of the absolute values of the terms
+    /// of the rate, is below this value.
     grazing: f64,
     d_time_s: Vec<f64>,
 }
@@ -71,10 +72,10 @@ impl<'a, O> TangentPropagator<'a, O> {
         room: &'a mut TangentWorkspace,
         [tolerance, accuracy]: [f64; 2],
     ) -> Self {
-        /// Smallest rate at which a guard does not graze zero, as a fraction of the sum of the absolute terms
-        /// of the rate: the larger of `GRAZING` and `TOLERANCES` times the tolerance. The rate has the error
-        /// of the solution, so that at this limit derivatives of the transition time have relative errors of
-        /// about a thousandth.
+        /// A guard grazes zero if its rate, divided by the sum of the absolute values of the terms of the
+        /// rate, is below a limit. The limit is the larger of `GRAZING` and of `TOLERANCES` times the
+        /// tolerance of the run. The rate has the error of the solution, so that at this limit derivatives of
+        /// the transition time have relative errors of about a thousandth.
         const GRAZING: f64 = 1e-6;
         const TOLERANCES: f64 = 1e3;
         let TangentWorkspace { blocks, works } = room;
@@ -115,7 +116,8 @@ impl<'a, O> TangentPropagator<'a, O> {
         }
     }
 
-    /// Moves the derivatives to the transition time, at which a guard has fallen to zero.
+    /// Converts derivatives of the state at a fixed time to derivatives at the transition time, which itself
+    /// varies; a guard has fallen to zero at this time.
     fn apply_transition(&mut self) {
         let Some(fallen) = self.fallen.take() else { return };
         if self.stand == TangentStatus::Lost {
@@ -132,7 +134,8 @@ impl<'a, O> TangentPropagator<'a, O> {
         self.stand = TangentStatus::AtTransition;
     }
 
-    /// Moves the derivatives from a transition time to the start of the next piece.
+    /// Converts derivatives of the state at a transition time, which itself varies, to derivatives at a fixed
+    /// time at the start of the next piece.
     fn begin_segment(&mut self, mode: TipMode, motion: &TaylorMotion) {
         let moved = self.stand == TangentStatus::AtTransition;
         let rates = moved.then(|| rates_after(motion, mode, 0.0));

@@ -20,7 +20,7 @@ use hybrid_ode::WorkCounters;
 pub(super) struct FallingGuard<'a> {
     pub mode: TipMode,
     pub guard: usize,
-    /// Time of the guard's zero, s after the start of the motion's series.
+    /// Time from the start of the motion's series to the zero of the guard, s.
     pub x: f64,
     pub span: &'a TangentStretch<'a>,
 }
@@ -29,7 +29,8 @@ pub(super) struct FallingGuard<'a> {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct GuardSlope {
     pub rate: f64,
-    /// Sum of the absolute terms of the rate; if the rate is far smaller, the guard grazes zero.
+    /// Sum of the absolute values of the terms of the rate; if the rate is far smaller, the guard grazes
+    /// zero.
     pub size: f64,
 }
 
@@ -122,9 +123,10 @@ pub(super) struct StrikeTangent<'a> {
 }
 
 impl StrikeTangent<'_> {
-    /// Derivatives of the state after an impact from those before the impact, both at the time of the strike,
-    /// which varies too. `d_velocity` contains the derivatives of the head's velocity at this time, m/s.
-    /// `None` if the derivatives do not exist.
+    /// Computes the derivatives of the state just after an impact from those just before it. Both are
+    /// derivatives at the time of the impact, which itself varies. `d_velocity` contains the derivatives of
+    /// the head's velocity at this time, m/s per unit of the direction. `None` if the derivatives do not
+    /// exist.
     pub(super) fn state_after(
         &self,
         seed: &BlockSeed,
@@ -146,7 +148,8 @@ impl StrikeTangent<'_> {
         d_velocity: f64,
         lane: usize,
     ) -> Option<[f64; 3]> {
-        /// Relative tolerance of the impacts in the finite difference: far below their differences.
+        /// Relative tolerance with which impacts are solved for a central difference; it is far smaller than
+        /// the relative differences between these impacts.
         const TOLERANCE: f64 = 1e-14;
         let TipStrike { pose, restitution, .. } = self.strike;
         let d = [before.angle[0], before.angle[1], before.rate[0], before.rate[1]].map(|row| row[lane]);

@@ -1,5 +1,5 @@
-//! Direct effects of each direction: on the constants of the linkage, the motion of the head and the initial
-//! state.
+//! Direct effects of each direction (a quantity with respect to which a run is differentiated) on the
+//! constants of the linkage, the motion of the head and the initial state.
 
 use super::source::TangentSource;
 use crate::model::parameters::{ModelParameter, ParameterQuantity};
@@ -12,7 +12,8 @@ use crate::simulate::scene::Scene;
 use crate::simulate::scene::error::SceneError;
 use nalgebra::{Matrix2, Vector2};
 
-/// Change of the head's motion `x(t)`: `dx = scale x + (stretch t - delay) x'`.
+/// Change of the head's motion `x(t)` per unit of the direction:
+/// `dx = scale * x + (stretch * t - delay) * x'`.
 #[derive(Debug, Clone, Default)]
 pub(super) struct DriveTangent {
     pub scale: LaneVector,
@@ -154,7 +155,8 @@ impl BlockSeed {
         match parameter.quantity {
             ParameterQuantity::DriveAmplitude => self.drive_mut().scale[lane] = 1.0 / value,
             ParameterQuantity::DriveFrequency => {
-                // a change of frequency stretches the cosine about its own start
+                // a change of frequency stretches the time axis of the cosine about the time at which the
+                // cosine starts
                 self.drive_mut().stretch[lane] = 1.0 / value;
                 self.drive_mut().delay[lane] = scene.drive.delay_s() / value;
             }
@@ -178,7 +180,7 @@ fn scale_at_zero(parameter: &ModelParameter, linkage: &Linkage) -> f64 {
         "m" => linkage.l1_m.min(linkage.l2_m),
         "kg" => linkage.m_phi / (linkage.l2_m * linkage.l2_m),
         "kg m2" => linkage.m_phi.min(linkage.m_theta),
-        _ => 1.0, // other parameters enter linearly
+        _ => 1.0, // the equations are linear in the others
     }
 }
 

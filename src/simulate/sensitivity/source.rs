@@ -10,7 +10,7 @@ use crate::simulate::drive::Drive;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum TangentSource {
     Constant(LinkageConstant),
-    /// Changes of the head's motion `x(t)` by `x`, `-x'` and `t x'`.
+    /// `HeadScale` changes the head's motion `x(t)` by `x`, `HeadDelay` by `-x'`, `HeadStretch` by `t * x'`.
     HeadScale,
     HeadDelay,
     HeadStretch,

@@ -95,7 +95,8 @@ impl<'a> TangentStretch<'a> {
 /// Plans the length and the number of nodes of stretches.
 #[derive(Debug, Clone)]
 pub(super) struct StretchPlanner {
-    /// Largest phase or decay of the fastest derivative that each number of nodes resolves, rad.
+    /// For each number of nodes: the largest phase or decay of the fastest derivative over a stretch, rad,
+    /// that these nodes resolve.
     limits: [f64; MOST_NODES + 1],
     /// Latest rates in stick, slip and flight, 1/s; first for a neck off the shoulder, then for a neck on it.
     rapid: [f64; 6],

@@ -74,9 +74,9 @@ impl<'a> TangentBlocks<'a> {
         self.all.iter_mut().zip(&self.seeds.blocks)
     }
 
-    /// Propagates the derivatives over the next stretch from `from` towards `to`, s after `start_s`. If
-    /// `is_fresh` is true, a phase begins at `from`; if it is a stick phase, the derivative of the tip's
-    /// velocity may still be nonzero there.
+    /// Propagates the derivatives over the next stretch, which begins at `from` and ends at or before `to`;
+    /// both are in s after `start_s`. If `is_fresh` is true, a phase begins at `from`; if it is a stick
+    /// phase, the derivative of the tip's velocity may still be nonzero there.
     pub(crate) fn propagate_stretch<'c>(
         &mut self,
         course: &SeriesReference<'c>,
@@ -331,8 +331,8 @@ pub(super) fn rates_after(motion: &TaylorMotion, mode: TipMode, x: f64) -> [f64;
 }
 
 impl StateTangent {
-    /// Adds `rates` times `time`, the change of the state if the instant at which it is taken changes by
-    /// `time`.
+    /// Adds `rates * time` to the derivatives of the state: the effect of a change of the instant at which
+    /// the state is taken, where `time` is the derivative of this instant, s.
     pub(super) fn shift_in_time(&mut self, rates: &[f64; 6], time: LaneVector) {
         let ([theta, phi], [theta_rate, phi_rate]) = (&mut self.angle, &mut self.rate);
         let rows = [theta, phi, theta_rate, phi_rate, &mut self.gap_m, &mut self.gap_rate];

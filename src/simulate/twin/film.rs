@@ -47,7 +47,7 @@ pub enum FilmError {
         trace: String,
         /// Sampling rate of the trace, 1/s.
         fine_hz: f64,
-        /// Smallest sampling rate, [`LEAST_OVERSAMPLING`] times the frame rate, 1/s.
+        /// Smallest sampling rate that is allowed, 1/s: [`LEAST_OVERSAMPLING`] times the frame rate.
         least_hz: f64,
         /// Frame rate of the camera, 1/s.
         frame_rate_hz: f64,
@@ -153,7 +153,7 @@ fn plan_frames(fine: &Recording, camera: &Camera, start_s: f64) -> Result<FrameG
     Ok(FrameGrid { start_s, frame_rate_hz, frames })
 }
 
-/// Times of the shutter on the fine trace, in samples.
+/// Instants of the frames and exposure of the camera, in sampling intervals of the fine trace.
 struct FrameShutter {
     first: f64,
     samples_per_frame: f64,
@@ -229,8 +229,8 @@ const COORDINATES: usize = 4;
 pub enum DropoutPattern {
     /// The frames that are missing in the recording; both clocks are aligned at the first turn of the head.
     SameFrames,
-    /// Frames chosen at random, as many as the recording misses: one of the traces shows no turn of the head
-    /// at which their clocks could be aligned.
+    /// Points chosen at random; the lost fraction is that of the recording. The clocks cannot be aligned,
+    /// because one of the traces shows no turn of the head.
     AtRandom,
 }
 
@@ -268,8 +268,8 @@ pub enum MatchedFilmError {
 ///
 /// [`noise_floor`] measures the white noise of each column of `like`; the noise is overestimated if the
 /// column oscillates within a few frames. If both traces show a turn of the head, their clocks are aligned at
-/// this turn, and the film covers the frames of `like` and drops the same frames. Otherwise the film drops
-/// the same fraction of frames at random. `seed` determines noise and random dropouts; dropouts do not change
+/// this turn, and the film covers the frames of `like` and drops the same frames. Otherwise the film loses
+/// the same fraction of points at random. `seed` determines noise and random dropouts; dropouts do not change
 /// the noise.
 ///
 /// # Errors
@@ -334,8 +334,8 @@ fn align_recordings(fine: &Recording, like: &Recording) -> Option<SharedFrames> 
     Some(SharedFrames { first, start_s: grid.time_s(first) + shift_s, frames })
 }
 
-/// The first `frames` frames of a film, with noise and lost points. `first` is the index of the first frame
-/// of the film in the columns `like`; `None` for random dropouts.
+/// The first `frames` frames of a film, with noise and lost points. If `first` is given, the film loses the
+/// points that are lost in the columns `like` from frame `first` on; for `None`, points are lost at random.
 fn track_frames(
     seen: &Recording,
     frames: usize,
