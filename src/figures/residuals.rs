@@ -117,12 +117,13 @@ fn draw_growth(shown: &ResidualDiagnostics) -> Option<Panel> {
 
 // Comparison of the residual of a condition with white noise.
 
-/// Number of bins of the histogram; and minimum half width of its range, in standard deviations of the noise.
+/// Number of bins of the histogram.
 const HISTOGRAM_BINS: usize = 40;
+/// Minimum half width of the range of the histogram, in standard deviations of the noise.
 const MIN_HISTOGRAM_RANGE: f64 = 4.0;
-/// Upper limits of the lag of the autocorrelation: a number of frames, and a fraction of the length of the
-/// recording; the smaller one applies.
+/// Maximum lag of the autocorrelation, frames; [`MAX_LAG_FRACTION`] may limit it further.
 const MAX_LAGS: usize = 60;
+/// Maximum lag of the autocorrelation, as a fraction of the length of the recording.
 const MAX_LAG_FRACTION: f64 = 0.25;
 /// Minimum number of frames that a figure needs.
 const MIN_FRAMES: usize = 50;

@@ -171,7 +171,7 @@ impl Drawn {
             2 => lines.swap(at, at + 1),
             3 => drop(lines.remove(at)),
             4 => lines[at] = lines[at].replacen(d, &format!("x{d}"), 1),
-            5 => lines[at].truncate(lines[at].rfind(d).unwrap()),
+            5 => lines[at] = lines[at].rsplit_once(d).unwrap().0.to_owned(),
             6 => lines[0] = lines[0].replacen(&self.clock_text(0), &format!("{}.4", 3 * at), 1),
             _ => {}
         }
@@ -229,12 +229,13 @@ impl Drawn {
         }
         let grid = found.recording.grid();
         // the unit of a clock that the file does not state is seconds, or what the option says
-        let seconds = match self.clock {
-            Some(("", _)) if self.time == Some(TimeColumn::Milliseconds) => 1e-3,
-            Some((_, unit_s)) if !self.unit_is_written() => 1.0 / unit_s,
+        let unit_s = self.clock.map_or(1.0, |clock| clock.1);
+        let read_s = match self.time {
+            _ if self.unit_is_written() => unit_s,
+            Some(TimeColumn::Milliseconds) => 1e-3,
             _ => 1.0,
         };
-        let in_file_hz = self.rate_hz / seconds;
+        let in_file_hz = self.rate_hz * unit_s / read_s;
         let rate_hz = self.declared_rate.unwrap_or(in_file_hz);
         if (grid.frame_rate_hz / rate_hz - 1.0).abs() > 1e-5 {
             return Some(format!("rate {}, expected {rate_hz}", grid.frame_rate_hz));
@@ -270,7 +271,7 @@ impl Drawn {
 
     /// Whether the file states the unit of its clock.
     fn unit_is_written(&self) -> bool {
-        self.clock.is_none_or(|clock| clock.0.is_empty() || self.unit_place != 3 || self.has_units_row())
+        self.clock.is_none_or(|clock| !clock.0.is_empty() && (self.unit_place != 3 || self.has_units_row()))
     }
 }
 

@@ -247,7 +247,10 @@ fn times_with_too_few_digits_say_how_to_count_the_rows() {
     let unset = says(&text, &ImportOptions { name: "made".to_owned(), ..ImportOptions::default() });
     assert!(unset.contains("the file's times repeat, go back or follow no rate"), "{unset}");
     assert!(
-        refused.contains("column time: found `") && refused.contains("frame=row if every row is a frame"),
+        refused.contains("column time: found `")
+            && refused.contains(
+                "there are as many rows as frames, so that every row may be one (--columns frame=row,...)"
+            ),
         "{refused}"
     );
     let counted = ImportOptions {

@@ -71,7 +71,8 @@ pub(super) struct ModelSelector<'a> {
 pub(super) struct DriftRegion {
     pub low_hz: f64,
     pub high_hz: f64,
-    /// Half width of the window's lobe for the segments in which the oscillation was followed, Hz.
+    /// Half width, Hz, of the main lobe of a window as long as the segments in which the oscillation was
+    /// tracked.
     pub lobe_hz: f64,
 }
 

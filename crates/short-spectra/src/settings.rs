@@ -47,8 +47,9 @@ pub const MIN_SAMPLES: usize = 8;
 pub(crate) const MIN_CYCLES: f64 = 3.0;
 /// Largest allowed length of a padded record, samples; memory limits it.
 pub(super) const MOST_PADDED: usize = 1 << 26;
-/// Longest padded length for which the padding of the settings is used, samples. A transform of this length
-/// takes some 50 ms; one of a million samples padded eight times takes half a second.
+/// Maximum length, in samples, of a record padded by `zero_padding`; a record that would become longer is
+/// padded less. A transform of this length takes about 50 ms; a transform of a million samples padded eightfold
+/// takes half a second.
 pub(crate) const LONG_PADDED: usize = 1 << 21;
 /// Padded length from which record and window are transformed in parallel, samples; a shorter transform takes
 /// less than 10 ms.

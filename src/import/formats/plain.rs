@@ -99,10 +99,7 @@ impl TableColumns {
         let used = self.used();
         let names = self.header.and_then(|row| table.head.get(row)).map_or(&[][..], |row| &row.cells);
         let meanings = names.iter().enumerate().filter(|(column, _)| !used.contains(column));
-        meanings
-            .map(|(column, name)| (column, ColumnMeaning::parse(name)))
-            .filter(|(_, meaning)| matches!(meaning, ColumnMeaning::Frame | ColumnMeaning::Time(_)))
-            .collect()
+        meanings.filter_map(|(column, name)| Some((column, ColumnMeaning::parse_clock(name)?))).collect()
     }
 
     /// Refuses a table with another clock that differs from the one that is read.

@@ -45,7 +45,7 @@ impl ImportCalibration {
     }
 }
 
-/// Tracks of the tip and the head, or the error of their choice.
+/// Tracks chosen for the tip and the head, or the error if they cannot be chosen.
 type TrackChoice = ImportResult<[Option<TrackIndex>; 2]>;
 
 /// Converts the times of every export to seconds or frames, and collects the other facts. One error lists

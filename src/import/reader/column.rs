@@ -87,6 +87,18 @@ impl ColumnMeaning {
         }
     }
 
+    /// The clock that a column holds by its name, by the last part of its name, or by its unit; `None` for any
+    /// other column.
+    pub(crate) fn parse_clock(name: &str) -> Option<Self> {
+        let is_clock = |meaning: &Self| matches!(meaning, Self::Frame | Self::Time(_));
+        let unit = split_unit(name).1;
+        let last = split_last_part(split_unit(name).0).map(|(_, last)| parse_clock(last, unit));
+        match ColumnUnit::in_name(name) {
+            Some(ColumnUnit::Time(unit)) => Some(Self::Time(unit)),
+            _ => Some(Self::parse(name)).filter(is_clock).or(last.flatten()).filter(is_clock),
+        }
+    }
+
     fn parse_whole(name: &str) -> Self {
         let (base, unit) = split_unit(name);
         if let Some(clock) = parse_clock(base, unit) {

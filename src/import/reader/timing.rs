@@ -190,7 +190,7 @@ fn apply_frame_step(frames: &mut [i64], step: usize) -> ImportResult<()> {
 }
 
 fn place_by_time(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<RowFrames> {
-    let times = read_times(rows)?;
+    let times = read_times(rows, declared)?;
     let row_s = declared.step as f64 / declared.rate_hz;
     let fit = if declared.playback {
         fit_shown_grid(rows, &times)?
@@ -279,16 +279,34 @@ fn format_number(value: f64) -> String {
     if value == 0.0 || (1e-9..1e15).contains(&value.abs()) { value.to_string() } else { format!("{value:e}") }
 }
 
-fn read_times(rows: ClockRows) -> ImportResult<Vec<f64>> {
+fn read_times(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<Vec<f64>> {
     let mut times: Vec<f64> = Vec::with_capacity(rows.clock.len());
     for row in 0..rows.clock.len() {
         let Some(time) = rows.clock.time.as_ref().and_then(|column| column.get(row)) else {
             return Err(cell_error(rows, row, CellProblem::NoTime, None));
         };
+        if times.last() == Some(&time) && !repeats_row_above(rows, row) && are_rows_frames(rows, declared) {
+            let remedy = (
+                "a value after that of the row above",
+                "export the times with more digits, or name a column that counts frames; there are as many rows as \
+                 frames, so that every row may be one (--columns frame=row,...)",
+            );
+            let (place, found) = (rows.export.row_location(rows.clock, row), format_number(time));
+            return Err(ImportError::cell(place, CellProblem::Duplicate, ("time", &found), remedy));
+        }
         refuse_disorder(rows, row, times.last().copied(), time)?;
         times.push(time);
     }
     Ok(times)
+}
+
+/// Whether a clock has as many rows as frames between its first and last time, at the declared rate.
+fn are_rows_frames(rows: ClockRows, declared: DeclaredTiming) -> bool {
+    let times = rows.clock.times();
+    let span_s = times.last().zip(times.first()).map_or(0.0, |(last, first)| last - first);
+    let frames = span_s * declared.rate_hz / declared.step as f64;
+    let rounding = 1.0 + rows.clock.digit * declared.rate_hz;
+    !declared.playback && (frames - (times.len() as f64 - 1.0)).abs() <= rounding
 }
 
 /// Whether a row has the same positions as the row above it.
@@ -321,7 +339,7 @@ fn refuse_stray_first_row(rows: ClockRows, times: &[f64], fit: &FrameFit) -> Imp
     let ahead = (times[1] - times[0]) / others.frame_s;
     let off = (ahead - ahead.round()).abs();
     let rounding = rows.clock.digit / others.frame_s;
-    if off > OFF_THE_OTHERS * others.worst_frames.max(rounding) && off > FEW_PARTS {
+    if off > (OFF_THE_OTHERS * others.worst_frames).max(rounding) + FEW_PARTS {
         return Err(cell_error(rows, 0, CellProblem::OffGrid, Some(times[0])));
     }
     Ok(())
@@ -363,7 +381,7 @@ fn cell_error(rows: ClockRows, row: usize, problem: CellProblem, found: Option<f
         ),
         CellProblem::Duplicate if repeats_row_above(rows, row) => (
             "a value after that of the row above, whose positions are the same: the row is there twice",
-            "delete one of the two lines in a copy of the file, or export again from the tracking program",
+            "keep one of the two lines in a copy of the file, or export again from the tracking program",
         ),
         CellProblem::Duplicate if rows.clock.frame.is_none() => (
             "a value after that of the row above",
@@ -376,8 +394,8 @@ fn cell_error(rows: ClockRows, row: usize, problem: CellProblem, found: Option<f
         ),
         CellProblem::OffGrid if row == 0 => (
             "a time on the frame grid of the other rows: the first row stands alone before them, between two frames",
-            "correct its time from what the tracking program shows (its unit may be another), or delete the line in a \
-             copy of the file",
+            "correct its time from what the tracking program shows (its unit may be another), or \
+             import a copy of the file without the line",
         ),
         CellProblem::Backwards => (
             "a value after that of the row above",

@@ -55,7 +55,8 @@ pub(super) fn spectra_figures(fits: &[ComparisonInput]) -> Vec<FigureBlock> {
     (1..).zip(drawn).map(block).collect()
 }
 
-/// The target components of a fit; those with windows of the same kind are numbered.
+/// The target components of a fit, each numbered from 0 among those with the same channel and the same kind of
+/// window.
 fn group_members<'a>(fitted: &'a ComparisonInput<'a>) -> Vec<SpectrumGroupMember<'a>> {
     let anchor = |end: WindowEnd| if let WindowEnd::Found { anchor, .. } = end { Some(anchor) } else { None };
     let mut found: Vec<SpectrumGroupMember> = Vec::new();

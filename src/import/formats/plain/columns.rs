@@ -393,7 +393,7 @@ impl MappedColumns<'_> {
             let mut of_point = [None, None];
             for (index, key) in [x, y].into_iter().enumerate() {
                 let Some(at) = self.column(key) else { continue };
-                if matches!(ColumnMeaning::parse(name(at)), ColumnMeaning::Frame | ColumnMeaning::Time(_)) {
+                if ColumnMeaning::parse_clock(name(at)).is_some() {
                     return refuse(key, at, &format!("the clock `{}`", name(at)), "a position");
                 }
                 of_point[index] = match unit(at) {
