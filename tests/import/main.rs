@@ -3,6 +3,7 @@
 #[path = "../common/exports.rs"]
 mod exports;
 
+mod advice;
 mod generated_tables;
 mod motion;
 mod one_reading;

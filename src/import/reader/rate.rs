@@ -62,7 +62,7 @@ pub(crate) fn implied_rate(export: &TrackFile) -> Option<FrameRate> {
     let (frames, times, hz) = number_rows(longest)?;
     let hz = clock::simplest_rate(hz, |rate| times_fit_rate(&times, &frames, rate));
     let source = format!("the times of {}", export.file);
-    Some(FrameRate { hz, error: times_error(&times, &frames, (hz, longest.digit)), source })
+    Some(FrameRate { hz, error: times_error(&times, &frames, longest.digit), source })
 }
 
 /// Frame numbers and times of the rows of a clock, and the rate of their ends, 1/s.
@@ -82,17 +82,18 @@ fn number_rows(clock: &Clock) -> Option<(Vec<f64>, Vec<f64>, f64)> {
 
 /// Largest relative error of the rate of times that are written to `digit_s`. If each time was rounded, only
 /// the two ends count. If all steps are equal, the step itself may have been rounded to half a digit.
-fn times_error(times: &[f64], frames: &[f64], (hz, digit_s): (f64, f64)) -> f64 {
-    let span_s = times.last().zip(times.first()).map_or(0.0, |(last, first)| last - first);
-    let digits = 1.0 / hz / digit_s;
-    let equal = times
-        .windows(2)
-        .zip(frames.windows(2))
-        .all(|(time, frame)| ((time[1] - time[0]) * hz / (frame[1] - frame[0]) - 1.0).abs() <= EQUAL_STEPS);
+fn times_error(times: &[f64], frames: &[f64], digit_s: f64) -> f64 {
+    let span = |values: &[f64]| values.last().zip(values.first()).map_or(0.0, |(last, first)| last - first);
+    let frame_s = span(times) / span(frames);
+    let mut steps = times.windows(2).zip(frames.windows(2));
+    let equal = steps.all(|(time, frame)| {
+        ((time[1] - time[0]) / (frame[1] - frame[0]) / frame_s - 1.0).abs() <= EQUAL_STEPS
+    });
+    let digits = frame_s / digit_s;
     if equal && digits.is_finite() && digits >= FEWEST_DIGITS_PER_STEP {
         0.5 / digits
     } else {
-        digit_s / span_s
+        digit_s / span(times)
     }
 }
 

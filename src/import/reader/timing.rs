@@ -300,13 +300,15 @@ fn read_times(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<Vec<f64
     Ok(times)
 }
 
-/// Whether a clock has as many rows as frames between its first and last time, at the declared rate.
+/// Whether the times are rounded more coarsely than the frames, and the clock has as many rows as frames
+/// between its first and last time at the declared rate.
 fn are_rows_frames(rows: ClockRows, declared: DeclaredTiming) -> bool {
     let times = rows.clock.times();
     let span_s = times.last().zip(times.first()).map_or(0.0, |(last, first)| last - first);
     let frames = span_s * declared.rate_hz / declared.step as f64;
-    let rounding = 1.0 + rows.clock.digit * declared.rate_hz;
-    !declared.playback && (frames - (times.len() as f64 - 1.0)).abs() <= rounding
+    let digit = rows.clock.digit * declared.rate_hz / declared.step as f64;
+    let rounding = 1.0 + digit;
+    !declared.playback && digit > 1.0 && (frames - (times.len() as f64 - 1.0)).abs() <= rounding
 }
 
 /// Whether a row has the same positions as the row above it.
