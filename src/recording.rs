@@ -7,11 +7,13 @@ pub mod alignment;
 pub mod channel;
 pub mod clock;
 pub mod files;
+mod frame_times;
 pub mod motion_traces;
 pub mod noise_model;
 pub mod quality;
 pub mod video;
 
+use frame_times::FrameTimes;
 use portable_math as math;
 use serde::Serialize;
 
@@ -71,6 +73,11 @@ pub(crate) const LARGEST_M: f64 = 1e6;
 pub struct Recording {
     name: String,
     grid: FrameGrid,
+    /// True times of frames that lie on no grid.
+    times: Option<FrameTimes>,
+    /// Largest distance of the true times from this grid, frames, if the tracks were interpolated to it.
+    resampled_frames: Option<f64>,
+    frame_rate_sd_hz: f64,
     traces: Traces,
     synthetic: bool,
 }
@@ -102,7 +109,8 @@ impl Recording {
         for (column, values) in traces.columns() {
             check_column(column, values, frames)?;
         }
-        Ok(Self { name: name.into(), grid, traces, synthetic })
+        let (times, resampled_frames, frame_rate_sd_hz) = (None, None, 0.0);
+        Ok(Self { name: name.into(), grid, times, resampled_frames, frame_rate_sd_hz, traces, synthetic })
     }
 
     /// The name in messages and figures, usually that of the recording's folder.
@@ -111,10 +119,66 @@ impl Recording {
         &self.name
     }
 
-    /// The frame grid.
+    /// The frame grid. For a recording with true times: first time, mean rate and number of frames; the
+    /// frames themselves lie at [`Self::time_s`].
     #[must_use]
     pub fn grid(&self) -> FrameGrid {
         self.grid
+    }
+
+    /// Time of frame `index`, s. After the last true time, the frames continue at the mean rate.
+    #[must_use]
+    pub fn time_s(&self, index: usize) -> f64 {
+        let Some(times) = self.frame_times_s() else { return self.grid.time_s(index) };
+        let after_last = (index + 1).saturating_sub(times.len()) as f64;
+        times[index.min(times.len() - 1)] + after_last / self.grid.frame_rate_hz
+    }
+
+    /// Index of the first frame at or after a time, s. The index is negative, or above the number of frames,
+    /// if the time is at least one frame outside the recording.
+    pub(crate) fn frame_at_or_after(&self, time_s: f64) -> f64 {
+        let FrameGrid { start_s, frame_rate_hz, frames } = self.grid;
+        let on_grid = |from_s: f64| ((time_s - from_s) * frame_rate_hz - ON_FRAME_TOLERANCE).ceil();
+        match self.frame_times_s() {
+            Some(times) if time_s > start_s && time_s <= times[frames - 1] => {
+                times.partition_point(|t| (t - time_s) * frame_rate_hz < -ON_FRAME_TOLERANCE) as f64
+            }
+            Some(times) if time_s > start_s => (frames - 1) as f64 + on_grid(times[frames - 1]),
+            _ => on_grid(start_s),
+        }
+    }
+
+    /// Standard deviation of the frame rate, 1/s; 0 if it is not known.
+    #[must_use]
+    pub fn frame_rate_sd_hz(&self) -> f64 {
+        self.frame_rate_sd_hz
+    }
+
+    /// This recording with a standard deviation of its frame rate, 1/s.
+    ///
+    /// # Errors
+    /// [`RecordingError`] unless it is a finite number of at least 0.
+    pub fn with_frame_rate_sd(self, frame_rate_sd_hz: f64) -> Result<Self, RecordingError> {
+        if frame_rate_sd_hz.is_finite() && frame_rate_sd_hz >= 0.0 {
+            return Ok(Self { frame_rate_sd_hz, ..self });
+        }
+        let found = format!("frame_rate_sd_hz: found {frame_rate_sd_hz}");
+        Err(RecordingError(format!("{found}, expected a finite number of at least 0")))
+    }
+
+    /// This recording with other traces at the same times.
+    ///
+    /// # Errors
+    /// [`RecordingError`] as for [`Self::new`].
+    pub fn with_traces(self, traces: Traces) -> Result<Self, RecordingError> {
+        let Self { name, grid, traces, .. } = Self::new(self.name, self.grid, traces, self.synthetic)?;
+        Ok(Self { name, grid, traces, ..self })
+    }
+
+    /// This recording, marked as one that no camera took.
+    #[must_use]
+    pub(crate) fn mark_synthetic(self) -> Self {
+        Self { synthetic: true, ..self }
     }
 
     /// The traces.
@@ -175,8 +239,12 @@ pub(crate) const ON_FRAME_TOLERANCE: f64 = 1e-6;
 impl Recording {
     /// Value of a column of this recording at a time, s. It comes from the polynomial through the three
     /// frames before and the three after that time; if one of the outer four is missing, from the straight
-    /// line through the two nearest frames. `None` outside the recording and next to a missing frame.
+    /// line through the two nearest frames. `None` outside the recording, next to a missing frame, and in a gap
+    /// of the times.
     pub(crate) fn interpolate_column(&self, column: &[Option<f64>], time_s: f64) -> Option<f64> {
+        if let Some(times) = &self.times {
+            return times.interpolate(column, time_s);
+        }
         let place = (time_s - self.grid.start_s) * self.grid.frame_rate_hz;
         if let Some(frame) = frame_at(place) {
             return *column.get(frame)?;
@@ -199,14 +267,19 @@ pub(crate) fn frame_at(place: f64) -> Option<usize> {
 /// Lagrange polynomial through the six frames from `first` on, evaluated at `place`, a time in frames after
 /// the first frame of the column; `None` if a frame is missing.
 pub(crate) fn lagrange_through_six(column: &[Option<f64>], first: usize, place: f64) -> Option<f64> {
-    /// Denominators of the polynomial: for each frame, the product of its signed distances from the other
-    /// five.
-    const APART: [f64; STENCIL] = [-120.0, 24.0, -12.0, 12.0, -24.0, 120.0];
-    let place = place - first as f64;
+    const NODES: [f64; STENCIL] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
+    lagrange_through_nodes(column.get(first..)?, &NODES, place - first as f64)
+}
+
+/// Lagrange polynomial through the first six values of `column` at `nodes`, evaluated at `place`; `None` if a
+/// value is missing.
+fn lagrange_through_nodes(column: &[Option<f64>], nodes: &[f64; STENCIL], place: f64) -> Option<f64> {
     let mut sum = 0.0;
-    for (i, (frame, apart)) in column.get(first..first + STENCIL)?.iter().zip(APART).enumerate() {
-        let weight: f64 = (0..STENCIL).filter(|j| *j != i).map(|j| place - j as f64).product();
-        sum += (*frame)? * weight / apart;
+    for (i, value) in column.get(..STENCIL)?.iter().enumerate() {
+        let others = || nodes.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, node)| node);
+        let weight: f64 = others().map(|node| place - node).product();
+        let apart: f64 = others().map(|node| nodes[i] - node).product();
+        sum += (*value)? * weight / apart;
     }
     Some(sum)
 }

@@ -20,6 +20,13 @@ pub struct PyRecording {
     exposure_s: Option<f64>,
 }
 
+/// The frames lie at true times, s, or on the grid of a rate, 1/s.
+#[derive(FromPyObject)]
+enum PyFrameClock<'py> {
+    Times(PyReadonlyArray1<'py, f64>),
+    Rate(f64),
+}
+
 #[pymethods]
 impl PyRecording {
     /// Reads the folder of a recording, or a single trace.csv.
@@ -32,13 +39,15 @@ impl PyRecording {
 
     /// Makes a recording from columns with one value per frame; NaN means that a position was not tracked.
     #[staticmethod]
-    #[pyo3(signature = (name, frame_rate_hz, columns, *, start_s = 0.0, exposure_s = None, synthetic = false))]
+    #[pyo3(signature = (name, clock, columns, *, start_s, frame_rate_sd_hz, exposure_s, synthetic))]
+    #[expect(clippy::too_many_arguments, reason = "a Python function has named arguments")]
     fn from_columns(
         py: Python<'_>,
         name: &str,
-        frame_rate_hz: f64,
+        clock: PyFrameClock<'_>,
         columns: Bound<'_, PyDict>,
         start_s: f64,
+        frame_rate_sd_hz: f64,
         exposure_s: Option<f64>,
         synthetic: bool,
     ) -> PyResult<Self> {
@@ -58,8 +67,17 @@ impl PyRecording {
                 tip_confidence: column("tip_confidence")?,
                 head_confidence: column("head_confidence")?,
             };
-            let grid = FrameGrid { start_s, frame_rate_hz, frames };
-            let recording = recording::Recording::new(name, grid, traces, synthetic);
+            let recording = match clock {
+                PyFrameClock::Rate(frame_rate_hz) => {
+                    let grid = FrameGrid { start_s, frame_rate_hz, frames };
+                    recording::Recording::new(name, grid, traces, synthetic)
+                }
+                PyFrameClock::Times(times_s) => {
+                    let times_s = times_s.as_array().to_vec();
+                    recording::Recording::from_times(name, times_s, traces, synthetic)
+                }
+            };
+            let recording = recording.and_then(|recording| recording.with_frame_rate_sd(frame_rate_sd_hz));
             let recording = recording.map_err(|error| errors::input_error(py, format!("{name}: {error}")))?;
             Ok(Self { inner: Arc::new(recording), exposure_s })
         })
@@ -77,8 +95,7 @@ impl PyRecording {
 
     #[getter]
     fn time_s<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        let grid = self.inner.grid();
-        PyArray1::from_vec(py, (0..grid.frames).map(|i| grid.time_s(i)).collect())
+        PyArray1::from_vec(py, (0..self.inner.grid().frames).map(|i| self.inner.time_s(i)).collect())
     }
 
     #[getter]
@@ -89,6 +106,16 @@ impl PyRecording {
     #[getter]
     fn frame_rate_hz(&self) -> f64 {
         self.inner.grid().frame_rate_hz
+    }
+
+    #[getter]
+    fn frame_rate_sd_hz(&self) -> f64 {
+        self.inner.frame_rate_sd_hz()
+    }
+
+    #[getter]
+    fn has_true_times(&self) -> bool {
+        self.inner.frame_times_s().is_some()
     }
 
     #[getter]

@@ -203,6 +203,18 @@ def test_what_a_notebook_shows_is_escaped(recording: wl.Recording) -> None:
     assert (found._repr_svg_() or "").startswith("<svg")
 
 
+def test_frames_at_uneven_times_keep_them(recording: wl.Recording) -> None:
+    time_s = np.cumsum(np.resize([0.0199, 0.0213, 0.0204], len(recording)))
+    uneven = wl.Recording.from_arrays(recording.columns, time_s=time_s, frame_rate_sd_hz=0.01, synthetic=True)
+    assert uneven.time_s.tobytes() == time_s.tobytes() and uneven.frame_rate_sd_hz == 0.01
+    assert pickle.loads(pickle.dumps(uneven)) == uneven != recording
+    assert "interpolated" in wl.spectrum(uneven, "head-drop").description["note"]
+    with pytest.raises(wl.InputError, match="time_s, frame 1: found"):
+        wl.Recording.from_arrays(recording.columns, time_s=np.zeros(len(recording)))
+    with pytest.raises(wl.InputError, match="frame_rate_hz"):
+        wl.Recording.from_arrays(recording.columns, 5000.0, time_s=time_s)
+
+
 def test_data_frames(scene: wl.Scene, recording: wl.Recording) -> None:
     motion = wl.simulate(scene)
     frame = motion.to_pandas()

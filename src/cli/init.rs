@@ -82,7 +82,8 @@ impl InitArgs {
                 Failure::at(path.display(), format!("found {:.4} s, too short or too slow a motion for a run to start in; expected a head that moves by several millimetres; film more of the stroke ({error})", found.length_s()))
             })?;
         let job = draft::write_job(&found, &loaded.recording, [&seen, SCENE], !self.no_shoulder);
-        Ok((vec![(SCENE, scene), (JOB, job)], found.describe()))
+        let said = loaded.recording.describe_resampling().into_iter().chain(found.describe());
+        Ok((vec![(SCENE, scene), (JOB, job)], said.collect()))
     }
 
     /// Amplitude and frequency of the stroke, as far as the options give them.

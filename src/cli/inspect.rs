@@ -47,11 +47,12 @@ impl InspectArgs {
         let scene = self.scene.as_deref().map(read_scene).transpose()?;
         self.figures.check_folder(&[FIGURE], self.overwrite)?;
         let loaded = load_recording(&self.recording)?;
+        let recording = &*loaded.recording.resample_to_grid();
         let changed = loaded.changed_sources(&self.recording).into_iter().collect();
-        let found = Inspection::from_folder(&loaded.recording, loaded.file.as_ref(), changed, scene.as_ref());
+        let found = Inspection::from_folder(recording, loaded.file.as_ref(), changed, scene.as_ref());
         let turns_s: Vec<f64> = found.reversals.iter().map(|turn| turn.reversal_s).collect();
         let headline = found.verdict_lines().into_iter().next().unwrap_or_default();
-        let drawn = || vec![(FIGURE, recorded::draw_figure(&loaded.recording, &turns_s, &headline))];
+        let drawn = || vec![(FIGURE, recorded::draw_figure(recording, &turns_s, &headline))];
         if self.json {
             let text = serde_json::to_string_pretty(&found).map_err(Failure::internal)?;
             output::print_lines(&text);
@@ -62,7 +63,7 @@ impl InspectArgs {
             let kind = if found.synthetic { " (synthetic: no camera took it)" } else { "" };
             print_line!("{}{kind}", found.recording);
             print_origin(&loaded);
-            let start_s = loaded.recording.grid().start_s;
+            let start_s = recording.grid().start_s;
             output::print_lines(&quality::measurement_table(&found.measurements, start_s));
             print_slope(&found);
             print_reversals(&found.reversals);

@@ -21,6 +21,7 @@ pub(crate) fn read_driven_scene(path: &Path) -> Outcome<(Scene, Option<PathBuf>)
     let recording = |named: &str| {
         let place = files::resolve_existing_path(path, named)?;
         let loaded = load_recording(&place).map_err(|failure| failure.to_string())?;
+        print_resampling(&place, &loaded.recording);
         driver = Some(place);
         Ok(loaded.recording)
     };
@@ -32,6 +33,13 @@ pub(crate) fn read_driven_scene(path: &Path) -> Outcome<(Scene, Option<PathBuf>)
 pub(crate) fn print_warnings(file: &Path, findings: &[PlausibilityFinding], global: &GlobalArgs) {
     for finding in findings.iter().filter(|_| !global.quiet) {
         warn_line!("warning: {}: {finding}", file.display());
+    }
+}
+
+/// Prints a warning if the tracks of a recording are interpolated to a grid.
+fn print_resampling(path: &Path, recording: &Recording) {
+    if let Some(said) = recording.describe_resampling() {
+        warn_line!("warning: {}: {said}", path.display());
     }
 }
 
@@ -88,8 +96,7 @@ pub(crate) fn load_recording(path: &Path) -> Outcome<LoadedRecording> {
     let recording = read_recording(&files::display_name(name), &shown, &text, file.as_ref());
     let mut recording = recording.map_err(Failure::input)?;
     if file.is_none() && is_simulated(&trace, &text)? {
-        let (name, traces) = (recording.name(), recording.traces().clone());
-        recording = Recording::new(name, recording.grid(), traces, true).map_err(Failure::internal)?;
+        recording = recording.mark_synthetic();
     }
     Ok(LoadedRecording { recording, file })
 }

@@ -12,7 +12,7 @@ use crate::recording::Recording;
 use crate::recording::channel::{Channel, ReversalInstants, Window};
 use crate::simulate::twin::film::{DropoutPattern, film_like_recording};
 use plain_charts::Figure;
-use short_spectra::{Detrend, FASTEST_HZ, MAX_COMPONENTS, SampledRecord, SpectralAnalysis, SpectrumSettings};
+use short_spectra::{Detrend, FASTEST_HZ, MAX_COMPONENTS, SpectralAnalysis, SpectrumSettings};
 use std::ops::Range;
 
 /// File names of the tables.
@@ -196,17 +196,17 @@ impl SpectrumArgs {
 
 impl SpectrumRequest {
     fn study_recording(&self, exposure_s: Option<f64>, recording: Recording) -> Outcome<StudiedWindow> {
+        let recording = recording.move_to_grid();
         let instants = ReversalInstants::find_instants(&recording);
         let frames = self.window.resolve_frames(&recording, &instants).map_err(Failure::input)?;
         let grid = recording.grid();
         let samples = self.channel.samples(&recording);
         // (a window whose frames were found is inside the recording)
         let inside = samples.get(frames.clone()).unwrap_or_default();
-        let record = SampledRecord { samples: inside, frame_rate_hz: grid.frame_rate_hz, exposure_s };
         let refuse = |error| {
             Failure::Input(format!("{}, {} in `{}`: {error}", recording.name(), self.channel, self.window))
         };
-        let analysis = SpectralAnalysis::from_record(&record, &self.settings).map_err(refuse)?;
+        let analysis = recording.analyse_samples(inside, exposure_s, &self.settings).map_err(refuse)?;
         let hint = flip_hint(&instants, (grid.time_s(frames.start), grid.time_s(frames.end)));
         let frames = frames.start + analysis.skipped_frames..frames.end;
         let (from_s, to_s) = (grid.time_s(frames.start), grid.time_s(frames.end));
@@ -216,7 +216,9 @@ impl SpectrumRequest {
         let rate = grid.frame_rate_hz / stride as f64;
         let every = || format!(" (one of {stride} is tracked: {rate:.6} frames/s)");
         let kept = if stride == 1 { String::new() } else { every() };
-        let note = format!("{from_s:.4} s to {to_s:.4} s{cut}, {count} frames{kept}, {removed} removed");
+        let uneven = recording.describe_resampling().map_or_else(String::new, |said| format!("; {said}"));
+        let note =
+            format!("{from_s:.4} s to {to_s:.4} s{cut}, {count} frames{kept}, {removed} removed{uneven}");
         Ok(StudiedWindow { recording, exposure_s, frames, analysis, note, hint })
     }
 

@@ -6,7 +6,7 @@ use crate::recording::channel::{Channel, InstantKind, Window, WindowEnd, mean_sp
 use short_spectra::time_frequency::{
     Ridge, RidgePoint, Spectrogram, SpectrogramSettings, SpeedPoint, course, default_band_hz,
 };
-use short_spectra::{Oscillation, SampledRecord, SpectralAnalysis, SpectrumSettings};
+use short_spectra::{Oscillation, SpectralAnalysis, SpectrumSettings};
 use std::ops::Range;
 
 /// Segment lengths to try, relative to the default length, in ascending order.
@@ -115,12 +115,8 @@ fn track_ridge(
 ) -> Option<TrackedRidge> {
     let rate_hz = side.recording.grid().frame_rate_hz;
     let samples = side.samples(Channel::Deflection);
-    let record = SampledRecord {
-        samples: samples.get(frames.clone())?,
-        frame_rate_hz: rate_hz,
-        exposure_s: case.exposure_s(),
-    };
-    let analysis = SpectralAnalysis::from_record(&record, &SpectrumSettings::default()).ok()?;
+    let (inside, exposure_s) = (samples.get(frames.clone())?, case.exposure_s());
+    let analysis = side.recording.analyse_samples(inside, exposure_s, &SpectrumSettings::default()).ok()?;
     let frames = frames.start + analysis.skipped_frames..frames.end;
     let top_hz = default_band_hz(frames.len(), rate_hz, None);
     let band_hz = fastest_band(case).map_or(top_hz, |band| (band.band_hz.0, band.band_hz.1.min(top_hz.1)));
@@ -199,7 +195,7 @@ fn ridge_over_speed(
         Some(SpeedPoint {
             speed_m_per_s: mean_speed_m_per_s(tip, grid.frame_rate_hz, segment)?.abs(),
             frequency_hz: p.frequency_hz,
-            frequency_sd_hz: Some(p.frequency_sd_hz),
+            frequency_sd_hz: Some(side.recording.add_clock_sd(p.frequency_hz, p.frequency_sd_hz)),
         })
     };
     let every = courses.iter().map(Vec::len).sum::<usize>().div_ceil(MAX_SPEED_POINTS).max(1);

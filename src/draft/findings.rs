@@ -7,7 +7,7 @@ use crate::simulate::drive::{EVEN_SPEED_SHARE, UNCERTAIN_END_S, smooth_head_moti
 use crate::text::{
     format_digits, format_milliseconds, format_speed, format_with_sd, join_with_and, pluralise,
 };
-use short_spectra::{Component, ComponentVerdict, SampledRecord, SpectralAnalysis, SpectrumSettings};
+use short_spectra::{Component, ComponentVerdict, SpectrumSettings};
 
 /// Motion of the head in the scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -112,6 +112,7 @@ impl DraftFindings {
         exposure_s: Option<f64>,
         known: KnownStroke,
     ) -> Result<Self, DraftError> {
+        let recording = &*recording.resample_to_grid();
         let (grid, traces) = (recording.grid(), recording.traces());
         let tracked = |column: &[Option<f64>]| column.iter().flatten().count();
         let enough =
@@ -294,14 +295,9 @@ fn find_components(
         let window = format!("{release}{from}..{release}{to}");
         let frames = Window::parse(&window).ok()?.resolve_frames(recording, instants).ok()?;
         let samples = channel.samples(recording);
-        let record = SampledRecord {
-            samples: samples.get(frames)?,
-            frame_rate_hz: recording.grid().frame_rate_hz,
-            exposure_s,
-        };
         let band = if is_low { [LOWEST_HZ, BETWEEN_HZ.min(highest_hz)] } else { [BETWEEN_HZ, highest_hz] };
         let settings = SpectrumSettings { band_hz: Some((band[0], band[1])), ..SpectrumSettings::default() };
-        let analysis = SpectralAnalysis::from_record(&record, &settings).ok()?;
+        let analysis = recording.analyse_samples(samples.get(frames)?, exposure_s, &settings).ok()?;
         let usable = |c: &Component| {
             let trusted = matches!(c.verdict, ComponentVerdict::Clear | ComponentVerdict::Attenuated)
                 || c.range_hz.is_some();

@@ -8,6 +8,7 @@ use crate::recording::channel::{Channel, ReversalInstants, Window};
 use crate::simulate::outputs::EnergyAudit;
 use crate::simulate::{RunResult, Transition};
 use short_spectra::{Detrend, SpectrumSettings, WindowedTransform};
+use std::borrow::Cow;
 use std::cell::{OnceCell, RefCell};
 use std::ops::Range;
 use std::rc::Rc;
@@ -15,7 +16,7 @@ use std::rc::Rc;
 /// A recording with its instants, and with the channels, transforms and speeds that have been computed from
 /// it.
 pub struct FeatureReader<'a> {
-    pub(super) recording: &'a Recording,
+    pub(super) recording: Cow<'a, Recording>,
     pub(super) instants: &'a ReversalInstants,
     pub(super) run: Option<&'a RunRecord>,
     channels: [OnceCell<Vec<Option<f64>>>; Channel::ALL.len()],
@@ -29,6 +30,7 @@ impl<'a> FeatureReader<'a> {
     #[must_use]
     pub fn new(recording: &'a Recording, instants: &'a ReversalInstants) -> Self {
         let (transforms, segments, speeds) = (RefCell::default(), RefCell::default(), RefCell::default());
+        let recording = recording.resample_to_grid();
         Self { recording, instants, run: None, channels: Default::default(), transforms, segments, speeds }
     }
 
@@ -46,11 +48,11 @@ impl<'a> FeatureReader<'a> {
     }
 
     pub(super) fn window_frames(&self, window: &Window) -> Result<Range<usize>, MissingValue> {
-        Ok(window.resolve_frames(self.recording, self.instants)?)
+        Ok(window.resolve_frames(&self.recording, self.instants)?)
     }
 
     pub(super) fn channel_frames(&self, channel: Channel, frames: Range<usize>) -> &[Option<f64>] {
-        let samples = self.channels[channel as usize].get_or_init(|| channel.samples(self.recording));
+        let samples = self.channels[channel as usize].get_or_init(|| channel.samples(&self.recording));
         samples.get(frames).unwrap_or_default()
     }
 

@@ -42,7 +42,8 @@ pub(super) fn read_frequency(
     check_amplitude(chosen, band)?;
     let below = |component: &Component| level_below_strongest_db(&inside, component);
     let runner_up = runner_up.map(|c| RunnerUpComponent { frequency_hz: c.frequency_hz, below_db: below(c) });
-    let value = FeatureValue::new(chosen.frequency_hz, Some(chosen.frequency_sd_hz));
+    let sd_hz = reader.recording.add_clock_sd(chosen.frequency_hz, chosen.frequency_sd_hz);
+    let value = FeatureValue::new(chosen.frequency_hz, Some(sd_hz));
     Ok(FeatureValue { below_db: below(chosen), runner_up, ..value })
 }
 
@@ -87,7 +88,7 @@ pub(super) fn read_cycle_frequency(
     };
     let (low, high) = band.band_hz;
     let (frequency_hz, sd_hz) = extreme.ok_or(MissingValue::NoPeak { low, high })?;
-    Ok(FeatureValue::new(*frequency_hz, Some(*sd_hz)))
+    Ok(FeatureValue::new(*frequency_hz, Some(reader.recording.add_clock_sd(*frequency_hz, *sd_hz))))
 }
 
 /// The strongest component of a band.

@@ -152,7 +152,7 @@ impl AnalysedWindow<'_> {
         CoursePoint {
             time_s: grid.time_s(self.frames.start) + p.time_s,
             frequency_hz: p.frequency_hz,
-            frequency_sd_hz: p.frequency_sd_hz,
+            frequency_sd_hz: self.recording.add_clock_sd(p.frequency_hz, p.frequency_sd_hz),
             amplitude_m: p.amplitude_m,
             tip_speed_m_per_s: speed(&traces.tip_x_m),
             head_speed_m_per_s: speed(&traces.head_x_m),
@@ -195,10 +195,11 @@ impl AnalysedWindow<'_> {
         let Some(ridge) = &self.analysis.ridge else { return Default::default() };
         let drawn = course::coherent_parts(ridge, of);
         let over_speed = |p: &RidgePoint| {
+            let point = self.course_point(p, ridge.segment_s);
             Some(SpeedPoint {
-                speed_m_per_s: self.course_point(p, ridge.segment_s).tip_speed_m_per_s?.abs(),
+                speed_m_per_s: point.tip_speed_m_per_s?.abs(),
                 frequency_hz: p.frequency_hz,
-                frequency_sd_hz: Some(p.frequency_sd_hz),
+                frequency_sd_hz: Some(point.frequency_sd_hz),
             })
         };
         let speeds = drawn.iter().flatten().filter_map(over_speed).collect();

@@ -23,6 +23,7 @@ use crate::simulate::drive::{Drive, HeadMotionError, smooth_head_motion};
 use crate::simulate::scene::error::SceneError;
 use crate::simulate::scene::{Scene, StartKind};
 use crate::simulate::twin::Camera;
+use crate::toml_file::is_zero;
 use serde::Serialize;
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -110,7 +111,9 @@ impl Problem {
         if found != expected {
             return Err(ProblemError::Recordings { found, expected });
         }
-        let mut measured = measured.into_iter();
+        let mut measured = measured
+            .into_iter()
+            .map(|measured| MeasuredRecording { recording: measured.recording.move_to_grid(), ..measured });
         let paths = job.conditions.iter().map(|condition| condition.recording.as_ref());
         let measured: Vec<Option<MeasuredRecording>> =
             paths.map(|path| path.and_then(|_| measured.next())).collect();
@@ -124,8 +127,8 @@ impl Problem {
         let identities = measured.iter().map(|measured| {
             let MeasuredRecording { recording, exposure_s } = measured.as_ref()?;
             let (grid, traces) = (recording.grid(), recording.traces());
-            let synthetic = recording.is_synthetic();
-            Some(RecordingIdentity { grid, traces, exposure_s: *exposure_s, synthetic })
+            let (synthetic, frame_rate_sd_hz) = (recording.is_synthetic(), recording.frame_rate_sd_hz());
+            Some(RecordingIdentity { grid, traces, exposure_s: *exposure_s, synthetic, frame_rate_sd_hz })
         });
         let fingerprint = fingerprint(&ProblemIdentity {
             version: env!("CARGO_PKG_VERSION"),
@@ -329,6 +332,8 @@ struct RecordingIdentity<'a> {
     traces: &'a Traces,
     exposure_s: Option<f64>,
     synthetic: bool,
+    #[serde(skip_serializing_if = "is_zero")]
+    frame_rate_sd_hz: f64,
 }
 
 // Runs over a whole recording with the fitted constants. If the recorded head drives the model, a run starts

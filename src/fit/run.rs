@@ -96,6 +96,7 @@ pub fn fit_features(
         let conditions: Vec<String> = job.conditions.iter().map(|condition| condition.name.clone()).collect();
         let fitted = (&aims[..], ledger.objective().targets());
         let values = &found.best.values;
+        found.notes.extend(measured.iter().flatten().filter_map(Recording::describe_resampling));
         found.notes.extend(start_notes(model, &conditions, fitted, values, job.ensemble.members));
     }
     let far = far_from_priors(&camera_nuisance_results(job, &found.cameras));

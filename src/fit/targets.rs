@@ -3,7 +3,9 @@
 
 use super::FitError;
 use super::job::{FitTarget, Job, TargetSource, TargetStage};
-use crate::feature::{Feature, FeatureValue, MissingValue, ValueComparison, read_assigned_features};
+use crate::feature::{
+    Feature, FeatureUnit, FeatureValue, MissingValue, ValueComparison, read_assigned_features,
+};
 use crate::fit::target_value::TargetValue;
 use crate::recording::Recording;
 use crate::recording::quality::measure_quality;
@@ -79,7 +81,11 @@ fn measure_target(
                 ValueComparison::Linear { scale } => scale,
             };
             let stated = least_sd > 0.0 || least_sd_relative > 0.0;
-            let noise = if stated { read.sd } else { scatter.or(read.sd) };
+            let recording = measured.get(aim.feature.condition).and_then(Option::as_ref);
+            let is_frequency = aim.feature.reading.unit() == FeatureUnit::HERTZ;
+            let clock = recording.filter(|_| is_frequency);
+            let with_clock = |sd| clock.map_or(sd, |recording| recording.add_clock_sd(read.value, sd));
+            let noise = if stated { read.sd } else { scatter.map(with_clock).or(read.sd) };
             let least =
                 if stated { least_sd.max(least_sd_relative * scale) } else { MIN_SD_RELATIVE * scale };
             (read.value, noise.filter(|sd| sd.is_finite()).unwrap_or(0.0).max(least))

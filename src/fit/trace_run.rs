@@ -394,7 +394,9 @@ impl TraceFindings<'_, '_> {
                     .to_owned(),
             );
         }
-        if self.problem.recordings().iter().flatten().any(Recording::is_synthetic) {
+        let recordings = || self.problem.recordings().iter().flatten();
+        notes.extend(recordings().filter_map(Recording::describe_resampling));
+        if recordings().any(Recording::is_synthetic) {
             notes.push("the recording is synthetic: no camera took it".to_owned());
         }
         notes

@@ -12,7 +12,7 @@ use crate::import::reader::track_choice::TrackIndex;
 use crate::import::reader::track_file::TrackFile;
 use crate::import::reader::{companion, findings, track_choice};
 use crate::recording::channel::ReversalInstants;
-use crate::recording::files::{CameraEntry, LevelEntry, OneOrMany, RecordingFile, SourceEntry};
+use crate::recording::files::{CameraEntry, FrameClock, LevelEntry, OneOrMany, RecordingFile, SourceEntry};
 use crate::recording::quality::{
     Check, Optics, Severity, check_position_steps, measure_quality, measure_tilt,
 };
@@ -71,10 +71,20 @@ pub(crate) fn assemble_recording(
         tip_confidence: tip.confidence,
         head_confidence: head.confidence,
     };
-    let recording = Recording::new(options.name.clone(), clocks.grid, traces, synthetic)
+    let name = options.name.clone();
+    let recording = match clocks.times {
+        Some(times_s) => Recording::from_times(name, times_s, traces, synthetic),
+        None => Recording::new(name, clocks.grid, traces, synthetic),
+    };
+    // (a simulation has an exact clock)
+    let rate_sd_hz = if synthetic { 0.0 } else { calibration.rate.sd_hz() };
+    let recording = recording
+        .and_then(|recording| recording.with_frame_rate_sd(rate_sd_hz))
         .map_err(|problem| ImportError::unusable(file_name, problem))?;
     let camera = CameraEntry {
-        frame_rate_hz: calibration.rate.hz,
+        frame_rate_hz: recording.grid().frame_rate_hz,
+        frame_rate_sd_hz: recording.frame_rate_sd_hz(),
+        clock: FrameClock::of(&recording),
         exposure_s: calibration.exposure_s,
         metres_per_pixel: calibration.metres_per_pixel(),
         y_axis: Some(calibration.y_axis),
@@ -219,8 +229,6 @@ fn level_recording(
     // (the quantisation step of the export is checked before the rotation, because rotated coordinates no
     // longer show it)
     report.findings.extend(check_position_steps(&measured, optics));
-    let (name, grid) = (recording.name().to_owned(), recording.grid());
-    let level = Recording::new(name, grid, traces, recording.is_synthetic())
-        .map_err(|problem| ImportError::unusable(file, problem))?;
+    let level = recording.with_traces(traces).map_err(|problem| ImportError::unusable(file, problem))?;
     Ok((level, Some(entry)))
 }

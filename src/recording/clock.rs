@@ -7,6 +7,9 @@ pub(crate) const OFF_GRID_LIMIT_FRAMES: f64 = 0.3;
 /// Largest number of frames of a grid: 17 minutes at 10,000 frames/s. Times that span more frames come from a
 /// damaged file.
 pub(crate) const MAX_FRAMES: f64 = 10_000_000.0;
+/// Maximum number of frames without a row: a fixed number plus a number per row. The limit keeps a small file
+/// with a jump in its times from filling the memory.
+pub(crate) const FRAMES_WITHOUT_ROWS: (usize, usize) = (250_000, 4);
 
 /// After each row, the phase of the grid is corrected by this fraction of the row's distance from the grid.
 /// If the first guess of the time per frame is wrong by 1 %, the phase lags by a tenth of a frame.
@@ -24,6 +27,8 @@ pub(crate) struct FrameFit {
     pub frames: Vec<usize>,
     /// Time from frame to frame, from the least-squares line, s.
     pub frame_s: f64,
+    /// Time of frame 0 on that line, s.
+    pub start_s: f64,
     /// Index of the row that is furthest from its frame.
     pub worst_row: usize,
     /// Distance of the row `worst_row` from its frame, in frames.
@@ -34,6 +39,11 @@ impl FrameFit {
     /// Whether every row lies on the grid within [`OFF_GRID_LIMIT_FRAMES`].
     pub(crate) fn is_on_grid(&self) -> bool {
         self.worst_frames <= OFF_GRID_LIMIT_FRAMES
+    }
+
+    /// Distance of a row from its frame, frames.
+    pub(crate) fn distance(&self, times_s: &[f64], row: usize) -> f64 {
+        (times_s[row] - self.start_s - self.frame_s * self.frames[row] as f64).abs() / self.frame_s
     }
 
     /// Smallest number of frames from one row to the next; above 1 if only every n-th frame has a row.
@@ -121,7 +131,7 @@ fn assess_fit(frames: Vec<usize>, times_s: &[f64], (intercept, slope): (f64, f64
         if row > 0 && frames[row] <= frames[row - 1] { distance + 1.0 } else { distance }
     };
     let worst_row = (0..frames.len()).max_by(|&a, &b| off(a).total_cmp(&off(b))).unwrap_or(0);
-    FrameFit { worst_frames: off(worst_row), worst_row, frame_s: slope, frames }
+    FrameFit { worst_frames: off(worst_row), worst_row, frame_s: slope, start_s: intercept, frames }
 }
 
 #[cfg(test)]

@@ -4,16 +4,21 @@ mod description;
 mod trace;
 
 pub use super::video::{PixelMapping, VideoEntry};
-pub use description::{CameraEntry, LevelEntry, OneOrMany, RecordingFile, SourceEntry, YAxis};
+pub use description::{CameraEntry, FrameClock, LevelEntry, OneOrMany, RecordingFile, SourceEntry, YAxis};
 pub use trace::{HEADER, parse_trace_csv, parse_trace_csv_at, push_trace_row, trace_blocks, trace_csv};
 
-use crate::recording::Recording;
+use crate::recording::{Recording, RecordingError};
 use crate::toml_file::TomlError;
+use trace::{TraceFrames, parse_trace_frames};
 
 /// Name of the file of traces in a recording's folder.
 pub(crate) const TRACE_FILE: &str = "trace.csv";
 /// Name of the description in a recording's folder.
 pub(crate) const DESCRIPTION_FILE: &str = "recording.toml";
+
+/// Largest relative difference between the stated mean rate and that of the true times: a rate that was
+/// written with seven digits passes, one that was changed does not.
+const SAME_RATE: f64 = 1e-6;
 
 /// Why a recording's files were refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -48,8 +53,8 @@ impl FilesError {
 }
 
 /// Reads a recording from the text of its `trace.csv` and its description. Without a description, the frame
-/// rate is estimated from the times, and the recording counts as taken by a camera. A trace is refused if its
-/// hash differs from the hash in the description.
+/// rate is estimated from the times, and the recording counts as taken by a camera; times that lie on no grid
+/// are kept. A trace is refused if its hash differs from the hash in the description.
 ///
 /// # Errors
 /// [`FilesError`] naming `file`, the file of the traces, and the place at fault.
@@ -59,14 +64,27 @@ pub fn read_recording(
     trace: &str,
     description: Option<&RecordingFile>,
 ) -> Result<Recording, FilesError> {
-    let (grid, traces) = match description {
-        Some(description) => {
-            description.check_trace(file, trace)?;
-            parse_trace_csv_at(file, trace, description.camera.frame_rate_hz)?
-        }
-        None => parse_trace_csv(file, trace)?,
-    };
+    if let Some(description) = description {
+        description.check_trace(file, trace)?;
+    }
+    let camera = description.map(|d| &d.camera);
+    let (frames, traces) = parse_trace_frames(file, trace, camera)?;
     let synthetic = description.is_some_and(|d| d.synthetic);
-    Recording::new(name, grid, traces, synthetic)
-        .map_err(|problem| FilesError::refuse(file, format!(": {problem}")))
+    let refuse = |problem: RecordingError| FilesError::refuse(file, format!(": {problem}"));
+    let recording = match frames {
+        TraceFrames::Grid(grid) => Recording::new(name, grid, traces, synthetic),
+        TraceFrames::Times(times_s) => Recording::from_times(name, times_s, traces, synthetic),
+    };
+    let recording = recording.map_err(refuse)?;
+    let mean_hz = recording.grid().frame_rate_hz;
+    if let Some(stated_hz) =
+        camera.map(|c| c.frame_rate_hz).filter(|hz| (hz / mean_hz - 1.0).abs() > SAME_RATE)
+    {
+        let problem = format!(
+            ": column time_s: found a mean rate of {mean_hz} frames/s, but {DESCRIPTION_FILE} has \
+             `frame_rate_hz = {stated_hz}` with `clock = \"times\"`; write the mean rate there"
+        );
+        return Err(FilesError::refuse(file, problem));
+    }
+    recording.with_frame_rate_sd(camera.map_or(0.0, |c| c.frame_rate_sd_hz)).map_err(refuse)
 }

@@ -41,8 +41,10 @@ pub fn collect_findings(
     instants: &ReversalInstants,
     import: &[QualityFinding],
 ) -> Vec<QualityFinding> {
+    let recording = &*recording.resample_to_grid();
     let columns = measurement::measured_columns(recording.traces(), measured);
     let mut found = import.to_vec();
+    found.extend(checks::check_clock(recording));
     found.extend(checks::check_grid(measured));
     found.push(checks::check_exposure(measured));
     found.extend(motion::check_motion(recording, measured));

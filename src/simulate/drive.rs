@@ -5,6 +5,7 @@ mod smoothing_spline;
 
 use crate::model::HeadMotion;
 use crate::recording::Recording;
+use crate::toml_file::is_zero;
 pub use head_spline::HeadSpline;
 use portable_math as math;
 use serde::Serialize;
@@ -119,11 +120,6 @@ impl Drive {
     }
 }
 
-#[allow(clippy::trivially_copy_pass_by_ref)] // serde passes a reference
-fn is_zero(value: &f64) -> bool {
-    *value == 0.0
-}
-
 // Motion of a recorded head.
 
 /// Time over which frames are averaged before smoothing, and time between knots of the spline, s. Tracking
@@ -163,6 +159,7 @@ pub enum HeadMotionError {
 /// # Errors
 /// [`HeadMotionError`] if too few frames show the head.
 pub fn smooth_head_motion(recording: &Recording) -> Result<HeadSpline, HeadMotionError> {
+    let recording = &*recording.resample_to_grid();
     let (grid, frames) = (recording.grid(), recording.traces().head_x_m.iter().enumerate());
     let points: Vec<(usize, f64)> = frames.filter_map(|(frame, x)| Some((frame, (*x)?))).collect();
     if points.len() < FEWEST_FRAMES {

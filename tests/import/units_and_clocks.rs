@@ -311,3 +311,72 @@ fn files_of_measurements_are_refused_by_name() {
     let universal = "    -1\n    58\nNONE\n         1    100    1\n    -1\n";
     assert!(refused(universal, &metres).contains("a universal file of vibration measurements"));
 }
+
+/// Times of rows that follow no rate, s: steps of 18 to 22 ms that drift.
+fn uneven_time_s(row: usize) -> f64 {
+    let row = row as f64;
+    0.02 * row + 0.011 * (0.013 * row).sin() + 0.0008 * (2.1 * row).sin()
+}
+
+#[test]
+fn times_that_are_no_grid_are_kept() {
+    let names = "time_s,tip_x,tip_y,head_x,head_y";
+    let mut text = format!("{names}\n");
+    for row in 0..400 {
+        let [tip_x, tip_y, head_x, head_y] = position_m(uneven_time_s(row)).map(|place| place * 1e3);
+        let time_s = uneven_time_s(row);
+        writeln!(text, "{time_s:.5},{tip_x:.6},{tip_y:.6},{head_x:.6},{head_y:.6}").unwrap();
+    }
+    for columns in [None, Some(BY_NUMBER)] {
+        for options in
+            [at_rate(50.0, columns), ImportOptions { time: Some(TimeColumn::Real), ..options(columns) }]
+        {
+            let found = read(&text, &in_mm(options));
+            let times = found.recording.frame_times_s().expect("true times");
+            for (row, time_s) in times.iter().enumerate() {
+                assert!((time_s - uneven_time_s(row)).abs() < 1e-5, "row {row}: {time_s}");
+                let tip = found.recording.traces().tip_x_m[row].unwrap();
+                assert!((tip - position_m(uneven_time_s(row))[0]).abs() < 1e-8, "row {row}");
+            }
+        }
+    }
+    // a declared rate that is far from the steps is a wrong unit or rate
+    assert!(refused(&text, &in_mm(at_rate(500.0, None))).contains("--frame-rate-hz says 500"));
+    // one damaged time among even ones is damage
+    let even = table(
+        names,
+        100,
+        |row| format!("{:.4}", if row == 50 { 1.008 } else { row as f64 * 0.02 }),
+        [1e-3; 2],
+        50.0,
+    );
+    assert!(
+        refused(&even, &in_mm(at_rate(50.0, None))).starts_with("run.csv:52:1: column time: found `1.008`")
+    );
+    // frame numbers place the rows; that the times disagree is said
+    let numbered: String = text
+        .lines()
+        .enumerate()
+        .map(|(row, line)| match row {
+            0 => format!("frame,{line}\n"),
+            row => format!("{},{line}\n", row - 1),
+        })
+        .collect();
+    let found = read(&numbered, &in_mm(at_rate(50.0, None)));
+    assert!(found.recording.frame_times_s().is_none());
+    let said = found.report.lines().join("\n");
+    assert!(said.contains("caution: run.csv: the times follow no even rate"), "{said}");
+    let followed = "time=2,tip-x=3,tip-y=4,head-x=5,head-y=6";
+    assert!(read(&numbered, &in_mm(at_rate(50.0, Some(followed)))).recording.frame_times_s().is_some());
+}
+
+#[test]
+fn the_uncertainty_of_the_rate_is_part_of_the_recording() {
+    let seconds = |row: usize| format!("{:.6}", row as f64 / 2000.0);
+    let text = table("t,tip_x,tip_y,head_x,head_y", 600, seconds, [1e-3; 2], 2000.0);
+    let sd = |options: ImportOptions| read(&text, &in_mm(options)).recording.frame_rate_sd_hz();
+    // an oscillator's 50 parts in a million, or half a microsecond in a step of 500
+    assert!((sd(at_rate(2000.0, None)) - 0.1 / 3_f64.sqrt()).abs() < 1e-12);
+    let real = ImportOptions { time: Some(TimeColumn::Real), ..options(None) };
+    assert!((sd(real) - 2.0 / 3_f64.sqrt()).abs() < 1e-9);
+}

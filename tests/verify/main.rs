@@ -28,6 +28,7 @@ mod allocations;
 mod analysis;
 mod belts;
 mod bits;
+mod clock;
 mod compliance;
 mod conditioning;
 mod cycles;

@@ -36,12 +36,13 @@ class Recording:
     @staticmethod
     def from_columns(
         name: str,
-        frame_rate_hz: float,
+        clock: _Row | float,
         columns: dict[str, _Row],
         *,
-        start_s: float = 0.0,
-        exposure_s: float | None = None,
-        synthetic: bool = False,
+        start_s: float,
+        frame_rate_sd_hz: float,
+        exposure_s: float | None,
+        synthetic: bool,
     ) -> Recording: ...
     def columns(self) -> dict[str, _Row]: ...
     @property
@@ -50,6 +51,10 @@ class Recording:
     def name(self) -> str: ...
     @property
     def frame_rate_hz(self) -> float: ...
+    @property
+    def frame_rate_sd_hz(self) -> float: ...
+    @property
+    def has_true_times(self) -> bool: ...
     @property
     def start_s(self) -> float: ...
     @property

@@ -42,21 +42,36 @@ class Recording:
     def from_arrays(
         cls,
         columns: Mapping[str, ArrayLike] | pd.DataFrame,
-        frame_rate_hz: float,
+        frame_rate_hz: float | None = None,
         *,
+        time_s: ArrayLike | None = None,
+        frame_rate_sd_hz: float = 0.0,
         start_s: float = 0.0,
         exposure_s: float | None = None,
         name: str = "recording",
         synthetic: bool = False,
     ) -> Recording:
         """A recording from columns (``tip_x_m``, ``tip_y_m``, ``head_x_m``, ``head_y_m``, any of them), or from a
-        data frame. Say so where it is ``synthetic``."""
+        data frame. The frames lie on the grid of ``frame_rate_hz`` or, if they lie on no grid, at ``time_s``.
+        ``frame_rate_sd_hz`` is the standard deviation of the rate. Say so where it is ``synthetic``."""
         unknown = [key for key in columns.keys() if key not in COLUMNS]
         if unknown:
             raise InputError(f"columns: found {unknown[0]!r}, expected some of {', '.join(COLUMNS)}")
         arrays = {key: np.ascontiguousarray(columns[key], dtype=np.float64) for key in columns.keys()}
+        if time_s is not None and frame_rate_hz is None and start_s == 0.0:
+            clock: float | NDArray[np.float64] = np.ascontiguousarray(time_s, dtype=np.float64)
+        elif frame_rate_hz is not None and time_s is None:
+            clock = float(frame_rate_hz)
+        else:
+            raise InputError("expected frame_rate_hz (and start_s) for frames on a grid, or time_s alone for others")
         native = NativeRecording.from_columns(
-            name, float(frame_rate_hz), arrays, start_s=start_s, exposure_s=exposure_s, synthetic=synthetic
+            name,
+            clock,
+            arrays,
+            start_s=start_s,
+            frame_rate_sd_hz=frame_rate_sd_hz,
+            exposure_s=exposure_s,
+            synthetic=synthetic,
         )
         return cls(native)
 
@@ -80,8 +95,13 @@ class Recording:
 
     @property
     def frame_rate_hz(self) -> float:
-        """Frames per second, 1/s."""
+        """Frames per second, 1/s; the mean rate without gaps where the frames lie on no grid."""
         return self._native.frame_rate_hz
+
+    @property
+    def frame_rate_sd_hz(self) -> float:
+        """Standard deviation of the frame rate, 1/s; 0 where it is not known."""
+        return self._native.frame_rate_sd_hz
 
     @property
     def start_s(self) -> float:
@@ -119,13 +139,16 @@ class Recording:
     __hash__ = None  # type: ignore[assignment]
 
     def __reduce__(self) -> tuple[Any, ...]:
+        uneven = self._native.has_true_times
         kept = {
-            "start_s": self.start_s,
+            "time_s": self.time_s if uneven else None,
+            "frame_rate_sd_hz": self.frame_rate_sd_hz,
+            "start_s": 0.0 if uneven else self.start_s,
             "exposure_s": self.exposure_s,
             "name": self.name,
             "synthetic": self.is_synthetic,
         }
-        return (_recording, (self.columns, self.frame_rate_hz, kept))
+        return (_recording, (self.columns, None if uneven else self.frame_rate_hz, kept))
 
     def __repr__(self) -> str:
         kind = ", synthetic" if self.is_synthetic else ""
@@ -139,7 +162,7 @@ class Recording:
         return tables.html(repr(self)[10:-1], ["column", "tracked"], tracked)
 
 
-def _recording(columns: Mapping[str, ArrayLike], frame_rate_hz: float, kept: dict[str, Any]) -> Recording:
+def _recording(columns: Mapping[str, ArrayLike], frame_rate_hz: float | None, kept: dict[str, Any]) -> Recording:
     return Recording.from_arrays(columns, frame_rate_hz, **kept)
 
 

@@ -11,7 +11,7 @@ use crate::figures::{FigureBlock, FigureText, ring_down};
 use crate::text::{
     capitalise, format_digits, format_length, format_percent, format_signed_percent, format_with_sd,
 };
-use short_spectra::{SampledRecord, SpectralAnalysis, SpectrumSettings};
+use short_spectra::{SpectralAnalysis, SpectrumSettings};
 
 /// The spectra are shown up to the largest of three frequencies: this multiple of the upper end of the band
 /// of the fit, `MIN_TOP_HZ`, and the highest frequency of a component. Above it, a fast camera records only
@@ -84,13 +84,9 @@ fn analyse_window(
     band: &FeatureBand,
 ) -> Option<SpectralAnalysis> {
     let samples = side.samples(band.channel);
-    let record = SampledRecord {
-        samples: samples.get(side.window_frames(&band.window)?)?,
-        frame_rate_hz: side.recording.grid().frame_rate_hz,
-        exposure_s: case.exposure_s(),
-    };
+    let inside = samples.get(side.window_frames(&band.window)?)?;
     let settings = SpectrumSettings { detrend: Some(band.detrend), ..SpectrumSettings::default() };
-    SpectralAnalysis::from_record(&record, &settings).ok()
+    side.recording.analyse_samples(inside, case.exposure_s(), &settings).ok()
 }
 
 fn figure_text(

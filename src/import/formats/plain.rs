@@ -7,6 +7,7 @@ use crate::import::error::ImportResult;
 use crate::import::format::FileFormat;
 use crate::import::options::ImportOptions;
 use crate::import::reader::layout::{self, ClockCell};
+use crate::import::reader::rate::EVEN_FRAMES;
 use crate::import::reader::{
     CellNumber, ColumnMeaning, DelimitedTable, Document, Facts, PointCells, RowOrder, TableLayout, TextRow,
     TimeUnit, TrackFile, new_finding,
@@ -203,10 +204,6 @@ impl TableColumns {
         Ok(Some(new_finding(Check::UnevenClock, Severity::Serious, value, found, advice)))
     }
 }
-
-/// Largest distance of a time from an even grid, frames, that needs no finding: it shifts the phase of a
-/// component at a fifth of the frame rate by 7 degrees.
-const EVEN_FRAMES: f64 = 0.1;
 
 /// The most common of the widths, or the largest of several equally common ones; 0 for none.
 fn usual_width(mut widths: Vec<usize>) -> usize {

@@ -3,7 +3,7 @@
 //! user for it.
 
 use super::column::{CoordinateUnit, TimeUnit};
-use super::rate::{FrameRate, RATE_AGREEMENT, format_rate, implied_rate};
+use super::rate::{FrameRate, RATE_AGREEMENT, format_rate, has_uneven_clock, implied_rate};
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::options::{CoordinateScale, ImportOptions, TimeColumn};
 use crate::import::reader::findings;
@@ -62,6 +62,7 @@ pub(crate) fn calibrate(
             missing.push(ASK_TIME.to_owned());
         }
     }
+    let uneven = options.time != Some(TimeColumn::Playback) && exports.iter().any(has_uneven_clock);
     let implied = exports.iter().find_map(implied_rate);
     let rate = frame_rate(exports, implied.as_ref(), options, report)?;
     if rate.is_none() {
@@ -79,7 +80,7 @@ pub(crate) fn calibrate(
     if let (Some(rate), Some(scales), Some(y_axis), true) = (rate, scales, y_axis, missing.is_empty()) {
         let exposure_s = exposure_s(exports, options, report)?;
         let tolerance = RATE_AGREEMENT + rate.error + implied.as_ref().map_or(0.0, |implied| implied.error);
-        if options.time != Some(TimeColumn::Playback) {
+        if options.time != Some(TimeColumn::Playback) && !uneven {
             report.findings.extend(implied.and_then(|times| compare_rates(&rate, times, options)));
         }
         return Ok(ImportCalibration { rate, tolerance, scales, y_axis, exposure_s });

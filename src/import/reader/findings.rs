@@ -78,6 +78,13 @@ pub(crate) fn rate_difference(used: &FrameRate, other: &FrameRate) -> Option<Qua
         .then(|| new_finding(Check::ImpliedRate, Severity::Caution, value, found, advice))
 }
 
+/// Finding about times that lie on no grid, next to frame numbers that are used instead.
+pub(crate) fn ignored_times_finding(file: &str) -> QualityFinding {
+    let found = format!("{file}: the times follow no even rate, but its frame numbers place the rows");
+    let advice = "if the camera has no even rate, name the column of times alone (--columns time=...)";
+    new_finding(Check::UnevenClock, Severity::Caution, (0.0, ""), found, advice)
+}
+
 /// Largest error of a rate that needs no finding; a larger one shifts a frequency visibly in every figure.
 const COARSE_RATE: f64 = 0.01;
 

@@ -4,6 +4,7 @@ use super::track_file::Column;
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::options::{CoordinateScale, ImportOptions, TimeColumn};
 use crate::import::reader::calibration::ImportCalibration;
+use crate::import::reader::rate::is_uneven;
 use crate::import::reader::timing::{ClockRows, DeclaredTiming, RowFrames};
 use crate::import::reader::track_choice::TrackIndex;
 use crate::import::reader::track_file::TrackFile;
@@ -16,6 +17,8 @@ use crate::recording::files::YAxis;
 /// The frame grid of the recording, and for every clock of the chosen tracks its frame numbers on this grid.
 pub(crate) struct ClockGrid {
     pub(crate) grid: FrameGrid,
+    /// The true times of the frames, s, if they lie on no grid.
+    pub(crate) times: Option<Vec<f64>>,
     used: Vec<PlacedClock>,
 }
 
@@ -63,7 +66,8 @@ impl ClockGrid {
         let (start_s, frame_rate_hz) = (earliest.placed.start_s, calibration.rate.hz);
         let grid = FrameGrid { start_s, frame_rate_hz, frames: frames as usize };
         used.iter_mut().for_each(|clock| clock.shift -= from);
-        Ok(Self { grid, used })
+        let times = shared_times(exports, &used)?;
+        Ok(Self { grid, times, used })
     }
 
     pub(crate) fn report_findings(
@@ -82,7 +86,9 @@ impl ClockGrid {
                 .implied_hz
                 .filter(|_| !playback)
                 .and_then(|hz| findings::rounded_times_finding(export.file, &times, hz));
-            for finding in implied.into_iter().chain(rounded) {
+            let uneven = placed.numbered && !playback && is_uneven(&times, export.clocks[*clock].digit);
+            let ignored = uneven.then(|| findings::ignored_times_finding(export.file));
+            for finding in implied.into_iter().chain(rounded).chain(ignored) {
                 // (two clocks of one file often give equal findings; one is enough)
                 if !report.findings.contains(&finding) {
                     report.findings.push(finding);
@@ -123,6 +129,19 @@ fn place_clocks(
         used.push(PlacedClock { file, clock, placed, shift });
     }
     Ok(used)
+}
+
+/// The true times of uneven clocks, which must be the same for both points; `None` for clocks on a grid.
+fn shared_times(exports: &[TrackFile], used: &[PlacedClock]) -> ImportResult<Option<Vec<f64>>> {
+    let [first, others @ ..] = used else { return Ok(None) };
+    match others.iter().find(|other| other.placed.times != first.placed.times) {
+        Some(other) => {
+            let (file, with) = (exports[other.file].file, exports[first.file].file);
+            let (found, expected) = ("times with uneven steps", "the same times in every row");
+            Err(ImportError::grid_mismatch(file, found, expected, with))
+        }
+        None => Ok(first.placed.times.clone()),
+    }
 }
 
 /// Coordinates and confidence of a point for every frame of the grid; `None` where a value is missing.

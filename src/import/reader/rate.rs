@@ -14,6 +14,31 @@ const FEWEST_DIGITS_PER_STEP: f64 = 4.0;
 /// Largest relative difference of two steps that count as equal.
 const EQUAL_STEPS: f64 = 1e-6;
 
+/// Largest distance of a time from the grid, frames, besides its rounding: it shifts the phase of a component
+/// at a fifth of the frame rate by 7 degrees.
+pub(crate) const EVEN_FRAMES: f64 = 0.1;
+/// Fraction of rows beyond [`EVEN_FRAMES`] from which a clock has no grid; fewer are damaged.
+const UNEVEN_ROWS: f64 = 0.05;
+/// Largest relative difference between the usual rate of a clock without a grid and a declared rate.
+pub(crate) const UNEVEN_RATE: f64 = 0.2;
+
+/// Whether times that are written to `digit_s` lie on no grid, whatever its rate.
+pub(crate) fn is_uneven(times: &[f64], digit_s: f64) -> bool {
+    let Some(step_s) = clock::median_step_s(times).filter(|step_s| *step_s > 0.0) else { return false };
+    let fit = clock::number_frames(times, step_s);
+    fit.is_some_and(|fit| {
+        let limit = EVEN_FRAMES + digit_s / fit.frame_s;
+        let far = (0..times.len()).filter(|row| fit.distance(times, *row) > limit).count();
+        far > 1 && far as f64 > UNEVEN_ROWS * times.len() as f64
+    })
+}
+
+/// Whether an export has a clock of times that lie on no grid and no frame numbers.
+pub(crate) fn has_uneven_clock(export: &TrackFile) -> bool {
+    let timed = export.clocks.iter().filter(|clock| clock.frame.is_none());
+    timed.into_iter().any(|clock| is_uneven(&clock.times(), clock.digit))
+}
+
 /// A frame rate with its uncertainty and its source.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FrameRate {

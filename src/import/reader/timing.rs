@@ -2,7 +2,7 @@
 //! equally spaced frames that fits the times.
 
 use crate::import::error::{CellProblem, ImportError, ImportResult};
-use crate::import::reader::rate::{RATE_AGREEMENT, find_quantum_s};
+use crate::import::reader::rate::{RATE_AGREEMENT, UNEVEN_RATE, find_quantum_s, is_uneven};
 use crate::import::reader::track_file::{Clock, Column, Track, TrackFile};
 use crate::recording::clock::{self, FrameFit, MAX_FRAMES, OFF_GRID_LIMIT_FRAMES};
 
@@ -36,6 +36,8 @@ pub(crate) struct RowFrames {
     pub numbered: bool,
     /// Time of the first row, s, in real time and not in playback time.
     pub start_s: f64,
+    /// Time of every row, s, if the times lie on no grid; the rows then count as consecutive frames.
+    pub times: Option<Vec<f64>>,
     /// Rate that the times imply, 1/s: frames per second if the file has frame numbers, otherwise rows per
     /// second.
     pub implied_hz: Option<f64>,
@@ -171,7 +173,7 @@ fn place_by_number(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<Ro
     }
     let counted_s = first as f64 / declared.rate_hz;
     let start_s = if declared.playback { counted_s } else { time_s(0).unwrap_or(counted_s) };
-    Ok(RowFrames { frames, numbered: true, start_s, implied_hz })
+    Ok(RowFrames { frames, numbered: true, start_s, times: None, implied_hz })
 }
 
 /// Multiplies frame numbers by `--frame-step`. They must increase by 1 from row to row, which shows that they
@@ -192,6 +194,9 @@ fn apply_frame_step(frames: &mut [i64], step: usize) -> ImportResult<()> {
 fn place_by_time(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<RowFrames> {
     let times = read_times(rows, declared)?;
     let row_s = declared.step as f64 / declared.rate_hz;
+    if !declared.playback && is_uneven(&times, rows.clock.digit) {
+        return keep_times(rows, times, declared);
+    }
     let fit = if declared.playback {
         fit_shown_grid(rows, &times)?
     } else {
@@ -200,7 +205,18 @@ fn place_by_time(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<RowF
     refuse_stray_first_row(rows, &times, &fit)?;
     let start_s = if declared.playback { (times[0] / fit.frame_s).round() * row_s } else { times[0] };
     let frames = fit.frames.iter().map(|&row| (row * declared.step) as i64).collect();
-    Ok(RowFrames { frames, numbered: false, start_s, implied_hz: Some(1.0 / fit.frame_s) })
+    Ok(RowFrames { frames, numbered: false, start_s, times: None, implied_hz: Some(1.0 / fit.frame_s) })
+}
+
+/// Rows of a clock without a grid, which keep their times. A declared rate only shows a wrong unit.
+fn keep_times(rows: ClockRows, times: Vec<f64>, declared: DeclaredTiming) -> ImportResult<RowFrames> {
+    let implied_hz = clock::median_step_s(&times).map(|step_s| 1.0 / step_s);
+    if let Some(implied_hz) = implied_hz {
+        let rate_hz = declared.rate_hz / declared.step as f64;
+        check_rate(rows, implied_hz, DeclaredTiming { rate_hz, tolerance: UNEVEN_RATE, ..declared }, None)?;
+    }
+    let frames = (0..times.len() as i64).collect();
+    Ok(RowFrames { frames, numbered: false, start_s: times[0], times: Some(times), implied_hz })
 }
 
 /// Fits a frame grid to the times. A grid with the declared rate is tried first, because coarsely rounded

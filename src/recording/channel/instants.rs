@@ -99,6 +99,7 @@ impl ReversalInstants {
     /// Finds the turns of the head and, around each, the interval in which the tip rests.
     #[must_use]
     pub fn find_instants(recording: &Recording) -> Self {
+        let recording = &*recording.resample_to_grid();
         let rate = recording.grid().frame_rate_hz;
         let head = TrackPoints::from_samples(&recording.traces().head_x_m);
         let tip = TrackPoints::from_samples(&recording.traces().tip_x_m);

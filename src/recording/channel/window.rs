@@ -3,7 +3,7 @@
 
 use super::instants::{InstantKind, InstantNotFound, ReversalInstants};
 use super::phase::ReversalPhase;
-use crate::recording::{FrameGrid, ON_FRAME_TOLERANCE, Recording};
+use crate::recording::Recording;
 use serde::Serialize;
 use std::fmt;
 use std::ops::Range;
@@ -89,7 +89,7 @@ impl Window {
         instants: &ReversalInstants,
     ) -> Result<(Range<usize>, f64, f64), WindowError> {
         let grid = recording.grid();
-        let (name, after_last_s) = (recording.name(), grid.time_s(grid.frames));
+        let (name, after_last_s) = (recording.name(), recording.time_s(grid.frames));
         let absent = |(instant, reason)| {
             let tracked = recording.traces().head_x_m.iter().any(Option::is_some);
             let turns = tracked || !instants.reversals.is_empty();
@@ -104,9 +104,9 @@ impl Window {
             let problem = format!(": it starts at {from_s:.6} s and ends at {to_s:.6} s; exchange its ends");
             return Err(self.refuse(problem));
         }
-        let (from, to) = (frame_at_or_after(&grid, from_s), frame_at_or_after(&grid, to_s));
+        let [from, to] = [from_s, to_s].map(|time_s| recording.frame_at_or_after(time_s));
         if from < 0.0 || to > grid.frames as f64 {
-            let end_s = grid.time_s(grid.frames.saturating_sub(1));
+            let end_s = recording.time_s(grid.frames.saturating_sub(1));
             return Err(self.refuse(format!(
                 " is {from_s:.6} s to {to_s:.6} s, but {name} runs from {:.6} s to {end_s:.6} s; choose a \
                  window inside it",
@@ -132,11 +132,6 @@ impl WindowEnd {
             }
         }
     }
-}
-
-/// Index of the first frame at or after a time; it may lie outside the recording.
-fn frame_at_or_after(grid: &FrameGrid, time_s: f64) -> f64 {
-    ((time_s - grid.start_s) * grid.frame_rate_hz - ON_FRAME_TOLERANCE).ceil()
 }
 
 const EXPECTED_END: &str = "seconds or one of `hold`, `reversal`, `flip`, `release` (`before`, `stick` and \

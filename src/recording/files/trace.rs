@@ -1,7 +1,7 @@
 //! `trace.csv`: one row per frame; a cell is empty if the point was not tracked.
 
-use super::FilesError;
-use crate::recording::clock::{self, FrameFit};
+use super::{CameraEntry, FilesError, FrameClock};
+use crate::recording::clock::{self, FRAMES_WITHOUT_ROWS, FrameFit};
 use crate::recording::{FrameGrid, Recording, Traces};
 use rayon::prelude::*;
 use std::fmt::Write;
@@ -22,8 +22,8 @@ const BLOCKS: usize = 8;
 /// Times printed with 16 digits are far closer to their frames.
 const SNAP_FRAMES: f64 = 1e-6;
 
-/// The recording as `trace.csv`: times from the grid, each number with the fewest digits that preserve its
-/// value.
+/// The recording as `trace.csv`: times from the grid or the true times, each number with the fewest digits
+/// that preserve its value.
 #[must_use]
 pub fn trace_csv(recording: &Recording) -> String {
     trace_blocks(recording).collect()
@@ -41,7 +41,7 @@ pub fn trace_blocks(recording: &Recording) -> impl Iterator<Item = String> {
             let mut text = String::new();
             for frame in start + index * BLOCK_ROWS..frames.min(start + (index + 1) * BLOCK_ROWS) {
                 let cells = columns.iter().map(|(_, column)| column.get(frame).copied().flatten());
-                push_trace_row(&mut text, recording.grid().time_s(frame), cells);
+                push_trace_row(&mut text, recording.time_s(frame), cells);
             }
             text
         };
@@ -81,10 +81,38 @@ fn push_number(text: &mut String, value: f64) {
 /// [`FilesError`] with file, line and column.
 pub fn parse_trace_csv(file: &str, text: &str) -> Result<(FrameGrid, Traces), FilesError> {
     let table = TraceTable::parse(file, text)?;
-    let seed_s = clock::median_step_s(&table.times_s).ok_or_else(|| FilesError::refuse(file, NO_ROWS))?;
-    let fit = table.number_rows(file, seed_s)?;
-    let frame_rate_hz = simplest_frame_rate_hz(&table.times_s, &fit);
-    Ok(table.place_on_grid(&fit, frame_rate_hz))
+    let fit = table.number_rows();
+    table.place_by_fit(file, fit)
+}
+
+/// The frames of a `trace.csv`: on a grid, or at true times, s.
+pub(super) enum TraceFrames {
+    Grid(FrameGrid),
+    Times(Vec<f64>),
+}
+
+/// Reads `trace.csv` with the camera of its description. True times are kept if the camera has such a clock
+/// or, without a description, if no grid explains the times.
+///
+/// # Errors
+/// [`FilesError`] with file, line and column.
+pub(super) fn parse_trace_frames(
+    file: &str,
+    text: &str,
+    camera: Option<&CameraEntry>,
+) -> Result<(TraceFrames, Traces), FilesError> {
+    let table = TraceTable::parse(file, text)?;
+    let (grid, traces) = match (camera, camera.map_or_else(|| table.number_rows(), |_| None)) {
+        (Some(camera), _) if camera.clock == FrameClock::Grid => {
+            table.place_at_rate(file, camera.frame_rate_hz)?
+        }
+        (None, fit) if fit.as_ref().is_none_or(FrameFit::is_on_grid) => table.place_by_fit(file, fit)?,
+        _ => {
+            let traces = collect_traces(table.columns.into_iter(), table.confidences);
+            return Ok((TraceFrames::Times(table.times_s), traces));
+        }
+    };
+    Ok((TraceFrames::Grid(grid), traces))
 }
 
 /// Reads `trace.csv` on a frame grid of known rate, 1/s. Missing rows become missing frames.
@@ -96,18 +124,8 @@ pub fn parse_trace_csv_at(
     text: &str,
     frame_rate_hz: f64,
 ) -> Result<(FrameGrid, Traces), FilesError> {
-    let table = TraceTable::parse(file, text)?;
-    let fit = table.number_rows(file, 1.0 / frame_rate_hz)?;
-    let (row, off_frames) = farthest_off_grid(&table.times_s, &fit.frames, frame_rate_hz);
-    if off_frames > clock::OFF_GRID_LIMIT_FRAMES {
-        return Err(table.off_grid_error(file, row, off_frames, frame_rate_hz));
-    }
-    Ok(table.place_on_grid(&fit, frame_rate_hz))
+    TraceTable::parse(file, text)?.place_at_rate(file, frame_rate_hz)
 }
-
-/// Maximum number of frames without a row: a fixed number plus a number per row. The limit keeps a small file
-/// with a jump in its times from filling the memory.
-const FRAMES_WITHOUT_ROWS: (usize, usize) = (250_000, 4);
 
 /// The rows of `trace.csv` as written, before frame numbers are assigned.
 struct TraceTable<'a> {
@@ -182,8 +200,28 @@ impl<'a> TraceTable<'a> {
         Ok(())
     }
 
-    fn number_rows(&self, file: &str, seed_s: f64) -> Result<FrameFit, FilesError> {
-        let fit = clock::number_frames(&self.times_s, seed_s).ok_or_else(|| too_long_error(file))?;
+    /// Frame numbers of the rows on the grid that fits their times best; `None` if the times span too much.
+    fn number_rows(&self) -> Option<FrameFit> {
+        clock::number_frames(&self.times_s, clock::median_step_s(&self.times_s)?)
+    }
+
+    fn place_by_fit(self, file: &str, fit: Option<FrameFit>) -> Result<(FrameGrid, Traces), FilesError> {
+        let fit = self.check_fit(file, fit)?;
+        let frame_rate_hz = simplest_frame_rate_hz(&self.times_s, &fit);
+        Ok(self.place_on_grid(&fit, frame_rate_hz))
+    }
+
+    fn place_at_rate(self, file: &str, frame_rate_hz: f64) -> Result<(FrameGrid, Traces), FilesError> {
+        let fit = self.check_fit(file, clock::number_frames(&self.times_s, 1.0 / frame_rate_hz))?;
+        let (row, off_frames) = farthest_off_grid(&self.times_s, &fit.frames, frame_rate_hz);
+        if off_frames > clock::OFF_GRID_LIMIT_FRAMES {
+            return Err(self.off_grid_error(file, row, off_frames, frame_rate_hz));
+        }
+        Ok(self.place_on_grid(&fit, frame_rate_hz))
+    }
+
+    fn check_fit(&self, file: &str, fit: Option<FrameFit>) -> Result<FrameFit, FilesError> {
+        let fit = fit.ok_or_else(|| too_long_error(file))?;
         let (rows, frames) = (self.times_s.len(), frame_count(&fit));
         if !fit.is_on_grid() {
             return Err(self.off_grid_error(file, fit.worst_row, fit.worst_frames, 1.0 / fit.frame_s));
@@ -211,7 +249,7 @@ impl<'a> TraceTable<'a> {
 
     fn place_on_grid(self, fit: &FrameFit, frame_rate_hz: f64) -> (FrameGrid, Traces) {
         let frames = frame_count(fit);
-        let mut spread = self.columns.into_iter().map(|column| {
+        let spread = self.columns.into_iter().map(|column| {
             if column.len() == frames {
                 return column; // every frame has its row
             }
@@ -221,18 +259,23 @@ impl<'a> TraceTable<'a> {
             }
             on_grid
         });
-        let mut next = || spread.next().unwrap_or_default();
-        let (tip_x_m, tip_y_m, head_x_m, head_y_m) = (next(), next(), next(), next());
-        let [tip, head] = self.confidences;
-        let traces = Traces {
-            tip_x_m,
-            tip_y_m,
-            head_x_m,
-            head_y_m,
-            tip_confidence: tip.then(&mut next),
-            head_confidence: head.then(&mut next),
-        };
+        let traces = collect_traces(spread, self.confidences);
         (FrameGrid { start_s: self.times_s[0], frame_rate_hz, frames }, traces)
+    }
+}
+
+/// Traces from columns in the order of the file; `confidences` says whether those of tip and head are present.
+fn collect_traces(mut columns: impl Iterator<Item = Vec<Option<f64>>>, confidences: [bool; 2]) -> Traces {
+    let mut next = || columns.next().unwrap_or_default();
+    let (tip_x_m, tip_y_m, head_x_m, head_y_m) = (next(), next(), next(), next());
+    let [tip, head] = confidences;
+    Traces {
+        tip_x_m,
+        tip_y_m,
+        head_x_m,
+        head_y_m,
+        tip_confidence: tip.then(&mut next),
+        head_confidence: head.then(&mut next),
     }
 }
 

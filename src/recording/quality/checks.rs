@@ -3,7 +3,7 @@
 use super::finding::{Check, QualityFinding, Severity};
 use super::measurement::{ChannelQuality, FEWEST_CYCLES, MeasuredColumn, Optics, Quality};
 use super::noise::FrameGaps;
-use crate::recording::{FrameGrid, Traces};
+use crate::recording::{FrameGrid, Recording, Traces};
 use short_spectra::sampling::exposure_gain;
 
 /// Fraction of missing frames above which the finding is a caution. Least-squares spectra with the true frame
@@ -36,6 +36,14 @@ const PLAYBACK_NEARNESS: f64 = 1e-3;
 /// recording rate.
 pub(crate) fn is_playback_rate(rate_hz: f64) -> bool {
     PLAYBACK_RATES_HZ.iter().any(|playback| (rate_hz / playback - 1.0).abs() <= PLAYBACK_NEARNESS)
+}
+
+/// Finding on a recording with true times.
+pub(super) fn check_clock(recording: &Recording) -> Option<QualityFinding> {
+    let value = (recording.clock_departure_frames()?, "frames");
+    let advice = "trust amplitudes up to half of the Nyquist frequency; above it the interpolation makes them too small";
+    let kind = (Check::UnevenClock, Severity::Caution);
+    Some(QualityFinding::advise(kind, value, recording.describe_resampling()?, advice))
 }
 
 /// Findings on frames, rate, length, frequency band, and the frames without a deflection.

@@ -90,12 +90,12 @@ checks! {
     Reversals = "reversals",
     /// An export that has changed since the import.
     SourceChanged = "source-changed",
+    /// Frames that lie on no grid.
+    UnevenClock = "uneven-clock",
     /// Rate that the times of an export imply.
     ImpliedRate = "implied-rate",
     /// Times rounded to a noticeable part of a frame.
     RoundedTimes = "rounded-times",
-    /// A clock with uneven steps that is not used.
-    UnevenClock = "uneven-clock",
     /// Times that count frames because the interval was never set.
     FrameInterval = "frame-interval",
     /// Positions resampled to another rate.

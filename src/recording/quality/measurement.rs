@@ -76,6 +76,7 @@ pub struct Optics {
 /// Measures `recording`; `exposure_s` is the exposure of a frame, s, if known.
 #[must_use]
 pub fn measure_quality(recording: &Recording, exposure_s: Option<f64>) -> Quality {
+    let recording = &*recording.resample_to_grid();
     let (grid, traces) = (recording.grid(), recording.traces());
     let both = traces.tip_x_m.iter().zip(&traces.head_x_m);
     let gaps = FrameGaps::count_gaps(both.map(|(tip, head)| tip.is_some() && head.is_some()));

@@ -105,7 +105,7 @@ pub fn measure_tilt(
     instants: &ReversalInstants,
     measured: &Quality,
 ) -> Result<CameraTilt, TiltNotFound> {
-    let path = TipPath::from_recording(recording, instants);
+    let path = TipPath::from_recording(&recording.resample_to_grid(), instants);
     let frames = path.points.len();
     if frames < FEWEST_FRAMES {
         return Err(TiltNotFound::TooFewFrames { frames });

@@ -98,6 +98,7 @@ pub enum FilmError {
 pub fn film_trace(fine: &Recording, camera: &Camera, start_s: f64) -> Result<Recording, FilmError> {
     check_film_camera(camera)?;
     let grid = plan_frames(fine, camera, start_s)?;
+    let fine = &*fine.resample_to_grid();
     let FrameGrid { start_s: first_s, frame_rate_hz: rate_hz, frames } = fine.grid();
     let shutter = FrameShutter {
         first: (start_s - first_s) * rate_hz,
@@ -280,6 +281,7 @@ pub fn film_like_recording(
     exposure_s: f64,
     seed: u64,
 ) -> Result<MatchedFilm, MatchedFilmError> {
+    let (fine, like) = (&*fine.resample_to_grid(), &*like.resample_to_grid());
     let camera = Camera { frame_rate_hz: like.grid().frame_rate_hz, exposure_s };
     let noise_m = measure_noises(like)?;
     let shown = align_recordings(fine, like).filter(|shown| shown.frames >= 2);
