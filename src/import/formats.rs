@@ -1,20 +1,16 @@
-//! The supported formats, and the choice of the format in which a file is read. To add a format, add one file
-//! to this folder and one line to [`FORMATS`].
+//! The supported formats, and the choice of the format of a file. A new format is a row of
+//! [`layouts::LAYOUTS`], or, if its structure is no row, a file in this folder and a line in [`PARSERS`].
 
 mod deeplabcut;
 mod dice;
-mod dippmotion;
 mod dltdv;
-mod framedias;
 mod imagej;
 mod kinovea;
-mod motion_analysis;
+mod layouts;
 mod plain;
 mod sleap;
 mod tracker;
 mod trackmate;
-mod trackpy;
-mod trc;
 mod wiperlab;
 
 use super::error::{ImportError, ImportResult};
@@ -24,10 +20,9 @@ use crate::import::format::FileFormat;
 use crate::recording::quality::{Check, QualityFinding, Severity};
 use crate::toml_file;
 
-/// The supported formats, in the order in which they are tried on a file.
-static FORMATS: &[&dyn FileFormat] = &[
+/// The formats with a parser of their own, in the order of detection.
+static PARSERS: [&dyn FileFormat; 9] = [
     &wiperlab::Wiperlab,
-    &dippmotion::DippMotion,
     &dice::Dice,
     &kinovea::Kinovea,
     &deeplabcut::DeepLabCut,
@@ -35,16 +30,17 @@ static FORMATS: &[&dyn FileFormat] = &[
     &trackmate::TrackMate,
     &sleap::Sleap,
     &tracker::TrackerFormat,
-    &trc::Trc,
     &imagej::ImageJ,
-    &trackpy::Trackpy,
-    &motion_analysis::MotionAnalysis,
-    &framedias::FrameDias,
-    &plain::PLAIN,
-    &plain::GENERIC,
 ];
 
-/// Programs that do not publish the layout of their tables. Such tables can be read only with `--columns`.
+/// The supported formats, in the order of detection.
+fn all_formats() -> impl Iterator<Item = &'static dyn FileFormat> {
+    let rows = layouts::LAYOUTS.iter().map(|row| row as &dyn FileFormat);
+    let plain: [&dyn FileFormat; 2] = [&plain::PLAIN, &plain::GENERIC];
+    PARSERS.into_iter().chain(rows).chain(plain)
+}
+
+/// Programs whose layout is not published; their tables need `--columns`.
 const UNDOCUMENTED: [&str; 5] = ["movias", "movias-neo", "tema", "proanalyst", "xcitex"];
 
 /// A format, and a text on the feature by which it recognises a document.
@@ -57,7 +53,7 @@ pub(crate) fn choose_format(
     let Some(name) = options.format.as_deref().filter(|name| *name != "auto") else {
         return detect_format(documents, options);
     };
-    let format = FORMATS.iter().copied().find(|format| format.name() == name);
+    let format = all_formats().find(|format| format.name() == name);
     let format = format.ok_or_else(|| unknown_format_error(name))?;
     // (a table without positions is refused by the format of its own program, even if --format names another
     // format. With --columns it is not refused, because the user then says which columns are positions)
@@ -73,11 +69,7 @@ fn detect_format(
     options: &ImportOptions,
 ) -> ImportResult<(&'static dyn FileFormat, String)> {
     if options.columns.is_some() {
-        // (a table of Kinovea's kinematics windows is read as such even with --columns, because its positions
-        // are filtered and may lack samples)
-        let windows = documents.iter().all(kinovea::is_window);
-        let format: &dyn FileFormat = if windows { &kinovea::Kinovea } else { &plain::GENERIC };
-        return Ok((format, "--columns names the columns".to_owned()));
+        return Ok((&plain::GENERIC, "--columns names the columns".to_owned()));
     }
     let mut found: Option<RecognisedFormat> = None;
     for document in documents {
@@ -108,7 +100,7 @@ fn recognise_document(document: &Document, options: &ImportOptions) -> ImportRes
 
 /// The formats that recognise the document. The plain format is left out, because it belongs to no program.
 fn recognising_formats<'d>(document: &'d Document) -> impl Iterator<Item = RecognisedFormat> + 'd {
-    let of_programs = FORMATS.iter().copied().filter(|format| format.name() != plain::PLAIN.name());
+    let of_programs = all_formats().filter(|format| format.name() != plain::PLAIN.name());
     of_programs.filter_map(|format| format.recognises(document).map(|reason| (format, reason)))
 }
 
@@ -125,7 +117,7 @@ fn refusal_by_others(
     options: &ImportOptions,
 ) -> Option<ImportError> {
     let others = recognising_formats(document).filter(|(format, _)| format.name() != chosen.name());
-    others.into_iter().find_map(|(format, _)| refusal_by(format, document, options))
+    { others }.find_map(|(format, _)| refusal_by(format, document, options))
 }
 
 /// Findings about tables that are read only because `--columns` names their columns; without it, they would
@@ -146,7 +138,7 @@ pub(crate) fn find_doubtful_columns(
 
 /// The names of all formats, in the order in which they are tried on a file.
 pub fn format_names() -> Vec<&'static str> {
-    FORMATS.iter().map(|format| format.name()).collect()
+    all_formats().map(|format| format.name()).collect()
 }
 
 fn unknown_format_error(name: &str) -> ImportError {

@@ -311,10 +311,6 @@ fn framedias(motion: &Motion) -> String {
     text
 }
 
-fn framedias_set(motion: &Motion) -> Vec<(&'static str, String)> {
-    vec![("run.set", format!("Memo=\"\"\nCameraSpeed={}\nPointName=\"tip\",\"head\"\n", motion.rate_hz))]
-}
-
 fn motion_analysis(motion: &Motion) -> String {
     let mut text = "frame_no,time,tip-x,tip-y,head-x,head-y\n".to_owned();
     for (frame, v) in motion.frames.iter().enumerate() {
@@ -413,7 +409,7 @@ pub fn exporters() -> Vec<Exporter> {
         Exporter { options: by_id, ..two("imagej", "mtrackj", "run.txt", mtrackj) },
         two("dippmotion", "graph", "run.csv", dippmotion),
         Exporter {
-            companions: framedias_set,
+            options: |o| (o.tip, o.head) = (Some("point1".to_owned()), Some("point2".to_owned())),
             rows_are_frames: true,
             ..two("framedias", "rd", "run.rd", framedias)
         },

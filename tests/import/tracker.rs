@@ -463,26 +463,20 @@ fn settings_above_a_table_are_no_damaged_rows() {
 }
 
 #[test]
-fn a_table_of_a_kinematics_window_stays_one_when_its_columns_are_named() {
+fn a_table_of_a_kinematics_window_is_doubted_when_its_columns_are_named() {
     let rows: String = (0..20).map(|i| format!("{i};{i},5\n")).collect();
     let source = [ImportSource::without_companions("a.csv", format!("Zeit (ms);tip\n{rows}").into_bytes())];
     let named =
         ImportOptions { columns: Some(ColumnMap::parse("time-ms=1,tip-x=2").unwrap()), ..world(1000.0, "") };
     let found = import(&source, &named).unwrap();
     assert!(
-        found.report.warnings().any(|warning| warning.contains("after a low-pass filter")),
+        found.report.warnings().any(|warning| warning.contains("kinematics windows, which are filtered")),
         "{:?}",
         found.report
     );
-    let fast = import(&source, &ImportOptions { frame_rate_hz: Some(2000.0), ..named.clone() })
-        .unwrap_err()
-        .to_string();
-    assert!(
-        fast.contains("keep one sample a millisecond") && fast.ends_with("add --format generic"),
-        "{fast}"
-    );
-    let other = ImportOptions { format: Some("generic".to_owned()), ..named };
-    assert!(!import(&source, &other).unwrap().report.warnings().any(|warning| warning.contains("low-pass")));
+    let fast =
+        import(&source, &ImportOptions { frame_rate_hz: Some(2000.0), ..named }).unwrap_err().to_string();
+    assert!(fast.contains("the times imply 1000.0"), "{fast}");
 }
 
 #[test]

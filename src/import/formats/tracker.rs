@@ -55,36 +55,32 @@ impl FileFormat for TrackerFormat {
             return Err(no_positions_error(table, row, &columns));
         }
         let notes = name_unnamed_points(&mut points, document.stem);
+        // (the unit and the axes of world coordinates are those of the user's calibration)
+        let open = "Tracker's x and y point up unless its axes were turned; image pixels point down";
+        let facts = if pair == WORLD {
+            Facts { y_axis_open: Some(open), ..Facts::default() }
+        } else {
+            Facts::pixels_down("Tracker's pixelx and pixely are image pixels, y downwards")
+        };
         let at = |name: &str| columns.iter().position(|column| *column == name);
-        // (a row may end after the positions: speeds in later columns are blank at the ends of a track, and
-        // some editors remove trailing blanks)
-        let layout = |time: Option<usize>, frame: Option<usize>, points: Vec<PointCells>| {
+        // (speeds after the positions are blank at the ends of a track, and some editors remove trailing
+        // blanks)
+        let layout = |((frame, time), points): (ClockColumns, Vec<PointCells>)| {
             let cells = points.iter().flat_map(|point| point.x.iter().chain(&point.y).copied());
             let width = cells.chain(time).chain(frame).max().map_or(0, |last| last + 1);
             let most = row.used_width();
             TableLayout { most, frame, time, ..TableLayout::new(header + 1, width, points) }
         };
         let mut export = if clocks_agree(table, header + 1, &columns)? {
-            layout(at(TIME), at(FRAME), points).read_tracks(document, table, facts(pair))?
+            layout(((at(FRAME), at(TIME)), points)).read_tracks(document, table, facts)?
         } else {
-            let groups = group_by_clock(table, row, &columns, &titles, points)?;
-            let layouts =
-                groups.into_iter().map(|group| layout(group.time, group.frame, group.points)).collect();
-            layout::read_clocks_apart(layouts, document, table, facts(pair))?
+            let groups = group_by_clock(table, row, &titles, points)?;
+            let layouts = groups.into_iter().map(layout).collect();
+            layout::read_clocks_apart(layouts, document, table, facts)?
         };
         export.notes.extend(notes);
         Ok(export)
     }
-}
-
-/// Facts about the coordinates, which are image pixels or world coordinates. Unit and axes of world
-/// coordinates come from the user's calibration, which the export does not contain.
-fn facts(pair: [&str; 2]) -> Facts {
-    if pair == WORLD {
-        let open = "Tracker's x and y point up unless its axes were turned; image pixels point down";
-        return Facts { y_axis_open: Some(open), ..Facts::default() };
-    }
-    Facts::pixels_down("Tracker's pixelx and pixely are image pixels, y downwards")
 }
 
 /// Index of the row of column names.
@@ -171,12 +167,8 @@ fn no_positions_error(table: &DelimitedTable, row: &TextRow, columns: &[&str]) -
 
 // Tables with several tracks side by side, each with its own clock.
 
-/// Columns of one clock, and the points whose rows have this clock.
-struct ClockGroup {
-    pub time: Option<usize>,
-    pub frame: Option<usize>,
-    pub points: Vec<PointCells>,
-}
+/// Columns of frame numbers and of times.
+type ClockColumns = (Option<usize>, Option<usize>);
 
 fn find_columns(columns: &[&str], name: &str) -> Vec<usize> {
     columns.iter().enumerate().filter(|(_, column)| **column == name).map(|(at, _)| at).collect()
@@ -186,9 +178,8 @@ fn find_columns(columns: &[&str], name: &str) -> Vec<usize> {
 /// numbers too.
 fn clocks_agree(table: &DelimitedTable, start: usize, columns: &[&str]) -> ImportResult<bool> {
     for clocks in [find_columns(columns, TIME), find_columns(columns, FRAME)] {
-        let [first, others @ ..] = clocks.as_slice() else { continue };
-        for other in others {
-            let [first, other] = [*first, *other].map(|cell| ClockCell { cell, unit: 1.0 });
+        for other in clocks.iter().skip(1) {
+            let [first, other] = [clocks[0], *other].map(|cell| ClockCell { cell, unit: 1.0 });
             if find_clock_difference(table, start, first, other)?.is_some() {
                 return Ok(false);
             }
@@ -197,47 +188,35 @@ fn clocks_agree(table: &DelimitedTable, start: usize, columns: &[&str]) -> Impor
     Ok(true)
 }
 
+/// The points by their clock: the one under the same title, or else the nearest one to the left.
 fn group_by_clock(
     table: &DelimitedTable,
     row: &TextRow,
-    columns: &[&str],
     titles: &[&str],
     points: Vec<PointCells>,
-) -> ImportResult<Vec<ClockGroup>> {
-    let (times, frames) = (find_columns(columns, TIME), find_columns(columns, FRAME));
-    let mut groups: Vec<ClockGroup> = vec![];
+) -> ImportResult<Vec<(ClockColumns, Vec<PointCells>)>> {
+    let title_of = |column: usize| find_title(titles, column).map(|(at, _)| at);
+    let mut groups: Vec<(ClockColumns, Vec<PointCells>)> = vec![];
     for point in points {
-        let x = point.x.first().copied().unwrap_or(0);
-        let own = |clocks: &[usize]| match clocks {
+        let x = point.x[0];
+        let own = |name: &str| match find_columns(&row.texts(), name).as_slice() {
             [only] => Some(*only),
-            several => clock_of_column(several, titles, x),
+            several => {
+                let under = |clock: &&usize| title_of(x).is_some() && title_of(**clock) == title_of(x);
+                several.iter().find(under).or_else(|| several.iter().rfind(|clock| **clock < x)).copied()
+            }
         };
-        let (time, frame) = (own(&times), own(&frames));
-        if time.is_none() && frame.is_none() {
-            return Err(no_clock_error(table, row, &point, x));
+        let clock = (own(FRAME), own(TIME));
+        if clock == (None, None) {
+            let found = format!("several clocks that differ, and none for the track `{}`", point.name);
+            let advice = "export again from Tracker, or each track to a file of its own";
+            let (place, expected) = (table.cell_location(row.line, x), "`t` or `frame` left of every track");
+            return Err(ImportError::format(place, found, expected, advice));
         }
-        match groups.iter_mut().find(|group| (group.time, group.frame) == (time, frame)) {
-            Some(group) => group.points.push(point),
-            None => groups.push(ClockGroup { time, frame, points: vec![point] }),
+        match groups.iter_mut().find(|group| group.0 == clock) {
+            Some(group) => group.1.push(point),
+            None => groups.push((clock, vec![point])),
         }
     }
     Ok(groups)
-}
-
-/// Column of the clock under the same title as column `x`, or else of the nearest clock to the left of `x`.
-fn clock_of_column(clocks: &[usize], titles: &[&str], x: usize) -> Option<usize> {
-    let title = find_title(titles, x).map(|(at, _)| at);
-    let under = |clock: &&usize| title.is_some() && find_title(titles, **clock).map(|(at, _)| at) == title;
-    clocks.iter().find(under).or_else(|| clocks.iter().rfind(|clock| **clock < x)).copied()
-}
-
-fn no_clock_error(table: &DelimitedTable, row: &TextRow, point: &PointCells, x: usize) -> ImportError {
-    let problem = format!(
-        "found several clocks that differ, and none for the track `{}` in column {}, expected `t` or `frame` to the \
-         left of every track",
-        point.name,
-        x + 1
-    );
-    let advice = "export again from Tracker, or each track to a file of its own";
-    ImportError::columns(table.file, row.line, problem, advice)
 }

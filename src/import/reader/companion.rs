@@ -13,8 +13,7 @@ use crate::recording::quality::{Check, QualityFinding, Severity};
 /// Paths that companion files of the export `file` may have, in the order in which they are read.
 pub(crate) fn companion_names(file: &str) -> Vec<String> {
     let stem = file.rsplit_once('.').map_or(file, |(stem, _)| stem);
-    let by_extension =
-        ["cih", "CIH", "cihx", "CIHX", "set", "SET"].iter().map(|extension| format!("{stem}.{extension}"));
+    let by_extension = ["cih", "CIH", "cihx", "CIHX"].iter().map(|extension| format!("{stem}.{extension}"));
     by_extension.chain(point_names_file(file)).collect()
 }
 
@@ -353,7 +352,7 @@ mod tests {
     fn companions_share_the_name_of_the_export() {
         assert!(companion_names("a/run 7.csv").contains(&"a/run 7.cih".to_owned()));
         assert!(companion_names("xypts/run7_xypts.tsv").contains(&"xypts/run7_pointNames.tsv".to_owned()));
-        assert_eq!(companion_names("xypts/run7.tsv").len(), 6);
+        assert_eq!(companion_names("xypts/run7.tsv").len(), 4);
     }
 
     const CIH: &str = "#Camera Information Header\r\nDate : 2020/1/1\r\nTime : 00:11\r\nRecord Rate(fps) : \
@@ -385,7 +384,7 @@ mod tests {
         assert_eq!(rate("run.CIH", CIH.replace(" : ", " :").as_bytes()), Ok(5000.0));
         assert_eq!(rate("run.cihx", CIHX), Ok(20_000.0));
         assert_eq!(CameraRecord::parse(&companion("run.cihx", CIHX)).unwrap().frame_count(), Some(8));
-        assert!(CameraRecord::parse(&companion("run.set", b"")).is_none());
+        assert!(CameraRecord::parse(&companion("run_pointNames.tsv", b"")).is_none());
     }
 
     #[test]

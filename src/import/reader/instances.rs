@@ -126,6 +126,25 @@ impl TrackCollector {
         self.instances.len() - 1
     }
 
+    /// Number of instances.
+    pub(crate) fn len(&self) -> usize {
+        self.instances.len()
+    }
+
+    /// Sorts the rows of every instance. Removes the instances that have two rows in one frame, and returns
+    /// their keys, each with its error.
+    pub(crate) fn take_branching(&mut self, file: &str) -> Vec<(String, ImportError)> {
+        let mut branching = vec![];
+        self.instances.retain_mut(|instance| match instance.sort_rows(file) {
+            Ok(()) => true,
+            Err(error) => {
+                branching.push((instance.key.clone(), error));
+                false
+            }
+        });
+        branching
+    }
+
     /// Returns one clock for each instance, and one track for each point of an instance. A track has the name
     /// of its point if its instance has no name. Otherwise it has the name of its instance if instances have
     /// only one point, the name of its point if there is only one instance, or else the name

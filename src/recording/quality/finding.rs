@@ -96,12 +96,6 @@ checks! {
     ImpliedRate = "implied-rate",
     /// Times rounded to a noticeable part of a frame.
     RoundedTimes = "rounded-times",
-    /// Times that count frames because the interval was never set.
-    FrameInterval = "frame-interval",
-    /// Positions resampled to another rate.
-    Resampled = "resampled",
-    /// A table that loses samples of fast cameras.
-    SamplesLost = "samples-lost",
     /// Numbers that a spreadsheet has rounded.
     SpreadsheetRounding = "spreadsheet-rounding",
     /// Labels of single pictures that were picked from a video.

@@ -1,20 +1,18 @@
-//! Reads XML as a sequence of opening and closing tags with their places in the file. This is the only file
-//! that uses `quick_xml`.
+//! XML as the starts of its elements with their places. This is the only file that uses `quick_xml`.
 //!
-//! Tags are read one by one, so that deeply nested elements cannot overflow the stack. Only character
-//! references and the five predefined entities are resolved. A document type definition, which could define
-//! other entities, is refused.
+//! Elements are read one by one, so that deep nesting takes no stack. Only the five predefined entities and
+//! character references are resolved; a document type, which could define others, is refused.
 
 use crate::import::error::{CellProblem, ImportError, ImportResult, TextLocation};
 use crate::import::reader::rows::count_lines;
 use crate::import::reader::{CellNumber, Document, parse_number};
 use quick_xml::XmlVersion;
-use quick_xml::events::{BytesEnd, BytesStart, Event};
+use quick_xml::events::{BytesStart, Event};
 use quick_xml::reader::Reader;
 
 const REMEDY: &str = "save or export it again from TrackMate";
 
-/// Reads the tags of a document in the order of the file.
+/// Reads the elements of a document in their order.
 pub(crate) struct XmlReader<'a> {
     file: &'a str,
     text: &'a str,
@@ -25,13 +23,7 @@ pub(crate) struct XmlReader<'a> {
     counted: (usize, usize),
 }
 
-/// Opening or closing tag of an element. An empty element such as `<a/>` gives both.
-pub(crate) enum XmlTag<'a> {
-    Open(XmlElement<'a>),
-    Close(BytesEnd<'a>),
-}
-
-/// Opening tag of an element.
+/// Start of an element.
 pub(crate) struct XmlElement<'a> {
     bytes: BytesStart<'a>,
     start: usize,
@@ -39,15 +31,8 @@ pub(crate) struct XmlElement<'a> {
 }
 
 impl XmlElement<'_> {
-    pub(crate) fn has_name(&self, name: &str) -> bool {
-        self.bytes.name().as_ref() == name
-    }
-}
-
-impl XmlTag<'_> {
-    /// Whether this is the closing tag of an element called `name`.
-    pub(crate) fn closes(&self, name: &str) -> bool {
-        matches!(self, Self::Close(end) if end.name().as_ref() == name)
+    pub(crate) fn name(&self) -> &str {
+        self.bytes.name().into_inner()
     }
 }
 
@@ -63,30 +48,25 @@ impl<'a> XmlReader<'a> {
         if !document.text.trim_start().starts_with('<') {
             return None;
         }
-        match XmlReader::new(document).next_tag().ok()?? {
-            XmlTag::Open(element) => Some(element.bytes.name().as_ref().to_owned()),
-            XmlTag::Close(_) => None,
-        }
+        let element = XmlReader::new(document).next_element().ok()??;
+        Some(element.name().to_owned())
     }
 
-    /// The next opening or closing tag; `None` after the last one.
+    /// The start of the next element; `None` after the last one.
     ///
     /// # Errors
     /// [`ImportError::WrongTable`] if the text is not well-formed, ends within an element, or has a document
-    /// type definition.
-    pub(crate) fn next_tag(&mut self) -> ImportResult<Option<XmlTag<'a>>> {
+    /// type.
+    pub(crate) fn next_element(&mut self) -> ImportResult<Option<XmlElement<'a>>> {
         loop {
             let start = self.clamp_offset(self.reader.buffer_position());
             match self.reader.read_event() {
                 Ok(Event::Start(bytes)) => {
                     self.depth += 1;
                     let line = self.line_at(start);
-                    return Ok(Some(XmlTag::Open(XmlElement { bytes, start, line })));
+                    return Ok(Some(XmlElement { bytes, start, line }));
                 }
-                Ok(Event::End(bytes)) => {
-                    self.depth = self.depth.saturating_sub(1);
-                    return Ok(Some(XmlTag::Close(bytes)));
-                }
+                Ok(Event::End(_)) => self.depth = self.depth.saturating_sub(1),
                 Ok(Event::DocType(_)) => {
                     return Err(self.damaged_error(start, "a document type definition".to_owned()));
                 }
@@ -130,8 +110,8 @@ impl<'a> XmlReader<'a> {
     /// [`ImportError::WrongTable`] if the attribute is missing.
     pub(crate) fn required_attribute(&self, element: &XmlElement, name: &str) -> ImportResult<String> {
         self.attribute(element, name)?.ok_or_else(|| {
-            let found = format!("<{}> without {name}", element.bytes.name().as_ref());
-            let place = self.location_at(element.start);
+            let found = format!("<{}> without {name}", element.name());
+            let place = self.element_location(element);
             ImportError::wrong_table(place, found, format!("the attribute {name}"), REMEDY)
         })
     }
@@ -149,7 +129,7 @@ impl<'a> XmlReader<'a> {
             CellNumber::Missing => Ok(None),
             CellNumber::Text => {
                 let remedy = ("a number with a decimal point", REMEDY);
-                let place = self.location_at(element.start);
+                let place = self.element_location(element);
                 Err(ImportError::cell(place, CellProblem::NotANumber, (name, &text), remedy))
             }
         }
