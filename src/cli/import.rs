@@ -26,9 +26,10 @@ Points: tracks called `tip` and `head` need no option. Otherwise name them: NAME
 files have a track of that name, or FILE when the file has a single track.
 
 Columns (any plain table): KEY=COLUMN pairs; a column is a number from 1 or a name of the header. Keys: frame
-(whole numbers; frame=row if every row is a frame), time (s), time-ms, tip-x, tip-y, head-x, head-y,
-tip-confidence, head-confidence; or track, x, y, confidence if each row names its point. Frame or time and
-one x are required; other columns stay empty.
+(whole numbers; frame=row if every row is a frame), time (in the unit of the header, else s), time-ms,
+tip-x, tip-y, head-x, head-y, tip-confidence, head-confidence; or track, x, y, confidence if each row names
+its point. Frame or time and one x are required; other columns stay empty. The header, or a row below it,
+may name the unit of each column; an option that names another unit is refused.
 
 Coordinates keep the file's origin: they are scaled, and y is mirrored if it points down. The import asks for
 every rate, unit or direction of y that neither the file, nor its format, nor a camera's .cih fixes.
