@@ -75,9 +75,10 @@ pub struct Recording {
     grid: FrameGrid,
     /// True times of frames that lie on no grid.
     times: Option<FrameTimes>,
-    /// Largest distance of the true times from this grid, frames, if the tracks were interpolated to it.
-    resampled_frames: Option<f64>,
-    frame_rate_sd_hz: f64,
+    /// Largest distance of the true times from the grid of their mean rate, frames; kept when the tracks are
+    /// interpolated to this grid.
+    departure_frames: Option<f64>,
+    frame_rate_sd_hz: Option<f64>,
     traces: Traces,
     synthetic: bool,
 }
@@ -109,8 +110,8 @@ impl Recording {
         for (column, values) in traces.columns() {
             check_column(column, values, frames)?;
         }
-        let (times, resampled_frames, frame_rate_sd_hz) = (None, None, 0.0);
-        Ok(Self { name: name.into(), grid, times, resampled_frames, frame_rate_sd_hz, traces, synthetic })
+        let (times, departure_frames, frame_rate_sd_hz) = (None, None, None);
+        Ok(Self { name: name.into(), grid, times, departure_frames, frame_rate_sd_hz, traces, synthetic })
     }
 
     /// The name in messages and figures, usually that of the recording's folder.
@@ -139,31 +140,31 @@ impl Recording {
     pub(crate) fn frame_at_or_after(&self, time_s: f64) -> f64 {
         let FrameGrid { start_s, frame_rate_hz, frames } = self.grid;
         let on_grid = |from_s: f64| ((time_s - from_s) * frame_rate_hz - ON_FRAME_TOLERANCE).ceil();
-        match self.frame_times_s() {
-            Some(times) if time_s > start_s && time_s <= times[frames - 1] => {
-                times.partition_point(|t| (t - time_s) * frame_rate_hz < -ON_FRAME_TOLERANCE) as f64
-            }
-            Some(times) if time_s > start_s => (frames - 1) as f64 + on_grid(times[frames - 1]),
-            _ => on_grid(start_s),
+        let Some(times) = self.frame_times_s() else { return on_grid(start_s) };
+        match times.partition_point(|t| (t - time_s) * frame_rate_hz < -ON_FRAME_TOLERANCE) {
+            0 => on_grid(start_s),
+            after if after == frames => (frames - 1) as f64 + on_grid(times[frames - 1]),
+            inside => inside as f64,
         }
     }
 
-    /// Standard deviation of the frame rate, 1/s; 0 if it is not known.
+    /// Standard deviation of the frame rate, 1/s; `None` if it is not known and taken as 0.
     #[must_use]
-    pub fn frame_rate_sd_hz(&self) -> f64 {
+    pub fn frame_rate_sd_hz(&self) -> Option<f64> {
         self.frame_rate_sd_hz
     }
 
     /// This recording with a standard deviation of its frame rate, 1/s.
     ///
     /// # Errors
-    /// [`RecordingError`] unless it is a finite number of at least 0.
-    pub fn with_frame_rate_sd(self, frame_rate_sd_hz: f64) -> Result<Self, RecordingError> {
-        if frame_rate_sd_hz.is_finite() && frame_rate_sd_hz >= 0.0 {
-            return Ok(Self { frame_rate_sd_hz, ..self });
+    /// [`RecordingError`] unless it is a finite number above 0, or `None`.
+    pub fn with_frame_rate_sd(self, frame_rate_sd_hz: Option<f64>) -> Result<Self, RecordingError> {
+        match frame_rate_sd_hz.filter(|sd| !(sd.is_finite() && *sd > 0.0)) {
+            None => Ok(Self { frame_rate_sd_hz, ..self }),
+            Some(found) => Err(RecordingError(format!(
+                "frame_rate_sd_hz: found {found}, expected a finite number above 0"
+            ))),
         }
-        let found = format!("frame_rate_sd_hz: found {frame_rate_sd_hz}");
-        Err(RecordingError(format!("{found}, expected a finite number of at least 0")))
     }
 
     /// This recording with other traces at the same times.
@@ -206,6 +207,15 @@ impl Traces {
         let optional = [("tip_confidence", &self.tip_confidence), ("head_confidence", &self.head_confidence)];
         let optional = optional.into_iter().filter_map(|(name, column)| column.as_deref().map(|c| (name, c)));
         always.into_iter().map(|(name, column)| (name, column.as_slice())).chain(optional)
+    }
+
+    /// Traces from columns in the order of [`Self::columns`]; `confidences` says whether those of tip and head
+    /// are among them.
+    fn from_columns(mut columns: impl Iterator<Item = Vec<Option<f64>>>, confidences: [bool; 2]) -> Self {
+        let mut next = || columns.next().unwrap_or_default();
+        let (tip_x_m, tip_y_m, head_x_m, head_y_m) = (next(), next(), next(), next());
+        let [tip_confidence, head_confidence] = confidences.map(|present| present.then(&mut next));
+        Self { tip_x_m, tip_y_m, head_x_m, head_y_m, tip_confidence, head_confidence }
     }
 }
 

@@ -61,12 +61,6 @@ pub enum TomlError {
 /// Version of every TOML format of this program.
 pub const FORMAT: u32 = 1;
 
-/// Whether a number is left out of a file because it is 0.
-#[allow(clippy::trivially_copy_pass_by_ref)] // serde passes a reference
-pub(crate) fn is_zero(value: &f64) -> bool {
-    *value == 0.0
-}
-
 /// Reads `text` as `T`; errors call it `file`.
 ///
 /// # Errors

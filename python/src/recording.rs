@@ -47,7 +47,7 @@ impl PyRecording {
         clock: PyFrameClock<'_>,
         columns: Bound<'_, PyDict>,
         start_s: f64,
-        frame_rate_sd_hz: f64,
+        frame_rate_sd_hz: Option<f64>,
         exposure_s: Option<f64>,
         synthetic: bool,
     ) -> PyResult<Self> {
@@ -109,7 +109,7 @@ impl PyRecording {
     }
 
     #[getter]
-    fn frame_rate_sd_hz(&self) -> f64 {
+    fn frame_rate_sd_hz(&self) -> Option<f64> {
         self.inner.frame_rate_sd_hz()
     }
 

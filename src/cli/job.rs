@@ -57,11 +57,10 @@ impl LoadedJob {
         let doubts = doubts.map(|(file, scene)| (file.clone(), scene.find_implausible())).collect();
         let measured_at = job.recordings().map(|named| found("recording.path", named));
         let measured_at = measured_at.collect::<Result<Vec<_>, _>>()?;
-        let on_grid = |loaded: LoadedRecording| LoadedRecording {
-            recording: loaded.recording.move_to_grid(),
-            ..loaded
-        };
-        let measured = measured_at.iter().map(|path| load_recording(path).map(on_grid));
+        let measured = measured_at.iter().map(|path| {
+            let loaded = load_recording(path)?;
+            Ok(LoadedRecording { recording: loaded.recording.move_to_grid(), ..loaded })
+        });
         let measured = measured.collect::<Result<Vec<_>, _>>()?;
         let to_measured = |loaded: &LoadedRecording| MeasuredRecording {
             recording: loaded.recording.clone(),

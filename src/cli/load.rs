@@ -21,7 +21,9 @@ pub(crate) fn read_driven_scene(path: &Path) -> Outcome<(Scene, Option<PathBuf>)
     let recording = |named: &str| {
         let place = files::resolve_existing_path(path, named)?;
         let loaded = load_recording(&place).map_err(|failure| failure.to_string())?;
-        print_resampling(&place, &loaded.recording);
+        if let Some(said) = loaded.recording.describe_resampling() {
+            warn_line!("warning: {}: {said}", place.display());
+        }
         driver = Some(place);
         Ok(loaded.recording)
     };
@@ -33,13 +35,6 @@ pub(crate) fn read_driven_scene(path: &Path) -> Outcome<(Scene, Option<PathBuf>)
 pub(crate) fn print_warnings(file: &Path, findings: &[PlausibilityFinding], global: &GlobalArgs) {
     for finding in findings.iter().filter(|_| !global.quiet) {
         warn_line!("warning: {}: {finding}", file.display());
-    }
-}
-
-/// Prints a warning if the tracks of a recording are interpolated to a grid.
-fn print_resampling(path: &Path, recording: &Recording) {
-    if let Some(said) = recording.describe_resampling() {
-        warn_line!("warning: {}: {said}", path.display());
     }
 }
 

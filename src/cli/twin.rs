@@ -6,9 +6,7 @@ use super::prelude::*;
 use super::run_observer::ProgressObserver;
 use crate::figures::twin as figure;
 use crate::recording::Recording;
-use crate::recording::files::{
-    CameraEntry, DESCRIPTION_FILE, FrameClock, RecordingFile, TRACE_FILE, YAxis, trace_csv,
-};
+use crate::recording::files::{CameraEntry, DESCRIPTION_FILE, RecordingFile, TRACE_FILE, YAxis, trace_csv};
 use crate::recording::quality::measure_quality;
 use crate::simulate::SolverOptions;
 use crate::simulate::scene::Scene;
@@ -128,8 +126,8 @@ fn describe_recording(
     let exposure_s = (spec.camera.exposure_s > 0.0).then_some(spec.camera.exposure_s);
     let camera = CameraEntry {
         frame_rate_hz: spec.camera.frame_rate_hz,
-        frame_rate_sd_hz: 0.0,
-        clock: FrameClock::Grid,
+        frame_rate_sd_hz: None,
+        clock: None,
         exposure_s,
         metres_per_pixel: Some(spec.tracking.metres_per_pixel),
         y_axis: Some(YAxis::Up),

@@ -123,11 +123,14 @@ fn track_ridge(
     let band_hz = if band_hz.0 < band_hz.1 { band_hz } else { top_hz };
     // components below the band would disturb the ridge
     let fast = remove_slow_components(&analysis, rate_hz, band_hz.0);
-    let ridge =
+    let mut ridge =
         choose_ridge(&fast, rate_hz, band_hz, segment_s.or(job_segment_s(case)), min_segment_s(case))?;
     let settings = SpectrogramSettings { segment_s: Some(ridge.segment_s), band_hz: Some(band_hz) };
     let spectrogram = Spectrogram::new(&analysis.detrended_m(), rate_hz, &settings).ok()?;
-    let courses = course::coherent_parts(&ridge, &spectrogram);
+    let mut courses = course::coherent_parts(&ridge, &spectrogram);
+    for point in ridge.points.iter_mut().chain(courses.iter_mut().flatten()) {
+        point.frequency_sd_hz = side.recording.add_clock_sd(point.frequency_hz, point.frequency_sd_hz);
+    }
     let over_speed = ridge_over_speed(side, frames.start, &courses, ridge.segment_s);
     let start_s = side.recording.grid().time_s(frames.start);
     Some(TrackedRidge { start_s, spectrogram, ridge, courses, band_hz, over_speed })
@@ -195,7 +198,7 @@ fn ridge_over_speed(
         Some(SpeedPoint {
             speed_m_per_s: mean_speed_m_per_s(tip, grid.frame_rate_hz, segment)?.abs(),
             frequency_hz: p.frequency_hz,
-            frequency_sd_hz: Some(side.recording.add_clock_sd(p.frequency_hz, p.frequency_sd_hz)),
+            frequency_sd_hz: Some(p.frequency_sd_hz),
         })
     };
     let every = courses.iter().map(Vec::len).sum::<usize>().div_ceil(MAX_SPEED_POINTS).max(1);

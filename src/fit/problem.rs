@@ -23,7 +23,6 @@ use crate::simulate::drive::{Drive, HeadMotionError, smooth_head_motion};
 use crate::simulate::scene::error::SceneError;
 use crate::simulate::scene::{Scene, StartKind};
 use crate::simulate::twin::Camera;
-use crate::toml_file::is_zero;
 use serde::Serialize;
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -332,8 +331,8 @@ struct RecordingIdentity<'a> {
     traces: &'a Traces,
     exposure_s: Option<f64>,
     synthetic: bool,
-    #[serde(skip_serializing_if = "is_zero")]
-    frame_rate_sd_hz: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    frame_rate_sd_hz: Option<f64>,
 }
 
 // Runs over a whole recording with the fitted constants. If the recorded head drives the model, a run starts

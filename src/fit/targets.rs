@@ -81,9 +81,8 @@ fn measure_target(
                 ValueComparison::Linear { scale } => scale,
             };
             let stated = least_sd > 0.0 || least_sd_relative > 0.0;
-            let recording = measured.get(aim.feature.condition).and_then(Option::as_ref);
-            let is_frequency = aim.feature.reading.unit() == FeatureUnit::HERTZ;
-            let clock = recording.filter(|_| is_frequency);
+            let clock = measured.get(aim.feature.condition).and_then(Option::as_ref);
+            let clock = clock.filter(|_| aim.feature.reading.unit() == FeatureUnit::HERTZ);
             let with_clock = |sd| clock.map_or(sd, |recording| recording.add_clock_sd(read.value, sd));
             let noise = if stated { read.sd } else { scatter.map(with_clock).or(read.sd) };
             let least =

@@ -84,7 +84,7 @@ pub(crate) fn assemble_recording(
     let camera = CameraEntry {
         frame_rate_hz: recording.grid().frame_rate_hz,
         frame_rate_sd_hz: recording.frame_rate_sd_hz(),
-        clock: FrameClock::of(&recording),
+        clock: recording.frame_times_s().map(|_| FrameClock::Times),
         exposure_s: calibration.exposure_s,
         metres_per_pixel: calibration.metres_per_pixel(),
         y_axis: Some(calibration.y_axis),

@@ -5,11 +5,11 @@ mod trace;
 
 pub use super::video::{PixelMapping, VideoEntry};
 pub use description::{CameraEntry, FrameClock, LevelEntry, OneOrMany, RecordingFile, SourceEntry, YAxis};
-pub use trace::{HEADER, parse_trace_csv, parse_trace_csv_at, push_trace_row, trace_blocks, trace_csv};
+pub use trace::{HEADER, parse_trace_csv, push_trace_row, trace_blocks, trace_csv};
 
 use crate::recording::{Recording, RecordingError};
 use crate::toml_file::TomlError;
-use trace::{TraceFrames, parse_trace_frames};
+use trace::TraceTable;
 
 /// Name of the file of traces in a recording's folder.
 pub(crate) const TRACE_FILE: &str = "trace.csv";
@@ -64,27 +64,28 @@ pub fn read_recording(
     trace: &str,
     description: Option<&RecordingFile>,
 ) -> Result<Recording, FilesError> {
-    if let Some(description) = description {
-        description.check_trace(file, trace)?;
-    }
-    let camera = description.map(|d| &d.camera);
-    let (frames, traces) = parse_trace_frames(file, trace, camera)?;
+    description.map(|d| d.check_trace(file, trace)).transpose()?;
+    let (table, camera) = (TraceTable::parse(file, trace)?, description.map(|d| &d.camera));
     let synthetic = description.is_some_and(|d| d.synthetic);
+    let recording =
+        if camera.map_or_else(|| table.is_uneven(), |camera| camera.clock == Some(FrameClock::Times)) {
+            let (times_s, traces) = table.keep_times();
+            Recording::from_times(name, times_s, traces, synthetic)
+        } else {
+            let (grid, traces) = match camera {
+                Some(camera) => table.place_at_rate(file, camera.frame_rate_hz)?,
+                None => table.place_at_fitted_rate(file)?,
+            };
+            Recording::new(name, grid, traces, synthetic)
+        };
     let refuse = |problem: RecordingError| FilesError::refuse(file, format!(": {problem}"));
-    let recording = match frames {
-        TraceFrames::Grid(grid) => Recording::new(name, grid, traces, synthetic),
-        TraceFrames::Times(times_s) => Recording::from_times(name, times_s, traces, synthetic),
-    };
     let recording = recording.map_err(refuse)?;
-    let mean_hz = recording.grid().frame_rate_hz;
-    if let Some(stated_hz) =
-        camera.map(|c| c.frame_rate_hz).filter(|hz| (hz / mean_hz - 1.0).abs() > SAME_RATE)
-    {
-        let problem = format!(
-            ": column time_s: found a mean rate of {mean_hz} frames/s, but {DESCRIPTION_FILE} has \
-             `frame_rate_hz = {stated_hz}` with `clock = \"times\"`; write the mean rate there"
-        );
-        return Err(FilesError::refuse(file, problem));
+    let (mean_hz, Some(camera)) = (recording.grid().frame_rate_hz, camera) else { return Ok(recording) };
+    if (camera.frame_rate_hz / mean_hz - 1.0).abs() > SAME_RATE {
+        let found = format!(": column time_s: found a mean rate of {mean_hz} frames/s");
+        let expected =
+            format!("expected the `frame_rate_hz` of {DESCRIPTION_FILE}; write the mean rate there");
+        return Err(FilesError::refuse(file, format!("{found}, {expected}")));
     }
-    recording.with_frame_rate_sd(camera.map_or(0.0, |c| c.frame_rate_sd_hz)).map_err(refuse)
+    recording.with_frame_rate_sd(camera.frame_rate_sd_hz).map_err(refuse)
 }

@@ -3,15 +3,18 @@
 
 use super::clock::{self, FRAMES_WITHOUT_ROWS, MAX_FRAMES};
 use super::{
-    FrameGrid, ON_FRAME_TOLERANCE, Recording, RecordingError, STENCIL, Traces, lagrange_through_nodes,
+    FrameGrid, LARGEST_M, ON_FRAME_TOLERANCE, Recording, RecordingError, STENCIL, Traces,
+    lagrange_through_nodes,
 };
 use portable_math as math;
+use short_spectra::time_frequency::FrequencyRange;
 use short_spectra::{SampledRecord, SpectralAnalysis, SpectrumError, SpectrumSettings};
 use std::borrow::Cow;
 
-/// A step from frame to frame is a gap if it is longer than this multiple of the median of the steps around
-/// it: half way from one frame to two.
-const GAP_STEPS: f64 = 1.5;
+/// A step from frame to frame is a gap if it exceeds the median of the steps around it by more than this many
+/// medians, half way from one frame to two, and if the step with its two neighbours exceeds three medians by
+/// as much. A frame that is only late makes the next step shorter.
+const LOST_STEPS: f64 = 0.5;
 /// Number of steps on either side that enter this median. Single lost frames do not change it. Where the rate
 /// of the camera changes, each step is compared mostly with steps of its own rate.
 const STEPS_AROUND: usize = 5;
@@ -22,8 +25,8 @@ pub(super) struct FrameTimes {
     pub times_s: Vec<f64>,
     /// Mean rate over the steps that are no gaps, 1/s.
     pub mean_rate_hz: f64,
-    /// Frames after which a gap follows, in ascending order.
-    gaps: Vec<usize>,
+    /// For each step from frame to frame, whether it is a gap.
+    gaps: Vec<bool>,
     /// Largest distance of a time from the grid of the mean rate, frames.
     departure_frames: f64,
 }
@@ -41,13 +44,16 @@ impl FrameTimes {
         };
         let steps = times_s.len() - 1;
         let step_s = |i: usize| times_s[i + 1] - times_s[i];
-        let is_gap = |i: &usize| {
+        let is_gap = |i: usize| {
             let around = i.saturating_sub(STEPS_AROUND)..(i + STEPS_AROUND + 2).min(times_s.len());
-            step_s(*i) > GAP_STEPS * clock::median_step_s(&times_s[around]).unwrap_or(f64::INFINITY)
+            let median_s = clock::median_step_s(&times_s[around]).unwrap_or(f64::INFINITY);
+            let (from, to) = (i.saturating_sub(1), (i + 2).min(steps));
+            let excess = (times_s[to] - times_s[from]) / median_s - (to - from) as f64;
+            (step_s(i) / median_s - 1.0).min(excess) > LOST_STEPS
         };
-        let gaps: Vec<usize> = (0..steps).filter(is_gap).collect();
-        let gaps_s: f64 = gaps.iter().map(|i| step_s(*i)).sum();
-        let mean_rate_hz = (steps - gaps.len()) as f64 / (last_s - first_s - gaps_s);
+        let gaps: Vec<bool> = (0..steps).map(is_gap).collect();
+        let gaps_s: Vec<f64> = (0..steps).filter(|i| gaps[*i]).map(step_s).collect();
+        let mean_rate_hz = (steps - gaps_s.len()) as f64 / (last_s - first_s - gaps_s.iter().sum::<f64>());
         let span = (last_s - first_s) * mean_rate_hz;
         let longest = FRAMES_WITHOUT_ROWS.0 + (1 + FRAMES_WITHOUT_ROWS.1) * times_s.len();
         if !(mean_rate_hz.is_finite() && (0.0..=MAX_FRAMES.min(longest as f64)).contains(&span)) {
@@ -58,10 +64,8 @@ impl FrameTimes {
             )));
         }
         let (mut on_grid, mut departure_frames) = (0.0, 0.0_f64);
-        let mut gap = gaps.iter().peekable();
-        for i in 0..steps {
-            let lost = gap.next_if_eq(&&i).is_some();
-            on_grid += if lost { (step_s(i) * mean_rate_hz).round() } else { 1.0 };
+        for (i, is_gap) in gaps.iter().enumerate() {
+            on_grid += if *is_gap { (step_s(i) * mean_rate_hz).round() } else { 1.0 };
             let off = (times_s[i + 1] - first_s) * mean_rate_hz - on_grid;
             departure_frames = departure_frames.max(off.abs());
         }
@@ -80,16 +84,14 @@ impl FrameTimes {
         }
         let before = after.checked_sub(1)?;
         let (low, high) = ((*column.get(before)?)?, (*column.get(after)?)?);
-        let gap = self.gaps.partition_point(|gap| gap < &before);
-        if self.gaps.get(gap) == Some(&before) {
+        if self.gaps[before] {
             return None;
         }
         let first = after.checked_sub(STENCIL / 2);
         let curved = first.and_then(|first| {
-            let unbroken = self.gaps[..gap].last().is_none_or(|gap| *gap < first)
-                && self.gaps.get(gap).is_none_or(|gap| gap + 1 >= first + STENCIL);
-            let nodes = times.get(first..first + STENCIL).filter(|_| unbroken)?;
-            lagrange_through_nodes(column.get(first..)?, nodes.try_into().ok()?, time_s)
+            let nodes = times.get(first..first + STENCIL)?.try_into().ok()?;
+            let unbroken = !self.gaps[first..first + STENCIL - 1].contains(&true);
+            lagrange_through_nodes(column.get(first..).filter(|_| unbroken)?, nodes, time_s)
         });
         let part = (time_s - times[before]) / (times[after] - times[before]);
         Some(curved.unwrap_or(low + part * (high - low)))
@@ -112,7 +114,8 @@ impl Recording {
         let times = FrameTimes::new(times_s)?;
         let (start_s, frames) = (times.times_s[0], times.times_s.len());
         let grid = FrameGrid { start_s, frame_rate_hz: times.mean_rate_hz, frames };
-        Ok(Self { times: Some(times), ..Self::new(name, grid, traces, synthetic)? })
+        let departure_frames = Some(times.departure_frames);
+        Ok(Self { times: Some(times), departure_frames, ..Self::new(name, grid, traces, synthetic)? })
     }
 
     /// The true times of the frames, s, of a recording whose frames lie on no grid.
@@ -130,23 +133,15 @@ impl Recording {
         let last_s = times.times_s.last().copied().unwrap_or(self.grid.start_s);
         let span = (last_s - self.grid.start_s) * times.mean_rate_hz;
         let grid = FrameGrid { frames: (span + ON_FRAME_TOLERANCE) as usize + 1, ..self.grid };
-        let track = |column: &Vec<Option<f64>>| -> Vec<Option<f64>> {
-            (0..grid.frames).map(|frame| self.interpolate_column(column, grid.time_s(frame))).collect()
-        };
-        let confidence = |column: &Option<Vec<Option<f64>>>| {
-            let column = column.as_ref().map(track);
-            column.map(|column| column.into_iter().map(|c| c.map(|c| c.clamp(0.0, 1.0))).collect())
-        };
-        let traces = Traces {
-            tip_x_m: track(&self.traces.tip_x_m),
-            tip_y_m: track(&self.traces.tip_y_m),
-            head_x_m: track(&self.traces.head_x_m),
-            head_y_m: track(&self.traces.head_y_m),
-            tip_confidence: confidence(&self.traces.tip_confidence),
-            head_confidence: confidence(&self.traces.head_confidence),
-        };
-        let resampled_frames = Some(times.departure_frames);
-        Cow::Owned(Self { grid, traces, times: None, resampled_frames, name: self.name.clone(), ..*self })
+        let columns = self.traces.columns().map(|(name, column)| {
+            let value = |frame| self.interpolate_column(column, grid.time_s(frame));
+            // the polynomial must not leave the range of a confidence
+            let within = if name.ends_with("confidence") { (0.0, 1.0) } else { (-LARGEST_M, LARGEST_M) };
+            (0..grid.frames).map(|frame| Some(value(frame)?.clamp(within.0, within.1))).collect()
+        });
+        let confidences = [&self.traces.tip_confidence, &self.traces.head_confidence];
+        let traces = Traces::from_columns(columns, confidences.map(Option::is_some));
+        Cow::Owned(Self { grid, traces, times: None, name: self.name.clone(), ..*self })
     }
 
     /// This recording on a grid, as [`Self::resample_to_grid`] gives it.
@@ -158,16 +153,10 @@ impl Recording {
         self
     }
 
-    /// Largest distance of the true times from the grid that [`Self::resample_to_grid`] makes, frames; `None`
-    /// for a recording that was taken on a grid.
-    pub(crate) fn clock_departure_frames(&self) -> Option<f64> {
-        self.times.as_ref().map(|times| times.departure_frames).or(self.resampled_frames)
-    }
-
     /// That the tracks are interpolated to a grid, with its rate and the distance of the true times from it;
     /// `None` for a recording that was taken on a grid.
     pub(crate) fn describe_resampling(&self) -> Option<String> {
-        let (off, rate_hz) = (self.clock_departure_frames()?, self.grid.frame_rate_hz);
+        let (off, rate_hz) = (self.departure_frames?, self.grid.frame_rate_hz);
         Some(format!(
             "the times of the frames lie up to {off:.2} frames off a grid of {rate_hz:.6} frames/s; the tracks \
              are interpolated to this grid, which changes their noise"
@@ -176,10 +165,14 @@ impl Recording {
 
     /// Standard deviation of a frequency, Hz, with that of the clock: `sqrt(sd^2 + (f * rate_sd / rate)^2)`.
     pub(crate) fn add_clock_sd(&self, frequency_hz: f64, sd_hz: f64) -> f64 {
-        if self.frame_rate_sd_hz == 0.0 {
-            return sd_hz;
-        }
-        math::hypot(sd_hz, frequency_hz * self.frame_rate_sd_hz / self.grid.frame_rate_hz)
+        let of_clock_hz = |rate_sd_hz| frequency_hz * rate_sd_hz / self.grid.frame_rate_hz;
+        self.frame_rate_sd_hz.map_or(sd_hz, |rate_sd_hz| math::hypot(sd_hz, of_clock_hz(rate_sd_hz)))
+    }
+
+    /// A frequency range with the standard deviation of the clock added to those of its ends.
+    pub(crate) fn widen_range(&self, range: FrequencyRange) -> FrequencyRange {
+        let low_sd_hz = self.add_clock_sd(range.low_hz, range.low_sd_hz);
+        FrequencyRange { low_sd_hz, high_sd_hz: self.add_clock_sd(range.high_hz, range.high_sd_hz), ..range }
     }
 
     /// Analyses consecutive samples of a channel on the grid of this recording. The standard deviations of
@@ -194,10 +187,7 @@ impl Recording {
         let mut analysis = SpectralAnalysis::from_record(&record, settings)?;
         for c in &mut analysis.spectrum.components {
             c.frequency_sd_hz = self.add_clock_sd(c.frequency_hz, c.frequency_sd_hz);
-            if let Some(range) = &mut c.range_hz {
-                range.low_sd_hz = self.add_clock_sd(range.low_hz, range.low_sd_hz);
-                range.high_sd_hz = self.add_clock_sd(range.high_hz, range.high_sd_hz);
-            }
+            c.range_hz = c.range_hz.map(|range| self.widen_range(range));
         }
         Ok(analysis)
     }

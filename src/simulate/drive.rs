@@ -5,7 +5,6 @@ mod smoothing_spline;
 
 use crate::model::HeadMotion;
 use crate::recording::Recording;
-use crate::toml_file::is_zero;
 pub use head_spline::HeadSpline;
 use portable_math as math;
 use serde::Serialize;
@@ -118,6 +117,11 @@ impl Drive {
     pub(crate) fn horizon(&self, t: f64, stop: f64) -> f64 {
         self.next_break(t).map_or(stop, |next| next.min(stop))
     }
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)] // serde passes a reference
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 // Motion of a recorded head.

@@ -40,7 +40,7 @@ class Recording:
         columns: dict[str, _Row],
         *,
         start_s: float,
-        frame_rate_sd_hz: float,
+        frame_rate_sd_hz: float | None,
         exposure_s: float | None,
         synthetic: bool,
     ) -> Recording: ...
@@ -52,7 +52,7 @@ class Recording:
     @property
     def frame_rate_hz(self) -> float: ...
     @property
-    def frame_rate_sd_hz(self) -> float: ...
+    def frame_rate_sd_hz(self) -> float | None: ...
     @property
     def has_true_times(self) -> bool: ...
     @property

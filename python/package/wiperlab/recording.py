@@ -45,7 +45,7 @@ class Recording:
         frame_rate_hz: float | None = None,
         *,
         time_s: ArrayLike | None = None,
-        frame_rate_sd_hz: float = 0.0,
+        frame_rate_sd_hz: float | None = None,
         start_s: float = 0.0,
         exposure_s: float | None = None,
         name: str = "recording",
@@ -99,8 +99,8 @@ class Recording:
         return self._native.frame_rate_hz
 
     @property
-    def frame_rate_sd_hz(self) -> float:
-        """Standard deviation of the frame rate, 1/s; 0 where it is not known."""
+    def frame_rate_sd_hz(self) -> float | None:
+        """Standard deviation of the frame rate, 1/s, where known."""
         return self._native.frame_rate_sd_hz
 
     @property

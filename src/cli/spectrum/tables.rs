@@ -83,7 +83,11 @@ pub(crate) fn description_json(request: &SpectrumRequest, studied: &StudiedWindo
             .into_iter()
             .map(|w| NamedWindowSpan { name: w.name, from_s: w.from_s, to_s: w.to_s })
             .collect(),
-        ridge_hz: analysis.ridge.as_ref().and_then(|ridge| ridge.range_hz()),
+        ridge_hz: analysis
+            .ridge
+            .as_ref()
+            .and_then(|ridge| ridge.range_hz())
+            .map(|range| recording.widen_range(range)),
         note: &studied.note,
         hint: studied.hint.as_deref(),
     })

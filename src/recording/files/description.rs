@@ -1,10 +1,9 @@
 //! `recording.toml`: the source of a recording, the camera, and the measured quality.
 
 use super::{DESCRIPTION_FILE, FilesError, VideoEntry};
-use crate::recording::Recording;
 use crate::recording::quality::{Optics, Quality, QualityFinding};
 use crate::text::{format_degrees, text_sha256};
-use crate::toml_file::{self, FORMAT, is_zero};
+use crate::toml_file::{self, FORMAT};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -100,11 +99,12 @@ pub struct CameraEntry {
     /// Recording rate, 1/s (not the playback rate); the mean rate if `clock` is "times".
     pub frame_rate_hz: f64,
     /// Standard deviation of the recording rate, 1/s; it is part of the standard deviation of every frequency.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub frame_rate_sd_hz: f64,
-    /// Whether the frames lie on a grid of `frame_rate_hz` ("grid") or at the times in `trace.csv` ("times").
-    #[serde(default, skip_serializing_if = "FrameClock::is_grid")]
-    pub clock: FrameClock,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frame_rate_sd_hz: Option<f64>,
+    /// Whether the frames lie on a grid of `frame_rate_hz` ("grid", also if absent) or at the times in
+    /// `trace.csv` ("times").
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clock: Option<FrameClock>,
     /// Exposure of a frame, s, if known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exposure_s: Option<f64>,
@@ -123,26 +123,13 @@ impl From<&CameraEntry> for Optics {
 }
 
 /// When the frames were taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum FrameClock {
     /// At a constant rate; `trace.csv` may lack rows.
-    #[default]
     Grid,
     /// At the times in `trace.csv`, which follow no constant rate.
     Times,
-}
-
-impl FrameClock {
-    /// The clock of a recording.
-    pub(crate) fn of(recording: &Recording) -> Self {
-        if recording.frame_times_s().is_some() { Self::Times } else { Self::Grid }
-    }
-
-    #[allow(clippy::trivially_copy_pass_by_ref)] // serde passes a reference
-    fn is_grid(&self) -> bool {
-        *self == Self::Grid
-    }
 }
 
 /// `[level]`: the tilt of the camera that `import --level` found. If `applied` is true, the traces in
@@ -233,6 +220,7 @@ impl RecordingFile {
         let camera = &parsed.camera;
         let lengths = [
             ("frame_rate_hz", Some(camera.frame_rate_hz)),
+            ("frame_rate_sd_hz", camera.frame_rate_sd_hz),
             ("exposure_s", camera.exposure_s),
             ("metres_per_pixel", camera.metres_per_pixel),
         ];
@@ -242,13 +230,6 @@ impl RecordingFile {
                     format!(": key `camera.{key}`: found {found}, expected a finite number above 0");
                 return Err(FilesError::refuse(file, problem));
             }
-        }
-        let found = camera.frame_rate_sd_hz;
-        if !(found.is_finite() && found >= 0.0) {
-            let problem = format!(
-                ": key `camera.frame_rate_sd_hz`: found {found}, expected a finite number of at least 0"
-            );
-            return Err(FilesError::refuse(file, problem));
         }
         if let Some(video) = &parsed.video {
             video.pixel_mapping(file, camera, parsed.level.as_ref())?;

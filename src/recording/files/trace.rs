@@ -1,6 +1,6 @@
 //! `trace.csv`: one row per frame; a cell is empty if the point was not tracked.
 
-use super::{CameraEntry, FilesError, FrameClock};
+use super::FilesError;
 use crate::recording::clock::{self, FRAMES_WITHOUT_ROWS, FrameFit};
 use crate::recording::{FrameGrid, Recording, Traces};
 use rayon::prelude::*;
@@ -80,55 +80,11 @@ fn push_number(text: &mut String, value: f64) {
 /// # Errors
 /// [`FilesError`] with file, line and column.
 pub fn parse_trace_csv(file: &str, text: &str) -> Result<(FrameGrid, Traces), FilesError> {
-    let table = TraceTable::parse(file, text)?;
-    let fit = table.number_rows();
-    table.place_by_fit(file, fit)
-}
-
-/// The frames of a `trace.csv`: on a grid, or at true times, s.
-pub(super) enum TraceFrames {
-    Grid(FrameGrid),
-    Times(Vec<f64>),
-}
-
-/// Reads `trace.csv` with the camera of its description. True times are kept if the camera has such a clock
-/// or, without a description, if no grid explains the times.
-///
-/// # Errors
-/// [`FilesError`] with file, line and column.
-pub(super) fn parse_trace_frames(
-    file: &str,
-    text: &str,
-    camera: Option<&CameraEntry>,
-) -> Result<(TraceFrames, Traces), FilesError> {
-    let table = TraceTable::parse(file, text)?;
-    let (grid, traces) = match (camera, camera.map_or_else(|| table.number_rows(), |_| None)) {
-        (Some(camera), _) if camera.clock == FrameClock::Grid => {
-            table.place_at_rate(file, camera.frame_rate_hz)?
-        }
-        (None, fit) if fit.as_ref().is_none_or(FrameFit::is_on_grid) => table.place_by_fit(file, fit)?,
-        _ => {
-            let traces = collect_traces(table.columns.into_iter(), table.confidences);
-            return Ok((TraceFrames::Times(table.times_s), traces));
-        }
-    };
-    Ok((TraceFrames::Grid(grid), traces))
-}
-
-/// Reads `trace.csv` on a frame grid of known rate, 1/s. Missing rows become missing frames.
-///
-/// # Errors
-/// [`FilesError`] with file, line and column; also if the times do not lie on that grid.
-pub fn parse_trace_csv_at(
-    file: &str,
-    text: &str,
-    frame_rate_hz: f64,
-) -> Result<(FrameGrid, Traces), FilesError> {
-    TraceTable::parse(file, text)?.place_at_rate(file, frame_rate_hz)
+    TraceTable::parse(file, text)?.place_at_fitted_rate(file)
 }
 
 /// The rows of `trace.csv` as written, before frame numbers are assigned.
-struct TraceTable<'a> {
+pub(super) struct TraceTable<'a> {
     text: &'a str,
     confidences: [bool; 2],
     times_s: Vec<f64>,
@@ -136,7 +92,7 @@ struct TraceTable<'a> {
 }
 
 impl<'a> TraceTable<'a> {
-    fn parse(file: &str, text: &'a str) -> Result<Self, FilesError> {
+    pub(super) fn parse(file: &str, text: &'a str) -> Result<Self, FilesError> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let header = text.lines().next().unwrap_or_default().trim();
         let confidences = CONFIDENCES.map(|name| header.split(',').any(|found| found == name));
@@ -200,19 +156,31 @@ impl<'a> TraceTable<'a> {
         Ok(())
     }
 
-    /// Frame numbers of the rows on the grid that fits their times best; `None` if the times span too much.
-    fn number_rows(&self) -> Option<FrameFit> {
-        clock::number_frames(&self.times_s, clock::median_step_s(&self.times_s)?)
+    /// Whether no grid explains the times.
+    pub(super) fn is_uneven(&self) -> bool {
+        let seed_s = clock::median_step_s(&self.times_s).unwrap_or_default();
+        clock::number_frames(&self.times_s, seed_s).is_some_and(|fit| !fit.is_on_grid())
     }
 
-    fn place_by_fit(self, file: &str, fit: Option<FrameFit>) -> Result<(FrameGrid, Traces), FilesError> {
-        let fit = self.check_fit(file, fit)?;
+    /// The times of the rows, s, and their traces.
+    pub(super) fn keep_times(self) -> (Vec<f64>, Traces) {
+        (self.times_s, Traces::from_columns(self.columns.into_iter(), self.confidences))
+    }
+
+    /// The traces on the grid of the rate with the fewest digits that explains the times.
+    pub(super) fn place_at_fitted_rate(self, file: &str) -> Result<(FrameGrid, Traces), FilesError> {
+        let fit = self.number_rows(file, clock::median_step_s(&self.times_s).unwrap_or_default())?;
         let frame_rate_hz = simplest_frame_rate_hz(&self.times_s, &fit);
         Ok(self.place_on_grid(&fit, frame_rate_hz))
     }
 
-    fn place_at_rate(self, file: &str, frame_rate_hz: f64) -> Result<(FrameGrid, Traces), FilesError> {
-        let fit = self.check_fit(file, clock::number_frames(&self.times_s, 1.0 / frame_rate_hz))?;
+    /// The traces on the grid of a known rate, 1/s.
+    pub(super) fn place_at_rate(
+        self,
+        file: &str,
+        frame_rate_hz: f64,
+    ) -> Result<(FrameGrid, Traces), FilesError> {
+        let fit = self.number_rows(file, 1.0 / frame_rate_hz)?;
         let (row, off_frames) = farthest_off_grid(&self.times_s, &fit.frames, frame_rate_hz);
         if off_frames > clock::OFF_GRID_LIMIT_FRAMES {
             return Err(self.off_grid_error(file, row, off_frames, frame_rate_hz));
@@ -220,8 +188,8 @@ impl<'a> TraceTable<'a> {
         Ok(self.place_on_grid(&fit, frame_rate_hz))
     }
 
-    fn check_fit(&self, file: &str, fit: Option<FrameFit>) -> Result<FrameFit, FilesError> {
-        let fit = fit.ok_or_else(|| too_long_error(file))?;
+    fn number_rows(&self, file: &str, seed_s: f64) -> Result<FrameFit, FilesError> {
+        let fit = clock::number_frames(&self.times_s, seed_s).ok_or_else(|| too_long_error(file))?;
         let (rows, frames) = (self.times_s.len(), frame_count(&fit));
         if !fit.is_on_grid() {
             return Err(self.off_grid_error(file, fit.worst_row, fit.worst_frames, 1.0 / fit.frame_s));
@@ -259,23 +227,8 @@ impl<'a> TraceTable<'a> {
             }
             on_grid
         });
-        let traces = collect_traces(spread, self.confidences);
+        let traces = Traces::from_columns(spread, self.confidences);
         (FrameGrid { start_s: self.times_s[0], frame_rate_hz, frames }, traces)
-    }
-}
-
-/// Traces from columns in the order of the file; `confidences` says whether those of tip and head are present.
-fn collect_traces(mut columns: impl Iterator<Item = Vec<Option<f64>>>, confidences: [bool; 2]) -> Traces {
-    let mut next = || columns.next().unwrap_or_default();
-    let (tip_x_m, tip_y_m, head_x_m, head_y_m) = (next(), next(), next(), next());
-    let [tip, head] = confidences;
-    Traces {
-        tip_x_m,
-        tip_y_m,
-        head_x_m,
-        head_y_m,
-        tip_confidence: tip.then(&mut next),
-        head_confidence: head.then(&mut next),
     }
 }
 
@@ -383,7 +336,8 @@ mod tests {
                 .starts_with("t.csv:1:1: found the header `a,b`")
         );
         assert!(
-            parse_trace_csv_at("t.csv", &format!("{HEADER}\n0,1,1,1,1\n0.1,1,1,1,1\n"), 15.0)
+            TraceTable::parse("t.csv", &format!("{HEADER}\n0,1,1,1,1\n0.1,1,1,1,1\n"))
+                .and_then(|table| table.place_at_rate("t.csv", 15.0))
                 .unwrap_err()
                 .to_string()
                 .contains("off the grid")
@@ -405,7 +359,9 @@ mod tests {
         ) {
             let grid = FrameGrid { start_s: start, frame_rate_hz: rate, frames: columns[0].len() };
             let written = recording(grid, columns, confidence);
-            let (read_grid, read_traces) = parse_trace_csv_at("t.csv", &trace_csv(&written), rate).unwrap();
+            let text = trace_csv(&written);
+            let table = TraceTable::parse("t.csv", &text).unwrap();
+            let (read_grid, read_traces) = table.place_at_rate("t.csv", rate).unwrap();
             prop_assert_eq!(read_grid, grid);
             prop_assert_eq!(&read_traces, written.traces());
         }

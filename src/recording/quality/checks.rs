@@ -40,7 +40,7 @@ pub(crate) fn is_playback_rate(rate_hz: f64) -> bool {
 
 /// Finding on a recording with true times.
 pub(super) fn check_clock(recording: &Recording) -> Option<QualityFinding> {
-    let value = (recording.clock_departure_frames()?, "frames");
+    let value = (recording.departure_frames?, "frames");
     let advice = "trust amplitudes up to half of the Nyquist frequency; above it the interpolation makes them too small";
     let kind = (Check::UnevenClock, Severity::Caution);
     Some(QualityFinding::advise(kind, value, recording.describe_resampling()?, advice))
