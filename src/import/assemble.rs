@@ -77,7 +77,7 @@ pub(crate) fn assemble_recording(
         None => Recording::new(name, clocks.grid, traces, synthetic),
     };
     // (a simulation has an exact clock)
-    let rate_sd_hz = if synthetic { 0.0 } else { calibration.rate.sd_hz() };
+    let rate_sd_hz = (!synthetic).then(|| calibration.rate.sd_hz());
     let recording = recording
         .and_then(|recording| recording.with_frame_rate_sd(rate_sd_hz))
         .map_err(|problem| ImportError::unusable(file_name, problem))?;

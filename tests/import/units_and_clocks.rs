@@ -254,7 +254,7 @@ fn equal_steps_of_few_digits_know_their_rate_coarsely() {
     let real = ImportOptions { time: Some(TimeColumn::Real), ..in_mm(options(None)) };
     let said = read(&text, &real).report.lines().join("\n");
     assert!(
-        said.contains("caution: the times of run.csv imply 30.30303 frames/s") && said.contains("1.5 % only"),
+        said.contains("caution: the times of run.csv imply 30.3 frames/s") && said.contains("1.5 % only"),
         "{said}"
     );
     // another rate is not within half of the last digit
@@ -376,7 +376,7 @@ fn the_uncertainty_of_the_rate_is_part_of_the_recording() {
     let text = table("t,tip_x,tip_y,head_x,head_y", 600, seconds, [1e-3; 2], 2000.0);
     let sd = |options: ImportOptions| read(&text, &in_mm(options)).recording.frame_rate_sd_hz();
     // an oscillator's 50 parts in a million, or half a microsecond in a step of 500
-    assert!((sd(at_rate(2000.0, None)) - 0.1 / 3_f64.sqrt()).abs() < 1e-12);
+    assert!((sd(at_rate(2000.0, None)).unwrap() - 0.1 / 3_f64.sqrt()).abs() < 1e-12);
     let real = ImportOptions { time: Some(TimeColumn::Real), ..options(None) };
-    assert!((sd(real) - 2.0 / 3_f64.sqrt()).abs() < 1e-9);
+    assert!((sd(real).unwrap() - 2.0 / 3_f64.sqrt()).abs() < 1e-9);
 }

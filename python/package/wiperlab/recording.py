@@ -27,6 +27,13 @@ if TYPE_CHECKING:
 COLUMNS = ("tip_x_m", "tip_y_m", "head_x_m", "head_y_m", "tip_confidence", "head_confidence")
 
 
+def _fill_masked(column: ArrayLike) -> NDArray[np.float64]:
+    """The numbers of a column; a masked one is missing."""
+    if isinstance(column, np.ma.MaskedArray):
+        column = column.astype(np.float64).filled(np.nan)
+    return np.ascontiguousarray(column, dtype=np.float64)
+
+
 class Recording:
     """Tracked positions of tip and head on the frame grid, m; not a number where a point was not tracked."""
 
@@ -57,7 +64,7 @@ class Recording:
         unknown = [key for key in columns.keys() if key not in COLUMNS]
         if unknown:
             raise InputError(f"columns: found {unknown[0]!r}, expected some of {', '.join(COLUMNS)}")
-        arrays = {key: np.ascontiguousarray(columns[key], dtype=np.float64) for key in columns.keys()}
+        arrays = {key: _fill_masked(columns[key]) for key in columns.keys()}
         if time_s is not None and frame_rate_hz is None and start_s == 0.0:
             clock: float | NDArray[np.float64] = np.ascontiguousarray(time_s, dtype=np.float64)
         elif frame_rate_hz is not None and time_s is None:
