@@ -187,7 +187,7 @@ fn uneven_times_of_a_trace_alone_are_kept_and_the_grid_is_named() {
     let mut time_s = 0.0;
     let row = |i: usize| {
         time_s += [0.0199, 0.0213, 0.0204, 0.0211][i % 7 % 4];
-        format!("{time_s},{},,0,\n", 1e-3 * (45.9 * time_s).cos())
+        format!("{time_s},{},,0,\n", 1e-3 * (45.9_f64 * time_s).cos())
     };
     let rows: String = (0..300).map(row).collect();
     fs::write(&file, format!("time_s,tip_x_m,tip_y_m,head_x_m,head_y_m\n{rows}")).unwrap();

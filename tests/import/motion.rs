@@ -329,7 +329,9 @@ fn dippmotion_tells_positions_that_are_relative_to_a_point() {
     let other = ImportOptions { scale: Some(CoordinateScale::Unit(1e-3)), ..rate(1000.0) };
     contains(
         &refusal(read(ORIGIN, &points("P 2", "P 1", other))),
-        &["--scale: found `units of 0.001 m`, expected units of 0.01 m (dippmotion/xy_graph_padded_local_origin.csv:5:6 names the unit cm)"],
+        &[
+            "--scale: found `units of 0.001 m`, expected units of 0.01 m (dippmotion/xy_graph_padded_local_origin.csv:5:6 names the unit cm)",
+        ],
     );
 }
 

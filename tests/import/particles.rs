@@ -3,7 +3,6 @@
 
 use wiperlab::import::source::{Import, ImportSource};
 use wiperlab::import::{CoordinateScale, ImportError, ImportOptions, import};
-use wiperlab::recording::quality::Severity;
 
 macro_rules! fixture {
     ($path:literal) => {

@@ -257,6 +257,18 @@ fn equal_steps_of_few_digits_know_their_rate_coarsely() {
         said.contains("caution: the times of run.csv imply 30.3 frames/s") && said.contains("1.5 % only"),
         "{said}"
     );
+    // steps of 4 ms may be those of 250 or of 240 frames/s, steps of 20 ms only those of 50
+    let steps_of = |step_s: f64| {
+        table(
+            "t,tip_x,tip_y,head_x,head_y",
+            300,
+            |row| format!("{:.3}", row as f64 * step_s),
+            [1e-3; 2],
+            30.0,
+        )
+    };
+    assert!(read(&steps_of(0.004), &real).report.lines().join("\n").contains("known to 4.2 % only"));
+    assert!(!read(&steps_of(0.02), &real).report.lines().join("\n").contains("% only"));
     // another rate is not within half of the last digit
     assert!(refused(&text, &in_mm(at_rate(25.0, None))).contains("--frame-rate-hz says 25"));
 }
@@ -375,8 +387,8 @@ fn the_uncertainty_of_the_rate_is_part_of_the_recording() {
     let seconds = |row: usize| format!("{:.6}", row as f64 / 2000.0);
     let text = table("t,tip_x,tip_y,head_x,head_y", 600, seconds, [1e-3; 2], 2000.0);
     let sd = |options: ImportOptions| read(&text, &in_mm(options)).recording.frame_rate_sd_hz();
-    // an oscillator's 50 parts in a million, or half a microsecond in a step of 500
+    // an oscillator's 50 parts in a million, declared or from equal steps of a round rate
     assert!((sd(at_rate(2000.0, None)).unwrap() - 0.1 / 3_f64.sqrt()).abs() < 1e-12);
     let real = ImportOptions { time: Some(TimeColumn::Real), ..options(None) };
-    assert!((sd(real).unwrap() - 2.0 / 3_f64.sqrt()).abs() < 1e-9);
+    assert!((sd(real).unwrap() - 0.1 / 3_f64.sqrt()).abs() < 1e-9);
 }

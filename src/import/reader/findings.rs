@@ -44,7 +44,7 @@ pub(crate) fn rounded_times_finding(file: &str, times: &[f64], implied_hz: f64) 
     let quantum_s = find_quantum_s(times).filter(|_| !times.is_empty())?;
     let frames = quantum_s * implied_hz;
     // the rounding changes nothing if a frame lasts a whole number of quanta
-    let even = (1.0 / frames - (1.0 / frames).round()).abs() <= 1e-6 && frames <= 1.0;
+    let even = (1.0 / frames - (1.0 / frames).round()).abs() <= 1e-6 && frames <= 1.0 + 1e-6;
     let severity = if frames > COARSE_FRAMES { Severity::Caution } else { Severity::Note };
     let found = format!("{file}: the times are rounded to {quantum_s} s, {frames:.2} of a frame");
     let advice = "the frames are taken from the grid of the rate, so nothing is lost; export frame numbers or \

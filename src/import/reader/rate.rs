@@ -27,7 +27,7 @@ pub(crate) fn is_uneven(times: &[f64], digit_s: f64) -> bool {
     let Some(step_s) = clock::median_step_s(times).filter(|step_s| *step_s > 0.0) else { return false };
     let fit = clock::number_frames(times, step_s);
     fit.is_some_and(|fit| {
-        let limit = EVEN_FRAMES + digit_s / fit.frame_s;
+        let limit = EVEN_FRAMES + rounding_s(times, digit_s) / fit.frame_s;
         let far = (0..times.len()).filter(|row| fit.distance(times, *row) > limit).count();
         far > 1 && far as f64 > UNEVEN_ROWS * times.len() as f64
     })
@@ -38,6 +38,12 @@ pub(crate) fn has_uneven_clock(export: &TrackFile) -> bool {
     let timed = export.clocks.iter().filter(|clock| clock.frame.is_none());
     timed.into_iter().any(|clock| is_uneven(&clock.times(), clock.digit))
 }
+
+/// Rates of films, television and telephones, 1/s.
+const COMMON_RATES_HZ: [f64; 16] = [
+    23.976, 24.0, 25.0, 29.97, 30.0, 48.0, 50.0, 59.94, 60.0, 100.0, 119.88, 120.0, 239.76, 240.0, 480.0,
+    960.0,
+];
 
 /// A frame rate with its uncertainty and its source.
 #[derive(Debug, Clone, PartialEq)]
@@ -87,7 +93,7 @@ pub(crate) fn implied_rate(export: &TrackFile) -> Option<FrameRate> {
     let (frames, times, hz) = number_rows(longest)?;
     let hz = clock::simplest_rate(hz, |rate| times_fit_rate(&times, &frames, rate));
     let source = format!("the times of {}", export.file);
-    Some(FrameRate { hz, error: times_error(&times, &frames, longest.digit), source })
+    Some(FrameRate { hz, error: times_error(&times, &frames, rounding_s(&times, longest.digit)), source })
 }
 
 /// Frame numbers and times of the rows of a clock, and the rate of their ends, 1/s.
@@ -106,7 +112,8 @@ fn number_rows(clock: &Clock) -> Option<(Vec<f64>, Vec<f64>, f64)> {
 }
 
 /// Largest relative error of the rate of times that are written to `digit_s`. If each time was rounded, only
-/// the two ends count. If all steps are equal, the step itself may have been rounded to half a digit.
+/// the two ends count. If all steps are equal, the step itself may have been rounded to half a digit; a round
+/// rate is the camera's own unless another common rate rounds to the same step.
 fn times_error(times: &[f64], frames: &[f64], digit_s: f64) -> f64 {
     let span = |values: &[f64]| values.last().zip(values.first()).map_or(0.0, |(last, first)| last - first);
     let frame_s = span(times) / span(frames);
@@ -114,12 +121,31 @@ fn times_error(times: &[f64], frames: &[f64], digit_s: f64) -> f64 {
     let equal = steps.all(|(time, frame)| {
         ((time[1] - time[0]) / (frame[1] - frame[0]) / frame_s - 1.0).abs() <= EQUAL_STEPS
     });
-    let digits = frame_s / digit_s;
-    if equal && digits.is_finite() && digits >= FEWEST_DIGITS_PER_STEP {
-        0.5 / digits
-    } else {
-        digit_s / span(times)
+    let of_ends = digit_s / span(times);
+    let digits = (frame_s / digit_s).round();
+    if !(equal && digits.is_finite() && digits >= FEWEST_DIGITS_PER_STEP) {
+        return of_ends;
     }
+    if !is_round(1.0 / frame_s) {
+        return 0.5 / digits;
+    }
+    let same_step = |hz: &&f64| (1.0 / (**hz * digit_s)).round() == digits;
+    COMMON_RATES_HZ
+        .iter()
+        .filter(same_step)
+        .map(|hz| (hz * frame_s - 1.0).abs())
+        .fold(OSCILLATOR_ERROR, f64::max)
+}
+
+/// Whether a rate has at most two significant digits.
+fn is_round(hz: f64) -> bool {
+    format!("{hz:.1e}").parse::<f64>().is_ok_and(|round| (hz / round - 1.0).abs() <= EQUAL_STEPS)
+}
+
+/// The place to which times are rounded, s: the coarsest one that explains all of them, or `digit_s`, the
+/// value of their last digit.
+fn rounding_s(times: &[f64], digit_s: f64) -> f64 {
+    find_quantum_s(times).unwrap_or(digit_s).max(digit_s)
 }
 
 /// Decimal places to which programs round times, s.
