@@ -6,6 +6,7 @@
 //! whether an oscillation of a single frequency is visible.
 
 mod checks;
+mod filled;
 mod finding;
 mod measurement;
 mod motion;
@@ -13,6 +14,7 @@ mod noise;
 mod outliers;
 mod prefilter;
 mod tilt;
+mod untracked;
 
 use super::{FrameGrid, Recording};
 use crate::recording::channel::ReversalInstants;
@@ -28,6 +30,7 @@ pub use noise::{noise_floor, quantisation_step};
 pub use outliers::outlier_frames;
 use serde::Serialize;
 pub use tilt::{CameraTilt, Curvature, TiltNotFound, measure_tilt};
+pub use untracked::{UntrackedFrames, drop_untracked, find_untracked_frames};
 
 /// All findings on a recording, the gravest first, with the findings of its import.
 ///
@@ -47,15 +50,14 @@ pub fn collect_findings(
     found.extend(checks::check_clock(recording));
     found.extend(checks::check_grid(measured));
     found.push(checks::check_exposure(measured));
-    found.extend(motion::check_motion(recording, measured));
+    found.extend(motion::check_motion(recording));
     found.extend(tilt::check_tilt(recording, measured, instants));
     found.push(motion::check_turns(instants));
     for column in &columns {
         found.extend(checks::check_track_column(column, recording.grid(), optics));
-        found.extend(outliers::check_outliers(column, recording.grid(), optics));
         found.extend(prefilter::check_prefilter(column, measured.frame_rate_hz));
     }
-    found.extend(checks::check_confidence(recording.traces()));
+    found.extend(untracked::check_untracked(recording, measured, optics));
     // (a stable sort keeps the order of the checks within a severity)
     found.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
     found

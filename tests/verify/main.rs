@@ -58,4 +58,5 @@ mod strokes;
 mod sweep;
 mod tilt;
 mod transitions;
+mod untracked;
 mod validate;

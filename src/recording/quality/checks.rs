@@ -1,9 +1,9 @@
-//! Checks of the frame grid, the exposure, the single columns and the tracker's confidence.
+//! Checks of the frame grid, the exposure and the single columns.
 
 use super::finding::{Check, QualityFinding, Severity};
 use super::measurement::{ChannelQuality, FEWEST_CYCLES, MeasuredColumn, Optics, Quality};
 use super::noise::FrameGaps;
-use crate::recording::{FrameGrid, Recording, Traces};
+use crate::recording::{FrameGrid, Recording};
 use short_spectra::sampling::exposure_gain;
 
 /// Fraction of missing frames above which the finding is a caution. Least-squares spectra with the true frame
@@ -18,12 +18,6 @@ const EXPOSURE_PASSES: f64 = 0.9;
 /// Largest relative difference between a step and a pixel at which the step counts as a whole pixel: scales
 /// are given to three digits.
 const PIXEL_NEARNESS: f64 = 0.01;
-/// Confidence below which a position is doubtful: the default cut-off of DeepLabCut (`pcutoff`).
-const LOW_CONFIDENCE: f64 = 0.6;
-/// Fraction of doubtful positions above which the finding is a caution: more than stray outliers.
-const MANY_DOUBTFUL: f64 = 0.01;
-/// Fraction of doubtful positions above which the finding is serious: most of the track is guessed.
-const MOST_DOUBTFUL: f64 = 0.5;
 
 /// Rates at which video is played back, 1/s (film, PAL, NTSC and their doubles).
 const PLAYBACK_RATES_HZ: [f64; 8] =
@@ -161,37 +155,6 @@ pub(super) fn check_exposure(measured: &Quality) -> QualityFinding {
         (Severity::Note, "")
     };
     QualityFinding::advise((Check::Exposure, severity), (passes, ""), words, advice)
-}
-
-/// Findings on positions in which the tracker has low confidence.
-pub(super) fn check_confidence(traces: &Traces) -> Vec<QualityFinding> {
-    let points = [
-        ("tip", &traces.tip_confidence, &traces.tip_x_m),
-        ("head", &traces.head_confidence, &traces.head_x_m),
-    ];
-    let check = |(name, confidence, x): (&str, &Option<Vec<_>>, &Vec<_>)| {
-        Some(low_confidence_finding(confidence.as_deref()?, x)?.on_channel(name))
-    };
-    points.into_iter().filter_map(check).collect()
-}
-
-fn low_confidence_finding(confidence: &[Option<f64>], x: &[Option<f64>]) -> Option<QualityFinding> {
-    let tracked: Vec<f64> = confidence.iter().zip(x).filter_map(|(p, x)| p.filter(|_| x.is_some())).collect();
-    let (low, all) = (tracked.iter().filter(|p| **p < LOW_CONFIDENCE).count(), tracked.len());
-    if low == 0 {
-        return None;
-    }
-    let share = low as f64 / all as f64;
-    let severity = match share {
-        share if share > MOST_DOUBTFUL => Severity::Serious,
-        share if share > MANY_DOUBTFUL => Severity::Caution,
-        _ => Severity::Note,
-    };
-    let words =
-        format!("{low} of {all} positions ({:.1} %) have a confidence below {LOW_CONFIDENCE}", 100.0 * share);
-    let advice =
-        format!("import again with --min-likelihood {LOW_CONFIDENCE}, so that they count as missing");
-    Some(QualityFinding::advise((Check::LowConfidence, severity), (share, ""), words, advice))
 }
 
 #[cfg(test)]

@@ -66,11 +66,15 @@ checks! {
     PlaybackRate = "playback-rate",
     /// Frames that exactly repeat the previous frame.
     FrozenFrames = "frozen-frames",
+    /// Frames in which one point exactly repeats its last position.
+    HeldPoints = "held-points",
+    /// Points on straight lines between others.
+    InterpolatedPoints = "interpolated-points",
     /// Positions in steps coarser than their noise.
     PositionStep = "position-step",
     /// Tracking noise of a channel.
     Noise = "noise",
-    /// Isolated points far from their neighbours.
+    /// Points that lie far off for a few frames and return.
     Outliers = "outliers",
     /// Positions that the tracker doubts.
     LowConfidence = "low-confidence",

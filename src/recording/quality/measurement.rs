@@ -11,6 +11,9 @@ use short_spectra::sampling::{alias_hz, exposure_gain, half_power_hz};
 pub(super) const FEWEST_CYCLES: f64 = 3.0;
 /// Fraction of the Nyquist frequency up to which a component is well separated from its alias.
 pub(super) const NYQUIST_SHARE: f64 = 0.8;
+/// Maximum number of positions of a column that are used, evenly spaced in time; a stroke is smooth over a
+/// thousandth of its duration.
+pub(super) const MOST_POSITIONS: usize = 20_000;
 
 /// Measured properties of a recording.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -1,25 +1,11 @@
-//! Checks on both points together: repeated frames, frames that both tracks cover, scale, direction of y, and
-//! the turns of the head.
+//! Checks on both points together: frames that both tracks cover, scale, direction of y, and the turns of the
+//! head.
 
 use super::finding::{Check, QualityFinding, Severity};
-use super::measurement::{ChannelQuality, Quality};
+use super::measurement::MOST_POSITIONS;
 use crate::recording::channel::{ReversalInstants, median_in_place};
 use crate::recording::{FrameGrid, Recording, Traces};
-use std::f64::consts::PI;
 
-/// Fraction of repeated frames above which the finding is serious: not only a few samples but also
-/// frequencies are then wrong.
-const MANY_REPEATED: f64 = 0.01;
-/// Ratio of the tolerated number of repeated frames to `1 + expected`, where `expected` is the number of
-/// repeated frames that rounding is expected to cause.
-const BY_ROUNDING: f64 = 3.0;
-/// No repeated frame is tolerated if rounding is expected to cause fewer repeated frames than this number.
-const NO_REPEATS: f64 = 0.01;
-/// Probability that rounding makes a frame repeat the previous one, above which repeated frames are not
-/// judged. If the noise is smaller than the step, positions stay equal for many frames.
-const LIKELY_REPEAT: f64 = 1e-3;
-/// Smallest noise of a column that moves, m; below a picometre, the noise is rounding of a point at rest.
-const LEAST_NOISE_M: f64 = 1e-12;
 /// Fraction of frames, at the start and the end of the recording, in which only one point is tracked, above
 /// which the finding is a caution. A late start of a track affects fewer frames.
 const MANY_ALONE: f64 = 0.1;
@@ -31,9 +17,6 @@ const LARGEST_VIEW_M: f64 = 0.5;
 const LARGEST_SWEEP_M: f64 = 2.0;
 /// Travel below which a point counts as at rest, m: five pixels of the usual size, 20 um.
 const LEAST_TRAVEL_M: f64 = 1e-4;
-/// Maximum number of positions of a column that are used, evenly spaced in time; a stroke is smooth over a
-/// thousandth of its duration.
-const MOST_POSITIONS: usize = 20_000;
 /// Fraction of the positions at either end of their range that are left out when a travel is measured,
 /// because they may be outliers.
 const TRIMMED: f64 = 0.01;
@@ -42,57 +25,10 @@ const TRIMMED: f64 = 0.01;
 const LEAST_HEIGHT_M: f64 = 1e-3;
 
 /// Findings from the checks on both points together.
-pub(super) fn check_motion(recording: &Recording, measured: &Quality) -> Vec<QualityFinding> {
+pub(super) fn check_motion(recording: &Recording) -> Vec<QualityFinding> {
     let (traces, grid) = (recording.traces(), recording.grid());
-    let found = [
-        check_repeated_frames(traces, measured),
-        check_overlap(traces, grid),
-        check_travel(traces),
-        check_head_above_tip(traces),
-    ];
+    let found = [check_overlap(traces, grid), check_travel(traces), check_head_above_tip(traces)];
     found.into_iter().flatten().collect()
-}
-
-/// Finding on frames that exactly repeat the previous frame, although noise should move every position.
-fn check_repeated_frames(traces: &Traces, measured: &Quality) -> Option<QualityFinding> {
-    let by_chance = repeat_probability(measured)?;
-    let still = |&frame: &usize| {
-        let same = |(_, axis): (_, &[Option<f64>])| axis[frame] == axis[frame - 1];
-        let tracked = traces.tip_x_m[frame].is_some() && traces.head_x_m[frame].is_some();
-        tracked && traces.columns().take(4).all(same)
-    };
-    let frames = traces.tip_x_m.len();
-    let mut repeated = (1..frames).filter(still);
-    let first = repeated.next()?;
-    let count = 1 + repeated.count();
-    let expected = by_chance * frames as f64;
-    let allowed = if expected < NO_REPEATS { 0.0 } else { BY_ROUNDING * (1.0 + expected) };
-    if count as f64 <= allowed {
-        return None;
-    }
-    let share = count as f64 / frames as f64;
-    let severity = if share > MANY_REPEATED { Severity::Serious } else { Severity::Caution };
-    let words = format!(
-        "{count} frames ({:.1} %) repeat the one before exactly, the first is frame {first}",
-        100.0 * share
-    );
-    let advice = "the video was converted or frames were doubled: track the file that the camera wrote";
-    let value = (count as f64, "frames");
-    Some(QualityFinding::advise((Check::FrozenFrames, severity), value, words, advice))
-}
-
-/// Probability that all columns by chance have the same values in two consecutive frames, the product over
-/// the columns. For a column with step `q` and noise `s` it is `q/(2 sqrt(pi) s)`: the step times the
-/// probability density of the difference of two values, taken at zero. `None` if noise does not move both
-/// points, or if repeats by chance are too likely to be judged.
-fn repeat_probability(measured: &Quality) -> Option<f64> {
-    let moved = |channel: &ChannelQuality| channel.noise_m.is_some_and(|noise| noise > LEAST_NOISE_M);
-    let unchanged = |channel: &ChannelQuality| {
-        Some((channel.step_m.unwrap_or(0.0) / (2.0 * PI.sqrt() * channel.noise_m?)).min(1.0))
-    };
-    let channels = measured.channels().into_iter().map(|(_, quality)| quality);
-    let probability: f64 = channels.filter(|channel| moved(channel)).filter_map(unchanged).product();
-    (probability < LIKELY_REPEAT && moved(&measured.tip_x) && moved(&measured.head_x)).then_some(probability)
 }
 
 /// First and last tracked frame of a column.

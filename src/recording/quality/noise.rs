@@ -4,9 +4,9 @@ use crate::recording::channel::median_in_place;
 
 /// Median absolute deviation of a normal distribution in units of its standard deviation.
 const MAD_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
-/// Variance of a third difference of white noise of unit variance: the sum of the squared binomial weights, 1
-/// + 9 + 9 + 1.
-const THIRD_DIFFERENCE_VARIANCE: f64 = 20.0;
+/// Variance of a difference of white noise of unit variance, from order 0: the sum of the squared binomial
+/// weights, 1 + 9 + 9 + 1 for the third difference.
+const DIFFERENCE_VARIANCES: [f64; 6] = [1.0, 2.0, 6.0, 20.0, 70.0, 252.0];
 /// Minimum number of differences between frames for an estimate of noise or step: the median of fewer is
 /// uncertain.
 const FEWEST_DIFFERENCES: usize = 8;
@@ -27,12 +27,33 @@ pub fn noise_floor(samples: &[Option<f64>]) -> Option<f64> {
         [Some(a), Some(b), Some(c), Some(d)] => Some((d - 3.0 * c + 3.0 * b - a).abs()),
         _ => None,
     };
-    let mut differences: Vec<f64> = samples.windows(4).filter_map(third).collect();
-    if differences.len() < FEWEST_DIFFERENCES {
+    noise_of_differences(samples.windows(4).filter_map(third), 3)
+}
+
+/// Standard deviation of the white noise that gives the median of absolute differences of the given order.
+pub(super) fn noise_of_differences(sizes: impl Iterator<Item = f64>, order: usize) -> Option<f64> {
+    let mut sizes: Vec<f64> = sizes.collect();
+    if sizes.len() < FEWEST_DIFFERENCES {
         return None;
     }
-    let median = median_in_place(&mut differences)?;
-    Some(median / (MAD_OF_NORMAL * THIRD_DIFFERENCE_VARIANCE.sqrt()))
+    Some(median_in_place(&mut sizes)? / (MAD_OF_NORMAL * DIFFERENCE_VARIANCES[order].sqrt()))
+}
+
+/// Binomial weights of the differences, from order 0.
+const DIFFERENCE_WEIGHTS: [&[f64]; 6] = [
+    &[1.0],
+    &[1.0, -1.0],
+    &[1.0, -2.0, 1.0],
+    &[1.0, -3.0, 3.0, -1.0],
+    &[1.0, -4.0, 6.0, -4.0, 1.0],
+    &[1.0, -5.0, 10.0, -10.0, 5.0, -1.0],
+];
+
+/// The difference of an order up to 5 that ends at `frame`.
+pub(super) fn difference_at(samples: &[Option<f64>], frame: usize, order: usize) -> Option<f64> {
+    let stencil = samples.get(frame.checked_sub(order)?..=frame)?;
+    let weighted = stencil.iter().rev().zip(DIFFERENCE_WEIGHTS[order]);
+    weighted.map(|(sample, weight)| Some((*sample)? * weight)).sum()
 }
 
 /// Quantisation step of the samples, in their unit: the greatest common divisor of the differences between
@@ -48,6 +69,7 @@ pub fn quantisation_step(samples: &[Option<f64>]) -> Option<f64> {
     let mut step = moves().next()?;
     for distance in moves() {
         step = approximate_common_divisor(distance, step, rounding);
+        step = distance / (distance / step).round(); // (Euclid's algorithm multiplies rounding errors)
         if step < largest / MOST_STEPS {
             return None;
         }

@@ -1,18 +1,19 @@
-//! Isolated points far from the prediction by their neighbours: the tracker jumps away for one frame and
+//! Points far from the prediction by their neighbours: the tracker jumps away for one frame or for several and
 //! comes back.
 //!
-//! A point is an outlier if all three conditions hold. The conditions exclude fast chatter, and kinks, jumps
+//! A single point is an outlier if all three conditions hold. The conditions exclude fast chatter, and kinks, jumps
 //! and flips of the blade:
 //! - its distance from the cubic through its four neighbours exceeds what noise and step explain;
 //! - it lies on the same side of two straight lines, through the two points before and the two points after
 //!   it (at a kink it lies on one of them), and both lines agree on its place (at a jump they do not);
 //! - the points around it are much closer to their own cubics (in chatter or strong noise they are not).
 //!
-//! A point is not judged if a frame within two frames of it is missing.
+//! A single point is not judged if a frame within two frames of it is missing. Several points in a row are
+//! outliers between two jumps of about the same size in opposite directions, if no other jump of a quarter of
+//! this size is near and the point moves on where it would be without them.
 
-use super::finding::{Check, QualityFinding, Severity};
-use super::measurement::{ChannelQuality, MeasuredColumn, Optics};
-use crate::recording::FrameGrid;
+use super::measurement::ChannelQuality;
+use super::noise::difference_at;
 
 /// Weight of the two nearer neighbours in the cubic through four points; the two further ones have the weight
 /// -1.
@@ -46,9 +47,16 @@ const MORE_THAN_AROUND: f64 = 4.0;
 /// Distances, in frames, from an outlier to the points around it: the nearest points whose own cubic does not
 /// use the outlier.
 const AROUND: std::ops::RangeInclusive<usize> = 3..=5;
-/// Fraction of outliers above which the finding is a caution: each outlier is an impulse that raises the
-/// noise of a spectrum.
-const MANY_OUTLIERS: f64 = 1e-3;
+/// Standard deviation of a third difference of white noise of standard deviation 1: `sqrt(1 + 9 + 9 + 1)`.
+const THIRD_DIFFERENCE_SD: f64 = 4.472_135_954_999_58;
+/// Largest number of frames between a jump away and the jump back. Motion of the blade itself moves it away
+/// and back in a longer time.
+const LONGEST_ABSENCE: usize = 30;
+/// Smallest size of the third difference next to a jump, as a fraction of that at the jump: half of its value
+/// without noise.
+const BESIDE_JUMP: f64 = 0.25;
+/// Number of frames before a jump away and after the jump back that show no other jump.
+const CALM_FRAMES: usize = 4;
 
 /// Frames of the outliers in a column, in order; `metres_per_pixel` is given if known.
 pub fn outlier_frames(
@@ -57,7 +65,7 @@ pub fn outlier_frames(
     metres_per_pixel: Option<f64>,
 ) -> Vec<usize> {
     let Some(noise_m) = channel.noise_m else { return vec![] };
-    let by_step = BEYOND_STEPS * channel.step_m.unwrap_or(0.0);
+    let by_step = BEYOND_STEPS * channel.step_m.or_else(|| smallest_movement(samples)).unwrap_or(0.0);
     let by_pixel = LEAST_MISS_PX * metres_per_pixel.unwrap_or(0.0);
     let least_m = (BEYOND_NOISE * MISS_SD * noise_m).max(by_step).max(by_pixel).max(LEAST_MISS_M);
     let candidates =
@@ -67,7 +75,51 @@ pub fn outlier_frames(
         lies_off_both_lines(samples, frame, miss, noise_m).unwrap_or(false)
             && is_calm_around(samples, frame, miss)
     });
-    isolated.map(|(frame, _)| frame).collect()
+    let mut frames: Vec<usize> = isolated.map(|(frame, _)| frame).collect();
+    let least_third_m = (BEYOND_NOISE * THIRD_DIFFERENCE_SD * noise_m).max(2.0 * least_m);
+    frames.extend(find_absences(samples, least_third_m).into_iter().flatten());
+    frames.sort_unstable();
+    frames.dedup();
+    frames
+}
+
+/// Smallest movement between neighbouring frames: the step of a column with too few movements for a divisor.
+fn smallest_movement(samples: &[Option<f64>]) -> Option<f64> {
+    let moves = samples.windows(2).filter_map(|w| Some((w[1]? - w[0]?).abs()));
+    moves.filter(|&size| size > 0.0).reduce(f64::min)
+}
+
+/// Runs of two and more frames between a jump away and the jump back. A jump of size 1 from one frame to the
+/// next gives third differences of 1, -2 and 1.
+fn find_absences(samples: &[Option<f64>], least_m: f64) -> Vec<std::ops::RangeInclusive<usize>> {
+    let third = |frame: usize| difference_at(samples, frame + 2, 3);
+    let size = |frame: usize| third(frame).map_or(0.0, f64::abs);
+    let is_jump =
+        |&i: &usize| size(i) > least_m && size(i) >= size(i + 1) && size(i) >= size(i.wrapping_sub(1));
+    let returns = |away: usize, back: usize| {
+        let (out, home) = (third(away)?, third(back)?);
+        let least = out.abs().min(home.abs());
+        let is_beside = |outer: f64, jump: f64| (BESIDE_JUMP..1.0 - BESIDE_JUMP).contains(&(-outer / jump));
+        let before = away.saturating_sub(CALM_FRAMES)..away - 1;
+        let mut others = before.chain(away + 2..back.saturating_sub(1)).chain(back + 2..back + CALM_FRAMES);
+        Some(
+            (2..=LONGEST_ABSENCE).contains(&(back - away))
+                && (out + home).abs() <= BOTH_SIDES * least
+                && is_beside(third(away - 1)?, out)
+                && is_beside(third(back + 1)?, home)
+                && others.all(|frame| MORE_THAN_AROUND * size(frame) < least),
+        )
+    };
+    let jumps: Vec<usize> = (1..samples.len()).filter(is_jump).collect();
+    let (mut absences, mut last) = (vec![], 0);
+    for pair in jumps.windows(2) {
+        // (after a jump back, the point is tracked until it jumps away again)
+        if pair[0] > last && returns(pair[0], pair[1]).unwrap_or(false) {
+            absences.push(pair[0] + 1..=pair[1]);
+            last = pair[1];
+        }
+    }
+    absences
 }
 
 /// Distance of the middle one of five frames from the cubic through the others.
@@ -95,22 +147,4 @@ fn is_calm_around(samples: &[Option<f64>], frame: usize, miss_m: f64) -> bool {
     let around = AROUND.flat_map(|apart| [frame.checked_sub(apart), frame.checked_add(apart)]);
     let largest = around.filter_map(miss).map(f64::abs).reduce(f64::max);
     largest.is_some_and(|largest| miss_m.abs() > MORE_THAN_AROUND * largest)
-}
-
-/// Finding on the outliers of a column.
-pub(super) fn check_outliers(
-    column: &MeasuredColumn,
-    grid: FrameGrid,
-    optics: &Optics,
-) -> Option<QualityFinding> {
-    let frames = outlier_frames(column.samples, column.quality, optics.metres_per_pixel);
-    let first = *frames.first()?;
-    let (count, first_s) = (frames.len(), grid.time_s(first));
-    let many = count as f64 > MANY_OUTLIERS * grid.frames as f64;
-    let severity = if many { Severity::Caution } else { Severity::Note };
-    let words = format!("{count} isolated outliers, the first in frame {first} at {first_s:.6} s");
-    let advice = "the tracker jumped away and came back: correct these points in it, or delete them there";
-    let value = (count as f64, "frames");
-    let finding = QualityFinding::advise((Check::Outliers, severity), value, words, advice);
-    Some(finding.on_channel(column.name))
 }
