@@ -2,10 +2,10 @@
 //! joins two tracked positions by a straight line. In the first case first differences are zero, in the
 //! second case second differences.
 //!
-//! A real point also rests or moves along a line. So each run of such frames is compared with the noise around
-//! it. For `k` differences in a row the joint density at zero is `(2 pi s^2)^(-k/2) det(G)^(-1/2)`, with the
-//! standard deviation `s` of the noise and the Gram matrix `G` of the differences. Its product with the volume
-//! in which the differences count as zero is the probability that noise causes the run.
+//! A real point also rests or moves along a line. So each run of such frames is compared with the noise
+//! around it. For `k` differences in a row the joint density at zero is `(2 pi s^2)^(-k/2) det(G)^(-1/2)`,
+//! with the standard deviation `s` of the noise and the Gram matrix `G` of the differences. Its product
+//! with the volume in which the differences count as zero is the probability that noise causes the run.
 
 use super::finding::Check;
 use super::measurement::{MOST_POSITIONS, MeasuredColumn};
@@ -15,13 +15,13 @@ use portable_math as math;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-/// Orders of the differences from which the noise around a run is taken: the smallest estimate counts, because
-/// motion makes some of them too large.
+/// Orders of the differences from which the noise around a run is taken: the smallest estimate counts,
+/// because motion makes some of them too large.
 const NOISE_ORDERS: std::ops::RangeInclusive<usize> = 2..=5;
 /// Number of frames on either side of a run from which the noise is taken.
 const AROUND: usize = 40;
-/// Orders of the differences from which the spacing of the values is taken: uniform motion does not contribute
-/// to them.
+/// Orders of the differences from which the spacing of the values is taken: uniform motion does not
+/// contribute to them.
 const SPACING_ORDERS: [usize; 2] = [2, 3];
 /// Probability of a zero difference above which an axis is not judged: a point at rest then stays within one
 /// step for many frames.
@@ -47,8 +47,8 @@ const CHANGES_OF_SPEED: f64 = 2.5;
 const LARGE_CHANGE: f64 = 0.95;
 /// Minimum number of changes of speed around a run: with fewer, the point rests in most frames.
 const FEWEST_CHANGES: usize = AROUND / 2;
-/// Minimum number of runs of a point with one axis, and of runs during which the point moves on: one or two may
-/// be rests of the blade itself.
+/// Minimum number of runs of a point with one axis, and of runs during which the point moves on: one or two
+/// may be rests of the blade itself.
 const FEWEST_RUNS: usize = 3;
 
 /// A column whose differences of one order are compared with zero.
@@ -137,9 +137,9 @@ impl<'a> DifferenceAxis<'a> {
     }
 }
 
-/// Probability that noise causes a run on all axes of a point. Both axes of a point have about the same noise,
-/// so the smaller estimate counts: motion affects it less. For a point with one axis, the other point serves
-/// as well.
+/// Probability that noise causes a run on all axes of a point. Both axes of a point have about the same
+/// noise, so the smaller estimate counts: motion affects it less. For a point with one axis, the other
+/// point serves as well.
 fn point_chance(axes: &[DifferenceAxis<'_>], other: &[DifferenceAxis<'_>], run: &Range<usize>) -> f64 {
     let others = if axes.len() > 1 { &[] } else { other };
     let noise_m = axes.iter().chain(others).map(|axis| axis.noise_around(run)).fold(f64::INFINITY, f64::min);
@@ -185,8 +185,8 @@ fn improbable_runs(
 /// Fewest repeats of one point, and fewest points on a line between two others, that are judged.
 const FEWEST_FILLED: usize = 2;
 
-/// Frames in which both points repeat the previous frame, frames in which one point repeats its last position,
-/// and frames of one point on a straight line between others.
+/// Frames in which both points repeat the previous frame, frames in which one point repeats its last
+/// position, and frames of one point on a straight line between others.
 pub(super) fn find_filled_frames(columns: &[MeasuredColumn<'_>; 4]) -> Vec<UntrackedFrames> {
     let frames = columns[0].samples.len();
     let (tip, head) = columns.split_at(2);

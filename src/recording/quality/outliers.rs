@@ -1,8 +1,8 @@
-//! Points far from the prediction by their neighbours: the tracker jumps away for one frame or for several and
-//! comes back.
+//! Points far from the prediction by their neighbours: the tracker jumps away for one frame or for several
+//! and comes back.
 //!
-//! A single point is an outlier if all three conditions hold. The conditions exclude fast chatter, and kinks, jumps
-//! and flips of the blade:
+//! A single point is an outlier if all three conditions hold. The conditions exclude fast chatter, and
+//! kinks, jumps and flips of the blade:
 //! - its distance from the cubic through its four neighbours exceeds what noise and step explain;
 //! - it lies on the same side of two straight lines, through the two points before and the two points after
 //!   it (at a kink it lies on one of them), and both lines agree on its place (at a jump they do not);

@@ -1,5 +1,5 @@
-//! Positions that no tracker found in the picture: what each check finds, with counts and frames, and how such
-//! positions are left out.
+//! Positions that no tracker found in the picture: what each check finds, with counts and frames, and how
+//! such positions are left out.
 
 use super::filled::find_filled_frames;
 use super::finding::{Check, QualityFinding, Severity};
