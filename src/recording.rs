@@ -159,12 +159,10 @@ impl Recording {
     /// # Errors
     /// [`RecordingError`] unless it is a finite number above 0, or `None`.
     pub fn with_frame_rate_sd(self, frame_rate_sd_hz: Option<f64>) -> Result<Self, RecordingError> {
-        match frame_rate_sd_hz.filter(|sd| !(sd.is_finite() && *sd > 0.0)) {
-            None => Ok(Self { frame_rate_sd_hz, ..self }),
-            Some(found) => Err(RecordingError(format!(
-                "frame_rate_sd_hz: found {found}, expected a finite number above 0"
-            ))),
-        }
+        let unusable = frame_rate_sd_hz.filter(|sd| !(sd.is_finite() && *sd > 0.0));
+        let found = unusable.map(|found| format!("frame_rate_sd_hz: found {found}"));
+        let refused = found.map(|found| RecordingError(found + ", expected a finite number above 0"));
+        refused.map_or(Ok(Self { frame_rate_sd_hz, ..self }), Err)
     }
 
     /// This recording with other traces at the same times.

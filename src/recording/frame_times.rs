@@ -35,9 +35,11 @@ impl FrameTimes {
     fn new(times_s: Vec<f64>) -> Result<Self, RecordingError> {
         let unordered = |i: &usize| !times_s[*i].is_finite() || (*i > 0 && times_s[*i] <= times_s[*i - 1]);
         if let Some(frame) = (0..times_s.len()).find(unordered) {
-            let found = format!("time_s, frame {frame}: found {}", times_s[frame]);
             let expected = "expected a finite time after that of the frame before; correct the times";
-            return Err(RecordingError(format!("{found}, {expected}")));
+            return Err(RecordingError(format!(
+                "time_s, frame {frame}: found {}, {expected}",
+                times_s[frame]
+            )));
         }
         let [first_s, .., last_s] = times_s[..] else {
             return Err(RecordingError(format!("found {} frames, expected at least 2", times_s.len())));
@@ -57,11 +59,8 @@ impl FrameTimes {
         let span = (last_s - first_s) * mean_rate_hz;
         let longest = FRAMES_WITHOUT_ROWS.0 + (1 + FRAMES_WITHOUT_ROWS.1) * times_s.len();
         if !(mean_rate_hz.is_finite() && (0.0..=MAX_FRAMES.min(longest as f64)).contains(&span)) {
-            return Err(RecordingError(format!(
-                "time_s: the times span {span:.0} frames, and only {} of them have a row; expected one \
-                 continuous recording: correct the times",
-                times_s.len()
-            )));
+            let found = format!("time_s: the times of {} frames span {span:.0} mean steps", times_s.len());
+            return Err(RecordingError(format!("{found}, expected one continuous recording; correct them")));
         }
         let (mut on_grid, mut departure_frames) = (0.0, 0.0_f64);
         for (i, is_gap) in gaps.iter().enumerate() {
@@ -72,7 +71,8 @@ impl FrameTimes {
         Ok(Self { times_s, mean_rate_hz, gaps, departure_frames })
     }
 
-    /// Value of a column at a time, s, as [`Recording::interpolate_column`] describes it.
+    /// Value of a column at a time, s, as [`Recording::interpolate_column`] describes it. Next to a gap or an
+    /// end, the polynomial passes through six frames of which more lie on the other side of the time.
     pub(super) fn interpolate(&self, column: &[Option<f64>], time_s: f64) -> Option<f64> {
         let times = &self.times_s;
         let after = times.partition_point(|t| *t < time_s);
@@ -87,8 +87,8 @@ impl FrameTimes {
         if self.gaps[before] {
             return None;
         }
-        let first = after.checked_sub(STENCIL / 2);
-        let curved = first.and_then(|first| {
+        let curved = [3, 2, 4, 1, 5].into_iter().find_map(|frames_before| {
+            let first = after.checked_sub(frames_before)?;
             let nodes = times.get(first..first + STENCIL)?.try_into().ok()?;
             let unbroken = !self.gaps[first..first + STENCIL - 1].contains(&true);
             lagrange_through_nodes(column.get(first..).filter(|_| unbroken)?, nodes, time_s)

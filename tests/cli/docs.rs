@@ -346,6 +346,7 @@ const LANGUAGES: [(&str, &str); 5] = [
 type Reader = fn(&str) -> Result<(), String>;
 const PARTS: &[(&str, &str, &str, Reader)] = &[
     ("docs/fits.md", "nuisance = ", "format = 1\ntitle = \"a\"\nscene = \"scene.toml\"\nseed = 1\n", job),
+    ("docs/formats.md", "[camera]", "format = 1\n", recording),
     ("docs/formats.md", "[video]", include_str!("../../data/actual-blade-twin/recording.toml"), recording),
     ("docs/keys.md", "#:schema ", include_str!("../../data/scenes/actual-blade.toml"), scene),
     ("docs/sweeps.md", "format = 1", "", study),

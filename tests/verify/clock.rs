@@ -77,7 +77,7 @@ fn number(of: &Value, key: &str) -> f64 {
 
 #[test]
 fn a_steady_tone_is_steady_at_its_frequency_on_every_clock() {
-    let (mut within, mut records) = ([0; 2], 0);
+    let (mut within, mut records, mut false_components) = ([0; 2], 0, 0);
     for seed in 0..10 {
         for (clock, times_s) in uneven_clocks(seed, FRAMES) {
             let [components, description] = spectrum(tone(&times_s, seed), "..");
@@ -88,15 +88,20 @@ fn a_steady_tone_is_steady_at_its_frequency_on_every_clock() {
             let height_m = number(first, "amplitude_m");
             let row = format!("{clock} {seed}: {hz} +- {sd_hz} Hz, {height_m} m, {} components", all.len());
             println!("{row}");
-            assert!(first["range_hz"].is_null() && all.len() == 1 && sd_hz < 1e-3, "{row}");
-            assert!((height_m / 5e-4 - 1.0).abs() < 0.05, "{row}");
+            assert!(first["range_hz"].is_null() && sd_hz < 2e-4, "{row}");
+            assert!((height_m / 5e-4 - 1.0).abs() < 0.01, "{row}");
+            for other in &all[1..] {
+                println!("false: {other}");
+                false_components += 1;
+            }
             records += 1;
             within = [within[0] + usize::from(off < 1.0), within[1] + usize::from(off < 2.0)];
             assert!(description["note"].as_str().unwrap().contains("interpolated"), "{description}");
         }
     }
-    println!("{within:?} of {records}");
+    println!("{within:?} of {records}, {false_components} false");
     assert!(records == 40 && within[0] >= 20 && within[1] >= 34, "{within:?} of {records}");
+    assert!(false_components <= 2, "{false_components} false components in {records} records");
 }
 
 /// A quintic in time is the polynomial through six frames, whatever their times.
@@ -110,7 +115,7 @@ fn a_polynomial_comes_onto_the_grid_exactly_and_gaps_stay_missing() {
         let grid = resampled.grid();
         assert_eq!((grid.start_s, resampled.frame_times_s()), (times_s[0], None));
         let is_long = |i: usize| times_s[i] - times_s[i - 1] > 1.4 / RATE_HZ;
-        let (mut missing, mut between) = (0, 0);
+        let (mut missing, mut exact) = (0, 0);
         for (frame, x) in resampled.traces().tip_x_m.iter().enumerate() {
             let t = grid.time_s(frame);
             let after = times_s.partition_point(|s| *s < t).clamp(1, times_s.len() - 1);
@@ -119,16 +124,17 @@ fn a_polynomial_comes_onto_the_grid_exactly_and_gaps_stay_missing() {
                 assert!(is_long(after), "{clock}: {t} lies in no gap");
                 continue;
             };
-            // six frames without a gap
-            if (3..times_s.len() - 2).contains(&after) && !(after - 2..after + 3).any(is_long) {
-                between += 1;
+            // some six frames in a row around the time have no gap
+            let stencils = after.saturating_sub(5)..=(after - 1).min(times_s.len() - 6);
+            if stencils.into_iter().any(|first| !(first + 1..first + 6).any(is_long)) {
+                exact += 1;
                 assert!((x / quintic(t) - 1.0).abs() < 1e-11, "{clock}, {t}: {x}");
             }
         }
         let lost = FRAMES - times_s.len();
-        println!("{clock}: {lost} lost, {missing} missing, {between} exact");
+        println!("{clock}: {lost} lost, {missing} missing, {exact} exact");
         assert!(missing >= lost && missing <= 2 * lost + lost / 2, "{clock}: {missing} missing, {lost} lost");
-        assert!(between + 8 * lost > 450, "{clock}: {between}");
+        assert!(exact + 4 * lost >= FRAMES - 10, "{clock}: {exact}");
     }
 }
 
@@ -237,7 +243,7 @@ fn times_that_do_not_advance_and_rates_that_are_not_theirs_are_refused() {
         Recording::from_times("r", times_s, Traces::default(), true)
             .unwrap_err()
             .to_string()
-            .contains("the times span")
+            .contains("mean steps, expected one continuous")
     );
     assert!(tone(&uneven_clocks(2, FRAMES)[0].1, 2).with_frame_rate_sd(Some(-1.0)).is_err());
 }

@@ -17,10 +17,11 @@ pub(crate) struct FramePictures {
 }
 
 impl FramePictures {
-    /// The pictures of the recording at `path`; `None` if its description names none.
+    /// The pictures of the recording at `path`; `None` if its description names none, or if the tracks were
+    /// interpolated to a grid, whose frames are not those of the pictures.
     pub(crate) fn load(path: &Path, loaded: &LoadedRecording) -> Outcome<Option<Self>> {
-        let Some((file, video)) = loaded.file.as_ref().and_then(|file| Some((file, file.video.as_ref()?)))
-        else {
+        let file = loaded.file.as_ref().filter(|_| loaded.recording.describe_resampling().is_none());
+        let Some((file, video)) = file.and_then(|file| Some((file, file.video.as_ref()?))) else {
             return Ok(None);
         };
         let described = description_path(path);

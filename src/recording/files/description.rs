@@ -98,7 +98,8 @@ impl From<Vec<String>> for OneOrMany {
 pub struct CameraEntry {
     /// Recording rate, 1/s (not the playback rate); the mean rate if `clock` is "times".
     pub frame_rate_hz: f64,
-    /// Standard deviation of the recording rate, 1/s; it is part of the standard deviation of every frequency.
+    /// Standard deviation of the recording rate, 1/s; it is part of the standard deviation of every
+    /// frequency.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frame_rate_sd_hz: Option<f64>,
     /// Whether the frames lie on a grid of `frame_rate_hz` ("grid", also if absent) or at the times in

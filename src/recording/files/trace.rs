@@ -175,17 +175,13 @@ impl<'a> TraceTable<'a> {
     }
 
     /// The traces on the grid of a known rate, 1/s.
-    pub(super) fn place_at_rate(
-        self,
-        file: &str,
-        frame_rate_hz: f64,
-    ) -> Result<(FrameGrid, Traces), FilesError> {
-        let fit = self.number_rows(file, 1.0 / frame_rate_hz)?;
-        let (row, off_frames) = farthest_off_grid(&self.times_s, &fit.frames, frame_rate_hz);
+    pub(super) fn place_at_rate(self, file: &str, rate_hz: f64) -> Result<(FrameGrid, Traces), FilesError> {
+        let fit = self.number_rows(file, 1.0 / rate_hz)?;
+        let (row, off_frames) = farthest_off_grid(&self.times_s, &fit.frames, rate_hz);
         if off_frames > clock::OFF_GRID_LIMIT_FRAMES {
-            return Err(self.off_grid_error(file, row, off_frames, frame_rate_hz));
+            return Err(self.off_grid_error(file, row, off_frames, rate_hz));
         }
-        Ok(self.place_on_grid(&fit, frame_rate_hz))
+        Ok(self.place_on_grid(&fit, rate_hz))
     }
 
     fn number_rows(&self, file: &str, seed_s: f64) -> Result<FrameFit, FilesError> {
