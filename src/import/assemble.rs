@@ -194,7 +194,7 @@ fn describe_recording(
 /// returned unchanged. Error messages name `file`.
 ///
 /// # Errors
-/// [`ImportError::Unusable`] if the tilt cannot be measured from the path of the tip, or if a point has only
+/// [`ImportError::Other`] if the tilt cannot be measured from the path of the tip, or if a point has only
 /// one coordinate in a frame.
 fn level_recording(
     recording: Recording,

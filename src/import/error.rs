@@ -41,24 +41,40 @@ pub enum CellProblem {
     FarAway,
 }
 
+/// What is wrong with a file or an option.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ImportProblem {
+    /// The file as named by the user, with line and column if they are known, or the option.
+    pub place: String,
+    /// What was found.
+    pub found: String,
+    /// What was expected; empty if `found` is a whole sentence.
+    pub expected: String,
+    /// What to do; empty if that is clear.
+    pub advice: String,
+}
+
+impl Display for ImportProblem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { place, found, expected, advice } = self;
+        if expected.is_empty() {
+            return write!(f, "{place}: {found}");
+        }
+        write!(f, "{place}: found {found}, expected {expected}")?;
+        if advice.is_empty() { Ok(()) } else { write!(f, "; {advice}") }
+    }
+}
+
 /// Reason for refusing an import.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ImportError {
-    /// No file was given.
-    #[error("no file to import: name the exported table")]
-    NoSource,
-    /// Two files have the same name, or a file has the name of one of the recording's own files, such as
-    /// `trace.csv`.
-    #[error(
-        "{file}: found the file name `{name}`, expected one that no other file of the recording has; rename \
-         the export"
-    )]
-    Name {
-        /// Path of the file as the user gave it.
-        file: String,
-        /// Name of the file, without the path of its folder.
-        name: String,
-    },
+    /// The file does not contain positions over time. It may be another kind of table of the same program.
+    #[error("{0}")]
+    WrongTable(ImportProblem),
+    /// It is not clear which track is the tip or the head: no track is named for it, or the given name fits
+    /// no track or several.
+    #[error("{0}")]
+    Point(ImportProblem),
     /// One track has two rows with the same frame number or time.
     #[error(
         "{place}: found {what} {found} of track `{track}` a second time (first in line {first}), expected \
@@ -77,31 +93,6 @@ pub enum ImportError {
         /// Line number of the first of the two rows.
         first: usize,
     },
-    /// The file does not contain positions over time. It may be another kind of table of the same program.
-    #[error("{place}: found {found}, expected {expected}; {advice}")]
-    WrongTable {
-        /// The file, or the place in the file that shows the problem.
-        place: String,
-        /// Contents of the file, in words.
-        found: String,
-        /// Contents that are expected instead, in words.
-        expected: String,
-        /// How to export the expected table from the program.
-        advice: String,
-    },
-    /// A row has more or fewer cells than the other rows of the table.
-    #[error(
-        "{place}: found {found} cells, expected {expected} as in the rest of the table; complete \
-         the row from what the tracking program shows (a missing value is an empty cell), or export again"
-    )]
-    Ragged {
-        /// Place of the row.
-        place: TextLocation,
-        /// Number of cells in the row.
-        found: usize,
-        /// Number of cells in the other rows.
-        expected: usize,
-    },
     /// A cell cannot be used.
     #[error("{place}: column {name}: found `{found}`, expected {expected}; {advice}")]
     Cell {
@@ -118,98 +109,9 @@ pub enum ImportError {
         /// What to do.
         advice: &'static str,
     },
-    /// A file or a value cannot be used.
-    #[error("{place}: found {found}, expected {expected}; {advice}")]
-    Format {
-        /// The file, with line and column if they are known; or the option whose value is refused.
-        place: String,
-        /// What was found.
-        found: String,
-        /// What was expected.
-        expected: String,
-        /// What to do.
-        advice: String,
-    },
-    /// A file cannot be used; the reason is given as one sentence.
-    #[error("{place}: {problem}")]
-    Unusable {
-        /// The file, with line and column if they are known.
-        place: String,
-        /// What was found and expected, and what to do.
-        problem: String,
-    },
-    /// It is not clear which track is the tip or the head: no track is named for it, or the given name fits
-    /// no track or several.
-    #[error("--point {point}: found {found}, expected {expected}; {advice}")]
-    Point {
-        /// `tip` or `head`.
-        point: &'static str,
-        /// What was found.
-        found: String,
-        /// What was expected.
-        expected: String,
-        /// The tracks that the files contain, and perhaps the track whose name is most similar to the given
-        /// one.
-        advice: String,
-    },
-    /// The user has to give options for facts that the file does not contain, such as the frame rate.
-    #[error("{files}: read as {format}, which does not say all of how it was recorded, and no default is \
-        safe; give\n  {}", .missing.join("\n  "))]
-    MissingOptions {
-        /// Files as named by the user.
-        files: String,
-        /// Format of the files.
-        format: String,
-        /// One text for each missing option: what it means, and which value the file suggests.
-        missing: Vec<String>,
-    },
-    /// An option has a value that cannot be used.
-    #[error("{option}: found `{found}`, expected {expected}")]
-    Option {
-        /// Name of the option.
-        option: &'static str,
-        /// Value that the user gave.
-        found: String,
-        /// Values that are allowed.
-        expected: String,
-    },
-    /// The times in the file imply another frame rate than the user declared.
-    #[error(
-        "{file}: the times imply {implied_hz:.6} frames/s, but --frame-rate-hz says {declared_hz} (a factor \
-         of {factor:.4}). Usually the times are those of playback, and every frequency would be wrong by \
-         that factor: check the camera's record. If {declared_hz} is right and the time column only counts \
-         frames, add --time playback{step}{milliseconds}",
-        factor = .declared_hz / .implied_hz,
-        step = .step.map_or(String::new(), |n| format!("; if only one frame in {n} was tracked and the times \
-            are real, add --frame-step {n}")),
-        milliseconds = if (.declared_hz / .implied_hz / 1000.0 - 1.0).abs() < 0.01 { "; if the times are \
-            milliseconds, add --time ms" } else { "" }
-    )]
-    RateMismatch {
-        /// Path of the file as the user gave it.
-        file: String,
-        /// Frame rate that the times imply, 1/s.
-        implied_hz: f64,
-        /// Frame rate that the user declared, 1/s.
-        declared_hz: f64,
-        /// Value of `--frame-step` that may explain the difference: if only every n-th frame was tracked, n.
-        /// `None` if no small whole number explains it.
-        step: Option<usize>,
-    },
-    /// The declared frame rate differs from the one in the camera's record or in the file.
-    #[error(
-        "--frame-rate-hz: found {declared_hz}, but {record} has {recorded_hz} frames/s; leave the option out if \
-         that is the rate at which this video was recorded, or move the record away if it belongs to another \
-         one"
-    )]
-    RecordedRateMismatch {
-        /// Frame rate that the user declared, or else that of the first record, 1/s.
-        declared_hz: f64,
-        /// Source of the other frame rate, such as the name of the camera's record.
-        record: String,
-        /// Frame rate in that source, 1/s.
-        recorded_hz: f64,
-    },
+    /// Anything else.
+    #[error("{0}")]
+    Other(ImportProblem),
     /// The specification of the twin, from which a synthetic export was made, is not valid TOML.
     #[error(transparent)]
     Twin(#[from] TomlError),
@@ -224,6 +126,18 @@ pub(crate) type ImportResult<T> = Result<T, ImportError>;
 /// Maximum number of characters that an error message shows of a cell.
 const LONGEST_CELL: usize = 60;
 
+impl ImportProblem {
+    fn new(
+        place: impl Display,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+        advice: impl Into<String>,
+    ) -> Self {
+        let (found, expected, advice) = (found.into(), expected.into(), advice.into());
+        Self { place: place.to_string(), found, expected, advice }
+    }
+}
+
 impl ImportError {
     pub(crate) fn wrong_table(
         place: impl Display,
@@ -231,8 +145,7 @@ impl ImportError {
         expected: impl Into<String>,
         advice: impl Into<String>,
     ) -> Self {
-        let (found, expected, advice) = (found.into(), expected.into(), advice.into());
-        Self::WrongTable { place: place.to_string(), found, expected, advice }
+        Self::WrongTable(ImportProblem::new(place, found, expected, advice))
     }
 
     pub(crate) fn format(
@@ -241,18 +154,23 @@ impl ImportError {
         expected: impl Into<String>,
         advice: impl Into<String>,
     ) -> Self {
-        let (found, expected, advice) = (found.into(), expected.into(), advice.into());
-        Self::Format { place: place.to_string(), found, expected, advice }
+        Self::Other(ImportProblem::new(place, found, expected, advice))
     }
 
+    /// Error with a whole sentence: what was found and expected, and what to do.
     pub(crate) fn unusable(place: impl Display, problem: impl Display) -> Self {
-        Self::Unusable { place: place.to_string(), problem: problem.to_string() }
+        Self::format(place, problem.to_string(), "", "")
     }
 
     /// Error for a table with unsuitable columns; `line` is the line that shows the problem, usually the
     /// header.
     pub(crate) fn columns(file: &str, line: usize, problem: impl Display, advice: impl Display) -> Self {
         Self::unusable(format!("{file}:{line}:1"), format!("{problem}; {advice}"))
+    }
+
+    /// Error for an import without files.
+    pub(crate) fn no_source() -> Self {
+        Self::unusable("no file to import", "name the exported table")
     }
 
     /// Error for an empty file.
@@ -268,10 +186,50 @@ impl ImportError {
         Self::format(format!("{file}:{line}:1"), found, expected, "export again with the data rows selected")
     }
 
+    /// Error for a row with another number of cells than the table.
+    pub(crate) fn ragged(place: TextLocation, found: usize, expected: usize) -> Self {
+        let advice = "complete the row from what the tracking program shows (a missing value is an empty cell), or \
+            export again";
+        Self::format(
+            place,
+            format!("{found} cells"),
+            format!("{expected} as in the rest of the table"),
+            advice,
+        )
+    }
+
     /// Error for files or tracks whose rows do not fall on one common grid of frames.
     pub(crate) fn grid_mismatch(file: &str, found: &str, expected: &str, other: &str) -> Self {
         let advice = "export both tracks from one clip with the same time settings";
         Self::format(file, found, format!("{expected} as in {other}"), advice)
+    }
+
+    /// Error for options that the user has to give for facts that the file does not contain. There is one
+    /// text for each missing option: what it means, and which value the file suggests.
+    pub(crate) fn missing_options(files: &str, format: &str, missing: &[String]) -> Self {
+        let problem = format!(
+            "read as {format}, which does not say all of how it was recorded, and no default is safe; give\n  {}",
+            missing.join("\n  ")
+        );
+        Self::unusable(files, problem)
+    }
+
+    /// Error for times in the file that imply another frame rate than the user declared. If only every n-th
+    /// frame was tracked, `step` is the n that may explain the difference.
+    pub(crate) fn rate_mismatch(file: &str, implied_hz: f64, declared_hz: f64, step: Option<usize>) -> Self {
+        let factor = declared_hz / implied_hz;
+        let step = step.map_or(String::new(), |n| {
+            format!("; if only one frame in {n} was tracked and the times are real, add --frame-step {n}")
+        });
+        let milliseconds = (factor / 1000.0 - 1.0).abs() < 0.01;
+        let milliseconds = if milliseconds { "; if the times are milliseconds, add --time ms" } else { "" };
+        let problem = format!(
+            "the times imply {implied_hz:.6} frames/s, but --frame-rate-hz says {declared_hz} (a factor of \
+             {factor:.4}). Usually the times are those of playback, and every frequency would be wrong by that factor: \
+             check the camera's record. If {declared_hz} is right and the time column only counts frames, add --time \
+             playback{step}{milliseconds}"
+        );
+        Self::unusable(file, problem)
     }
 
     /// Error for a cell that cannot be used. `expected` says what the cell should contain, `advice` what to
@@ -287,10 +245,10 @@ impl ImportError {
     }
 
     pub(crate) fn point(point: &'static str, found: String, expected: &str, advice: String) -> Self {
-        Self::Point { point, found, expected: expected.to_owned(), advice }
+        Self::Point(ImportProblem::new(format!("--point {point}"), found, expected, advice))
     }
 
     pub(crate) fn option(option: &'static str, found: impl Display, expected: impl Into<String>) -> Self {
-        Self::Option { option, found: found.to_string(), expected: expected.into() }
+        Self::format(option, format!("`{found}`"), expected, "")
     }
 }

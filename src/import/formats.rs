@@ -82,7 +82,7 @@ fn detect_format(
             return Err(ImportError::format(document.file, name, first, advice));
         }
     }
-    found.ok_or(ImportError::NoSource)
+    found.ok_or_else(ImportError::no_source)
 }
 
 /// The first format that recognises the document. If a later format recognises it as a table of its program
@@ -107,7 +107,7 @@ fn recognising_formats<'d>(document: &'d Document) -> impl Iterator<Item = Recog
 /// Error with which `format` refuses the document because it contains no positions over time; `None` if it
 /// has no such error. The document must be one that `format` recognises.
 fn refusal_by(format: &dyn FileFormat, document: &Document, options: &ImportOptions) -> Option<ImportError> {
-    format.read(document, options).err().filter(|error| matches!(error, ImportError::WrongTable { .. }))
+    format.read(document, options).err().filter(|error| matches!(error, ImportError::WrongTable(_)))
 }
 
 /// Error of the first format other than `chosen` that recognises the document but finds no positions in it.

@@ -80,7 +80,7 @@ impl CoordinateScale {
     /// Reads a length per pixel such as `21.5um/px`, or a unit of length such as `mm`.
     ///
     /// # Errors
-    /// [`ImportError::Option`] for any other text.
+    /// [`ImportError::Other`] for any other text.
     pub fn parse(text: &str) -> Result<Self, ImportError> {
         let expected =
             "a length a pixel such as 21.5um/px, or the unit of the file's coordinates: m, cm, mm or um";
@@ -171,7 +171,7 @@ impl ColumnMap {
     /// counted from 1, or by its name in the header.
     ///
     /// # Errors
-    /// [`ImportError::Option`], which shows the faulty part of the text.
+    /// [`ImportError::Other`], which shows the faulty part of the text.
     pub fn parse(text: &str) -> Result<Self, ImportError> {
         let refuse = |found: &str, expected: &str| ImportError::option("--columns", found, expected);
         let mut columns: Vec<(&'static str, ColumnName)> = vec![];
@@ -228,7 +228,7 @@ impl ImportOptions {
     /// other value as text.
     ///
     /// # Errors
-    /// [`ImportError::Option`] if the key is missing or was given before.
+    /// [`ImportError::Other`] if the key is missing or was given before.
     pub fn add_condition(&mut self, text: &str) -> Result<(), ImportError> {
         let refuse = |expected: &str| ImportError::option("--condition", text, expected);
         let pair = text.split_once('=').filter(|pair| !pair.0.trim().is_empty());
@@ -247,7 +247,7 @@ impl ImportOptions {
     /// Reads `tip=NAME` or `head=NAME`, where `NAME` is the name of a track.
     ///
     /// # Errors
-    /// [`ImportError::Option`] for any other text, or if the point was given before.
+    /// [`ImportError::Other`] for any other text, or if the point was given before.
     pub(crate) fn add_point(&mut self, text: &str) -> Result<(), ImportError> {
         let refuse = |expected: &str| ImportError::option("--point", text, expected);
         let pair = text.split_once('=').filter(|pair| !pair.1.trim().is_empty());
@@ -274,7 +274,7 @@ const RATES_HZ: std::ops::RangeInclusive<f64> = 1e-3..=1e9;
 /// Refuses options whose numbers are outside the allowed range.
 ///
 /// # Errors
-/// [`ImportError::Option`], which names the option.
+/// [`ImportError::Other`], which names the option.
 pub(crate) fn check_options(options: &ImportOptions) -> Result<(), ImportError> {
     let positive = [("--frame-rate-hz", options.frame_rate_hz), ("--exposure-s", options.exposure_s)];
     for (option, value) in positive {

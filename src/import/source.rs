@@ -86,13 +86,15 @@ impl ImportSource {
 /// recording's folder needs its own name.
 pub(crate) fn check_file_names(sources: &[ImportSource]) -> Result<(), ImportError> {
     if sources.is_empty() {
-        return Err(ImportError::NoSource);
+        return Err(ImportError::no_source());
     }
     let mut taken = vec![TRACE_FILE, DESCRIPTION_FILE];
     for source in sources {
         let name = base_name(&source.name);
         if name.is_empty() || taken.iter().any(|other| other.eq_ignore_ascii_case(name)) {
-            return Err(ImportError::Name { file: source.name.clone(), name: name.to_owned() });
+            let (found, expected) =
+                (format!("the file name `{name}`"), "one that no other file of the recording has");
+            return Err(ImportError::format(&source.name, found, expected, "rename the export"));
         }
         taken.push(name);
     }

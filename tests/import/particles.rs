@@ -102,7 +102,10 @@ fn each_fixture_is_claimed_by_its_own_format() {
         [(EDGES, "SPOT_SOURCE_ID"), (TRACKS, "NUMBER_SPOTS"), (UNLINKED, "without particle")]
     {
         let error = read(fixture, &options(1000.0, "", "")).unwrap_err();
-        assert!(matches!(&error, ImportError::WrongTable { found, .. } if found.contains(what)), "{error}");
+        assert!(
+            matches!(&error, ImportError::WrongTable(problem) if problem.found.contains(what)),
+            "{error}"
+        );
     }
 }
 

@@ -4,7 +4,7 @@
 
 use super::column::{CoordinateUnit, TimeUnit};
 use super::rate::{FrameRate, RATE_AGREEMENT, format_rate, has_uneven_clock, implied_rate};
-use crate::import::error::{ImportError, ImportResult};
+use crate::import::error::{ImportError, ImportProblem, ImportResult};
 use crate::import::options::{CoordinateScale, ImportOptions, TimeColumn};
 use crate::import::reader::findings;
 use crate::import::reader::track_choice::TrackIndex;
@@ -85,11 +85,11 @@ pub(crate) fn calibrate(
         }
         return Ok(ImportCalibration { rate, tolerance, scales, y_axis, exposure_s });
     }
-    if let Err(ImportError::Point { advice, .. }) = chosen {
+    if let Err(ImportError::Point(ImportProblem { advice, .. })) = chosen {
         missing.push(format!("--point tip=NAME --point head=NAME   which tracks are meant; {advice}"));
     }
     let files = exports.iter().map(|export| export.file).collect::<Vec<_>>().join(", ");
-    Err(ImportError::MissingOptions { files, format: report.format.clone(), missing })
+    Err(ImportError::missing_options(&files, &report.format, &missing))
 }
 
 const ASK_TIME: &str = "--time UNIT         the times have the unit of the program's preferences, or another \
@@ -178,8 +178,12 @@ fn frame_rate(
     let declared = options.frame_rate_hz.map(|hz| FrameRate::stated(hz, "--frame-rate-hz"));
     if let Some(used) = declared.as_ref().or(records.first()) {
         if let Some(other) = records.iter().find(|record| used.difference(record) > RATE_AGREEMENT) {
-            let (declared_hz, recorded_hz, record) = (used.hz, other.hz, other.source.clone());
-            return Err(ImportError::RecordedRateMismatch { declared_hz, record, recorded_hz });
+            let problem = format!(
+                "found {}, but {} has {} frames/s; leave the option out if that is the rate at which this video was \
+                 recorded, or move the record away if it belongs to another one",
+                used.hz, other.source, other.hz
+            );
+            return Err(ImportError::unusable("--frame-rate-hz", problem));
         }
         if declared.is_none() {
             report.notes.push(format!("recording rate {} frames/s: {}", format_rate(used.hz), used.source));

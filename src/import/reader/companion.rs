@@ -29,7 +29,7 @@ fn point_names_file(file: &str) -> Option<String> {
 /// Reads frame rate and exposure time from the camera's record of each file, if there is one.
 ///
 /// # Errors
-/// [`ImportError::Format`] for a record that contradicts the options or the table, or whose settings cannot
+/// [`ImportError::Other`] for a record that contradicts the options or the table, or whose settings cannot
 /// be used. If the user declares the frame rate, a record with unusable settings, or with fewer frames than
 /// the table has rows, gives only a finding.
 pub(crate) fn read_camera_records(
@@ -306,7 +306,7 @@ impl<'a> CameraRecord<'a> {
     /// frame rate of the camera, 1/s.
     ///
     /// # Errors
-    /// [`ImportError::Format`] if the exposure time is longer than the time of a frame, 1 / `rate_hz`.
+    /// [`ImportError::Other`] if the exposure time is longer than the time of a frame, 1 / `rate_hz`.
     pub(crate) fn exposure_s(&self, rate_hz: f64) -> ImportResult<Option<(f64, usize)>> {
         let (nanoseconds, seconds) = (self.values(SHUTTER_NS), self.values(SHUTTER));
         let found = nanoseconds.first().and_then(|value| Some((parse_positive(value.text)? * 1e-9, value)));

@@ -51,7 +51,7 @@ impl ClockGrid {
     ) -> ImportResult<Self> {
         let mut used = place_clocks(exports, chosen, calibration, options)?;
         let Some(earliest) = used.iter().min_by_key(|clock| clock.first_frame()) else {
-            return Err(ImportError::NoSource);
+            return Err(ImportError::no_source());
         };
         let (from, to) =
             (earliest.first_frame(), used.iter().map(PlacedClock::last_frame).max().unwrap_or(0));

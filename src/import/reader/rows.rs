@@ -170,7 +170,7 @@ impl<'t> RowReader<'t> {
     /// all empty are not.
     ///
     /// # Errors
-    /// [`ImportError::Format`] if a quoted cell continues in the next line.
+    /// [`ImportError::Other`] if a quoted cell continues in the next line.
     #[allow(clippy::should_implement_trait)] // (no `Iterator`: a row is valid until the next call)
     pub(crate) fn next_row(&mut self) -> ImportResult<Option<RowView<'_>>> {
         let text = self.text;

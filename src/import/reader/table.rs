@@ -195,7 +195,7 @@ impl<'a> DelimitedTable<'a> {
 
     /// Error for a row whose number of cells differs from that of the other rows.
     pub(crate) fn ragged_error(&self, line: usize, found: usize, expected: usize) -> ImportError {
-        ImportError::Ragged { place: self.location(line, 1), found, expected }
+        ImportError::ragged(self.location(line, 1), found, expected)
     }
 
     /// Error for a cell that is not a number.

@@ -384,7 +384,7 @@ fn check_rate(
     if (implied_hz / declared_hz - 1.0).abs() <= declared.tolerance {
         return Ok(());
     }
-    Err(ImportError::RateMismatch { file: rows.export.file.to_owned(), implied_hz, declared_hz, step })
+    Err(ImportError::rate_mismatch(rows.export.file, implied_hz, declared_hz, step))
 }
 
 fn cell_error(rows: ClockRows, row: usize, problem: CellProblem, found: Option<f64>) -> ImportError {
@@ -474,7 +474,8 @@ mod tests {
         let gaps: Vec<f64> =
             rounded(1000.0).into_iter().enumerate().filter(|(i, _)| i % 50 != 7).map(|(_, t)| t).collect();
         for times in [rounded(1000.0), gaps] {
-            assert!(matches!(placed(&times, declared(800.0)), Err(ImportError::RateMismatch { .. })));
+            let message = placed(&times, declared(800.0)).unwrap_err().to_string();
+            assert!(message.contains("the times imply 1000.0"), "{message}");
         }
     }
 
@@ -536,10 +537,8 @@ mod tests {
         };
         let export = TrackFile { file: "a.csv", ..TrackFile::default() };
         assert!(place_rows(ClockRows { export: &export, clock: &clock }, declared(3000.0)).is_ok());
-        assert!(matches!(
-            place_rows(ClockRows { export: &export, clock: &clock }, declared(1000.0)),
-            Err(ImportError::RateMismatch { .. })
-        ));
+        let other = place_rows(ClockRows { export: &export, clock: &clock }, declared(1000.0)).unwrap_err();
+        assert!(other.to_string().contains("but --frame-rate-hz says 1000"), "{other}");
     }
 
     #[test]
