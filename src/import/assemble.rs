@@ -14,7 +14,8 @@ use crate::import::reader::{companion, findings, track_choice};
 use crate::recording::channel::ReversalInstants;
 use crate::recording::files::{CameraEntry, FrameClock, LevelEntry, OneOrMany, RecordingFile, SourceEntry};
 use crate::recording::quality::{
-    Check, Optics, Severity, check_position_steps, measure_quality, measure_tilt,
+    Check, Optics, Severity, check_position_steps, drop_untracked, find_untracked_frames, measure_quality,
+    measure_tilt,
 };
 use crate::recording::{Recording, Traces, rotate_traces};
 use crate::toml_file;
@@ -90,10 +91,30 @@ pub(crate) fn assemble_recording(
         y_axis: Some(calibration.y_axis),
     };
     let optics = Optics::from(&camera);
+    let recording = leave_out_untracked(recording, file_name, (options, &optics), &mut report)?;
     let (recording, level) = level_recording(recording, file_name, (options, &optics), &mut report)?;
     let described = describe_recording(sources, decoded, options, camera, &recording, &report)?;
     let file = RecordingFile { level, ..described };
     Ok(Import { recording, file, report })
+}
+
+/// With `--drop-untracked`, the recording without the positions that nobody tracked.
+fn leave_out_untracked(
+    recording: Recording,
+    file: &str,
+    (options, optics): (&ImportOptions, &Optics),
+    report: &mut ImportReport,
+) -> ImportResult<Recording> {
+    if !options.drop_untracked {
+        return Ok(recording);
+    }
+    let untracked =
+        find_untracked_frames(&recording, &measure_quality(&recording, optics.exposure_s), optics);
+    let notes =
+        untracked.iter().map(|found| format!("left out as nobody tracked them: {}", found.describe()));
+    report.notes.extend(notes);
+    let traces = drop_untracked(recording.traces().clone(), &untracked);
+    recording.with_traces(traces).map_err(|problem| ImportError::unusable(file, problem))
 }
 
 /// Refuses an import in which no chosen track has any position.

@@ -35,6 +35,8 @@ pub struct ImportOptions {
     pub columns: Option<ColumnMap>,
     /// Confidence, from 0 to 1, below which a position counts as missing.
     pub min_likelihood: Option<f64>,
+    /// Whether positions that nobody tracked count as missing, such as repeated or interpolated ones.
+    pub drop_untracked: bool,
     /// Whether the positions of tip and head are rotated to correct the tilt of the camera.
     pub level: bool,
     /// Contents of the table `[conditions]` in the description of the recording.

@@ -341,7 +341,7 @@ fn the_severity_follows_the_share_and_the_finding_names_the_frames() {
         assert_eq!(found.len(), 1, "{found:?}");
         let QualityFinding { channel, found, advice, .. } = &found[0];
         assert_eq!((channel.as_deref(), found.as_str()), (Some("tip"), words));
-        assert!(advice.contains("empty their cells"), "{advice}");
+        assert!(advice.contains("--drop-untracked"), "{advice}");
     }
 }
 

@@ -51,6 +51,12 @@ impl UntrackedFrames {
         self.runs.iter().map(Range::len).sum()
     }
 
+    /// Number of frames, point and check in words.
+    pub(crate) fn describe(&self) -> String {
+        let point = if self.channel.is_empty() { "both points" } else { self.channel };
+        format!("{} frames of {point} ({})", self.count(), self.check.name())
+    }
+
     /// Whether a position of the point `name` is concerned.
     fn concerns(&self, name: &str) -> bool {
         self.channel.is_empty() || self.channel.starts_with(name)
@@ -68,7 +74,7 @@ impl UntrackedFrames {
         let (many, most, remedy) = match self.check {
             Check::FrozenFrames => (MANY_FRAMES, MOST_REPEATED, "track the file that the camera wrote"),
             Check::LowConfidence => (MANY_DOUBTFUL, MOST_FRAMES, "import again with --min-likelihood 0.6"),
-            _ => (MANY_FRAMES, MOST_FRAMES, "track these frames again, or empty their cells in the export"),
+            _ => (MANY_FRAMES, MOST_FRAMES, "track these frames again, or import with --drop-untracked"),
         };
         let (count, advice) = (self.count(), format!("{why}: {remedy}"));
         let share = count as f64 / tracked.max(1) as f64;
