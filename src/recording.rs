@@ -207,8 +207,8 @@ impl Traces {
         always.into_iter().map(|(name, column)| (name, column.as_slice())).chain(optional)
     }
 
-    /// Traces from columns in the order of [`Self::columns`]; `confidences` says whether those of tip and head
-    /// are among them.
+    /// Traces from columns in the order of [`Self::columns`]; `confidences` says whether those of tip and
+    /// head are among them.
     fn from_columns(mut columns: impl Iterator<Item = Vec<Option<f64>>>, confidences: [bool; 2]) -> Self {
         let mut next = || columns.next().unwrap_or_default();
         let (tip_x_m, tip_y_m, head_x_m, head_y_m) = (next(), next(), next(), next());
@@ -247,8 +247,8 @@ pub(crate) const ON_FRAME_TOLERANCE: f64 = 1e-6;
 impl Recording {
     /// Value of a column of this recording at a time, s. It comes from the polynomial through the three
     /// frames before and the three after that time; if one of the outer four is missing, from the straight
-    /// line through the two nearest frames. `None` outside the recording, next to a missing frame, and in a gap
-    /// of the times.
+    /// line through the two nearest frames. `None` outside the recording, next to a missing frame, and in a
+    /// gap of the times.
     pub(crate) fn interpolate_column(&self, column: &[Option<f64>], time_s: f64) -> Option<f64> {
         if let Some(times) = &self.times {
             return times.interpolate(column, time_s);
