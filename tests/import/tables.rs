@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use wiperlab::import::source::{CompanionFile, Import, ImportSource};
-use wiperlab::import::{ColumnMap, CoordinateScale, ImportError, ImportOptions, import};
+use wiperlab::import::{ColumnMap, CoordinateScale, ImportOptions, import};
 use wiperlab::recording::files::YAxis;
 
 macro_rules! fixture {

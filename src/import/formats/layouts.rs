@@ -415,7 +415,7 @@ impl ProgramTable {
                 let (found, expected) = (format!("the unit `{unit}`"), "a unit of length or pixels");
                 return Err(ImportError::wrong_table(place, found, expected, self.advice));
             }
-            facts.unit = known.map(|known| (known, format!("line {} names the unit {unit}", place.line)));
+            facts.unit = known.map(|known| (known, format!("{place} names the unit {unit}")));
         }
         let Some((first, others)) = self.rates.split_first() else { return Ok(()) };
         let (rate_hz, place) = self.read_number(table, *first)?;
