@@ -225,7 +225,7 @@ fn rates_that_differ_by_more_than_their_errors_are_a_caution_with_both() {
     let found = read(&text, &in_mm(at_rate(1983.0, None)));
     let said = rate_caution(&found);
     assert!(
-        said.contains("1983 +- 0.09915") && said.contains("2000 +- 2") && said.contains("0.85 %"),
+        said.contains("1983 +- 0.09915") && said.contains("2000 +- 0.1") && said.contains("0.85 %"),
         "{said}"
     );
     assert!(!found.report.lines().join("\n").contains("rounded"), "{:?}", found.report.lines());
@@ -267,7 +267,7 @@ fn equal_steps_of_few_digits_know_their_rate_coarsely() {
             30.0,
         )
     };
-    assert!(read(&steps_of(0.004), &real).report.lines().join("\n").contains("known to 4.2 % only"));
+    assert!(read(&steps_of(0.004), &real).report.lines().join("\n").contains("known to 4.1 % only"));
     assert!(!read(&steps_of(0.02), &real).report.lines().join("\n").contains("% only"));
     // another rate is not within half of the last digit
     assert!(refused(&text, &in_mm(at_rate(25.0, None))).contains("--frame-rate-hz says 25"));

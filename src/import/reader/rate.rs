@@ -123,11 +123,12 @@ fn times_error(times: &[f64], frames: &[f64], digit_s: f64) -> f64 {
     });
     let of_ends = digit_s / span(times);
     let digits = (frame_s / digit_s).round();
-    if !(equal && digits.is_finite() && digits >= FEWEST_DIGITS_PER_STEP) {
-        return of_ends;
-    }
-    if !is_round(1.0 / frame_s) {
-        return 0.5 / digits;
+    let few = !digits.is_finite() || digits < FEWEST_DIGITS_PER_STEP;
+    match (equal, is_round(1.0 / frame_s)) {
+        (true, true) if few => return OSCILLATOR_ERROR,
+        (true, true) => {}
+        (true, false) if !few => return 0.5 / digits,
+        _ => return of_ends,
     }
     let same_step = |hz: &&f64| (1.0 / (**hz * digit_s)).round() == digits;
     COMMON_RATES_HZ
