@@ -339,6 +339,7 @@ fn the_severity_follows_the_share_and_the_finding_names_the_frames() {
     ] {
         let found = judge(with_fault(&CAMERA, Fault::Held, &runs), CAMERA.rate_hz);
         assert_eq!(found.len(), 1, "{found:?}");
+        assert_eq!(found[0].severity, severity);
         let QualityFinding { channel, found, advice, .. } = &found[0];
         assert_eq!((channel.as_deref(), found.as_str()), (Some("tip"), words));
         assert!(advice.contains("--drop-untracked"), "{advice}");
