@@ -44,6 +44,8 @@ pub fn collect_findings(
     instants: &ReversalInstants,
     import: &[QualityFinding],
 ) -> Vec<QualityFinding> {
+    // (resampling to a grid changes repeats and lines)
+    let untracked = untracked::check_untracked(recording, measured, optics);
     let recording = &*recording.resample_to_grid();
     let columns = measurement::measured_columns(recording.traces(), measured);
     let mut found = import.to_vec();
@@ -57,7 +59,7 @@ pub fn collect_findings(
         found.extend(checks::check_track_column(column, recording.grid(), optics));
         found.extend(prefilter::check_prefilter(column, measured.frame_rate_hz));
     }
-    found.extend(untracked::check_untracked(recording, measured, optics));
+    found.extend(untracked);
     // (a stable sort keeps the order of the checks within a severity)
     found.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
     found

@@ -200,7 +200,7 @@ fn planted_faults_are_found() {
         ("no step", decimals(0.0), [1.0, 1.0, 1.0]),
         ("tenths of a pixel", decimals(2e-6), [0.8, 0.0, 1.0]),
         ("whole pixels", decimals(2e-5), [0.76, 0.0, 1.0]),
-        ("x alone", Made { heights: false, ..CAMERA }, [0.93, 0.99, 1.0]),
+        ("x alone", Made { heights: false, ..CAMERA }, [0.93, 0.72, 1.0]),
         ("30 frames/s", Made { rate_hz: 30.0, ..CAMERA }, [1.0, 1.0, 1.0]),
         ("10000 frames/s", Made { rate_hz: 10_000.0, ..CAMERA }, [0.99, 0.99, 1.0]),
         ("300 frames", Made { frames: 300, ..CAMERA }, [0.98, 0.96, 1.0]),

@@ -77,12 +77,12 @@ fn value_spacing(samples: &[Option<f64>]) -> f64 {
 }
 
 impl<'a> DifferenceAxis<'a> {
-    /// `None` for a column without values, with a constant value or with too few frames for its noise.
-    fn measure_axis(column: &MeasuredColumn<'a>, order: usize) -> Option<Self> {
+    /// `None` for a column without values, with a constant value or with too few frames for its noise. The
+    /// columns of a point have the same number of decimals, so the larger step of the two counts.
+    fn measure_axis(column: &MeasuredColumn<'a>, order: usize, step_m: f64) -> Option<Self> {
         let (samples, noise_m) = (column.samples, column.quality.noise_m?);
         let first = samples.iter().flatten().next()?;
         samples.iter().flatten().find(|value| *value != first)?;
-        let step_m = column.quality.step_m.unwrap_or(0.0);
         let zero_m = if order == 1 { 0.0 } else { (ROUNDED_STEPS * step_m).max(ZERO_SHARE * noise_m) };
         let width_m = value_spacing(samples).max(step_m).max(ROUNDED_VALUES * zero_m);
         Some(Self { samples, order, noise_m, zero_m, width_m })
@@ -147,7 +147,8 @@ fn point_chance(axes: &[DifferenceAxis<'_>], other: &[DifferenceAxis<'_>], run: 
 }
 
 fn measure_axes<'a>(point: &[MeasuredColumn<'a>], order: usize) -> Vec<DifferenceAxis<'a>> {
-    point.iter().filter_map(|column| DifferenceAxis::measure_axis(column, order)).collect()
+    let step_m = point.iter().filter_map(|column| column.quality.step_m).fold(0.0, f64::max);
+    point.iter().filter_map(|column| DifferenceAxis::measure_axis(column, order, step_m)).collect()
 }
 
 fn are_zero(axes: &[DifferenceAxis<'_>], frame: usize) -> bool {

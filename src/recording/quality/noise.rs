@@ -69,7 +69,6 @@ pub fn quantisation_step(samples: &[Option<f64>]) -> Option<f64> {
     let mut step = moves().next()?;
     for distance in moves() {
         step = approximate_common_divisor(distance, step, rounding);
-        step = distance / (distance / step).round(); // (Euclid's algorithm multiplies rounding errors)
         if step < largest / MOST_STEPS {
             return None;
         }
