@@ -8,8 +8,7 @@ use crate::recording::Recording;
 use crate::recording::channel::{Reversal, ReversalInstants};
 use crate::recording::files::{LevelEntry, RecordingFile};
 use crate::recording::quality::{
-    self, CameraTilt, ComponentVisibility, Grade, Optics, PUBLISHED_COMPONENTS_HZ, PUBLISHED_TITLE, Quality,
-    QualityFinding,
+    self, CameraTilt, ComponentVisibility, Grade, MotionSummary, Optics, Quality, QualityFinding,
 };
 use crate::simulate::scene::Scene;
 use crate::text::format_degrees;
@@ -19,8 +18,8 @@ const AFTER_HELP: &str = "\
 The verdict starts with the grade: good, usable with care, or not usable. Every finding follows with a number
 and advice, worst first. docs/quality.md describes each finding, its threshold and what to do.
 
-Components: whether the recording can show the modes of a scene's blade or, without a scene, the two
-components of the published experiment.";
+With --scene the height of the blade is compared with that of the scene, and the components say whether the
+recording can show the modes of its blade.";
 
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP)]
@@ -28,11 +27,10 @@ pub(crate) struct InspectArgs {
     /// Folder of a recording, or a single trace.csv
     #[arg(value_name = "RECORDING")]
     pub recording: PathBuf,
-    /// Scene whose modes the recording should show (scene.toml); otherwise the components of the published
-    /// experiment
+    /// Scene of the blade (scene.toml): compares its height, and lists which of its modes the recording shows
     #[arg(long, value_name = "SCENE.toml")]
     pub scene: Option<PathBuf>,
-    /// Print one JSON object to standard output: measurements, findings, components, reversals
+    /// Print one JSON object to standard output: measurements, motion, findings, reversals
     #[arg(long)]
     pub json: bool,
     #[command(flatten)]
@@ -65,9 +63,10 @@ impl InspectArgs {
             print_origin(&loaded);
             let start_s = recording.grid().start_s;
             output::print_lines(&quality::measurement_table(&found.measurements, start_s));
+            output::print_lines(&quality::motion_lines(&found.motion).join("\n"));
             print_slope(&found);
             print_reversals(&found.reversals);
-            print_components(&found.components);
+            found.components.iter().for_each(print_components);
         }
         for line in found.verdict_lines() {
             print_line!("verdict: {line}");
@@ -139,13 +138,16 @@ pub(crate) struct Inspection {
     pub synthetic: bool,
     grade: Grade,
     pub measurements: Quality,
+    pub motion: MotionSummary,
     findings: Vec<QualityFinding>,
     #[serde(flatten)]
     pub tilt: GlassSlope,
     /// The rotation applied by the import, if it was requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub level: Option<LevelEntry>,
-    pub components: InspectedComponents,
+    /// Visibility of the modes of the scene, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub components: Option<InspectedComponents>,
     pub reversals: Vec<InspectedReversal>,
 }
 
@@ -212,7 +214,11 @@ impl Inspection {
         let instants = ReversalInstants::find_instants(recording);
         let kept =
             file.iter().filter_map(|file| file.source.as_ref()).flat_map(|source| source.findings.clone());
-        let import: Vec<QualityFinding> = more.into_iter().chain(kept).collect();
+        let motion = quality::measure_motion(recording, &measurements, &instants);
+        let height =
+            |scene: &Scene| quality::check_scene_height(&motion, scene.linkage.l1_m + scene.linkage.l2_m);
+        let import: Vec<QualityFinding> =
+            scene.and_then(height).into_iter().chain(more).chain(kept).collect();
         let findings = quality::collect_findings(recording, &measurements, &optics, &instants, &import);
         let slope = quality::measure_tilt(recording, &instants, &measurements);
         let reversal = |turn: &Reversal| InspectedReversal {
@@ -226,7 +232,8 @@ impl Inspection {
             grade: quality::grade_findings(&findings),
             tilt: slope.map_or_else(|reason| GlassSlope::NoTilt(reason.to_string()), GlassSlope::Tilt),
             level: file.and_then(|file| file.level.clone()),
-            components: inspect_components(scene, &measurements),
+            components: scene.map(|scene| inspect_components(scene, &measurements)),
+            motion,
             measurements,
             findings,
             reversals: instants.reversals.iter().map(reversal).collect(),
@@ -239,17 +246,12 @@ impl Inspection {
     }
 }
 
-/// Whether the recording can show the modes of the scene or, without a scene, the published components.
-fn inspect_components(scene: Option<&Scene>, measurements: &Quality) -> InspectedComponents {
-    let published = || PUBLISHED_COMPONENTS_HZ.map(|(name, hz)| (name.to_owned(), hz)).to_vec();
-    let sought = scene.map_or_else(published, scene_components);
+/// Whether the recording can show the modes of the scene.
+fn inspect_components(scene: &Scene, measurements: &Quality) -> InspectedComponents {
     let component = |(name, hz)| InspectedComponent { name, showing: measurements.component_visibility(hz) };
     InspectedComponents {
-        source: scene.map_or_else(
-            || format!("published experiment, \"{PUBLISHED_TITLE}\""),
-            |scene| format!("modes of the scene \"{}\"", scene.title()),
-        ),
-        shown: sought.into_iter().map(component).collect(),
+        source: format!("modes of the scene \"{}\"", scene.title()),
+        shown: scene_components(scene).into_iter().map(component).collect(),
     }
 }
 

@@ -6,13 +6,18 @@
 //! whether an oscillation of a single frequency is visible.
 
 mod checks;
+mod columns;
 mod filled;
 mod finding;
+mod lag;
 mod measurement;
+mod mechanism;
 mod motion;
 mod noise;
 mod outliers;
 mod prefilter;
+mod regression;
+mod smoothing;
 mod tilt;
 mod untracked;
 
@@ -21,18 +26,18 @@ use crate::recording::channel::ReversalInstants;
 use crate::text::{format_decimals, format_or_dash, to_ascii};
 pub(crate) use checks::check_position_steps;
 pub use finding::{Check, QualityFinding, Severity};
-pub use measurement::{
-    ChannelQuality, ComponentVisibility, Optics, PUBLISHED_COMPONENTS_HZ, PUBLISHED_TITLE, Quality,
-    Visibility, measure_quality,
-};
+pub use measurement::{ChannelQuality, ComponentVisibility, Optics, Quality, Visibility, measure_quality};
 use measurement::{FEWEST_CYCLES, NYQUIST_SHARE};
+pub(crate) use mechanism::motion_lines;
+pub use mechanism::{MotionSummary, check_scene_height, measure_motion};
 pub use noise::{noise_floor, quantisation_step};
 pub use outliers::outlier_frames;
 use serde::Serialize;
 pub use tilt::{CameraTilt, Curvature, TiltNotFound, measure_tilt};
 pub use untracked::{UntrackedFrames, drop_untracked, find_untracked_frames};
 
-/// All findings on a recording, the gravest first, with the findings of its import.
+/// All findings on a recording, the gravest first, with the findings of its import. Within a severity, those
+/// that change the meaning of all numbers come first.
 ///
 /// `measured` is the result of [`measure_quality`] for the same recording, and `instants` is the result of
 /// [`ReversalInstants::find_instants`].
@@ -50,6 +55,13 @@ pub fn collect_findings(
     let columns = measurement::measured_columns(recording.traces(), measured);
     let mut found = import.to_vec();
     found.extend(checks::check_clock(recording));
+    let motion = measure_motion(recording, measured, instants);
+    found.extend(columns::check_columns(recording.traces(), measured, instants));
+    found.extend(mechanism::check_mechanism(&motion, measured));
+    found.extend(
+        columns.iter().filter_map(|column| prefilter::check_prefilter(column, measured.frame_rate_hz)),
+    );
+    found.extend(lag::check_lag(motion.lag_frames));
     found.extend(checks::check_grid(measured));
     found.push(checks::check_exposure(measured));
     found.extend(motion::check_motion(recording));
@@ -57,7 +69,6 @@ pub fn collect_findings(
     found.push(motion::check_turns(instants));
     for column in &columns {
         found.extend(checks::check_track_column(column, recording.grid(), optics));
-        found.extend(prefilter::check_prefilter(column, measured.frame_rate_hz));
     }
     found.extend(untracked);
     // (a stable sort keeps the order of the checks within a severity)

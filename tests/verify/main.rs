@@ -43,6 +43,7 @@ mod identities;
 mod impact;
 mod level;
 mod multitaper;
+mod newcomer;
 mod paper_scheme;
 mod plausibility;
 mod quality;

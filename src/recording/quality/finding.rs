@@ -82,8 +82,16 @@ checks! {
     PreFiltered = "pre-filtered",
     /// Attenuation of fast motion by the exposure.
     Exposure = "exposure",
-    /// Travel along the sweep; an implausible one reveals a wrong scale.
+    /// Travel along the sweep and height of the blade; an implausible one reveals a wrong scale.
     Scale = "scale",
+    /// A frame rate that gives impossible strokes, or shows no vibration.
+    FrameRate = "frame-rate",
+    /// Tracks of tip and head that belong to different frames.
+    Lag = "lag",
+    /// Tip and head exchanged.
+    SwappedPoints = "swapped-points",
+    /// Columns of tip and head, or of x and y, exchanged.
+    MixedColumns = "mixed-columns",
     /// A tip above the head, which means that y points down.
     YDirection = "y-direction",
     /// A picture in which the glass is not level.

@@ -151,11 +151,6 @@ pub(super) fn measured_columns<'a>(traces: &'a Traces, measured: &'a Quality) ->
     })
 }
 
-/// Title of the paper whose experiment showed the [`PUBLISHED_COMPONENTS_HZ`].
-pub const PUBLISHED_TITLE: &str = "Investigation of the dynamics of the wiper blade around the reversal";
-/// Names and frequencies, Hz, of the two spectral components in the published experiment.
-pub const PUBLISHED_COMPONENTS_HZ: [(&str, f64); 2] =
-    [("low", 78.4), ("high (printed as about 900 Hz)", 900.0)];
 /// Smallest fraction of an amplitude passed by the exposure at which the amplitude counts as shown in full: a
 /// scale is rarely known to better than a tenth.
 const NEARLY_ALL: f64 = 0.9;

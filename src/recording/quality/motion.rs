@@ -1,5 +1,4 @@
-//! Checks on both points together: frames that both tracks cover, scale, direction of y, and the turns of the
-//! head.
+//! Checks on both points together: frames that both tracks cover, scale, and the turns of the head.
 
 use super::finding::{Check, QualityFinding, Severity};
 use super::measurement::MOST_POSITIONS;
@@ -11,7 +10,7 @@ use crate::recording::{FrameGrid, Recording, Traces};
 const MANY_ALONE: f64 = 0.1;
 /// Largest travel of a point in a camera's view that still resolves the lip, m: with 1,000 pixels across, a
 /// lip of 5 mm is 10 pixels high.
-const LARGEST_VIEW_M: f64 = 0.5;
+pub(super) const LARGEST_VIEW_M: f64 = 0.5;
 /// Travel of a point that is longer than any wiper's sweep, m: the longest blades travel about 1.5 m along
 /// their arc.
 const LARGEST_SWEEP_M: f64 = 2.0;
@@ -20,14 +19,11 @@ const LEAST_TRAVEL_M: f64 = 1e-4;
 /// Fraction of the positions at either end of their range that are left out when a travel is measured,
 /// because they may be outliers.
 const TRIMMED: f64 = 0.01;
-/// Smallest height of the tip above the head that calls for a caution, m: neck and lip are 5 to 10 mm high,
-/// and smaller heights may come from different origins of the two tracks.
-const LEAST_HEIGHT_M: f64 = 1e-3;
 
 /// Findings from the checks on both points together.
 pub(super) fn check_motion(recording: &Recording) -> Vec<QualityFinding> {
     let (traces, grid) = (recording.traces(), recording.grid());
-    let found = [check_overlap(traces, grid), check_travel(traces), check_head_above_tip(traces)];
+    let found = [check_overlap(traces, grid), check_travel(traces)];
     found.into_iter().flatten().collect()
 }
 
@@ -63,16 +59,18 @@ fn check_overlap(traces: &Traces, grid: FrameGrid) -> Option<QualityFinding> {
     Some(QualityFinding::advise((Check::Overlap, severity), (both as f64, "frames"), words, advice))
 }
 
-/// Travel of the tip or of the head along the sweep, whichever is longer, m.
-fn largest_travel_m(traces: &Traces) -> Option<f64> {
-    let travel = |samples: &[Option<f64>]| {
-        let some = samples.iter().step_by(samples.len() / MOST_POSITIONS + 1);
-        let mut positions: Vec<f64> = some.flatten().copied().collect();
-        positions.sort_unstable_by(f64::total_cmp);
-        let trimmed = (TRIMMED * positions.len() as f64) as usize;
-        Some(positions.get(positions.len().checked_sub(1 + trimmed)?)? - positions.get(trimmed)?)
-    };
-    let travels = [travel(&traces.tip_x_m), travel(&traces.head_x_m)];
+/// Range of the positions of a column, m, without the outermost ones.
+pub(super) fn trimmed_range_m(samples: &[Option<f64>]) -> Option<f64> {
+    let some = samples.iter().step_by(samples.len() / MOST_POSITIONS + 1);
+    let mut positions: Vec<f64> = some.flatten().copied().collect();
+    positions.sort_unstable_by(f64::total_cmp);
+    let trimmed = (TRIMMED * positions.len() as f64) as usize;
+    Some(positions.get(positions.len().checked_sub(1 + trimmed)?)? - positions.get(trimmed)?)
+}
+
+/// Travel of the point that travels farther, m.
+pub(super) fn largest_travel_m(traces: &Traces) -> Option<f64> {
+    let travels = [&traces.tip_x_m, &traces.head_x_m].map(|x| trimmed_range_m(x));
     travels.into_iter().flatten().reduce(f64::max)
 }
 
@@ -98,19 +96,6 @@ pub(super) fn head_height_m(traces: &Traces) -> Option<f64> {
     let both = traces.tip_y_m.iter().zip(&traces.head_y_m);
     let apart = both.filter_map(|(tip, head)| Some((*head)? - (*tip)?));
     median_in_place(&mut apart.step_by(traces.tip_y_m.len() / MOST_POSITIONS + 1).collect::<Vec<_>>())
-}
-
-/// Finding on the direction of y: the blade stands on its lip, so a tip above the head means that y points
-/// down.
-fn check_head_above_tip(traces: &Traces) -> Option<QualityFinding> {
-    let height_m = -head_height_m(traces)?;
-    if height_m < LEAST_HEIGHT_M {
-        return None;
-    }
-    let words = format!("the tip lies {:.3} mm above the head", 1e3 * height_m);
-    let advice = "a blade stands on its lip: check --y-axis (image coordinates point down), and which point \
-        is the tip; no matter if the camera stood on its head";
-    Some(QualityFinding::advise((Check::YDirection, Severity::Caution), (height_m, "m"), words, advice))
 }
 
 /// Finding on the number of turns of the head; windows can be named after these turns.

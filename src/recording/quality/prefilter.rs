@@ -9,12 +9,13 @@
 
 use super::finding::{Check, QualityFinding, Severity};
 use super::measurement::{ChannelQuality, MeasuredColumn};
+use super::smoothing::find_smoothing;
 use portable_math as math;
 use std::f64::consts::TAU;
 
 /// Number of frames of a segment: it resolves a plateau up to a sixth of the Nyquist frequency, and 32
 /// segments fit into 2,112 frames.
-const SEGMENT: usize = 128;
+pub(super) const SEGMENT: usize = 128;
 /// Maximum number of missing frames of a segment, which are bridged by straight lines: 5 % of missing frames
 /// change the power of a band by less than 0.5 dB.
 const MOST_BRIDGED: usize = 6;
@@ -49,7 +50,7 @@ const ROUNDING: f64 = 1e-26;
 /// Cut-off frequency of the low-pass filter that a trace went through, Hz; `None` if the trace shows no
 /// filter.
 pub(crate) fn cutoff_hz(samples: &[Option<f64>], frame_rate_hz: f64) -> Option<f64> {
-    let bands = median_band_powers(samples)?;
+    let bands = median_band_powers(&collect_segments(samples))?;
     let largest = samples.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
     let ends_at = |start: usize| {
         let plateau = &bands[start..start + PLATEAU];
@@ -92,11 +93,15 @@ struct PrefilterBand {
     scatter: f64,
 }
 
-fn median_band_powers(samples: &[Option<f64>]) -> Option<Vec<PrefilterBand>> {
+/// Segments spread over the recording, half overlapping, without trend and in a Hann window.
+fn collect_segments(samples: &[Option<f64>]) -> Vec<Vec<f64>> {
     let starts: Vec<usize> = (0..samples.len().saturating_sub(SEGMENT - 1)).step_by(SEGMENT / 2).collect();
     let every = starts.len() / MOST_SEGMENTS + 1;
     let segment = |&start: &usize| windowed_segment(&samples[start..start + SEGMENT]);
-    let segments: Vec<Vec<f64>> = starts.iter().step_by(every).filter_map(segment).collect();
+    starts.iter().step_by(every).filter_map(segment).collect()
+}
+
+fn median_band_powers(segments: &[Vec<f64>]) -> Option<Vec<PrefilterBand>> {
     if segments.len() < FEWEST_SEGMENTS {
         return None;
     }
@@ -151,7 +156,7 @@ fn interpolate_gaps(samples: &[Option<f64>]) -> Option<Vec<f64>> {
 }
 
 /// Power of a segment at a bin (Goertzel's recurrence).
-fn goertzel_power(values: &[f64], bin: usize) -> f64 {
+pub(super) fn goertzel_power(values: &[f64], bin: usize) -> f64 {
     let twice_cosine = 2.0 * math::cos(TAU * bin as f64 / SEGMENT as f64);
     let (last, before) =
         values.iter().fold((0.0, 0.0), |(last, before), x| (x + twice_cosine * last - before, last));
@@ -164,9 +169,14 @@ pub(super) fn check_prefilter(column: &MeasuredColumn, frame_rate_hz: f64) -> Op
     if step_m.is_some_and(|step| noise_m.is_none_or(|noise| noise < step)) {
         return None;
     }
-    let cut_hz = cutoff_hz(column.samples, frame_rate_hz)?;
-    let words =
-        format!("the noise ends at about {cut_hz:.0} Hz, so the trace was low-passed before it was exported");
+    let (cut_hz, words) = match find_smoothing(&collect_segments(column.samples)) {
+        Some(filter) => (filter.cutoff * frame_rate_hz, filter.describe()),
+        None => {
+            let cut_hz = cutoff_hz(column.samples, frame_rate_hz)?;
+            let words = "so the trace was low-passed before it was exported";
+            (cut_hz, format!("the noise ends at about {cut_hz:.0} Hz, {words}"))
+        }
+    };
     let advice = "faster components are too small or gone: export the raw positions, without the tracker's \
         filter or smoothing";
     let kind = (Check::PreFiltered, Severity::Caution);
