@@ -67,8 +67,11 @@ fn made_first(motion: &Motion) -> usize {
     motion.frames.iter().position(|frame| frame[0].is_some()).unwrap()
 }
 
+/// A mistake, and what it changes in the options.
+type Mistake = (&'static str, fn(&mut ImportOptions, &Motion));
+
 /// Ways in which a user gets the options wrong.
-fn mistakes() -> Vec<(&'static str, fn(&mut ImportOptions, &Motion))> {
+fn mistakes() -> Vec<Mistake> {
     fn rate(options: &mut ImportOptions, motion: &Motion, factor: f64) {
         options.frame_rate_hz = Some(motion.rate_hz * factor);
     }

@@ -321,7 +321,7 @@ fn a_computed_point_is_not_interpolated() {
 fn the_severity_follows_the_share_and_the_finding_names_the_frames() {
     for (runs, severity, words) in [
         (
-            vec![500..503],
+            std::iter::once(500..503).collect(),
             Severity::Note,
             "3 of 1000 frames (0.3 %) repeat the last position exactly: frames 500 to 502",
         ),

@@ -96,7 +96,7 @@ impl TableColumns {
     }
 
     /// Columns of times or frame numbers that are not read, with their meaning.
-    fn unused_clocks<'t>(&self, table: &'t DelimitedTable) -> Vec<(usize, ColumnMeaning)> {
+    fn unused_clocks(&self, table: &DelimitedTable) -> Vec<(usize, ColumnMeaning)> {
         let used = self.used();
         let names = self.header.and_then(|row| table.head.get(row)).map_or(&[][..], |row| &row.cells);
         let meanings = names.iter().enumerate().filter(|(column, _)| !used.contains(column));

@@ -244,6 +244,7 @@ fn parse_seconds(text: &str) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::recording::FrameGrid;
     use crate::recording::Traces;
     use crate::recording::channel::Reversal;
     use crate::recording::channel::flip::Flip;
