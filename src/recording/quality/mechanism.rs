@@ -77,6 +77,7 @@ pub fn measure_motion(
     measured: &Quality,
     instants: &ReversalInstants,
 ) -> MotionSummary {
+    let recording = &*recording.resample_to_grid();
     let (traces, rate_hz) = (recording.traces(), measured.frame_rate_hz);
     let strokes = instants.reversals.len() + 1;
     let speeds = head_speeds_m_per_s(&traces.head_x_m, rate_hz, strokes);
