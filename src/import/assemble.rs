@@ -98,7 +98,7 @@ pub(crate) fn assemble_recording(
     Ok(Import { recording, file, report })
 }
 
-/// With `--drop-untracked`, the recording without the positions that nobody tracked.
+/// Removes the positions that nobody tracked from the recording, if `--drop-untracked` is given.
 fn leave_out_untracked(
     recording: Recording,
     file: &str,

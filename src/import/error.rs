@@ -109,7 +109,7 @@ pub enum ImportError {
         /// What to do.
         advice: &'static str,
     },
-    /// Anything else.
+    /// Any other problem, for example with an option.
     #[error("{0}")]
     Other(ImportProblem),
     /// The specification of the twin, from which a synthetic export was made, is not valid TOML.
@@ -123,7 +123,7 @@ pub enum ImportError {
 /// Result of a function of the import: a value, or an [`ImportError`].
 pub(crate) type ImportResult<T> = Result<T, ImportError>;
 
-/// Maximum number of characters that an error message shows of a cell.
+/// Maximum number of characters of a cell that an error message shows.
 const LONGEST_CELL: usize = 60;
 
 impl ImportProblem {
@@ -157,7 +157,7 @@ impl ImportError {
         Self::Other(ImportProblem::new(place, found, expected, advice))
     }
 
-    /// Error with a whole sentence: what was found and expected, and what to do.
+    /// Error whose text `problem` is a whole sentence: it says what was found and expected, and what to do.
     pub(crate) fn unusable(place: impl Display, problem: impl Display) -> Self {
         Self::format(place, problem.to_string(), "", "")
     }
@@ -204,8 +204,8 @@ impl ImportError {
         Self::format(file, found, format!("{expected} as in {other}"), advice)
     }
 
-    /// Error for options that the user has to give for facts that the file does not contain. There is one
-    /// text for each missing option: what it means, and which value the file suggests.
+    /// Error for options that the user has to give for facts that the file does not contain. `missing` has
+    /// one text for each of these options: what the option means, and which value the file suggests.
     pub(crate) fn missing_options(files: &str, format: &str, missing: &[String]) -> Self {
         let problem = format!(
             "read as {format}, which does not say all of how it was recorded, and no default is safe; give\n  {}",

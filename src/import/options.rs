@@ -71,7 +71,7 @@ pub enum CoordinateScale {
     Unit(f64),
 }
 
-/// Largest relative difference between units that count as equal.
+/// Largest allowed relative difference between the lengths of two units that count as equal.
 const SAME_UNIT: f64 = 1e-9;
 
 /// Units of length by their symbol, m; `u`, the micro sign and the Greek mu all mean micro.
@@ -99,7 +99,7 @@ impl CoordinateScale {
         Ok(Self::MetresPerPixel(number / (1.0 / unit).round()))
     }
 
-    /// Whether coordinates in `unit` have this scale.
+    /// Whether this scale is right for coordinates in `unit`.
     pub(crate) fn agrees_with(self, unit: CoordinateUnit) -> bool {
         match (self, unit) {
             (Self::Unit(metres), CoordinateUnit::Metres(stated)) => {

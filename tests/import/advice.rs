@@ -1,13 +1,14 @@
-//! Advice is followed: what a refusal or a finding suggests gives the same rows, or a further refusal.
+//! Follows the advice in refusals and findings: an import with the suggested options gives the same rows or
+//! is refused again.
 
 use crate::exports::{Exporter, Motion, exporters};
 use wiperlab::import::source::{Import, ImportSource};
 use wiperlab::import::{ColumnMap, CoordinateScale, ImportOptions, TimeColumn, import};
 
-/// A suggestion: words that announce it, and what it changes in the options.
+/// A suggestion: the words by which it is found in a message, and the change of the options that it requires.
 type Suggestion = (&'static str, fn(&mut ImportOptions, &str));
 
-/// Every option that an error or a finding suggests with a value that can be typed as it stands.
+/// The suggestions in errors and findings that a user can follow without knowing anything else.
 const SUGGESTIONS: [Suggestion; 11] = [
     ("add --time playback", |options, _| options.time = Some(TimeColumn::Playback)),
     ("add --time ms", |options, _| options.time = Some(TimeColumn::Milliseconds)),
@@ -35,7 +36,7 @@ fn leading_number(text: &str) -> Option<usize> {
     text.split(|c: char| !c.is_ascii_digit()).next()?.parse().ok()
 }
 
-/// A motion with gaps in which no position occurs twice.
+/// A motion that has gaps and in which no position occurs twice.
 fn motion() -> Motion {
     let place = |row: usize, point: f64| Some(100.0 * point + row as f64 * 1.5 + (row as f64 * 0.7).sin());
     let frames = (0..48_usize).map(|row| {
@@ -47,7 +48,8 @@ fn motion() -> Motion {
     Motion { rate_hz: 500.0, frames: frames.collect() }
 }
 
-/// Whether the tracked tips of an import are those of the motion in their order, evenly spaced over the frames.
+/// Whether the tip positions of an import are those of the motion in the same order. The frame numbers may
+/// differ from those of the motion by an offset and a constant factor.
 fn has_rows_of(found: &Import, motion: &Motion) -> bool {
     let numbered = |column: &[Option<f64>]| -> Vec<(usize, f64)> {
         column.iter().enumerate().filter_map(|(frame, x)| Some((frame, (*x)?))).collect()
@@ -67,7 +69,7 @@ fn made_first(motion: &Motion) -> usize {
     motion.frames.iter().position(|frame| frame[0].is_some()).unwrap()
 }
 
-/// A mistake, and what it changes in the options.
+/// A mistake of a user: its description, and the change of the options that it causes.
 type Mistake = (&'static str, fn(&mut ImportOptions, &Motion));
 
 /// Ways in which a user gets the options wrong.
@@ -90,7 +92,8 @@ fn mistakes() -> Vec<Mistake> {
     ]
 }
 
-/// Follows every suggestion in `text`, and those of what comes next, up to `depth` steps.
+/// Imports `source`, follows each suggestion in the resulting message, and repeats this at most `depth`
+/// times. `followed` counts the followed suggestions. The error describes rows that differ from the motion.
 fn follow(
     exporter: &Exporter,
     motion: &Motion,

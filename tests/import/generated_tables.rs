@@ -1,4 +1,5 @@
-//! Tables drawn at random from units, clocks, layouts, options and damage: each is read right or refused.
+//! Tables drawn at random from units, clocks, layouts, options and damage: each is either read correctly or
+//! refused.
 
 use proptest::prelude::*;
 use std::fmt::Write;
@@ -12,9 +13,10 @@ use wiperlab::recording::quality::Severity;
 struct Drawn {
     rows: usize,
     rate_hz: f64,
-    /// Unit of the clock: its symbol and its length, s; `None` for frame numbers.
+    /// Symbol of the clock's unit, and the length of this unit, s; `None` for frame numbers.
     clock: Option<(&'static str, f64)>,
-    /// Units of tip and head: symbol and length, m; an empty symbol is not written.
+    /// Symbol of the unit of tip and of head, and the length of this unit, m. If the symbol is empty, the
+    /// file does not state the unit.
     units: [(&'static str, f64); 2],
     naming: usize,
     unit_place: usize,
@@ -79,7 +81,7 @@ fn drawn() -> impl Strategy<Value = Drawn> {
 }
 
 impl Drawn {
-    /// Position of a point in a row, m: x and y of the tip, x and y of the head.
+    /// Positions in a row, m: x and y of the tip, x and y of the head.
     fn position_m(&self, row: usize) -> [f64; 4] {
         let t = row as f64;
         [
@@ -132,14 +134,14 @@ impl Drawn {
         }
     }
 
-    /// Whether the row of units is written below the names, where the names have none.
+    /// Whether the file has a row of units below the names; the names then contain no units.
     fn has_units_row(&self) -> bool {
         self.unit_place == 3
             && self.units.iter().all(|unit| !unit.0.is_empty())
             && self.clock.is_some_and(|clock| !clock.0.is_empty())
     }
 
-    /// Units that the file states.
+    /// Whether the file states the unit of the tip and that of the head.
     fn stated(&self) -> [bool; 2] {
         let in_names = self.unit_place < 3;
         self.units.map(|unit| !unit.0.is_empty() && (in_names || self.has_units_row()))
@@ -202,8 +204,8 @@ impl Drawn {
         }
     }
 
-    /// Length of a unit of a point's coordinates as file and options state it, m; `None` if they contradict each
-    /// other.
+    /// Length of the unit of a point's coordinates that the import should use, m; `None` if file and options
+    /// contradict each other or do not state the unit.
     fn expected_unit(&self, point: usize) -> Option<f64> {
         let (symbol, length_m) = self.units[point];
         let scale = self.declared_scale;
@@ -219,7 +221,7 @@ impl Drawn {
         }
     }
 
-    /// What is wrong with a reading, in words; `None` if it is right.
+    /// Describes the first error in the result of an import; `None` if the result is right.
     fn find_error(&self, found: &Import) -> Option<String> {
         let Some(units) = self.expected_unit(0).zip(self.expected_unit(1)) else {
             return Some("contradicting or missing units were read".to_owned());
@@ -228,7 +230,7 @@ impl Drawn {
             return Some(format!("damage {} was read", self.damage));
         }
         let grid = found.recording.grid();
-        // the unit of a clock that the file does not state is seconds, or what the option says
+        // if the file does not state the unit of the clock, it is seconds or the unit that the option states
         let unit_s = self.clock.map_or(1.0, |clock| clock.1);
         let read_s = match self.time {
             _ if self.unit_is_written() => unit_s,
@@ -289,7 +291,7 @@ proptest! {
     }
 }
 
-/// Of the tables without damage and contradiction, most are read, so that refusing everything is no way out.
+/// All tables without damage and contradiction are read. So an import that refuses every table fails.
 #[test]
 fn sound_tables_are_read() {
     let (mut sound, mut read) = (0, 0);

@@ -1,5 +1,5 @@
-//! Units and clocks of columns are read alike by every route: a header that names the columns, and columns that
-//! are named or numbered. All files are made here.
+//! Units and clocks of columns are read in the same way whether the header names the columns or `--columns`
+//! names or numbers them. The tests write all their files themselves.
 
 use std::fmt::Write;
 use wiperlab::import::source::{Import, ImportSource};
@@ -12,7 +12,8 @@ fn position_m(time_s: f64) -> [f64; 4] {
     [head + 2e-4 * (std::f64::consts::TAU * 61.0 * time_s).sin(), 1e-5, head, 0.012]
 }
 
-/// A table with `rows` rows; `time` writes the clock of a row, and the points have the given lengths of a unit, m.
+/// A table with `rows` rows at `rate_hz`. `time` gives the text in the time column of a row. `units_m` has
+/// the lengths of the units of tip and head coordinates, m.
 fn table(
     header: &str,
     rows: usize,
@@ -69,7 +70,8 @@ fn refused(text: &str, options: &ImportOptions) -> String {
     import(&[source], options).map_or_else(|error| error.to_string(), |found| panic!("{:?}", found.report))
 }
 
-/// The recording holds the motion at `rate_hz` to the rounding of the file.
+/// Asserts that the recording contains the motion of [`position_m`] at `rate_hz`, within the rounding of the
+/// file.
 fn assert_positions(found: &Import, rate_hz: f64) {
     let (grid, traces) = (found.recording.grid(), found.recording.traces());
     assert!((grid.frame_rate_hz / rate_hz - 1.0).abs() < 1e-9, "{}", grid.frame_rate_hz);
@@ -97,7 +99,7 @@ fn columns_of_different_units_are_each_converted_by_every_route() {
             "{says}"
         );
     }
-    // a length a pixel is that of the columns in pixels
+    // a length per pixel applies only to the columns in pixels
     let names = "time (s),tip x (px),tip y (px),head x (cm),head y (cm)";
     let text = table(names, 200, seconds, [2e-5, 1e-2], 2000.0);
     let scale = Some(CoordinateScale::MetresPerPixel(2e-5));
@@ -182,7 +184,7 @@ fn settings_stray_cells_and_aligned_names_are_no_obstacle() {
         let found = read(&speed, &in_mm(at_rate(2000.0, Some(columns))));
         assert_eq!(found.recording.grid().frames, 40);
     }
-    // names that blanks align, above numbers between tabs
+    // column names that are aligned with blanks, above numbers that are separated by tabs
     let mut tracker = String::from("weight\nt       x       y\n");
     for row in 0..60 {
         let [x, y, ..] = position_m(f64::from(row) / 2000.0);
@@ -195,7 +197,7 @@ fn settings_stray_cells_and_aligned_names_are_no_obstacle() {
     };
     let found = read_as("run.txt", &tracker, &metres);
     assert_eq!((found.report.format.as_str(), found.recording.grid().frames), ("tracker", 60));
-    // names of columns behind the name of their data set
+    // column names that follow the name of their data set
     let names = "Film: Time (s),Film: X Lip (m),Film: Y Lip (m),Film: X Arm (m),Film: Y Arm (m),Film: X Velocity Lip (m/s)";
     let text: String = table(names, 60, seconds, [1.0; 2], 2000.0);
     let text: String = text
@@ -236,7 +238,7 @@ fn rates_that_differ_by_more_than_their_errors_are_a_caution_with_both() {
 
 #[test]
 fn equal_steps_of_few_digits_know_their_rate_coarsely() {
-    // a camera of 30 frames/s whose program adds up steps of 33 ms
+    // a camera of 30 frames/s, whose program rounds the step to 33 ms and then adds up the steps
     let text = table(
         "t,tip_x,tip_y,head_x,head_y",
         300,
@@ -269,7 +271,7 @@ fn equal_steps_of_few_digits_know_their_rate_coarsely() {
     };
     assert!(read(&steps_of(0.004), &real).report.lines().join("\n").contains("known to 4.1 % only"));
     assert!(!read(&steps_of(0.02), &real).report.lines().join("\n").contains("% only"));
-    // another rate is not within half of the last digit
+    // 25 frames/s differs from the rate of the steps by more than half of the last digit
     assert!(refused(&text, &in_mm(at_rate(25.0, None))).contains("--frame-rate-hz says 25"));
 }
 
@@ -352,9 +354,10 @@ fn times_that_are_no_grid_are_kept() {
             }
         }
     }
-    // a declared rate that is far from the steps is a wrong unit or rate
+    // a declared rate that is far from the rate of the steps is refused: the rate or the unit of the times is
+    // wrong
     assert!(refused(&text, &in_mm(at_rate(500.0, None))).contains("--frame-rate-hz says 500"));
-    // one damaged time among even ones is damage
+    // a single time off an otherwise even grid is refused as damaged
     let even = table(
         names,
         100,
@@ -365,7 +368,7 @@ fn times_that_are_no_grid_are_kept() {
     assert!(
         refused(&even, &in_mm(at_rate(50.0, None))).starts_with("run.csv:52:1: column time: found `1.008`")
     );
-    // frame numbers place the rows; that the times disagree is said
+    // if the file has frame numbers, they are used, and a finding says that the times are uneven
     let numbered: String = text
         .lines()
         .enumerate()
@@ -387,7 +390,8 @@ fn the_uncertainty_of_the_rate_is_part_of_the_recording() {
     let seconds = |row: usize| format!("{:.6}", row as f64 / 2000.0);
     let text = table("t,tip_x,tip_y,head_x,head_y", 600, seconds, [1e-3; 2], 2000.0);
     let sd = |options: ImportOptions| read(&text, &in_mm(options)).recording.frame_rate_sd_hz();
-    // an oscillator's 50 parts in a million, declared or from equal steps of a round rate
+    // the error is that of an oscillator, 50 parts in a million, for a declared rate and for equal steps of a
+    // round rate
     assert!((sd(at_rate(2000.0, None)).unwrap() - 0.1 / 3_f64.sqrt()).abs() < 1e-12);
     let real = ImportOptions { time: Some(TimeColumn::Real), ..options(None) };
     assert!((sd(real).unwrap() - 0.1 / 3_f64.sqrt()).abs() < 1e-9);

@@ -14,7 +14,7 @@ use crate::recording::quality::{Check, QualityFinding, Severity};
 /// First cells of the header rows; a table of one animal has no row `individuals`.
 const ROW_NAMES: [&str; 4] = ["scorer", "individuals", "bodyparts", "coords"];
 const COORDINATES: [&str; 3] = ["x", "y", "likelihood"];
-/// Name of the individual that has the body parts that occur only once in a picture.
+/// Name that DeepLabCut gives the individual with the body parts that occur only once in a picture.
 const UNIQUE_INDIVIDUAL: &str = "single";
 /// Words in the names of files or scorers that mark smoothed positions: those of DeepLabCut's filtered
 /// predictions and of the ensemble Kalman smoother of Lightning Pose.
@@ -138,7 +138,8 @@ impl DeepLabCutHeader {
                 "x and y after one cell (frame number or picture) or after three (folder, video, picture)";
             return Err(header_error(table, coordinates, &found, expected));
         }
-        // (a body part is the cells above its coordinates; with them go the columns of x, y and likelihood)
+        // (for each body part: the header cells above its coordinates, and the columns of its x, y and
+        // likelihood)
         let mut parts: Vec<(Vec<&str>, [Option<usize>; 3])> = vec![];
         for cell in index_cells..cells {
             let coordinate = coordinates.cell(cell);

@@ -108,7 +108,8 @@ fn refuse_full_field(table: &DelimitedTable, start: usize, cells: [usize; 3]) ->
     Ok(())
 }
 
-/// Refuses displacements from frame to frame, which are not positions.
+/// Refuses a file whose displacements are relative to the previous frame, because the import needs
+/// displacements from one reference picture.
 fn refuse_incremental(document: &Document) -> ImportResult<()> {
     let lines = document.text.lines().take(PREAMBLE_LINES).enumerate();
     let mut stated =

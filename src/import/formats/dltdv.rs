@@ -44,7 +44,7 @@ impl FileFormat for Dltdv {
     }
 }
 
-/// Contents of a file of DLTdv without positions in pictures.
+/// Contents of a DLTdv file that has no positions in pictures; `None` for any other file.
 fn find_other_content(document: &Document) -> Option<&'static str> {
     let start = document.text.lines().next()?.to_lowercase();
     if start.starts_with("pointnames") {

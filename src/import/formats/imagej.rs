@@ -10,8 +10,8 @@ use crate::import::reader::{
 };
 use crate::recording::files::YAxis;
 
-/// The table of the plugin Manual Tracking: one row per click. The encoding of the degree sign after two of
-/// its names is unknown, and the sign may be lost.
+/// The table of the plugin Manual Tracking: one row per click. Two of the column names end in a degree sign,
+/// whose encoding is unknown and which may be lost.
 static MANUAL_TRACKING: ProgramTable = ProgramTable {
     name: "imagej",
     frame: Some("Slice n*"),
@@ -93,7 +93,7 @@ fn explain_duplicate(error: ImportError, expected: &str, advice: &str) -> Import
     ImportError::wrong_table(place, found, expected, advice)
 }
 
-/// Facts from the documentation that hold for all three tables.
+/// Facts from ImageJ's documentation that hold for all three kinds of tables.
 fn imagej_facts() -> Facts {
     let why = "ImageJ counts y from the top of the picture, unless `Invert Y coordinates` was ticked in \
         Analyze > Set Measurements"

@@ -74,7 +74,7 @@ impl FileFormat for Kinovea {
     }
 }
 
-/// Place and contents of an export without positions as x and y.
+/// Place and contents of a Kinovea export that has no x and y of points; `None` for any other file.
 fn other_export(document: &Document) -> Option<(String, &'static str)> {
     if document.text.chars().take(PROJECT_START_CHARACTERS).collect::<String>().contains(PROJECT) {
         return Some((document.file.to_owned(), "a Kinovea project (.kva)"));

@@ -1,5 +1,5 @@
-//! Formats whose structure a row of a table describes: how the file is recognised, what its columns mean, and
-//! what the file or the documentation of its program states. One interpreter reads all of them.
+//! Formats that are each described by a [`ProgramTable`]: how the file is recognised, what its columns mean,
+//! and what the file or the documentation of its program states. The same code reads all these formats.
 
 use crate::import::error::{ImportError, ImportResult, TextLocation};
 use crate::import::format::FileFormat;
@@ -12,7 +12,8 @@ use crate::import::reader::{
 };
 use crate::recording::quality::{Check, QualityFinding, Severity};
 
-/// Layout of the table of a program. A column name that ends in `*` may go on with a unit or another sign.
+/// Layout of the table of a program. If a column name in this description ends in `*`, the name in the file
+/// may continue with a unit or another sign.
 pub(crate) struct ProgramTable {
     /// Name of the format.
     pub name: &'static str,
@@ -22,17 +23,19 @@ pub(crate) struct ProgramTable {
     pub frame: Option<&'static str>,
     /// Column of the times.
     pub time: Option<&'static str>,
-    /// Columns that name the track of a row; only the last one is always there.
+    /// Columns that name the track of a row; only the last one must exist.
     pub key: &'static [&'static str],
     pub points: PointColumns,
-    /// Other columns of the program, and the minimum number of them that identifies the format.
+    /// A minimum number, and the names of other columns of the program. The format is recognised if the table
+    /// has at least this number of these columns.
     pub others: (usize, &'static [&'static str]),
-    /// Two texts. A line that contains the first names the quantities of the two axes, and both have to be
-    /// positions, which contain the second.
+    /// Two texts for the table of a graph. The line that contains the first text names the quantities on the
+    /// two axes. Both must be positions, so this line must contain the second text exactly twice.
     pub axes: Option<[&'static str; 2]>,
-    /// Settings that name the unit of x and that of y.
+    /// Settings above the table that name the units of x and y: one setting for each, or one for both.
     pub units: &'static [CellPlace],
-    /// Settings with the rate of the rows, 1/s; those after the first may be missing.
+    /// Settings above the table with the rate of the rows, 1/s. The first one must exist; the others may be
+    /// missing.
     pub rates: &'static [CellPlace],
     /// Setting with the number of rows.
     pub rows: Option<CellPlace>,
@@ -40,7 +43,7 @@ pub(crate) struct ProgramTable {
     pub facts: fn() -> Facts,
     /// Note for the user; empty if there is none.
     pub note: &'static str,
-    /// How to export the table of the positions.
+    /// Advice for the user on how to export the table of positions.
     pub advice: &'static str,
 }
 
@@ -48,26 +51,28 @@ pub(crate) struct ProgramTable {
 pub(crate) enum PointColumns {
     /// One point in a row, with x and y in the columns with these names.
     Named([&'static str; 2]),
-    /// Columns in pairs, called NAME and the endings for x and y, after those of the clock. The columns from
-    /// the first one on that has one of the endings `rest` are not read. `rename` makes the name of the track.
+    /// Pairs of columns after the columns of the clock. The names of a pair are NAME with the two endings
+    /// `ends`, for x and y. The first column with an ending in `rest`, and all columns after it, are not
+    /// read. `rename` makes the name of the track from NAME.
     Pairs { ends: [&'static str; 2], rest: &'static [&'static str], rename: fn(&str) -> &str },
-    /// After the columns of the clock, a name above the first of three columns: X, Y and Z.
+    /// Groups of three columns (X, Y and Z) after the columns of the clock. The name of the point is above
+    /// the first column of its group.
     Triples,
-    /// No names, and every row is a frame: x and y of each point. The first row has the number of rows, the
-    /// number of points and the time from row to row, s.
+    /// A table without column names, in which every row is a frame with x and y of each point. Its first row
+    /// has the number of rows, the number of points and the time from row to row, s.
     Counted,
 }
 
 /// Place of a setting above the table.
 #[derive(Clone, Copy)]
 pub(crate) enum CellPlace {
-    /// To the right of the cell with its name.
+    /// In the cell to the right of the cell with the given name.
     RightOf(&'static str),
-    /// Below the cell with its name.
+    /// In the cell below the cell with the given name.
     Below(&'static str),
 }
 
-/// A row without any statement, for the rows of the table to change.
+/// Default values for the description of a format. Each description replaces some of them.
 pub(crate) const PLAIN_ROW: ProgramTable = ProgramTable {
     name: "",
     mark: "",
@@ -85,7 +90,7 @@ pub(crate) const PLAIN_ROW: ProgramTable = ProgramTable {
     advice: "export again without changing the columns, or name them with --columns",
 };
 
-/// The formats that a row describes completely.
+/// The formats that a [`ProgramTable`] describes completely.
 pub(super) static LAYOUTS: [ProgramTable; 5] = [
     // the data of an X-Y graph of DIPP-MOTION (DITECT) in CP932; the Japanese words are "time", "coordinate
     // value", "unit of the horizontal axis" and "unit of the vertical axis"
@@ -154,16 +159,16 @@ pub(super) static LAYOUTS: [ProgramTable; 5] = [
     },
 ];
 
-/// Number of rows at the top in which the column names are sought if they identify the format; a user may
-/// have added lines above them.
+/// Number of rows at the top of a table that are searched for the column names, if these names identify the
+/// format. A user may have added lines above them.
 const HEADER_ROWS: usize = 3;
-/// Longest time from row to row in the first line of a table without names, s; a larger third number has
-/// another meaning.
+/// Largest allowed time from row to row, s, in the first line of a table without column names. If the third
+/// number of this line is larger, it has another meaning.
 const LONGEST_STEP_S: f64 = 10.0;
-/// Extension of a table without names.
+/// File extension of a table without column names.
 const COUNTED_EXTENSION: &str = ".rd";
-/// Largest coordinate of a point that counts as the origin, in units of the file; rounding errors of 1e-11
-/// occur.
+/// Largest magnitude of the coordinates of a point that counts as the origin, in units of the file. Rounding
+/// errors of 1e-11 occur.
 const AT_ORIGIN: f64 = 1e-6;
 
 impl FileFormat for ProgramTable {
@@ -308,7 +313,8 @@ impl ProgramTable {
         Ok(TableLayout { frame, time, key, order, skip_nameless: true, ..layout })
     }
 
-    /// Takes the units after the names of the times and of x and y; returns whether the times count frames.
+    /// Reads the units that follow the column names of the times and of x and y. Returns whether the column
+    /// of times contains frame numbers.
     fn read_column_units(
         &self,
         table: &DelimitedTable,
@@ -446,7 +452,7 @@ impl ProgramTable {
     }
 }
 
-/// Whether a cell has this name. If the name ends in `*`, a unit or a sign may follow.
+/// Whether the text of a cell is `name`. If `name` ends in `*`, a unit or a sign may follow in the cell.
 fn is_named(cell: &str, name: &str) -> bool {
     match name.strip_suffix('*').map(|start| cell.strip_prefix(start)) {
         Some(rest) => rest.is_some_and(|rest| !rest.starts_with(|c: char| c.is_ascii_alphanumeric())),

@@ -1,5 +1,5 @@
-//! Tables of a clock and coordinates, as scripts write them. The header names the columns, or `--columns`
-//! names or numbers them; in both cases the header gives their units.
+//! Reads tables with a clock and coordinates, as scripts write them. The header names the columns, or
+//! `--columns` names or numbers them; in both cases the header gives the units of the columns.
 
 mod columns;
 
@@ -31,7 +31,8 @@ impl FileFormat for PlainFormat {
         self.name
     }
 
-    /// Recognises a header that names a clock and a coordinate; nothing shows that `--columns` is meant.
+    /// Recognises a table whose header names a clock and a coordinate. The format `generic` is never
+    /// recognised, because only an option selects it.
     fn recognises(&self, document: &Document) -> Option<String> {
         let table = document.table.as_ref().ok().filter(|_| self.name == PLAIN.name)?;
         let header = columns::find_header(table)?;
@@ -60,15 +61,15 @@ impl FileFormat for PlainFormat {
     }
 }
 
-/// The columns of a table that are read. Columns and rows are counted from 0.
+/// The columns that are read from a table. Columns and rows are counted from 0.
 pub(super) struct TableColumns {
-    /// Whether the header gives the meaning of the columns, and not `--columns`.
+    /// Whether the header gives the meaning of the columns; otherwise `--columns` gives it.
     by_header: bool,
-    /// Row of the names in the head of the table, if there is one.
+    /// Index in `DelimitedTable::head` of the row of column names, if there is one.
     header: Option<usize>,
-    /// Row of the units below the names, if there is one.
+    /// Index in `DelimitedTable::head` of the row of units below the names, if there is one.
     units: Option<usize>,
-    /// First row of data in the head of the table.
+    /// Index in `DelimitedTable::head` of the first row of data.
     start: usize,
     frame: Option<usize>,
     time: Option<(usize, TimeUnit)>,
@@ -114,7 +115,8 @@ impl TableColumns {
                 }),
                 _ => None,
             };
-            // (with `--columns`, only a clock directly before a point may be the own clock of that point)
+            // (frame numbers, and with `--columns` every clock, are compared only if they are directly before
+            // x of a point: then they may be the clock of that point)
             let of_table = self.by_header && meaning != ColumnMeaning::Frame;
             if let Some((clock, unit)) = pair.filter(|_| of_table || first_x.contains(&(column + 1))) {
                 let other = ClockCell { cell: column, unit };
@@ -135,7 +137,7 @@ impl TableColumns {
             point
         };
         let named = self.header.and_then(|row| table.head.get(row)).map_or(0, TextRow::used_width);
-        // (the last cell of the first rows may be blank)
+        // (in some of the first rows the last cell may be blank, so the most common width is used)
         let filled = table.head.iter().skip(self.start).map(TextRow::used_width).collect::<Vec<_>>();
         TableLayout {
             start: self.start,
@@ -175,8 +177,8 @@ impl TableColumns {
         format!("line {} names the columns; the rows are placed by {clock}{units}{other}", line(header))
     }
 
-    /// Finding about a column of times that is not read while every row counts as a frame, if its steps are
-    /// not even.
+    /// Finding about a column of times with uneven steps that is not read, because every row counts as a
+    /// frame.
     fn unused_clock_finding(&self, table: &DelimitedTable) -> ImportResult<Option<QualityFinding>> {
         let unused = self.unused_clocks(table).into_iter().find(|(_, kind)| *kind != ColumnMeaning::Frame);
         let Some((column, _)) = unused.filter(|_| self.clock().next().is_none()) else { return Ok(None) };
@@ -205,7 +207,7 @@ impl TableColumns {
     }
 }
 
-/// The most common of the widths, or the largest of several equally common ones; 0 for none.
+/// The most common of the widths, or the largest of several equally common ones; 0 if there are no widths.
 fn usual_width(mut widths: Vec<usize>) -> usize {
     widths.sort_unstable();
     let runs = widths.chunk_by(|a, b| a == b).max_by_key(|run| run.len());

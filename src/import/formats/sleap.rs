@@ -10,7 +10,7 @@ use crate::import::reader::{
     TextRow, Track, TrackCollector, TrackFile,
 };
 
-/// Column of the frame numbers, counted from 0.
+/// Name of the column of frame numbers; the first frame of the video is 0.
 const FRAME: &str = "frame_idx";
 const TRACK: &str = "track";
 const NODE: &str = "node";
@@ -85,8 +85,8 @@ impl FileFormat for Sleap {
     }
 }
 
-/// Names the tracks of a table with one row per point: by their node, by their instance if it has only one
-/// node, or by both.
+/// Names the tracks of a table with one row per point: by the node if there is only one instance, by the
+/// instance if there is only one node, and otherwise by both.
 fn name_by_node(tracks: &mut [Track]) {
     let parts = tracks.iter().filter_map(|track| track.name.split_once(SEPARATOR));
     let parts: Vec<(String, String)> = parts.map(|(a, b)| (a.to_owned(), b.to_owned())).collect();
@@ -117,12 +117,12 @@ fn untracked_error(place: TextLocation, found: &str) -> ImportError {
     ImportError::wrong_table(place, found, "one instance of a track in a frame", TRACK_FIRST)
 }
 
-/// Source of the track of an instance.
+/// Where the track of an instance is named.
 enum TrackSource {
-    /// A cell of the row.
+    /// In a cell of the row; the value is the index of this cell.
     Cell(usize),
-    /// The name of the instance in the names of its columns; empty if the instances are numbered anew in each
-    /// frame.
+    /// In the names of the instance's columns; the value is the name of the instance, or empty if the
+    /// instances are numbered anew in each frame.
     Name(String),
 }
 
@@ -184,7 +184,7 @@ impl SleapColumns {
         Ok(Self { frame, node, video: VIDEO.iter().find_map(|name| at(name)), instances })
     }
 
-    /// Refuses a row of another video than the rows before (`video`).
+    /// Refuses a row of another video than `video`, the video of the rows before it.
     fn check_video(
         &self,
         table: &DelimitedTable,

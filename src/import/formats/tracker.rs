@@ -188,7 +188,8 @@ fn clocks_agree(table: &DelimitedTable, start: usize, columns: &[&str]) -> Impor
     Ok(true)
 }
 
-/// The points by their clock: the one under the same title, or else the nearest one to the left.
+/// Groups the points by their clock. The clock of a point is the clock under the same title, or else the
+/// nearest clock to the left of the point.
 fn group_by_clock(
     table: &DelimitedTable,
     row: &TextRow,

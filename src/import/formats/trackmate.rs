@@ -15,8 +15,8 @@ use crate::recording::files::YAxis;
 use crate::recording::quality::{Check, QualityFinding, Severity};
 use xml::XmlReader;
 
-/// Number of rows at the top in which the column names are sought: old versions have one header row, later
-/// ones up to four.
+/// Number of rows at the top of a table that are searched for the column names. Old versions have one header
+/// row, later versions up to four.
 const HEADER_ROWS: usize = 4;
 /// Columns that occur only in tables of edges or of tracks.
 const OTHER_COLUMNS: [&str; 5] =
@@ -136,8 +136,8 @@ impl<'a> TrackMateSpots<'a> {
         })
     }
 
-    /// Leaves out tracks that split or merge, because they have several positions in a frame. A requested
-    /// track is refused.
+    /// Leaves out tracks that split or merge, because they have several positions in a frame. If the user
+    /// requested such a track, or if no other track is left, the import is refused.
     fn leave_out_branching(
         &mut self,
         file: &str,
@@ -176,7 +176,8 @@ fn name_of_key(key: &str) -> &str {
     key.split_once(SEPARATOR).map_or(key, |(_, name)| name)
 }
 
-/// The unit of length. Micrometres are the only unit with a sign outside ASCII, which a wrong encoding damages.
+/// Reads a unit of length. An `m` after a damaged sign means micrometres, because only their sign is outside
+/// ASCII and can be damaged by a wrong encoding.
 fn parse_length_unit(text: &str) -> Option<CoordinateUnit> {
     let name = text.trim().trim_matches(['(', ')']).trim();
     let sign = name.strip_suffix('m').unwrap_or_default();

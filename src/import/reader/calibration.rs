@@ -26,7 +26,8 @@ const Y_AXIS_OPEN: &str = "world coordinates point up unless their axes were tur
 #[derive(Debug, Clone)]
 pub(crate) struct ImportCalibration {
     pub rate: FrameRate,
-    /// Largest relative difference between the rate and that of the file's times that their errors allow.
+    /// Largest allowed relative difference between `rate` and the rate that the file's times imply; it
+    /// includes the errors of both rates.
     pub tolerance: f64,
     /// Scales of x and y of the tip, and of x and y of the head.
     pub scales: [[CoordinateScale; 2]; 2],
@@ -36,7 +37,7 @@ pub(crate) struct ImportCalibration {
 }
 
 impl ImportCalibration {
-    /// Length that a pixel shows, m, if any coordinate is in pixels.
+    /// Length that one pixel shows, m; `None` if no coordinate is in pixels.
     pub(crate) fn metres_per_pixel(&self) -> Option<f64> {
         self.scales.as_flattened().iter().find_map(|scale| match scale {
             CoordinateScale::MetresPerPixel(metres) => Some(*metres),
@@ -49,7 +50,7 @@ impl ImportCalibration {
 type TrackChoice = ImportResult<[Option<TrackIndex>; 2]>;
 
 /// Converts the times of every export to seconds or frames, and collects the other facts. One error lists
-/// everything that is missing, with what the files suggest.
+/// every missing fact and what the files suggest for it.
 pub(crate) fn calibrate(
     exports: &mut [TrackFile],
     chosen: &TrackChoice,
@@ -123,9 +124,9 @@ fn ask_scale(exports: &[TrackFile]) -> String {
     format!("--scale S           {hint}")
 }
 
-/// Converts times to seconds, or to frame numbers if `--time` says so. Returns false if the unit of the
-/// times is unknown and the rows have no frame numbers. Refuses times whose unit in the file is another than
-/// the declared one.
+/// Converts times to seconds, or to frame numbers if `--time` says so. Returns false if the unit of the times
+/// is unknown and the rows have no frame numbers. Refuses the file if it states another unit of the times
+/// than `--time` does.
 fn convert_times(export: &mut TrackFile, options: &ImportOptions) -> ImportResult<bool> {
     let numbered = export.clocks.iter().all(|clock| clock.frame.is_some());
     let factor = match (options.time, export.facts.time) {
@@ -163,7 +164,8 @@ fn convert_times(export: &mut TrackFile, options: &ImportOptions) -> ImportResul
     Ok(true)
 }
 
-/// The declared frame rate, or else that of the camera's record, or else that of times declared to be real.
+/// The frame rate: the declared one, or else the one in the camera's record, or else the one that the times
+/// imply if `--time` declares them to be real.
 fn frame_rate(
     exports: &[TrackFile],
     implied: Option<&FrameRate>,
@@ -204,7 +206,8 @@ fn frame_rate(
     Ok(implied.cloned())
 }
 
-/// Finding about the rate of the times: that it differs from the used one, or that it is coarse.
+/// Finding if the rate that the times imply differs from the rate that is used. If the times themselves gave
+/// the used rate, finding if that rate has a large error.
 fn compare_rates(used: &FrameRate, mut times: FrameRate, options: &ImportOptions) -> Option<QualityFinding> {
     if used.source == times.source {
         return findings::coarse_rate_finding(used);
@@ -262,7 +265,7 @@ fn coordinate_scales(
     let lengths = || known().filter(|(unit, _)| *unit != CoordinateUnit::Pixel);
     let used = chosen.iter().flatten().count();
     if let Some(scale) = declared {
-        // (a length a pixel is that of the columns in pixels, if there are any)
+        // (a length per pixel applies to the columns in pixels or without a unit, if there are any)
         let of_pixels = matches!(scale, CoordinateScale::MetresPerPixel(_)) && lengths().count() < 2 * used;
         let in_header = |stated: &(CoordinateUnit, String)| {
             chosen.iter().flatten().any(|(file, track)| {

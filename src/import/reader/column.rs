@@ -1,4 +1,5 @@
-//! Meaning of a column from its name in the header: clock, coordinate of a point or confidence, and its unit.
+//! Determines the meaning of a column (such as clock, coordinate of a point or confidence) and its unit from
+//! its name in the header.
 
 use crate::import::options::CoordinateScale;
 
@@ -24,7 +25,7 @@ const FRAMES: [&str; 16] = [
 /// Names of columns of times, in lower case and without separators, with the unit that a name implies (`None`
 /// if it implies none).
 const TIMES: [(&[&str], Option<TimeUnit>); 4] = [
-    // (the last name is Japanese jikan: time)
+    // (the last name is the Japanese word jikan, time)
     (&["t", "time", "zeit", "temps", "tempo", "tiempo", "\u{6642}\u{9593}"], None),
     // (a timestamp may be in seconds or milliseconds, and may count from 1970)
     (&["timestamp"], Some(TimeUnit::Unknown)),
@@ -78,8 +79,8 @@ pub(crate) enum ColumnMeaning {
 }
 
 impl ColumnMeaning {
-    /// The meaning of a name. Programs that write several data sets put the name of the set before that of
-    /// the column (`VideoAnalysis: X Wrist (m)`).
+    /// The meaning of a column name. Programs that write several data sets put the name of the data set
+    /// before the column name (`VideoAnalysis: X Wrist (m)`); the part before the colon is then left out.
     pub(crate) fn parse(name: &str) -> Self {
         match (Self::parse_whole(name), name.split_once(": ")) {
             (Self::Other, Some((_, column))) => Self::parse_whole(column),
@@ -87,8 +88,8 @@ impl ColumnMeaning {
         }
     }
 
-    /// The clock that a column holds by its name, by the last part of its name, or by its unit; `None` for any
-    /// other column.
+    /// The kind of clock in a column, frame numbers or times, from the column's name, the last part of the
+    /// name, or the unit; `None` if the column is no clock.
     pub(crate) fn parse_clock(name: &str) -> Option<Self> {
         let is_clock = |meaning: &Self| matches!(meaning, Self::Frame | Self::Time(_));
         let unit = split_unit(name).1;
@@ -252,7 +253,7 @@ impl TimeUnit {
 pub(crate) enum CoordinateUnit {
     /// A pixel of unknown size.
     Pixel,
-    /// A length, m.
+    /// A unit of length; the value is the length of the unit, m.
     Metres(f64),
 }
 
@@ -279,7 +280,7 @@ impl CoordinateUnit {
 /// Unit of a column, by the quantity that it measures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum ColumnUnit {
-    /// A pixel or a length: the column may hold a coordinate.
+    /// A pixel or a unit of length: the column may contain a coordinate.
     Coordinate(CoordinateUnit),
     /// A time.
     Time(TimeUnit),
@@ -287,8 +288,8 @@ pub(crate) enum ColumnUnit {
     Other,
 }
 
-/// Symbols of units that measure neither a length nor a time, in lower case; every unit with a slash or a
-/// power is another one.
+/// Symbols of units that measure neither a length nor a time, in lower case. Units with a slash or a power,
+/// such as `mm/s`, need no entry.
 const OTHER_UNITS: [&str; 20] = [
     "deg", "degree", "degrees", "\u{b0}", "rad", "radians", "hz", "khz", "n", "mn", "kn", "v", "mv", "pa",
     "kpa", "mpa", "g", "kg", "%", "c",

@@ -1,5 +1,5 @@
-//! Findings about the quality of the data that only the exported file shows: rounded times, lost points,
-//! doubtful units.
+//! Findings about the quality of the data that can be made only while the exported file is read: rounded
+//! times, lost points, doubtful units.
 
 use super::column::CoordinateUnit;
 use super::rate::{FrameRate, find_quantum_s, format_rate};
@@ -24,7 +24,7 @@ const PIXEL_LIKE_LIMIT: f64 = 100.0;
 const MILLIMETRE_M: f64 = 1e-3;
 /// Minimum number of coordinates for the conclusion that they are pixels because all are whole numbers.
 const FEWEST_WHOLE: usize = 8;
-/// Rounding step of the times, frames, above which the finding is a caution. An error of 0.1 frames shifts
+/// Rounding step of the times, in frames, above which the finding is a caution. An error of 0.1 frames shifts
 /// the phase of a component at a fifth of the frame rate by 7 degrees.
 const COARSE_FRAMES: f64 = 0.1;
 
@@ -43,7 +43,7 @@ pub(crate) fn new_finding(
 pub(crate) fn rounded_times_finding(file: &str, times: &[f64], implied_hz: f64) -> Option<QualityFinding> {
     let quantum_s = find_quantum_s(times).filter(|_| !times.is_empty())?;
     let frames = quantum_s * implied_hz;
-    // the rounding changes nothing if a frame lasts a whole number of quanta
+    // the rounding changes nothing if a frame lasts a whole number of rounding steps
     let even = (1.0 / frames - (1.0 / frames).round()).abs() <= 1e-6 && frames <= 1.0 + 1e-6;
     let severity = if frames > COARSE_FRAMES { Severity::Caution } else { Severity::Note };
     let found = format!("{file}: the times are rounded to {quantum_s} s, {frames:.2} of a frame");
@@ -78,17 +78,18 @@ pub(crate) fn rate_difference(used: &FrameRate, other: &FrameRate) -> Option<Qua
         .then(|| new_finding(Check::ImpliedRate, Severity::Caution, value, found, advice))
 }
 
-/// Finding about times that lie on no grid, next to frame numbers that are used instead.
+/// Finding about times that lie on no grid and are ignored, because the file also has frame numbers.
 pub(crate) fn ignored_times_finding(file: &str) -> QualityFinding {
     let found = format!("{file}: the times follow no even rate, but its frame numbers place the rows");
     let advice = "if the camera has no even rate, name the column of times alone (--columns time=...)";
     new_finding(Check::UnevenClock, Severity::Caution, (0.0, ""), found, advice)
 }
 
-/// Largest error of a rate that needs no finding; a larger one shifts a frequency visibly in every figure.
+/// Largest allowed relative error of a frame rate without a finding. A larger error shifts the frequencies
+/// visibly in figures.
 const COARSE_RATE: f64 = 0.01;
 
-/// Finding about times that know the frame rate only coarsely.
+/// Finding about times with so few digits that the frame rate from them has a large error.
 pub(crate) fn coarse_rate_finding(rate: &FrameRate) -> Option<QualityFinding> {
     let found = format!(
         "{} imply {} frames/s: their steps have so few digits that the rate, and with it every frequency, is \

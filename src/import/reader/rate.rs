@@ -1,28 +1,32 @@
-//! Frame rates, with the largest error that their source allows.
+//! Frame rates, each with the largest error that its source allows.
 
 use super::track_file::{Clock, TrackFile};
 use crate::recording::clock;
 
-/// Largest relative difference between two rates that may both be right, besides their errors; if they differ
-/// by more, one of them is wrong, and the import is refused.
+/// Largest allowed relative difference between two statements of the frame rate, in addition to their errors.
+/// If they differ by more, the import is refused.
 pub(crate) const RATE_AGREEMENT: f64 = 0.01;
-/// Relative error of an oscillator: inexpensive ones hold their frequency to 50 parts in a million.
+/// Largest relative error of the frequency of an inexpensive oscillator: 50 parts in a million.
 const OSCILLATOR_ERROR: f64 = 5e-5;
-/// Fewest last digits in a step that may have been rounded before the times were added up; software that
-/// rounds a step to fewer digits would be wrong by more than an eighth.
+/// Minimum length of a step, in units of the last digit of the times, for the assumption that a program
+/// rounded the step before it added up the times. If the step is shorter, this rounding would change it by
+/// more than an eighth.
 const FEWEST_DIGITS_PER_STEP: f64 = 4.0;
-/// Largest relative difference of two steps that count as equal.
+/// Largest allowed relative difference between two steps, or two rates, that count as equal.
 const EQUAL_STEPS: f64 = 1e-6;
 
-/// Largest distance of a time from the grid, frames, besides its rounding: it shifts the phase of a component
-/// at a fifth of the frame rate by 7 degrees.
+/// Largest allowed distance of a time from the grid, in frames, in addition to the rounding of the times.
+/// This distance shifts the phase of a component at a fifth of the frame rate by 7 degrees.
 pub(crate) const EVEN_FRAMES: f64 = 0.1;
-/// Fraction of rows beyond [`EVEN_FRAMES`] from which a clock has no grid; fewer are damaged.
+/// Largest allowed fraction of rows that are farther than [`EVEN_FRAMES`] from the grid. If the fraction is
+/// larger, the clock has no grid; otherwise these few rows are damaged.
 const UNEVEN_ROWS: f64 = 0.05;
-/// Largest relative difference between the usual rate of a clock without a grid and a declared rate.
+/// Largest allowed relative difference between the declared rate and the rate of a clock without a grid,
+/// which is the inverse of its median step.
 pub(crate) const UNEVEN_RATE: f64 = 0.2;
 
-/// Whether times that are written to `digit_s` lie on no grid, whatever its rate.
+/// Whether times lie on no grid of equal steps, whatever its rate. `digit_s` is the value of the last digit
+/// of the times, s.
 pub(crate) fn is_uneven(times: &[f64], digit_s: f64) -> bool {
     let Some(step_s) = clock::median_step_s(times).filter(|step_s| *step_s > 0.0) else { return false };
     let fit = clock::number_frames(times, step_s);
@@ -33,13 +37,13 @@ pub(crate) fn is_uneven(times: &[f64], digit_s: f64) -> bool {
     })
 }
 
-/// Whether an export has a clock of times that lie on no grid and no frame numbers.
+/// Whether an export has a clock without frame numbers whose times lie on no grid.
 pub(crate) fn has_uneven_clock(export: &TrackFile) -> bool {
     let timed = export.clocks.iter().filter(|clock| clock.frame.is_none());
     timed.into_iter().any(|clock| is_uneven(&clock.times(), clock.digit))
 }
 
-/// Rates of films, television and telephones, 1/s.
+/// Usual frame rates of films, television and telephones, 1/s.
 const COMMON_RATES_HZ: [f64; 16] = [
     23.976, 24.0, 25.0, 29.97, 30.0, 48.0, 50.0, 59.94, 60.0, 100.0, 119.88, 120.0, 239.76, 240.0, 480.0,
     960.0,
@@ -52,12 +56,13 @@ pub(crate) struct FrameRate {
     pub hz: f64,
     /// Largest error, as a fraction of the rate.
     pub error: f64,
-    /// Text on the source.
+    /// Text that says where the rate comes from.
     pub source: String,
 }
 
 impl FrameRate {
-    /// A rate as a person or a camera states it. A rate with decimals is known to half of its last digit.
+    /// A rate that a person or a camera states. If it has decimals, its error is half a unit of the last one,
+    /// and at least the error of an oscillator.
     pub(crate) fn stated(hz: f64, source: impl Into<String>) -> Self {
         let written = hz.to_string();
         let decimals = written.split_once('.').map_or(0, |(_, decimals)| decimals.len());
@@ -65,12 +70,13 @@ impl FrameRate {
         Self { hz, error: OSCILLATOR_ERROR.max(half_digit / hz), source: source.into() }
     }
 
-    /// Standard deviation of the rate, 1/s: that of a uniform distribution between the largest errors.
+    /// Standard deviation of the rate, 1/s. The true rate is assumed to be uniformly distributed within the
+    /// largest error on either side.
     pub(crate) fn sd_hz(&self) -> f64 {
         self.hz * self.error / 3.0_f64.sqrt()
     }
 
-    /// Relative difference from another rate.
+    /// Magnitude of the difference from another rate, as a fraction of the other rate.
     pub(crate) fn difference(&self, other: &Self) -> f64 {
         (self.hz / other.hz - 1.0).abs()
     }
@@ -86,7 +92,7 @@ pub(crate) fn format_rate(hz: f64) -> String {
     format!("{:.6e}", hz).parse::<f64>().map_or_else(|_| hz.to_string(), |rounded| rounded.to_string())
 }
 
-/// The frame rate that the times of an export imply, from its longest clock.
+/// The frame rate that the times of an export's longest clock imply.
 pub(crate) fn implied_rate(export: &TrackFile) -> Option<FrameRate> {
     let timed = export.clocks.iter().filter(|clock| clock.time.is_some());
     let longest = timed.max_by_key(|clock| clock.len())?;
@@ -96,7 +102,8 @@ pub(crate) fn implied_rate(export: &TrackFile) -> Option<FrameRate> {
     Some(FrameRate { hz, error: times_error(&times, &frames, rounding_s(&times, longest.digit)), source })
 }
 
-/// Frame numbers and times of the rows of a clock, and the rate of their ends, 1/s.
+/// Frame numbers and times of the rows of a clock, and the frame rate, 1/s. If the file has frame numbers,
+/// the rate is that between the first and last row; otherwise it is the rate of the grid that fits the times.
 fn number_rows(clock: &Clock) -> Option<(Vec<f64>, Vec<f64>, f64)> {
     if let (Some(frames), Some(times)) = (&clock.frame, &clock.time) {
         let rows = frames.iter().zip(times.iter()).filter_map(|(frame, time)| frame.zip(time));
@@ -111,9 +118,11 @@ fn number_rows(clock: &Clock) -> Option<(Vec<f64>, Vec<f64>, f64)> {
     Some((frames, times, 1.0 / fit.frame_s))
 }
 
-/// Largest relative error of the rate of times that are written to `digit_s`. If each time was rounded, only
-/// the two ends count. If all steps are equal, the step itself may have been rounded to half a digit; a round
-/// rate is the camera's own unless another common rate rounds to the same step.
+/// Largest relative error of the frame rate that times imply; `digit_s` is the value of their last digit, s.
+/// If each time was rounded separately, the error is the last digit divided by the time from the first to the
+/// last row. If all steps are equal, the step itself may have been rounded, with an error of half its last
+/// digit. A rate of at most two significant digits counts as exact, unless another common rate has the same
+/// rounded step.
 fn times_error(times: &[f64], frames: &[f64], digit_s: f64) -> f64 {
     let span = |values: &[f64]| values.last().zip(values.first()).map_or(0.0, |(last, first)| last - first);
     let frame_s = span(times) / span(frames);
@@ -143,13 +152,13 @@ fn is_round(hz: f64) -> bool {
     format!("{hz:.1e}").parse::<f64>().is_ok_and(|round| (hz / round - 1.0).abs() <= EQUAL_STEPS)
 }
 
-/// The place to which times are rounded, s: the coarsest one that explains all of them, or `digit_s`, the
-/// value of their last digit.
+/// Step to which times are rounded, s: the largest power of ten of which all times are multiples, and at
+/// least `digit_s`, the value of their last digit.
 fn rounding_s(times: &[f64], digit_s: f64) -> f64 {
     find_quantum_s(times).unwrap_or(digit_s).max(digit_s)
 }
 
-/// Decimal places to which programs round times, s.
+/// Steps to which programs round times, s.
 const QUANTA_S: [f64; 8] = [1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7];
 
 /// Whether times lie on the grid of `rate_hz` that starts at the first time, within the rounding of the
@@ -157,13 +166,13 @@ const QUANTA_S: [f64; 8] = [1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7];
 fn times_fit_rate(times: &[f64], frames: &[f64], rate_hz: f64) -> bool {
     let (Some(start), Some(first)) = (times.first(), frames.first()) else { return false };
     let half_quantum = find_quantum_s(times).map_or(1e-9, |q| q / 2.0 * (1.0 + 1e-6));
-    // (twice, because the first time is rounded too)
+    // (two half steps of rounding, because the first time is rounded too)
     let fits =
         |(time, frame): (&f64, &f64)| (start + (frame - first) / rate_hz - time).abs() <= 2.0 * half_quantum;
     times.iter().zip(frames).all(fits)
 }
 
-/// The coarsest decimal place to which all times are rounded, s.
+/// Largest step of `QUANTA_S`, s, of which all times are multiples; `None` if there is none.
 pub(crate) fn find_quantum_s(times: &[f64]) -> Option<f64> {
     QUANTA_S.into_iter().find(|quantum| are_multiples(times, *quantum))
 }

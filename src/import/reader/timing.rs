@@ -6,8 +6,8 @@ use crate::import::reader::rate::{RATE_AGREEMENT, UNEVEN_RATE, find_quantum_s, i
 use crate::import::reader::track_file::{Clock, Column, Track, TrackFile};
 use crate::recording::clock::{self, FrameFit, MAX_FRAMES, OFF_GRID_LIMIT_FRAMES};
 
-/// Largest `--frame-step` that an error message suggests. It suggests one if the declared rate is a whole
-/// multiple of the rate that the times imply.
+/// Largest `--frame-step` that an error message suggests. A message suggests this option if the declared rate
+/// is a whole multiple of the rate that the times imply.
 const LARGEST_STEP: f64 = 10.0;
 /// Largest frame number that is accepted; a larger number is damaged.
 const LARGEST_FRAME: f64 = 1e12;
@@ -20,7 +20,7 @@ pub(crate) const MOST_SPREAD: i64 = 1000;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct DeclaredTiming {
     pub rate_hz: f64,
-    /// Largest relative difference between this rate and that of the times.
+    /// Largest allowed relative difference between `rate_hz` and the rate that the times imply.
     pub tolerance: f64,
     /// Whether the times are those of playback and only count frames.
     pub playback: bool,
@@ -75,8 +75,8 @@ pub(crate) fn place_rows(rows: ClockRows, declared: DeclaredTiming) -> ImportRes
     Ok(placed)
 }
 
-/// Refuses rows that are so far apart that one of their numbers must be damaged. The size of the file then
-/// also limits the memory that the frames need.
+/// Refuses rows that are so far apart that a frame number or time must be damaged. As a result, the number of
+/// rows also limits the memory for the frames.
 fn refuse_sparse(rows: ClockRows, placed: &RowFrames) -> ImportResult<()> {
     let jump = |row: usize| placed.frames[row] - placed.frames[row - 1];
     let span = placed.frames.last().zip(placed.frames.first()).map_or(0, |(last, first)| last - first);
@@ -208,7 +208,8 @@ fn place_by_time(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<RowF
     Ok(RowFrames { frames, numbered: false, start_s, times: None, implied_hz: Some(1.0 / fit.frame_s) })
 }
 
-/// Rows of a clock without a grid, which keep their times. A declared rate only shows a wrong unit.
+/// Counts the rows of a clock without a grid as consecutive frames and keeps their times. The declared rate
+/// serves only to detect times in a wrong unit.
 fn keep_times(rows: ClockRows, times: Vec<f64>, declared: DeclaredTiming) -> ImportResult<RowFrames> {
     let implied_hz = clock::median_step_s(&times).map(|step_s| 1.0 / step_s);
     if let Some(implied_hz) = implied_hz {
@@ -316,8 +317,8 @@ fn read_times(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<Vec<f64
     Ok(times)
 }
 
-/// Whether the times are rounded more coarsely than the frames, and the clock has as many rows as frames
-/// between its first and last time at the declared rate.
+/// Whether the last digit of the times is larger than a frame, and the number of rows is the number of frames
+/// from the first to the last time at the declared rate.
 fn are_rows_frames(rows: ClockRows, declared: DeclaredTiming) -> bool {
     let times = rows.clock.times();
     let span_s = times.last().zip(times.first()).map_or(0.0, |(last, first)| last - first);
@@ -337,14 +338,15 @@ fn repeats_row_above(rows: ClockRows, row: usize) -> bool {
     tracks.all(|track| same(&track.x) && track.y.as_ref().is_none_or(same))
 }
 
-/// Number of frames before the others from which a first row stands alone.
+/// Minimum number of frames between the first and the second row if the first row counts as isolated.
 const FRAMES_ALONE: usize = 10;
-/// Ratio of the first row's distance from the grid to the largest distance of the others, from which it is
-/// between two frames.
+/// Factor in two tests of the first row. The row is isolated if the gap after it is at least this factor
+/// longer than every other gap. It is off the grid if its distance from the grid is more than this factor
+/// times the largest distance of the other rows.
 const OFF_THE_OTHERS: f64 = 3.0;
 
-/// Refuses a first row that stands alone before the others and is off their grid, such as one whose time has
-/// another unit.
+/// Refuses a first row that is many frames before the other rows and off their grid. For example, the time of
+/// such a row may have another unit.
 fn refuse_stray_first_row(rows: ClockRows, times: &[f64], fit: &FrameFit) -> ImportResult<()> {
     let gap = |row: usize| fit.frames[row] - fit.frames[row - 1];
     let alone = times.len() > 3
@@ -363,7 +365,8 @@ fn refuse_stray_first_row(rows: ClockRows, times: &[f64], fit: &FrameFit) -> Imp
     Ok(())
 }
 
-/// Smallest distance from the grid, frames, that is not the error of the fitted rate over a gap.
+/// Largest allowed distance of an isolated first row from the grid, in frames, in addition to the other
+/// limits. An error of the fitted rate can cause this distance over a long gap.
 const FEW_PARTS: f64 = 0.02;
 
 fn refuse_disorder(rows: ClockRows, row: usize, last: Option<f64>, next: f64) -> ImportResult<()> {

@@ -10,7 +10,8 @@ use crate::recording::files::YAxis;
 const CAMERA: &str = "_cam";
 /// Endings of the names of x and y columns.
 const ENDS: [[&str; 2]; 4] = [["_U", "_V"], ["_x", "_y"], ["_X", "_Y"], ["_u", "_v"]];
-/// Direction of y for the first of these endings, each of which only one program writes.
+/// Direction of y, and the reason for it, for the first two pairs of endings. Only one program writes each of
+/// these pairs.
 const WRITERS: [(YAxis, &str); 2] = [
     (
         YAxis::Down,

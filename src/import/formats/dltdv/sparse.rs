@@ -11,7 +11,8 @@ use std::collections::BTreeMap;
 pub(super) const TITLE: &str = "sparse format camera coordinates";
 const EXPORT_AGAIN: &str = "the file was cut short or edited: export it again";
 
-/// Positions in a pair of columns by row number: line number, x and y.
+/// Positions in a pair of columns. The key is the row number, which counts frames; the value contains the
+/// line number in the file, and x and y.
 type SparseFrames = BTreeMap<u64, (usize, [Option<f64>; 2])>;
 
 pub(super) fn recognise_sparse_table(table: &DelimitedTable) -> Option<String> {

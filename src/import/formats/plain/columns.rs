@@ -10,9 +10,9 @@ use crate::import::reader::{
 };
 use crate::toml_file::suggest_key;
 
-/// Number of rows at the top in which the column names are sought.
+/// Number of rows at the top of a table that are searched for the column names.
 const HEADER_ROWS: usize = 48;
-/// Number of rows of numbers above a row of words that show that the words are no header.
+/// If at least this number of rows of numbers is directly above a row of words, the words are not the header.
 const DATA_ABOVE: usize = 3;
 /// Keys of `--columns` for each point: x, y and confidence.
 const POINT_KEYS: [(&str, [&str; 3]); 3] = [
@@ -23,14 +23,14 @@ const POINT_KEYS: [(&str, [&str; 3]); 3] = [
 const ADVICE: &str = "say which columns are meant by their numbers (from 1): --columns frame=A,tip-x=B,tip-y=C,head-x=D,head-y=E \
      with numbers for A to E";
 const NUMBER_ADVICE: &str = "correct the column number; columns count from 1";
-/// Maximum number of cells of a row in an error message.
+/// Maximum number of cells of a row that an error message shows.
 const MOST_SHOWN: usize = 16;
-/// Maximum number of characters of such a cell.
+/// Maximum number of characters of a cell that an error message shows.
 const LONGEST_SHOWN: usize = 24;
 
-// The header names the columns.
+// Tables whose header names the columns.
 
-/// The first row that names a clock and a coordinate.
+/// Index of the first row that names a clock and a coordinate.
 pub(super) fn find_header(table: &DelimitedTable) -> Option<usize> {
     let names = |row: &TextRow| {
         let meanings = || row.cells.iter().map(|cell| ColumnMeaning::parse(cell));
@@ -60,8 +60,8 @@ pub(super) fn find_header_columns(table: &DelimitedTable) -> ImportResult<TableC
     Ok(columns)
 }
 
-/// First row below the names. A row without numbers directly below the names is skipped; further down it is
-/// damaged.
+/// Index of the first row of data below the names. One row without numbers directly below the names is
+/// skipped. Further down, a row without numbers counts as damaged.
 fn first_data_row(table: &DelimitedTable, header: usize, clock: usize) -> ImportResult<usize> {
     let below = header + 1;
     let line = table.head[header].line;
@@ -75,7 +75,7 @@ struct NamedColumns<'t> {
     table: &'t DelimitedTable<'t>,
     row: &'t TextRow,
     meanings: Vec<ColumnMeaning>,
-    /// Row of the units below the names, if there is one.
+    /// Index in `DelimitedTable::head` of the row of units below the names, if there is one.
     units: Option<usize>,
 }
 
@@ -94,18 +94,20 @@ impl<'t> NamedColumns<'t> {
         Self { table, row, meanings, units }
     }
 
-    /// Columns with the wanted meaning.
+    /// Indices of the columns with the wanted meaning.
     fn columns_where(&self, wanted: impl Fn(&ColumnMeaning) -> bool) -> Vec<usize> {
         self.meanings.iter().enumerate().filter(|(_, meaning)| wanted(meaning)).map(|(at, _)| at).collect()
     }
 
-    /// The only column with the wanted meaning, if there is one; refuses several.
+    /// Index of the column with the wanted meaning; `None` if there is none. Refuses a header with several
+    /// such columns.
     fn only(&self, wanted: impl Fn(&ColumnMeaning) -> bool, what: &str) -> ImportResult<Option<usize>> {
         let found = self.columns_where(wanted);
         if found.len() > 1 { Err(self.ambiguous_error(&found, what)) } else { Ok(found.first().copied()) }
     }
 
-    /// The first column of times. Refuses several whose units are equal or unknown; others are compared later.
+    /// The first column of times, with its unit. Refuses a header with several columns of times whose units
+    /// are equal or unknown. Columns with different known units are compared later.
     fn time_column(&self) -> ImportResult<Option<(usize, TimeUnit)>> {
         let unit = |at: usize| match self.meanings.get(at) {
             Some(ColumnMeaning::Time(unit)) => *unit,
@@ -195,7 +197,7 @@ fn no_header_error(table: &DelimitedTable) -> ImportError {
     ImportError::columns(table.file, table.first_line(), problem, ADVICE)
 }
 
-// `--columns` names or numbers the columns.
+// Tables whose columns `--columns` names or numbers.
 
 /// Reads the meaning of the columns from `--columns`, and their units from the header.
 pub(super) fn find_mapped_columns(table: &DelimitedTable, map: &ColumnMap) -> ImportResult<TableColumns> {
@@ -241,7 +243,7 @@ fn find_column(table: &DelimitedTable, header: usize, name: &str) -> ImportResul
     }
 }
 
-/// Columns with their keys.
+/// The columns that `--columns` gives, with their keys.
 struct MappedColumns<'t> {
     table: &'t DelimitedTable<'t>,
     positions: Vec<(&'static str, usize)>,
@@ -264,7 +266,8 @@ impl MappedColumns<'_> {
         Err(ImportError::columns(table.file, table.first_line(), problem, NUMBER_ADVICE))
     }
 
-    /// Refuses a column that is used for two keys. Some trackers give one confidence for all points.
+    /// Refuses a column that is used for two keys. Only the keys of confidences may share a column, because
+    /// some trackers give one confidence for all points.
     fn check_distinct(&self, header: Option<usize>) -> ImportResult<()> {
         for (index, (first, at)) in self.positions.iter().enumerate() {
             let may_share = |key: &str| first.ends_with("confidence") && key.ends_with("confidence");
@@ -287,7 +290,8 @@ impl MappedColumns<'_> {
         self.table.parse_cell(row.cell(at))
     }
 
-    /// Columns with numbers: the clock, or the first x if every row is a frame, and then the others.
+    /// Indices of the columns with numbers: first the clock (or the first x column if every row is a frame),
+    /// then the other columns.
     fn numeric_columns(&self) -> Vec<usize> {
         let clock =
             ["frame", "time", "time-ms", "tip-x", "head-x", "x"].into_iter().find_map(|key| self.column(key));
@@ -303,7 +307,9 @@ impl MappedColumns<'_> {
         cells.first().is_some_and(is_value) && !cells.contains(&CellNumber::Text)
     }
 
-    /// The row of names above the numbers: the first row with words in all used columns, not all the same. Lines of settings above it may contain numbers, but no block of data.
+    /// Index of the row of column names: the first row with text in all columns of numbers, if the texts are
+    /// not all equal. Lines of settings above this row may contain numbers. If a block of data is above it,
+    /// the row is not the header.
     fn find_header(&self) -> Option<usize> {
         let columns = self.numeric_columns();
         let names = |row: &TextRow| {
@@ -315,8 +321,9 @@ impl MappedColumns<'_> {
         (above < DATA_ABOVE).then_some(header)
     }
 
-    /// First row of data below the header. A row before it with numbers in most of its columns is damaged, and
-    /// is refused.
+    /// Index of the first row of data: the first row below the header that has a number in the column of the
+    /// clock. If a row before it has numbers in most of the other columns, its clock is damaged, and the
+    /// table is refused.
     fn first_data_row(&self, header: Option<usize>) -> ImportResult<usize> {
         let (table, columns) = (self.table, self.numeric_columns());
         let clock = columns.first().copied().unwrap_or(0);
@@ -334,7 +341,7 @@ impl MappedColumns<'_> {
         Err(ImportError::header_only(table.file, table.head.last().map_or(1, |row| row.line)))
     }
 
-    /// The row of units between the names and the numbers.
+    /// Index of the row of units between the names and the numbers.
     fn units_row(&self, header: usize, start: usize) -> Option<usize> {
         let is_unit = |at: usize, row: &TextRow| ColumnUnit::parse(row.cell(at)).is_some();
         (header + 1..start).find(|&row| {
@@ -355,7 +362,7 @@ impl MappedColumns<'_> {
         Some((unit, unit_source(self.table, header, rows[1], at)))
     }
 
-    /// Checks that the units of the header fit the keys, and reads them.
+    /// Checks that the units in the header fit the keys of `--columns`, and collects the columns to read.
     fn read(&self, header: Option<usize>, units: Option<usize>, start: usize) -> ImportResult<TableColumns> {
         let unit = |at: usize| self.unit([header, units], at);
         let name = |at: usize| header.map_or("", |row| self.table.head[row].cell(at));
@@ -451,7 +458,7 @@ fn no_such_column_error(table: &DelimitedTable, names: &[&str]) -> ImportError {
     ImportError::columns(table.file, best.map_or(1, |row| row.line), problem, advice)
 }
 
-/// Error for a second clock that differs from the first; `names` are those of both columns.
+/// Error for a second clock that differs from the first; `names` are the names of the two columns.
 pub(super) fn clock_difference_error(
     table: &DelimitedTable,
     first: usize,

@@ -22,7 +22,7 @@ struct ProjectTrack {
     spots: Vec<String>,
 }
 
-/// Reads either kind of file; the elements of the two have different names.
+/// Reads a file of simple tracks or a project. The elements of these two kinds of files have different names.
 pub(super) fn read_xml<'a>(document: &'a Document<'a>) -> ImportResult<TrackMateSpots<'a>> {
     let mut xml = XmlReader::new(document);
     let mut file = TrackMateSpots::new(None, 0);

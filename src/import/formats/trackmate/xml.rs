@@ -1,7 +1,8 @@
-//! XML as the starts of its elements with their places. This is the only file that uses `quick_xml`.
+//! Reads the start tags of XML elements, with their places in the file. This is the only module that uses
+//! `quick_xml`.
 //!
-//! Elements are read one by one, so that deep nesting takes no stack. Only the five predefined entities and
-//! character references are resolved; a document type, which could define others, is refused.
+//! Elements are read one by one, so deep nesting cannot overflow the stack. Only the five predefined entities
+//! and character references are resolved; a document type, which could define others, is refused.
 
 use crate::import::error::{CellProblem, ImportError, ImportResult, TextLocation};
 use crate::import::reader::rows::count_lines;
