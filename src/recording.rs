@@ -73,10 +73,10 @@ pub(crate) const LARGEST_M: f64 = 1e6;
 pub struct Recording {
     name: String,
     grid: FrameGrid,
-    /// True times of frames that lie on no grid.
+    /// True times of the frames; `None` if the frames lie on a grid.
     times: Option<FrameTimes>,
-    /// Largest distance of the true times from the grid of their mean rate, frames; kept when the tracks are
-    /// interpolated to this grid.
+    /// Largest distance of the true frame times from a grid at their mean rate, in frames. It is kept when
+    /// the tracks are interpolated to this grid; `None` if the frames were taken on a grid.
     departure_frames: Option<f64>,
     frame_rate_sd_hz: Option<f64>,
     traces: Traces,
@@ -120,8 +120,8 @@ impl Recording {
         &self.name
     }
 
-    /// The frame grid. For a recording with true times: first time, mean rate and number of frames; the
-    /// frames themselves lie at [`Self::time_s`].
+    /// The frame grid. If the frames lie on no grid, it has their first time, their mean rate and their
+    /// number; [`Self::time_s`] then gives the time of each frame.
     #[must_use]
     pub fn grid(&self) -> FrameGrid {
         self.grid
@@ -207,8 +207,8 @@ impl Traces {
         always.into_iter().map(|(name, column)| (name, column.as_slice())).chain(optional)
     }
 
-    /// Traces from columns in the order of [`Self::columns`]; `confidences` says whether those of tip and
-    /// head are among them.
+    /// Traces from columns in the order of [`Self::columns`]; `confidences` says whether the confidence
+    /// columns of the tip and of the head are among them.
     fn from_columns(mut columns: impl Iterator<Item = Vec<Option<f64>>>, confidences: [bool; 2]) -> Self {
         let mut next = || columns.next().unwrap_or_default();
         let (tip_x_m, tip_y_m, head_x_m, head_y_m) = (next(), next(), next(), next());
@@ -245,10 +245,10 @@ pub(crate) const STENCIL: usize = 6;
 pub(crate) const ON_FRAME_TOLERANCE: f64 = 1e-6;
 
 impl Recording {
-    /// Value of a column of this recording at a time, s. It comes from the polynomial through the three
-    /// frames before and the three after that time; if one of the outer four is missing, from the straight
-    /// line through the two nearest frames. `None` outside the recording, next to a missing frame, and in a
-    /// gap of the times.
+    /// Value of a column of this recording at `time_s`, interpolated by the polynomial through the three
+    /// frames before and the three frames after this time. If one of the outer four frames is missing, the
+    /// straight line through the two nearest frames is used instead. `None` outside the recording, next to a
+    /// missing frame, and in a gap of the times.
     pub(crate) fn interpolate_column(&self, column: &[Option<f64>], time_s: f64) -> Option<f64> {
         if let Some(times) = &self.times {
             return times.interpolate(column, time_s);

@@ -1,11 +1,11 @@
 //! Frame numbers from a column of times; the times may be rounded, and rows may be missing.
 
-/// Largest distance of a time from the time of its frame, in frames. Rounding to half a frame moves a time by
-/// up to a quarter of a frame; at more than a third, the nearest frame is uncertain.
+/// Largest allowed distance of a row's time from the time of its frame, in frames. Rounding to half a frame
+/// moves a time by up to a quarter of a frame; at more than a third, the nearest frame is uncertain.
 pub(crate) const OFF_GRID_LIMIT_FRAMES: f64 = 0.3;
 
-/// Largest number of frames of a grid: 17 minutes at 10,000 frames/s. Times that span more frames come from a
-/// damaged file.
+/// Largest allowed number of frames of a grid: 17 minutes at 10,000 frames/s. Times that span more frames
+/// come from a damaged file.
 pub(crate) const MAX_FRAMES: f64 = 10_000_000.0;
 /// Maximum number of frames without a row: a fixed number plus a number per row. The limit keeps a small file
 /// with a jump in its times from filling the memory.
@@ -52,10 +52,11 @@ impl FrameFit {
     }
 }
 
-/// Assigns frame numbers to strictly increasing finite `times_s` on a grid with about `seed_s` per frame. The
-/// phase of the grid follows the times slowly, so that errors of rounding or of the seed do not accumulate
-/// and a damaged row does not shift the rows after it. Then a line is fitted and the rows are numbered again.
-/// `None` for fewer than two rows, a seed that is not positive, or a grid longer than [`MAX_FRAMES`].
+/// Assigns frame numbers to strictly increasing finite times on a grid; `seed_s` is a guess of the time per
+/// frame, s. The phase of the grid follows the times slowly, so that errors of rounding or of the seed do not
+/// accumulate and a damaged row does not shift the rows after it. Then a line is fitted and the rows are
+/// numbered again. `None` for fewer than two rows, a seed that is not positive, or a grid longer than
+/// [`MAX_FRAMES`].
 pub(crate) fn number_frames(times_s: &[f64], seed_s: f64) -> Option<FrameFit> {
     let first = *times_s.first()?;
     let span_frames = (times_s.last()? - first) / seed_s;

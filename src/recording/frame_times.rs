@@ -11,23 +11,25 @@ use short_spectra::time_frequency::FrequencyRange;
 use short_spectra::{SampledRecord, SpectralAnalysis, SpectrumError, SpectrumSettings};
 use std::borrow::Cow;
 
-/// A step from frame to frame is a gap if it exceeds the median of the steps around it by more than this many
-/// medians, half way from one frame to two, and if the step with its two neighbours exceeds three medians by
-/// as much. A frame that is only late makes the next step shorter.
+/// A step is the time from a frame to the next. It is a gap if it exceeds the median of the steps around it
+/// by more than this fraction of the median, and if the sum of the step and its two neighbours exceeds three
+/// medians by more than the same amount. A frame that is only late makes the next step shorter, so the sum
+/// stays near three medians.
 const LOST_STEPS: f64 = 0.5;
-/// Number of steps on either side that enter this median. Single lost frames do not change it. Where the rate
-/// of the camera changes, each step is compared mostly with steps of its own rate.
+/// Number of steps on either side of a step that enter the median with which the step is compared. Single
+/// lost frames hardly change this median. Where the rate of the camera changes, each step is compared mostly
+/// with steps of its own rate.
 const STEPS_AROUND: usize = 5;
 
 /// Strictly increasing times of frames, s.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct FrameTimes {
     pub times_s: Vec<f64>,
-    /// Mean rate over the steps that are no gaps, 1/s.
+    /// Mean frame rate without the gaps, 1/s.
     pub mean_rate_hz: f64,
     /// For each step from frame to frame, whether it is a gap.
     gaps: Vec<bool>,
-    /// Largest distance of a time from the grid of the mean rate, frames.
+    /// Largest distance of a time from a grid at the mean rate, in frames.
     departure_frames: f64,
 }
 
@@ -71,8 +73,9 @@ impl FrameTimes {
         Ok(Self { times_s, mean_rate_hz, gaps, departure_frames })
     }
 
-    /// Value of a column at a time, s, as [`Recording::interpolate_column`] describes it. Next to a gap or an
-    /// end, the polynomial passes through six frames of which more lie on the other side of the time.
+    /// Value of a column at a time, s, as [`Recording::interpolate_column`] describes it. Near a gap or an
+    /// end of the recording, the polynomial passes through four or five frames on one side of the time and
+    /// two or one on the other side.
     pub(super) fn interpolate(&self, column: &[Option<f64>], time_s: f64) -> Option<f64> {
         let times = &self.times_s;
         let after = times.partition_point(|t| *t < time_s);
@@ -103,8 +106,8 @@ impl Recording {
     /// are; the rate of [`Self::grid`] is their mean rate without gaps.
     ///
     /// # Errors
-    /// [`RecordingError`] naming the frame of a time that does not lie after the one before, or the column
-    /// and the frame at fault.
+    /// [`RecordingError`] naming the frame whose time is not finite or not after the time of the previous
+    /// frame, or the column and the frame at fault.
     pub fn from_times(
         name: impl Into<String>,
         times_s: Vec<f64>,
@@ -118,15 +121,16 @@ impl Recording {
         Ok(Self { times: Some(times), departure_frames, ..Self::new(name, grid, traces, synthetic)? })
     }
 
-    /// The true times of the frames, s, of a recording whose frames lie on no grid.
+    /// True times of the frames, s; `None` if the frames lie on a grid.
     #[must_use]
     pub fn frame_times_s(&self) -> Option<&[f64]> {
         self.times.as_ref().map(|times| times.times_s.as_slice())
     }
 
-    /// This recording with all tracks on the grid of its mean rate, from the first time on; a recording on a
-    /// grid is returned as it is. Between frames a track is interpolated as in `interpolate_column`; in gaps
-    /// of the times and next to missing frames it stays missing. Spectra, features and fits use this grid.
+    /// This recording with all tracks on the grid of its mean rate, from the first time on; a recording that
+    /// is already on a grid is returned unchanged. Between frames, tracks are interpolated by
+    /// `interpolate_column`; in gaps of the times and next to missing frames, they stay missing. Spectra,
+    /// features and fits use this grid.
     #[must_use]
     pub fn resample_to_grid(&self) -> Cow<'_, Self> {
         let Some(times) = &self.times else { return Cow::Borrowed(self) };
@@ -135,7 +139,7 @@ impl Recording {
         let grid = FrameGrid { frames: (span + ON_FRAME_TOLERANCE) as usize + 1, ..self.grid };
         let columns = self.traces.columns().map(|(name, column)| {
             let value = |frame| self.interpolate_column(column, grid.time_s(frame));
-            // the polynomial must not leave the range of a confidence
+            // the polynomial may overshoot, so confidences are limited to the range from 0 to 1
             let within = if name.ends_with("confidence") { (0.0, 1.0) } else { (-LARGEST_M, LARGEST_M) };
             (0..grid.frames).map(|frame| Some(value(frame)?.clamp(within.0, within.1))).collect()
         });
@@ -153,8 +157,8 @@ impl Recording {
         self
     }
 
-    /// That the tracks are interpolated to a grid, with its rate and the distance of the true times from it;
-    /// `None` for a recording that was taken on a grid.
+    /// Statement in words that the tracks are interpolated to a grid, with the rate of the grid and the
+    /// largest distance of the true times from it; `None` for a recording that was taken on a grid.
     pub(crate) fn describe_resampling(&self) -> Option<String> {
         let (off, rate_hz) = (self.departure_frames?, self.grid.frame_rate_hz);
         Some(format!(
@@ -163,20 +167,22 @@ impl Recording {
         ))
     }
 
-    /// Standard deviation of a frequency, Hz, with that of the clock: `sqrt(sd^2 + (f * rate_sd / rate)^2)`.
+    /// Standard deviation of a frequency, Hz, including the uncertainty of the frame rate:
+    /// `sqrt(sd^2 + (frequency * rate_sd / rate)^2)`, where `sd` is the standard deviation without it.
     pub(crate) fn add_clock_sd(&self, frequency_hz: f64, sd_hz: f64) -> f64 {
         let of_clock_hz = |rate_sd_hz| frequency_hz * rate_sd_hz / self.grid.frame_rate_hz;
         self.frame_rate_sd_hz.map_or(sd_hz, |rate_sd_hz| math::hypot(sd_hz, of_clock_hz(rate_sd_hz)))
     }
 
-    /// A frequency range with the standard deviation of the clock added to those of its ends.
+    /// A frequency range in which the standard deviations of both ends include the uncertainty of the frame
+    /// rate.
     pub(crate) fn widen_range(&self, range: FrequencyRange) -> FrequencyRange {
         let low_sd_hz = self.add_clock_sd(range.low_hz, range.low_sd_hz);
         FrequencyRange { low_sd_hz, high_sd_hz: self.add_clock_sd(range.high_hz, range.high_sd_hz), ..range }
     }
 
     /// Analyses consecutive samples of a channel on the grid of this recording. The standard deviations of
-    /// the frequencies of its components include that of the clock.
+    /// the component frequencies include the uncertainty of the frame rate.
     pub(crate) fn analyse_samples(
         &self,
         samples: &[Option<f64>],

@@ -36,8 +36,8 @@ use serde::Serialize;
 pub use tilt::{CameraTilt, Curvature, TiltNotFound, measure_tilt};
 pub use untracked::{UntrackedFrames, drop_untracked, find_untracked_frames};
 
-/// All findings on a recording, the gravest first, with the findings of its import. Within a severity, those
-/// that change the meaning of all numbers come first.
+/// All findings on a recording and on its import, the gravest first. Within a severity, findings that change
+/// the meaning of all numbers come first.
 ///
 /// `measured` is the result of [`measure_quality`] for the same recording, and `instants` is the result of
 /// [`ReversalInstants::find_instants`].
@@ -49,7 +49,7 @@ pub fn collect_findings(
     instants: &ReversalInstants,
     import: &[QualityFinding],
 ) -> Vec<QualityFinding> {
-    // (resampling to a grid changes repeats and lines)
+    // (this check needs the original frames: resampling to a grid changes repeated positions and exact lines)
     let untracked = untracked::check_untracked(recording, measured, optics);
     let recording = &*recording.resample_to_grid();
     let columns = measurement::measured_columns(recording.traces(), measured);

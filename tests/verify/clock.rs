@@ -17,7 +17,8 @@ const TONE_HZ: f64 = 7.3;
 const NOISE_M: f64 = 5e-6;
 const FRAMES: usize = 500;
 
-/// Clocks of a camera of about 48.4 frames/s that keep to no grid, each with its name.
+/// Frame times, s, of a camera at about 48.4 frames/s that lie on no uniform grid: four kinds, each with its
+/// name.
 fn uneven_clocks(seed: u64, frames: usize) -> [(&'static str, Vec<f64>); 4] {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut normal = || random.sample::<f64, _>(StandardNormal);
@@ -104,7 +105,8 @@ fn a_steady_tone_is_steady_at_its_frequency_on_every_clock() {
     assert!(false_components <= 2, "{false_components} false components in {records} records");
 }
 
-/// A quintic in time is the polynomial through six frames, whatever their times.
+/// Interpolation through six frames reproduces a polynomial of degree five in time exactly, however the
+/// frames are spaced.
 #[test]
 fn a_polynomial_comes_onto_the_grid_exactly_and_gaps_stay_missing() {
     let quintic = |t: f64| 1e-3 * (1.0 + 0.3 * t - 0.02 * t * t + 1e-5 * t.powi(5));
@@ -124,7 +126,7 @@ fn a_polynomial_comes_onto_the_grid_exactly_and_gaps_stay_missing() {
                 assert!(is_long(after), "{clock}: {t} lies in no gap");
                 continue;
             };
-            // some six frames in a row around the time have no gap
+            // the value is exact if six consecutive frames around the time have no gap
             let stencils = after.saturating_sub(5)..=(after - 1).min(times_s.len() - 6);
             if stencils.into_iter().any(|first| !(first + 1..first + 6).any(is_long)) {
                 exact += 1;
@@ -188,7 +190,8 @@ fn files_keep_every_time_and_the_rate_with_its_deviation() {
         assert_eq!(again, recording, "{clock}");
         assert_eq!(again.frame_times_s(), Some(&times_s[..]), "{clock}");
         if ["random walk", "two rates"].contains(&clock) {
-            // no grid comes within 0.3 frames of these times: alone they are kept, with a stated rate refused
+            // no uniform grid is within 0.3 frames of all these times: without a description they are kept,
+            // with a stated frame rate they are refused
             let alone = read_recording("tone", "trace.csv", &text, None).unwrap();
             assert_eq!(alone.frame_times_s(), Some(&times_s[..]), "{clock}");
             let file = described(camera(&recording, None));
@@ -236,7 +239,7 @@ fn times_that_do_not_advance_and_rates_that_are_not_theirs_are_refused() {
     let message =
         Recording::from_times("r", times_s.clone(), Traces::default(), true).unwrap_err().to_string();
     assert!(message.starts_with("time_s, frame 70: found"), "{message}");
-    // a jump of years fills no memory
+    // a jump of years in the times is refused before memory is allocated for it
     times_s.truncate(70);
     times_s.push(1e9);
     assert!(

@@ -1,5 +1,5 @@
-//! What a newcomer gets wrong: each fault planted in films of different blades, and films without a fault.
-//! `docs/quality.md` has the counts of the thorough run.
+//! Typical mistakes of a newcomer. The tests plant each mistake in films of different blades, and also check
+//! films without a fault.
 
 use crate::blade::Parts;
 use crate::thorough;
@@ -20,8 +20,8 @@ struct Film {
 }
 
 impl Parts {
-    /// The blade of the same rubber and `size` times as large: lengths grow with the size, masses with its
-    /// cube, and frequencies fall as its inverse.
+    /// The parts of a blade of the same rubber that is `size` times as large: lengths are proportional to the
+    /// size, masses to its cube, and frequencies to its inverse.
     fn scaled(self, size: f64) -> Self {
         let power = |value: f64, exponent: i32| value * size.powi(exponent);
         let Self { m, l, g, j, k, c, hd, .. } = self;
@@ -39,13 +39,14 @@ impl Parts {
     }
 }
 
-/// A number between two others, evenly on a logarithmic axis.
+/// A random number between `low` and `high`, uniformly distributed on a logarithmic axis.
 fn between(rng: &mut impl Rng, low: f64, high: f64) -> f64 {
     low * (high / low).powf(rng.random::<f64>())
 }
 
-/// A film of a random blade of `sizes` times the usual size around a reversal, at a rate that resolves the
-/// neck or, if `any_rate`, at any rate; `None` if the blade leaves the glass.
+/// A film of a random blade around a reversal; its size is between `sizes[0]` and `sizes[1]` times the usual
+/// size. The frame rate resolves the vibration of the neck or, if `any_rate`, is random; `None` if the blade
+/// leaves the glass.
 fn film_blade(seed: u64, sizes: [f64; 2], any_rate: bool) -> Option<Film> {
     let rng = &mut Xoshiro256PlusPlus::seed_from_u64(seed);
     let size = between(rng, sizes[0], sizes[1]);
@@ -84,7 +85,8 @@ fn film_blade(seed: u64, sizes: [f64; 2], any_rate: bool) -> Option<Film> {
     Some(Film { recording, height_m })
 }
 
-/// A slow rig: a slider on a spring that rests on a belt and slips back, without heights.
+/// A film of a slow stick-slip rig, without heights: the head moves at constant speed, and the tip rests,
+/// slips after it and rings down.
 fn film_rig(seed: u64) -> Film {
     let rng = &mut Xoshiro256PlusPlus::seed_from_u64(seed);
     let frame_rate_hz = between(rng, 500.0, 2_000.0).round();
@@ -113,7 +115,8 @@ fn film_rig(seed: u64) -> Film {
     Film { recording: Recording::new("rig", grid, traces, true).unwrap(), height_m: f64::NAN }
 }
 
-/// The findings that are more than notes, the first first; with a scene if its height is given.
+/// The findings that are more than notes, in the reported order. If `scene_height_m` is given, the height of
+/// the blade is compared with it.
 fn doubts(recording: &Recording, scene_height_m: Option<f64>) -> Vec<QualityFinding> {
     let optics = Optics { exposure_s: Some(0.1 / recording.grid().frame_rate_hz), metres_per_pixel: None };
     let measured = measure_quality(recording, optics.exposure_s);
@@ -128,7 +131,8 @@ fn doubts(recording: &Recording, scene_height_m: Option<f64>) -> Vec<QualityFind
 
 type Columns = [Vec<Option<f64>>; 4];
 
-/// A film with other columns (tip x, tip y, head x, head y) and another rate.
+/// The recording of a film with changed columns (tip x, tip y, head x, head y) and the frame rate `rate`,
+/// 1/s.
 fn alter_film(film: &Film, rate: f64, change: impl Fn(Columns) -> Columns) -> Recording {
     let traces = film.recording.traces().clone();
     let [tip_x_m, tip_y_m, head_x_m, head_y_m] =
@@ -155,7 +159,7 @@ fn average_frames(column: &[Option<f64>], width: usize) -> Vec<Option<f64>> {
     (0..column.len()).map(mean).collect()
 }
 
-/// Frames of the tip left out, and its track closed up.
+/// Leaves out `lost` evenly spread frames of the tip and renumbers the rest of its track without gaps.
 fn close_up_track([mut tip_x, mut tip_y, mut head_x, mut head_y]: Columns, lost: usize) -> Columns {
     let every = tip_x.len() / (lost + 1);
     for column in [&mut tip_x, &mut tip_y] {
@@ -167,7 +171,8 @@ fn close_up_track([mut tip_x, mut tip_y, mut head_x, mut head_y]: Columns, lost:
     [tip_x, tip_y, head_x, head_y]
 }
 
-/// Name of a fault, the check that names it, and the film with it.
+/// Name of a fault, name of the check that reports it, and a function that makes a recording with the fault
+/// from a film.
 type Fault = (&'static str, &'static str, fn(&Film) -> Recording);
 
 fn own_rate(film: &Film) -> f64 {
@@ -208,7 +213,7 @@ const FAULTS: [Fault; 10] = [
     }),
 ];
 
-/// The first `count` films of usual blades, each at a rate that resolves its neck.
+/// The first `count` films of usual blades, each at a frame rate that resolves the vibration of the neck.
 fn usual_films(count: usize) -> Vec<Film> {
     (1_000..).filter_map(|seed| film_blade(seed, [0.5, 2.0], false)).take(count).collect()
 }

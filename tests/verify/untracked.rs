@@ -1,5 +1,5 @@
-//! Positions that nobody tracked, planted in made recordings: how many frames the checks find, and how many
-//! clean recordings they caution.
+//! Untracked positions are planted in synthetic recordings. The tests count the planted frames that the
+//! checks find, and the clean recordings that get a caution.
 
 use portable_math::StandardNormal;
 use rand::{Rng, SeedableRng};
@@ -21,13 +21,13 @@ enum Motion {
     StickSlip,
 }
 
-/// A made recording.
+/// Settings of a synthetic recording.
 #[derive(Debug, Clone, Copy)]
 struct Made {
     frames: usize,
     rate_hz: f64,
     motion: Motion,
-    /// Noise of a frame, m.
+    /// Standard deviation of the noise of a position, m.
     noise_m: f64,
     /// Correlation of the noise of neighbouring frames.
     correlation: f64,
@@ -35,7 +35,7 @@ struct Made {
     step_m: f64,
     /// Whether heights are recorded.
     heights: bool,
-    /// Whether some frames apart from the planted faults are missing.
+    /// Whether every seventh frame is missing, except near planted faults.
     gaps: bool,
     seed: u64,
 }
@@ -131,7 +131,7 @@ enum Fault {
     Reflection,
 }
 
-/// Runs of lost frames of 2 to `longest` frames, with at least 12 frames between them.
+/// Runs of lost frames of 2 to `longest` frames, with at least 6 frames between them.
 fn lost_runs(made: &Made, longest: usize, share: f64) -> Vec<std::ops::Range<usize>> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(1_000 + made.seed);
     let (mut runs, mut frame) = (vec![], 10);
@@ -147,7 +147,7 @@ fn lost_runs(made: &Made, longest: usize, share: f64) -> Vec<std::ops::Range<usi
     }
 }
 
-/// The tip with a fault in the given frames.
+/// Traces in which the tip has the fault in the given runs of frames.
 fn with_fault(made: &Made, fault: Fault, runs: &[std::ops::Range<usize>]) -> Traces {
     let mut traces = made.traces();
     for column in [&mut traces.tip_x_m, &mut traces.tip_y_m] {
@@ -169,8 +169,8 @@ fn with_fault(made: &Made, fault: Fault, runs: &[std::ops::Range<usize>]) -> Tra
     traces
 }
 
-/// Share of the planted frames that are found, and frames of the tip that are found though not planted, over
-/// ten recordings.
+/// Results of ten recordings: the fraction of the planted frames that are found, and the number of frames of
+/// the tip that are found but were not planted.
 fn score(made: Made, fault: Fault, longest: usize, share: f64) -> (f64, usize) {
     let (mut planted_frames, mut hits, mut false_frames) = (0, 0, 0);
     for seed in 0..10 {
@@ -188,7 +188,7 @@ fn score(made: Made, fault: Fault, longest: usize, share: f64) -> (f64, usize) {
 }
 
 /// Pixels are 20 um. A step as coarse as the noise hides part of the repeats and all lines. The few frames
-/// that are found though not planted are neighbours of planted ones.
+/// that are found but were not planted are next to planted frames.
 #[test]
 fn planted_faults_are_found() {
     let decimals = |step_m: f64| Made { step_m, ..CAMERA };
@@ -291,7 +291,8 @@ fn a_rest_within_one_step_of_its_sensor_is_not_held() {
     }
 }
 
-/// A head that is speed times time, and a tip that is this head less a force in whole steps.
+/// The head is computed as speed times time, and the tip as the position of the head minus a deflection in
+/// whole steps.
 #[test]
 fn a_computed_point_is_not_interpolated() {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(4);
@@ -307,7 +308,7 @@ fn a_computed_point_is_not_interpolated() {
     let traces = Traces { tip_x_m, head_x_m, tip_y_m: missing(), head_y_m: missing(), ..Traces::default() };
     let found = find(traces, 2_000.0);
     assert!(found.iter().all(|found| found.check.name() == "outliers"), "{found:?}");
-    // the same with a head without noise beside a tip whose gaps are filled
+    // a computed head without noise is not reported either if the gaps of the tip are filled by lines
     let runs = lost_runs(&CAMERA, 8, 0.3);
     let mut traces = with_fault(&CAMERA, Fault::Interpolated, &runs);
     traces.head_x_m = (0..1_000).map(|i| Some(2e-5 * f64::from(i))).collect();
@@ -363,7 +364,8 @@ fn what_nobody_tracked_is_left_out_on_request() {
 
 // (simulated)
 
-/// Runs of a blade that sticks and slips, seen with steps from none to whole pixels and without noise.
+/// Simulated films of a blade that sticks and slips, without noise. The positions are rounded to steps from 0
+/// to a whole pixel.
 #[test]
 fn a_simulated_blade_that_sticks_is_tracked() {
     use wiperlab::simulate::SolverOptions;

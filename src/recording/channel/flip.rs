@@ -8,8 +8,8 @@ use std::ops::Range;
 const START_SHARE: f64 = 0.05;
 /// Fraction of the change of the deflection at which the flip ends.
 const END_SHARE: f64 = 0.95;
-/// Number of tracked frames on either side of the head's turn that always enter the median which gives the
-/// level of the deflection before the turn.
+/// The level of the deflection before a turn of the head is a median. At least this number of tracked frames
+/// on either side of the turn enter it.
 const NEAR_TURN: usize = 5;
 /// Minimum number of tracked frames for the level of the deflection after the turn: the median of fewer
 /// frames is dominated by noise.
@@ -34,7 +34,8 @@ pub struct Flip {
     pub end_s: f64,
 }
 
-/// A turn, the tip's rest around it and the next turn, in frames (real numbers).
+/// Frame numbers (real numbers) of a turn, of the start and end of the tip's rest around it, and of the next
+/// turn.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TurnNeighbourhood {
     pub turn: f64,
@@ -65,8 +66,8 @@ pub(super) fn find_flip(
     Some((start, interpolate_crossing(points, &share, end.checked_sub(1)?, END_SHARE)))
 }
 
-/// Indices of the points between the stop of the tip and the turn of the head, in either order, and of at
-/// least [`NEAR_TURN`] points on either side of the turn.
+/// Indices of the points between the stop of the tip and the turn of the head (either may come first), and of
+/// at least [`NEAR_TURN`] points on either side of the turn.
 fn level_before(points: &[(usize, f64)], around: &TurnNeighbourhood) -> Range<usize> {
     let frames = [around.turn, around.hold.unwrap_or(around.turn)];
     let [turn, hold] = frames.map(|frame| index_at_frame(points, frame));
@@ -82,8 +83,8 @@ fn level_after(points: &[(usize, f64)], around: &TurnNeighbourhood) -> Range<usi
     from..index_at_frame(points, (around.release + rested).min(around.next_turn)).max(from)
 }
 
-/// Frame number (a real number) at which the fraction `share` of the change passes `level` between a point
-/// and the next point, by linear interpolation.
+/// Frame number (a real number) at which the fraction `share` of the change passes `level` between the point
+/// `index` and the next point, by linear interpolation.
 fn interpolate_crossing(
     points: &[(usize, f64)],
     share: &impl Fn(usize) -> f64,

@@ -13,12 +13,12 @@ const RETURN_NOISES: f64 = 12.0;
 /// Smallest distance that the head must move towards a turn and away from it, as a fraction of the head's
 /// whole travel; vibration of the drive is smaller.
 const RETURN_TRAVEL: f64 = 0.005;
-/// The time of a turn comes from a parabola through the frames in which the distance of the head from the
-/// extremum is at most this multiple of the smallest distance of a turn.
+/// The time of a turn comes from a parabola. It is fitted to the frames in which the head is near the
+/// extremum: within this multiple of the smallest movement that counts as a turn.
 const FIT_RETURNS: f64 = 4.0;
 
-/// A turn of the head: its time in frames, and the first and last frame to which the parabola was fitted that
-/// gives this time.
+/// A turn of the head: its time in frames, and the first and last frame of the fitted parabola that gives
+/// this time.
 pub(super) struct HeadTurn {
     pub frame: f64,
     pub first: usize,
@@ -110,10 +110,11 @@ const HOLD_STEPS: f64 = 1.1;
 /// Number of consecutive frames outside the tolerance, all on the same side, that end a hold; fewer frames
 /// are outliers of the tracker.
 const LEFT_FRAMES: usize = 3;
-/// Number of frames on either side of a turn at which a search for a hold starts. They are spread evenly over
-/// the frames of the parabola that gives the time of the turn.
+/// The search for a hold starts at the turn and at this number of frames on either side of it. These frames
+/// are spread evenly over the frames of the parabola that gives the time of the turn.
 const SEEDS: isize = 4;
-/// Half the number of frames whose median is the first estimate of the position of a hold.
+/// The first estimate of the position of a hold is the median over the starting frame and this number of
+/// frames on either side of it.
 const SEED_HALF: usize = 5;
 /// Smallest travel of the head during a hold, in tolerances of the tip's position. If the tip only follows a
 /// slow head, it leaves the tolerance before the head has travelled two tolerances; noise adds less than two

@@ -119,8 +119,8 @@ impl Window {
 }
 
 impl WindowEnd {
-    /// Time of this end, s, as the end of a window (if `at_end`) or as its start; `None` means the end or the
-    /// start of the recording.
+    /// Time, s, at which a window ends (if `at_end`) or starts. `None` means the end or the start of the
+    /// recording, respectively.
     fn time_s(self, at_end: bool, instants: &ReversalInstants) -> Result<Option<f64>, AbsentInstant> {
         match self {
             Self::Open => Ok(None),
@@ -228,7 +228,7 @@ fn parse_phase(text: &str) -> Result<Window, &'static str> {
     if rest.trim().is_empty() { Ok(Window { from: end, to: end }) } else { Err(EXPECTED_PHASE) }
 }
 
-/// The number in `[k]`, 1 without brackets, and the text after it.
+/// Parses an optional `[k]`: the number `k` (1 without brackets), and the text after it.
 fn parse_reversal(text: &str) -> Result<(usize, &str), &'static str> {
     let Some(rest) = text.strip_prefix('[') else { return Ok((1, text)) };
     let (number, rest) = rest.split_once(']').ok_or("`]` after the number of the reversal")?;

@@ -13,12 +13,11 @@ const NO_ROWS: &str = ": found no rows of numbers, expected the header \
 pub const HEADER: &str = "time_s,tip_x_m,tip_y_m,head_x_m,head_y_m";
 const CONFIDENCES: [&str; 2] = ["tip_confidence", "head_confidence"];
 const POSITIONS: usize = 4;
-/// Number of rows in a block of text, which has about half a megabyte; [`BLOCKS`] blocks are made in
-/// parallel.
+/// Number of rows in a block of text (about half a megabyte); [`BLOCKS`] blocks are written in parallel.
 const BLOCK_ROWS: usize = 4096;
 const BLOCKS: usize = 8;
 
-/// Largest distance of a time from its frame, in frames, that is always accepted for a rounded frame rate.
+/// A rounded frame rate is always accepted if every time is within this distance, in frames, of its frame.
 /// Times printed with 16 digits are far closer to their frames.
 const SNAP_FRAMES: f64 = 1e-6;
 
@@ -156,7 +155,7 @@ impl<'a> TraceTable<'a> {
         Ok(())
     }
 
-    /// Whether no grid explains the times.
+    /// Whether the times of the rows do not fit any uniform grid.
     pub(super) fn is_uneven(&self) -> bool {
         let seed_s = clock::median_step_s(&self.times_s).unwrap_or_default();
         clock::number_frames(&self.times_s, seed_s).is_some_and(|fit| !fit.is_on_grid())

@@ -6,8 +6,8 @@ use super::noise::FrameGaps;
 use crate::recording::{FrameGrid, Recording};
 use short_spectra::sampling::exposure_gain;
 
-/// Fraction of missing frames above which the finding is a caution. Least-squares spectra with the true frame
-/// times stay accurate up to 40 % of missing frames, but weak components are lost much earlier.
+/// Fraction of missing frames above which the finding on gaps is a caution. Least-squares spectra with the
+/// true frame times stay accurate up to 40 % of missing frames, but weak components are lost much earlier.
 const MANY_MISSING: f64 = 0.2;
 /// Largest fraction of the recording that a single gap may cover without a caution: a longer gap may hide the
 /// whole stick phase of a stroke.
@@ -32,7 +32,7 @@ pub(crate) fn is_playback_rate(rate_hz: f64) -> bool {
     PLAYBACK_RATES_HZ.iter().any(|playback| (rate_hz / playback - 1.0).abs() <= PLAYBACK_NEARNESS)
 }
 
-/// Finding on a recording with true times.
+/// Finding on a recording whose tracks were interpolated from true frame times to a grid.
 pub(super) fn check_clock(recording: &Recording) -> Option<QualityFinding> {
     let value = (recording.departure_frames?, "frames");
     let advice = "trust amplitudes up to half of the Nyquist frequency; above it the interpolation makes them too small";

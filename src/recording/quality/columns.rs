@@ -8,34 +8,40 @@ use super::regression::{fit_rows, polynomial_row};
 use crate::recording::Traces;
 use crate::recording::channel::ReversalInstants;
 
-/// Number of blocks of each stroke whose cubic is compared with the path along the sweep.
+/// Number of blocks into which a stroke is divided. In each block, a cubic is fitted to the path along the
+/// sweep.
 const BLOCKS: usize = 8;
 /// Minimum number of frames of a block.
 const LEAST_BLOCK: usize = 16;
-/// The rougher of two paths deviates from its cubics by this many times as much (mean square, in units of
-/// the noise) as the smoother one, and as noise.
+/// Smallest ratio of the roughnesses of two paths at which the rougher path is taken for that of the tip. The
+/// roughness is the mean square deviation from cubics, in units of the squared noise. The smoother path
+/// counts as at least 1, the roughness of noise.
 const ROUGHER: f64 = 3.0;
-/// Smallest difference of the travels around a turn, as a fraction: the tip rests while the head passes over
-/// it.
+/// Smallest difference of the travels of two points around a turn that shows which one is the head, as a
+/// fraction of the travel. The head travels farther, because the tip rests while the head passes over it.
 const FARTHER: f64 = 0.05;
 /// Range of the middle 98 % of white noise, in standard deviations.
 const NOISE_RANGE: f64 = 4.65;
-/// A height varies if its range exceeds that of noise by this factor, and rests if by less than half of it.
+/// Smallest ratio of the range of a height to that of noise at which the height varies. The other height must
+/// have a range that is smaller than that of the varying height by at least the same factor.
 const VARIES: f64 = 1.6;
-/// Smallest height of the upper point, in units of the noise.
+/// Smallest difference between the heights of two points, or between their travels, that counts, in units of
+/// the noise.
 const HEIGHT_NOISES: f64 = 10.0;
-/// Smallest height of the upper point, in units of the range of the deflection: a blade that leans to both
-/// sides by 45 degrees has a range of 1.4 times its height.
+/// Smallest height of the upper point above the lower one that counts, in units of the range of the
+/// deflection: a blade that leans to both sides by 45 degrees has a range of 1.4 times its height.
 const HEIGHT_DEFLECTIONS: f64 = 0.3;
-/// Smallest range along y, as a fraction of that along x, that shows exchanged columns: the head sinks by at
-/// most a third of the height of the blade, and a film shows at least a travel of that height.
+/// Smallest range of a point along y that shows exchanged columns, as a fraction of its range along x. With
+/// correct columns the fraction is smaller: the head sinks by at most a third of the height of the blade, and
+/// its travel in a film is at least this height.
 const ALONG_Y: f64 = 0.8;
-/// Smallest such range in units of the noise.
+/// Smallest range of a point along y that shows exchanged columns, in units of the noise or the step along y,
+/// whichever is larger.
 const ALONG_Y_NOISES: f64 = 30.0;
-/// Maximum number of frames from which the height of a point is fitted.
+/// Maximum number of frames in the fit of a point's height against its position along the sweep.
 const MOST_ROWS: usize = 4_000;
 
-/// Mean square of the deviation of a path from cubics over blocks, in units of its noise.
+/// Mean square of the deviation of a path from the cubics of its blocks, in units of the squared noise.
 fn roughness(samples: &[Option<f64>], noise_m: f64, strokes: usize) -> Option<f64> {
     let length = (samples.len() / (BLOCKS * strokes)).max(LEAST_BLOCK);
     let block = |block: &[Option<f64>]| {
@@ -50,7 +56,8 @@ fn roughness(samples: &[Option<f64>], noise_m: f64, strokes: usize) -> Option<f6
     (noise_m > 0.0 && !squares.is_empty()).then(|| mean / (noise_m * noise_m))
 }
 
-/// Range of a height without tilt and curvature of the glass, in units of the range of noise.
+/// Range of a height, in units of the range of noise, after tilt and curvature of the glass are removed (a
+/// parabola along the sweep).
 fn height_range(x: &[Option<f64>], y: &[Option<f64>], quality: &ChannelQuality) -> Option<f64> {
     let noise_m = quality.noise_m.filter(|noise| *noise > 0.0)?.max(quality.step_m.unwrap_or(0.0) / 3.0);
     let centre = x.iter().flatten().next()?;
@@ -64,7 +71,7 @@ fn height_range(x: &[Option<f64>], y: &[Option<f64>], quality: &ChannelQuality) 
     Some(trimmed_range_m(&rest)? / (NOISE_RANGE * noise_m))
 }
 
-/// Finding on exchanged points or columns or on the direction of y.
+/// Finding on exchanged points, on exchanged columns, or on a wrong direction of y.
 pub(super) fn check_columns(
     traces: &Traces,
     measured: &Quality,
@@ -106,7 +113,7 @@ pub(super) fn check_columns(
         (x_exchanged == Some(true), "the tip moves as a head does, smoothly and farther".to_owned()),
         (y_exchanged == Some(true), "the head keeps its height and the tip does not".to_owned()),
     ];
-    // (without stick and slip or without a lean, the other column of the point decides)
+    // (if x gives no answer, y decides; if y gives none, x and the order of the heights decide)
     let y_exchanged = y_exchanged.unwrap_or(upside_down && x_exchanged == Some(true));
     let x_exchanged = x_exchanged.unwrap_or(y_exchanged);
     let flipped = upside_down != y_exchanged;
@@ -132,7 +139,7 @@ pub(super) fn check_columns(
     Some(QualityFinding::advise((check, Severity::Caution), value, found, advice))
 }
 
-/// Finding on a point that moves as far along y as along x.
+/// Finding on a point whose range along y is nearly as large as its range along x, or larger.
 fn check_sweep_along_y(traces: &Traces, measured: &Quality) -> Option<QualityFinding> {
     let points = [
         ("tip", &traces.tip_x_m, &traces.tip_y_m, &measured.tip_y),

@@ -1,11 +1,12 @@
 //! Positions that a tracking program wrote where it had lost the point: it repeats the last position, or it
-//! joins two tracked positions by a straight line. In the first case first differences are zero, in the
-//! second case second differences.
+//! joins two tracked positions by a straight line. Repeats make first differences zero; lines make second
+//! differences zero.
 //!
 //! A real point also rests or moves along a line. So each run of such frames is compared with the noise
 //! around it. For `k` differences in a row the joint density at zero is `(2 pi s^2)^(-k/2) det(G)^(-1/2)`,
-//! with the standard deviation `s` of the noise and the Gram matrix `G` of the differences. Its product
-//! with the volume in which the differences count as zero is the probability that noise causes the run.
+//! where `s` is the standard deviation of the noise and `G` is the Gram matrix of the differences. The
+//! probability that noise causes the run is this density times the volume in which the differences count as
+//! zero.
 
 use super::finding::Check;
 use super::measurement::{MOST_POSITIONS, MeasuredColumn};
@@ -15,8 +16,8 @@ use portable_math as math;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-/// Orders of the differences from which the noise around a run is taken: the smallest estimate counts,
-/// because motion makes some of them too large.
+/// Orders of the differences from which the noise around a run is estimated. The smallest estimate counts,
+/// because motion makes some of the estimates too large.
 const NOISE_ORDERS: std::ops::RangeInclusive<usize> = 2..=5;
 /// Number of frames on either side of a run from which the noise is taken.
 const AROUND: usize = 40;
@@ -26,11 +27,14 @@ const SPACING_ORDERS: [usize; 2] = [2, 3];
 /// Probability of a zero difference above which an axis is not judged: a point at rest then stays within one
 /// step for many frames.
 const LIKELY_ZERO: f64 = 0.2;
-/// Fraction of the noise within which a second difference counts as zero, if the step is smaller than that.
+/// Largest second difference that counts as zero, as a fraction of the noise, if the step is smaller than
+/// this value.
 const ZERO_SHARE: f64 = 1.0 / 300.0;
-/// Second differences of a line that is rounded to steps are at most one step.
+/// Largest second difference that counts as zero, in steps. Positions on a line that are rounded to steps
+/// have second differences of at most one step.
 const ROUNDED_STEPS: f64 = 1.01;
-/// Number of steps that such a second difference can take: -1, 0 and 1.
+/// Number of values that the second difference of rounded positions on a line can have, in steps: -1, 0 and
+/// 1.
 const ROUNDED_VALUES: f64 = 3.0;
 /// Ratio of the tolerated number of runs to `1 + expected`, where `expected` is the number of runs that noise
 /// is expected to cause.
@@ -39,16 +43,19 @@ const BY_NOISE: f64 = 3.0;
 const NO_RUNS: f64 = 1e-3;
 /// Smallest noise of an axis that moves, m; below a picometre, the noise is rounding of a point at rest.
 const LEAST_NOISE_M: f64 = 1e-12;
-/// Smallest movement back to the true position, in steps and in standard deviations of the noise.
+/// Smallest jump after a run of repeats that shows a held point, in units of the value spacing or the noise,
+/// whichever is larger.
 const CERTAIN_STEPS: f64 = 4.0;
-/// Smallest movement back to the true position, in large changes of speed around the run.
+/// Smallest jump after a run of repeats that shows a held point, in units of a large change of speed around
+/// the run.
 const CHANGES_OF_SPEED: f64 = 2.5;
-/// Fraction of the changes of speed that a large one exceeds: a few come from other faults.
+/// Quantile of the changes of speed around a run that counts as a large change: the few changes above it may
+/// come from other faults.
 const LARGE_CHANGE: f64 = 0.95;
 /// Minimum number of changes of speed around a run: with fewer, the point rests in most frames.
 const FEWEST_CHANGES: usize = AROUND / 2;
-/// Minimum number of runs of a point with one axis, and of runs during which the point moves on: one or two
-/// may be rests of the blade itself.
+/// Minimum number of runs that are reported for a point with one axis, and of runs that only a jump
+/// afterwards shows to be held: one or two may be rests of the blade itself.
 const FEWEST_RUNS: usize = 3;
 
 /// A column whose differences of one order are compared with zero.
@@ -62,8 +69,9 @@ struct DifferenceAxis<'a> {
     width_m: f64,
 }
 
-/// Distance between neighbouring values of a column, m: the largest gap between the sizes of its differences
-/// below their median. It is the step of a sensor also if its conversion made the steps unequal.
+/// Distance between neighbouring values of a column, m: the sizes of its differences are sorted, and the
+/// largest gap between neighbouring sizes below the median is taken. This is the step of a sensor even if the
+/// conversion to metres made the steps unequal.
 fn value_spacing(samples: &[Option<f64>]) -> f64 {
     let spacing = |order: usize| {
         let frames = (order..samples.len()).step_by(samples.len() / MOST_POSITIONS + 1);
@@ -77,8 +85,9 @@ fn value_spacing(samples: &[Option<f64>]) -> f64 {
 }
 
 impl<'a> DifferenceAxis<'a> {
-    /// `None` for a column without values, with a constant value or with too few frames for its noise. The
-    /// columns of a point have the same number of decimals, so the larger step of the two counts.
+    /// Measures an axis; `None` if the column has no values, only one value, or too few frames for an
+    /// estimate of the noise. `step_m` is the larger step of the two columns of the point, because both
+    /// columns have the same number of decimals.
     fn measure_axis(column: &MeasuredColumn<'a>, order: usize, step_m: f64) -> Option<Self> {
         let (samples, noise_m) = (column.samples, column.quality.noise_m?);
         let first = samples.iter().flatten().next()?;
@@ -115,8 +124,8 @@ impl<'a> DifferenceAxis<'a> {
         if judged { math::powi(ratio, run.len() as i32) / determinant(run.len() as f64).sqrt() } else { 1.0 }
     }
 
-    /// Whether the point moves on while the column repeats: afterwards it jumps by much more than its speed
-    /// changes around the run.
+    /// Whether the point moves on while the column repeats its value: the position then jumps after the run
+    /// by much more than the changes of speed around the run.
     fn moves_on(&self, run: &Range<usize>) -> Option<bool> {
         let at = |frame: usize| *self.samples.get(frame)?;
         let jump_m = (at(run.end)? - at(run.start.checked_sub(1)?)?).abs();
@@ -124,8 +133,8 @@ impl<'a> DifferenceAxis<'a> {
         Some(jump_m >= certain_m.max(CHANGES_OF_SPEED * self.speed_change_around(run)?))
     }
 
-    /// Size of the second differences around a run that few of them exceed, m, where the point moves in every
-    /// frame; `None` if it rests in most frames.
+    /// A large change of speed around a run, m: a high quantile of the sizes of the second differences of
+    /// frames in which the point moves. `None` if the point rests in most frames.
     fn speed_change_around(&self, run: &Range<usize>) -> Option<f64> {
         let frames = run.start.saturating_sub(AROUND)..self.samples.len().min(run.end + AROUND);
         let moves = |frame: &usize| (0..3).all(|back| *frame >= back && !self.is_zero(frame - back));
@@ -138,8 +147,8 @@ impl<'a> DifferenceAxis<'a> {
 }
 
 /// Probability that noise causes a run on all axes of a point. Both axes of a point have about the same
-/// noise, so the smaller estimate counts: motion affects it less. For a point with one axis, the other
-/// point serves as well.
+/// noise, so the smaller estimate counts: motion affects it less. For a point with one axis, the axes of the
+/// other point also enter the estimate.
 fn point_chance(axes: &[DifferenceAxis<'_>], other: &[DifferenceAxis<'_>], run: &Range<usize>) -> f64 {
     let others = if axes.len() > 1 { &[] } else { other };
     let noise_m = axes.iter().chain(others).map(|axis| axis.noise_around(run)).fold(f64::INFINITY, f64::min);
@@ -162,7 +171,8 @@ fn event_runs(frames: usize, fewest: usize, is_event: impl Fn(&usize) -> bool) -
     runs
 }
 
-/// The most improbable runs, as many as exceed the number that noise causes by far, in order.
+/// The least probable runs, in order of time: the largest number of them that far exceeds the number of
+/// equally improbable runs expected from noise. Empty if there are fewer than `fewest`.
 fn improbable_runs(
     runs: Vec<Range<usize>>,
     frames: usize,
@@ -183,7 +193,8 @@ fn improbable_runs(
     runs
 }
 
-/// Fewest repeats of one point, and fewest points on a line between two others, that are judged.
+/// Minimum number of consecutive repeats of one point, or of points on a line between two others, that are
+/// judged.
 const FEWEST_FILLED: usize = 2;
 
 /// Frames in which both points repeat the previous frame, frames in which one point repeats its last

@@ -1,6 +1,6 @@
-//! Frames by which the tracks of tip and head are apart.
+//! Lag between the tracks of tip and head, in frames.
 //!
-//! While the tip is on the glass, the head is the lower the more the blade leans, so its height is a function
+//! While the tip is on the glass, the head sinks as the blade leans, so the height of the head is a function
 //! of the deflection in the same frame. If one track is shifted, the height follows the shifted deflection
 //! less closely. A lag that grows, because one track lost frames and was renumbered, adds speed times lag to
 //! the deflection; this is visible without heights.
@@ -12,22 +12,26 @@ use crate::recording::Traces;
 use crate::recording::channel::median_in_place;
 use std::ops::Range;
 
-/// Largest growth of a lag, as a fraction of the frames: more than a tenth of a track is not lost unnoticed.
+/// Largest accepted growth of a lag over the recording, as a fraction of the number of frames: a loss of more
+/// than a tenth of a track would be noticed.
 const MOST_GROWTH: f64 = 0.1;
 /// Largest lag that is tried, frames.
 const MOST_LAG: isize = 40;
-/// Smallest lag of a finding, frames: neck and lip bend with a phase lag of a frame or two.
+/// Smallest lag that is reported, frames: neck and lip bend with a phase lag of one or two frames.
 const LEAST_LAG: isize = 3;
-/// Smallest difference of the lags in the two halves of a recording, and smallest growth of a lag, frames.
+/// A lag counts as growing if the lags in the two halves of a recording, or at its start and its end, differ
+/// by at least this number of frames.
 const LEAST_GROWTH: f64 = 5.0;
-/// Largest mean square of the residuals at the best lag, as a fraction of that without a lag. In 97 clean
-/// films with a best lag of three frames or more it is at least 0.919.
+/// A lag is clear if the mean square of its residuals is below this fraction of the mean square without a
+/// lag. In 97 clean films with a best lag of three frames or more, the fraction is at least 0.919.
 const CLEARLY_BETTER: f64 = 0.9;
-/// The same if the residuals at the best lag are noise alone: nothing else can change the fraction then.
+/// Replaces [`CLEARLY_BETTER`] if the residuals at the best lag are only noise: then nothing but a lag can
+/// change the fraction.
 const BETTER_IN_NOISE: f64 = 0.96;
-/// Largest mean square of residuals that are noise alone, in units of the square of the noise.
+/// Residuals count as only noise if their mean square is below this multiple of the squared noise.
 const NOISE_ALONE: f64 = 1.25;
-/// Largest mean square of the residuals with a growing lag, as a fraction of that with a constant lag.
+/// A growing lag is accepted if the mean square of its residuals is below this fraction of the mean square
+/// with a constant lag and a drift.
 const GROWTH_EXPLAINS: f64 = 0.5;
 /// Maximum number of frames of a fit.
 const MOST_ROWS: usize = 4_000;
@@ -36,12 +40,12 @@ const MOST_ROWS: usize = 4_000;
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct BestLag {
     frames: isize,
-    /// Whether the fit without a lag is clearly worse.
+    /// Whether the lag is large enough to be reported and the fit without it is clearly worse.
     clear: bool,
 }
 
-/// Lag of the tip behind the head, frames: at the start and the end of the recording. Both are equal unless
-/// the lag grows. `None` if tip and head are not visibly apart.
+/// Lag of the tip's track behind the head's track, in frames, at the start and the end of the recording. Both
+/// are equal unless the lag grows. `None` if no lag is visible.
 pub(super) fn measure_lag_frames(traces: &Traces, measured: &Quality) -> Option<[f64; 2]> {
     let frames = traces.tip_x_m.len();
     let best = |range: Range<usize>| best_lag(traces, range, measured.head_y.noise_m?);
@@ -52,7 +56,7 @@ pub(super) fn measure_lag_frames(traces: &Traces, measured: &Quality) -> Option<
         && first.frames.abs_diff(last.frames) as f64 >= LEAST_GROWTH
         && first.frames * last.frames >= 0
     {
-        // (each half has its mean lag)
+        // (the lag of a half is its mean over this half)
         let half_growth = (last.frames - first.frames) as f64 / 2.0;
         return Some([first.frames as f64 - half_growth, last.frames as f64 + half_growth]);
     }
@@ -90,8 +94,9 @@ fn best_lag(traces: &Traces, range: Range<usize>, noise_m: f64) -> Option<BestLa
     Some(BestLag { frames, clear: frames.abs() >= LEAST_LAG && least < limit * unshifted })
 }
 
-/// A lag that grows evenly, frames at the start and the end, from the speed of the head. A drift of one track
-/// at constant speed looks the same, so only a lag that a drift does not explain counts.
+/// Lag at the start and the end of the recording, in frames, if it grows evenly, from a fit of the deflection
+/// to the speed of the head. If the head moves at constant speed, a drift of one track looks like a growing
+/// lag; only a lag that explains the deflection much better than a drift counts.
 fn growing_lag_frames(traces: &Traces) -> Option<[f64; 2]> {
     let frames = traces.tip_x_m.len();
     let (half, head_x) = (frames / 100 + 2, &traces.head_x_m);
@@ -111,7 +116,7 @@ fn growing_lag_frames(traces: &Traces) -> Option<[f64; 2]> {
     (explains && possible.contains(&growth.abs())).then_some([mean - growth / 2.0, mean + growth / 2.0])
 }
 
-/// Finding on tracks that are apart.
+/// Finding on a lag between the tracks of tip and head.
 pub(super) fn check_lag(lag_frames: Option<[f64; 2]>) -> Option<QualityFinding> {
     let [start, end] = lag_frames?;
     let behind = |lag: f64| {

@@ -11,8 +11,8 @@ use short_spectra::sampling::{alias_hz, exposure_gain, half_power_hz};
 pub(super) const FEWEST_CYCLES: f64 = 3.0;
 /// Fraction of the Nyquist frequency up to which a component is well separated from its alias.
 pub(super) const NYQUIST_SHARE: f64 = 0.8;
-/// Maximum number of positions of a column that are used, evenly spaced in time; a stroke is smooth over a
-/// thousandth of its duration.
+/// Maximum number of positions of a column, evenly spaced in time, from which ranges, medians and value
+/// spacings are computed; a stroke is smooth over a thousandth of its duration.
 pub(super) const MOST_POSITIONS: usize = 20_000;
 
 /// Measured properties of a recording.
@@ -178,7 +178,7 @@ pub struct ComponentVisibility {
     pub frequency_hz: f64,
     /// Visibility of the component.
     pub verdict: Visibility,
-    /// Frequency at which the component appears, Hz; equal to its own frequency unless it is aliased.
+    /// Frequency at which the component appears, Hz; equal to `frequency_hz` unless the component is aliased.
     pub appears_at_hz: f64,
     /// Number of cycles of the component in the whole recording.
     pub cycles: f64,

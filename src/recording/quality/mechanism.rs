@@ -15,38 +15,42 @@ use std::f64::consts::TAU;
 /// Smallest frame rate that shows the slowest vibration of a blade, 1/s: the head on its spring vibrates at
 /// 8.88 and 20 Hz in the paper, and ten frames a cycle show its shape.
 const LEAST_RATE_HZ: f64 = 100.0;
-/// Highest frequency of strokes of a wiper, 1/s: FMVSS 104 demands at least 45 cycles a minute at the high
-/// speed, and wipers make up to 75.
+/// Highest plausible frequency of wiping cycles (two strokes each), 1/s: FMVSS 104 demands at least 45 cycles
+/// a minute at the high speed, and wipers make up to 75.
 const MOST_STROKES_HZ: f64 = 2.0;
-/// Travel from which a stroke is one of a wiper, m: a short stroke of a rig may be faster.
+/// Smallest travel for which the frequency of the wiping cycles is judged, m: a short stroke of a rig may be
+/// faster.
 const STROKE_TRAVEL_M: f64 = 0.01;
-/// Highest acceleration of a head, m/s2: twice that of gravity. A stroke of 2 m at 65 cycles a minute turns
-/// with 46 m/s2 at the end of the arm, one of the paper's rig with 1 m/s2.
+/// Highest plausible acceleration of a head, m/s2: five times that of gravity. In a stroke of 2 m at 65
+/// cycles a minute, the end of the arm turns with 46 m/s2; the head of the paper's rig turns with 1 m/s2.
 const MOST_ACCELERATION_M_PER_S2: f64 = 50.0;
-/// Highest speed of a head, m/s: the end of the longest arm reaches 3 m/s.
+/// Highest plausible speed of a head, m/s: the end of the longest arm reaches 3 m/s.
 const MOST_SPEED_M_PER_S: f64 = 5.0;
-/// Heights of a blade, m: a tenth of the lowest rubber (5 mm) and ten times the highest (20 mm).
+/// Smallest and largest plausible height of a blade, m: a tenth of the lowest rubber (5 mm) and ten times the
+/// highest (20 mm).
 const BLADE_M: [f64; 2] = [2.5e-4, 0.2];
-/// Largest ratio of the height in the recording and in the scene: the tracked point of the head may lie above
-/// its hinge.
+/// Largest allowed ratio between the blade heights of the recording and of the scene, in either direction:
+/// the tracked point of the head may lie above its hinge.
 const SCENE_RATIO: f64 = 2.0;
-/// Number of speeds measured in a stroke.
+/// Number of equal intervals of a stroke over which the speed of the head is averaged.
 const SPEEDS: usize = 64;
 /// Maximum number of frames of the fit of a stroke.
 const MOST_ROWS: usize = 500;
-/// Smallest phase of a stroke, rad, that a recording must cover to show its duration: a quarter of a turn.
+/// Smallest phase of the fitted cosine, rad, that a recording must cover to show the duration of a stroke. A
+/// whole stroke is pi rad.
 const LEAST_PHASE: f64 = 1.25;
 /// Largest phase that is fitted, rad; a longer recording shows two turns.
 const MOST_PHASE: f64 = 12.0;
 /// Ratio of neighbouring trial phases.
 const PHASE_STEP: f64 = 1.02;
-/// Largest root mean square of the residuals of a stroke, as a fraction of the travel.
+/// Largest allowed root mean square of the residuals of the fitted cosine, as a fraction of the travel.
 const STROKE_MISFIT: f64 = 0.02;
-/// Ratio of neighbouring intervals of the structure function.
+/// Ratio of successive time intervals at which the structure function is evaluated.
 const INTERVAL_STEP: f64 = 1.06;
-/// The structure function falls below this fraction of its maximum where the interval is a whole period.
+/// A maximum of the structure function counts if the function falls below this fraction of it at longer
+/// intervals, as it does for an oscillation when the interval is a whole period.
 const FALLS: f64 = 0.7;
-/// Smallest maximum of the structure function, in units of the contribution of noise.
+/// Smallest maximum of the structure function that counts, in units of the contribution of noise.
 const ABOVE_NOISE: f64 = 5.0;
 
 /// Motion of a recording as physical quantities.
@@ -56,17 +60,17 @@ pub struct MotionSummary {
     pub blade_height_m: Option<f64>,
     /// Travel of the point that travels farther, m.
     pub travel_m: Option<f64>,
-    /// Highest speed of the head, m/s, averaged over a 64th of a stroke.
+    /// Highest of the mean speeds of the head over 1/64 of a stroke, m/s.
     pub peak_speed_m_per_s: Option<f64>,
-    /// Median speed of the head, m/s, averaged in the same way.
+    /// Median of the mean speeds of the head over 1/64 of a stroke, m/s.
     pub median_speed_m_per_s: Option<f64>,
-    /// Duration of a stroke, s: between two turns of the head, or half the period of the cosine that fits its
-    /// path.
+    /// Duration of a stroke, s: the median time between turns of the head or, with fewer than two turns, half
+    /// the period of the cosine that fits the path of the head.
     pub stroke_s: Option<f64>,
     /// Frequency of the fastest oscillation of the deflection that stands out from the noise, Hz.
     pub fastest_oscillation_hz: Option<f64>,
-    /// Frames by which the track of the tip is behind that of the head, at the start and the end; absent
-    /// unless the tracks are visibly apart.
+    /// Lag of the tip's track behind the head's track, in frames, at the start and the end of the recording;
+    /// absent if no lag is visible.
     pub lag_frames: Option<[f64; 2]>,
 }
 
@@ -101,7 +105,7 @@ fn head_speeds_m_per_s(head_x: &[Option<f64>], rate_hz: f64, strokes: usize) -> 
         .map(|block| median_in_place(&mut block.iter().flatten().copied().collect::<Vec<_>>()));
     let medians: Vec<Option<f64>> = medians.collect();
     let speed = |pair: &[Option<f64>]| Some((pair[1]? - pair[0]?).abs() * rate_hz / length as f64);
-    // (the last block is shorter)
+    // (the last block may be shorter and is left out)
     medians[..medians.len().saturating_sub(1)].windows(2).filter_map(speed).collect()
 }
 
@@ -125,8 +129,9 @@ fn stroke_of_cosine_s(head_x: &[Option<f64>], rate_hz: f64) -> Option<f64> {
     fits.then(|| TAU / 2.0 * frames as f64 / rate_hz / best.0)
 }
 
-/// Frequency at which the structure function of the deflection, the mean square of its second difference over
-/// an interval, has its first maximum: an oscillation has it at half a period.
+/// Frequency of the fastest oscillation of the deflection, Hz, from its structure function. This function is
+/// the mean square of the second difference over an interval; it has its first maximum where the interval is
+/// half a period.
 fn fastest_oscillation_hz(deflection: &[Option<f64>], measured: &Quality) -> Option<f64> {
     let floor_m2 = 6.0 * ABOVE_NOISE * math::powi(measured.deflection_floor_m()?, 2);
     let every = deflection.len() / 20_000 + 1;
@@ -151,7 +156,7 @@ fn fastest_oscillation_hz(deflection: &[Option<f64>], measured: &Quality) -> Opt
     None
 }
 
-/// Findings on a frame rate or a scale that gives the mechanism impossible numbers.
+/// Findings on a frame rate or a scale with which the motion would be impossible for a wiper.
 pub(super) fn check_mechanism(motion: &MotionSummary, measured: &Quality) -> Vec<QualityFinding> {
     let height = || check_height(motion, BLADE_M, "blades of a tenth to ten times the usual size");
     // (a longer travel has its own finding)
@@ -159,7 +164,8 @@ pub(super) fn check_mechanism(motion: &MotionSummary, measured: &Quality) -> Vec
     [check_rate(motion, measured), visible.then(height).flatten()].into_iter().flatten().collect()
 }
 
-/// Finding on a blade that is not as high as that of the scene, which has `scene_height_m`.
+/// Finding on a blade whose height differs by more than a factor of two from `scene_height_m`, the height of
+/// the blade of the scene.
 #[must_use]
 pub fn check_scene_height(motion: &MotionSummary, scene_height_m: f64) -> Option<QualityFinding> {
     check_height(
@@ -205,7 +211,7 @@ fn check_rate(motion: &MotionSummary, measured: &Quality) -> Option<QualityFindi
 
 fn check_height(motion: &MotionSummary, range: [f64; 2], whose: &str) -> Option<QualityFinding> {
     let height_m = motion.blade_height_m?.abs();
-    // (tracks with their own origins may have the same height)
+    // (if each track has its own origin, the difference of the heights may be near zero)
     if height_m < BLADE_M[0] / 10.0 || (range[0]..=range[1]).contains(&height_m) {
         return None;
     }

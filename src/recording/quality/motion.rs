@@ -5,11 +5,11 @@ use super::measurement::MOST_POSITIONS;
 use crate::recording::channel::{ReversalInstants, median_in_place};
 use crate::recording::{FrameGrid, Recording, Traces};
 
-/// Fraction of frames, at the start and the end of the recording, in which only one point is tracked, above
-/// which the finding is a caution. A late start of a track affects fewer frames.
+/// The finding on overlap is a caution if, at the start and the end of the recording, only one point is
+/// tracked in more than this fraction of the frames. A late start of a track affects fewer frames.
 const MANY_ALONE: f64 = 0.1;
-/// Largest travel of a point in a camera's view that still resolves the lip, m: with 1,000 pixels across, a
-/// lip of 5 mm is 10 pixels high.
+/// Largest travel of a point that fits into a camera's view in which the lip is still resolved, m: if 1,000
+/// pixels cover this length, a lip of 5 mm is 10 pixels high.
 pub(super) const LARGEST_VIEW_M: f64 = 0.5;
 /// Travel of a point that is longer than any wiper's sweep, m: the longest blades travel about 1.5 m along
 /// their arc.
@@ -59,7 +59,7 @@ fn check_overlap(traces: &Traces, grid: FrameGrid) -> Option<QualityFinding> {
     Some(QualityFinding::advise((Check::Overlap, severity), (both as f64, "frames"), words, advice))
 }
 
-/// Range of the positions of a column, m, without the outermost ones.
+/// Range of the positions of a column, m, without the outermost 1 % at either end.
 pub(super) fn trimmed_range_m(samples: &[Option<f64>]) -> Option<f64> {
     let some = samples.iter().step_by(samples.len() / MOST_POSITIONS + 1);
     let mut positions: Vec<f64> = some.flatten().copied().collect();

@@ -4,14 +4,14 @@ use crate::recording::channel::median_in_place;
 
 /// Median absolute deviation of a normal distribution in units of its standard deviation.
 const MAD_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
-/// Variance of a difference of white noise of unit variance, from order 0: the sum of the squared binomial
-/// weights, 1 + 9 + 9 + 1 for the third difference.
+/// Variances of the differences of white noise of unit variance, for orders 0 to 5: sums of squared binomial
+/// weights, such as 1 + 9 + 9 + 1 for order 3.
 const DIFFERENCE_VARIANCES: [f64; 6] = [1.0, 2.0, 6.0, 20.0, 70.0, 252.0];
 /// Minimum number of differences between frames for an estimate of noise or step: the median of fewer is
 /// uncertain.
 const FEWEST_DIFFERENCES: usize = 8;
-/// Remainder of a division that counts as zero, relative to the largest position. It allows for the rounding
-/// of decimal numbers.
+/// Largest remainder of a division that counts as zero, as a fraction of the largest position. It allows for
+/// the rounding of decimal numbers.
 const ROUNDING: f64 = 1e-10;
 /// Maximum ratio of the largest difference between neighbouring frames to the quantisation step. A larger
 /// ratio means that the common divisor is a coincidence of many digits.
@@ -30,7 +30,8 @@ pub fn noise_floor(samples: &[Option<f64>]) -> Option<f64> {
     noise_of_differences(samples.windows(4).filter_map(third), 3)
 }
 
-/// Standard deviation of the white noise that gives the median of absolute differences of the given order.
+/// Standard deviation of the white noise whose absolute differences of this order have the same median as
+/// `sizes`.
 pub(super) fn noise_of_differences(sizes: impl Iterator<Item = f64>, order: usize) -> Option<f64> {
     let mut sizes: Vec<f64> = sizes.collect();
     if sizes.len() < FEWEST_DIFFERENCES {
@@ -39,7 +40,7 @@ pub(super) fn noise_of_differences(sizes: impl Iterator<Item = f64>, order: usiz
     Some(median_in_place(&mut sizes)? / (MAD_OF_NORMAL * DIFFERENCE_VARIANCES[order].sqrt()))
 }
 
-/// Binomial weights of the differences, from order 0.
+/// Binomial weights of the differences of orders 0 to 5.
 const DIFFERENCE_WEIGHTS: [&[f64]; 6] = [
     &[1.0],
     &[1.0, -1.0],

@@ -9,8 +9,8 @@
 //! - the points around it are much closer to their own cubics (in chatter or strong noise they are not).
 //!
 //! A single point is not judged if a frame within two frames of it is missing. Several points in a row are
-//! outliers between two jumps of about the same size in opposite directions, if no other jump of a quarter of
-//! this size is near and the point moves on where it would be without them.
+//! outliers between two jumps of about the same size in opposite directions, if no other jump of more than a
+//! quarter of this size is near and the point afterwards continues its earlier path.
 
 use super::measurement::ChannelQuality;
 use super::noise::difference_at;
@@ -52,10 +52,10 @@ const THIRD_DIFFERENCE_SD: f64 = 4.472_135_954_999_58;
 /// Largest number of frames between a jump away and the jump back. Motion of the blade itself moves it away
 /// and back in a longer time.
 const LONGEST_ABSENCE: usize = 30;
-/// Smallest size of the third difference next to a jump, as a fraction of that at the jump: half of its value
-/// without noise.
+/// Smallest size of the third difference next to a jump, as a fraction of the third difference at the jump.
+/// Without noise, this fraction is 0.5.
 const BESIDE_JUMP: f64 = 0.25;
-/// Number of frames before a jump away and after the jump back that show no other jump.
+/// Number of frames before a jump away, and after the jump back, in which no other jump may occur.
 const CALM_FRAMES: usize = 4;
 
 /// Frames of the outliers in a column, in order; `metres_per_pixel` is given if known.
@@ -83,7 +83,8 @@ pub fn outlier_frames(
     frames
 }
 
-/// Smallest movement between neighbouring frames: the step of a column with too few movements for a divisor.
+/// Smallest movement between neighbouring frames that is not zero. It is used as the step of a column that
+/// moves too rarely for a common divisor.
 fn smallest_movement(samples: &[Option<f64>]) -> Option<f64> {
     let moves = samples.windows(2).filter_map(|w| Some((w[1]? - w[0]?).abs()));
     moves.filter(|&size| size > 0.0).reduce(f64::min)

@@ -13,8 +13,8 @@ use super::smoothing::find_smoothing;
 use portable_math as math;
 use std::f64::consts::TAU;
 
-/// Number of frames of a segment: it resolves a plateau up to a sixth of the Nyquist frequency, and 32
-/// segments fit into 2,112 frames.
+/// Number of frames of a segment. A segment resolves a plateau that ends at a sixth of the Nyquist frequency,
+/// and 32 half-overlapping segments fit into 2,112 frames.
 pub(super) const SEGMENT: usize = 128;
 /// Maximum number of missing frames of a segment, which are bridged by straight lines: 5 % of missing frames
 /// change the power of a band by less than 0.5 dB.
@@ -29,19 +29,20 @@ const MOST_SEGMENTS: usize = 256;
 const EDGES: [usize; 12] = [3, 5, 7, 10, 13, 16, 20, 25, 32, 40, 50, 64];
 /// Number of frequency bands of a plateau.
 const PLATEAU: usize = 3;
-/// Largest power ratio within a plateau, 3 dB. Across three bands, the power of a random walk, 1/f^2, falls
-/// by 4 dB or more.
+/// Largest allowed ratio of the powers of two bands of a plateau: 3 dB. Across three bands, the power of a
+/// random walk, 1/f^2, falls by 4 dB or more.
 const FLAT: f64 = 2.0;
 /// In a filtered trace, the power is low in all bands above this multiple of the cut-off frequency.
 const ABOVE: f64 = 1.6;
-/// Largest power of a filtered trace in the bands above [`ABOVE`] times the cut-off frequency, as a fraction
-/// of the power of the plateau: -8 dB. A moving average over three frames just satisfies this limit.
+/// Largest allowed power of a filtered trace in the bands above [`ABOVE`] times the cut-off frequency, as a
+/// fraction of the power of the plateau: -8 dB. A moving average over three frames just satisfies this limit.
 const FALLEN: f64 = 0.16;
 /// The power of a filtered trace falls by at least this factor, 10 dB, over the steepest octave. A random
 /// walk falls by only 6 dB per octave, a filter of second order by 12 dB.
 const STEEP: f64 = 10.0;
-/// Range of the ratio of the median to the lower quartile of the power in a bin, over the segments of noise.
-/// The expected ratio is ln 2/ln(4/3) = 2.41; with 32 segments, the ratio is within this range.
+/// Allowed range of the ratio of the median to the lower quartile of the powers that the segments have in a
+/// bin, if the trace is noise. The expected ratio is ln 2/ln(4/3) = 2.41; with 32 segments, the ratio is
+/// within this range.
 const NOISE_SCATTER: std::ops::RangeInclusive<f64> = 1.6..=3.8;
 /// Smallest power of a plateau, as a fraction of the square of the largest position; a lower power is
 /// rounding error.
@@ -93,7 +94,8 @@ struct PrefilterBand {
     scatter: f64,
 }
 
-/// Segments spread over the recording, half overlapping, without trend and in a Hann window.
+/// Segments spread over the recording, half overlapping, each minus its trend and multiplied by a Hann
+/// window.
 fn collect_segments(samples: &[Option<f64>]) -> Vec<Vec<f64>> {
     let starts: Vec<usize> = (0..samples.len().saturating_sub(SEGMENT - 1)).step_by(SEGMENT / 2).collect();
     let every = starts.len() / MOST_SEGMENTS + 1;
@@ -125,7 +127,7 @@ fn windowed_segment(samples: &[Option<f64>]) -> Option<Vec<f64>> {
     let centre = (SEGMENT - 1) as f64 / 2.0;
     let place = |i: usize| (i as f64 - centre) / centre;
     let mean_square = (0..SEGMENT).map(|i| math::powi(place(i), 2)).sum::<f64>() / SEGMENT as f64;
-    // (these shapes are orthogonal on the grid)
+    // (these shapes are orthogonal over a segment, so each can be removed on its own)
     let shapes: [&dyn Fn(usize) -> f64; 3] = [&|_| 1.0, &place, &|i| math::powi(place(i), 2) - mean_square];
     for shape in shapes {
         let (mut along, mut square) = (0.0, 0.0);

@@ -8,8 +8,8 @@ pub(super) struct LinearFit<const N: usize> {
     pub mean_square: f64,
 }
 
-/// Fits `y` by a linear combination of predictors; a row has the predictors and `y`. `None` for too few rows
-/// or predictors that depend on each other.
+/// Fits `y` by a linear combination of predictors; a row has the predictors and `y`. `None` if there are too
+/// few rows or the predictors are linearly dependent.
 pub(super) fn fit_rows<const N: usize>(rows: &[([f64; N], f64)]) -> Option<LinearFit<N>> {
     if rows.len() < 2 * N {
         return None;

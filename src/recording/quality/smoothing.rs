@@ -9,20 +9,22 @@ use crate::recording::channel::median_in_place;
 use portable_math as math;
 use std::f64::consts::TAU;
 
-/// Windows of the filters, frames: shorter ones hardly smooth, longer ones leave less than two bins between
-/// their zeros.
+/// Lengths of the filter windows that are tried, frames: shorter windows hardly smooth, longer ones leave
+/// less than two bins between their zeros.
 const WINDOWS: std::ops::RangeInclusive<usize> = 3..=25;
 /// Minimum number of segments: the median power is then known to about 40 %.
 const FEWEST_SEGMENTS: usize = 12;
-/// First bin of the comparison; motion and trend lie below it.
+/// First frequency bin that is compared; motion and trend are at lower frequencies.
 const FIRST_BIN: usize = 12;
-/// Powers of white noise added to the filtered noise, as fractions of it: rounding in the export.
+/// Powers of the white noise that is added to the response of a filter before the comparison, as fractions of
+/// the response at zero frequency. This noise represents rounding in the export.
 const FLOORS: [f64; 3] = [0.0, 1e-3, 1e-2];
-/// Largest root mean square deviation of the logarithm of the power from the shape of a filter. With few
-/// segments, the medians alone scatter by 0.4.
+/// Largest allowed root mean square deviation of the logarithm of the power from the shape of a filter. With
+/// few segments, the medians alone scatter by 0.4.
 const MATCHES: f64 = 0.6;
-/// Smallest such deviation from white noise, and its smallest ratio to the deviation from the filter. In 360
-/// columns of clean films no filter reaches this ratio.
+/// Smallest root mean square deviation of the logarithm of the power from a flat spectrum, and smallest ratio
+/// of this deviation to the deviation from the shape of the filter. In 360 columns of clean films no filter
+/// reaches this ratio.
 const NOT_WHITE: (f64, f64) = (0.8, 2.0);
 
 /// A filter that fits a polynomial to a window and takes its value in the middle.
@@ -49,8 +51,8 @@ impl Smoothing {
     }
 }
 
-/// The filter whose shape the noise has; `None` for too few segments, or if no shape fits far better than a
-/// flat one. A segment is detrended and multiplied by a Hann window.
+/// The filter whose frequency response fits the spectrum of the noise; `None` for too few segments, or if no
+/// filter fits far better than a flat spectrum. The segments are detrended and multiplied by a Hann window.
 pub(super) fn find_smoothing(segments: &[Vec<f64>]) -> Option<Smoothing> {
     if segments.len() < FEWEST_SEGMENTS {
         return None;
@@ -76,7 +78,8 @@ pub(super) fn find_smoothing(segments: &[Vec<f64>]) -> Option<Smoothing> {
     found.then(|| Smoothing { window, degree, cutoff: half as f64 / SEGMENT as f64, white_db })
 }
 
-/// Least root mean square deviation of the logarithms of the powers from those of a shape of any size.
+/// Root mean square deviation of the logarithm of the powers from that of a spectral shape. The level of the
+/// shape is fitted (median), and the added white noise of [`FLOORS`] with the smallest deviation is used.
 fn log_deviation(powers: &[f64], shape: &[f64]) -> Option<f64> {
     let with_floor = |floor: f64| {
         let log = |bin: usize| math::ln(powers[bin] / (shape[bin] + floor));
@@ -88,8 +91,8 @@ fn log_deviation(powers: &[f64], shape: &[f64]) -> Option<f64> {
     FLOORS.into_iter().filter_map(with_floor).min_by(f64::total_cmp)
 }
 
-/// Weights of the least-squares polynomial at the middle of a window (Savitzky and Golay 1964), from
-/// polynomials that are orthogonal on the window.
+/// Weights of the samples of a window in the value of their least-squares polynomial at the middle (Savitzky
+/// and Golay 1964), computed from polynomials that are orthogonal on the window.
 fn smoothing_weights(window: usize, degree: usize) -> Vec<f64> {
     let half = (window as f64 - 1.0) / 2.0;
     let mut weights = vec![0.0; window];
@@ -110,7 +113,7 @@ fn smoothing_weights(window: usize, degree: usize) -> Vec<f64> {
     weights
 }
 
-/// Squared frequency response at every bin of a segment, as a Hann window shows it.
+/// Squared frequency response at every bin of a segment, smoothed as by a Hann window.
 fn response_powers(weights: &[f64]) -> Vec<f64> {
     let power = |bin: usize| {
         let angle = |i: usize| TAU * (bin * i) as f64 / SEGMENT as f64;

@@ -63,7 +63,7 @@ pub struct Curvature {
     pub per_m: f64,
     /// Standard deviation of the curvature, 1/m.
     pub sd_per_m: f64,
-    /// Standard deviation of the slope over the frames, rad.
+    /// Standard deviation, over the frames, of the slope of the curved path, rad.
     pub slope_sd_rad: f64,
 }
 
@@ -228,7 +228,8 @@ impl TiltEffect {
         Some(self.height_m? * math::sin(angle_rad))
     }
 
-    /// Severity of a tilt: a shift above the noise of a single frame calls for a caution.
+    /// Severity of a tilt: a caution if it shifts the deflection by more than the noise of a single frame,
+    /// otherwise a note.
     fn severity(&self, angle_rad: f64) -> Severity {
         match (self.shift_m(angle_rad), self.noise_m) {
             (Some(shift), Some(noise)) if shift.abs() > noise => Severity::Caution,

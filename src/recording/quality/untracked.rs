@@ -13,15 +13,19 @@ use std::ops::Range;
 const LOW_CONFIDENCE: f64 = 0.6;
 /// Number of frames up to which a finding is a note: a few single samples change no spectrum.
 const FEW_FRAMES: usize = 3;
-/// Fraction of a point's frames that calls for a caution: each such frame raises the noise of a spectrum.
+/// Fraction of untracked frames of a point from which the finding is a caution: each such frame raises the
+/// noise of a spectrum.
 const MANY_FRAMES: f64 = 1e-3;
-/// Fraction of doubtful positions that calls for a caution: more than stray outliers.
+/// Fraction of doubtful positions of a point from which the finding is a caution: these are more than stray
+/// outliers.
 const MANY_DOUBTFUL: f64 = 0.01;
-/// Fraction of a point's frames that is serious: amplitudes and frequencies are then wrong.
+/// Fraction of untracked frames of a point above which the finding is serious: amplitudes and frequencies are
+/// then wrong.
 const MOST_FRAMES: f64 = 0.05;
-/// Fraction of repeated frames that is serious: they also shift the times of all later frames.
+/// Fraction of repeated frames above which the finding is serious: repeated frames also shift the times of
+/// all later frames.
 const MOST_REPEATED: f64 = 0.01;
-/// Number of runs that a finding names.
+/// Maximum number of runs whose frames are listed in a finding.
 const NAMED_RUNS: usize = 4;
 
 /// Frames in which a check found that a position was not tracked.
@@ -36,7 +40,7 @@ pub struct UntrackedFrames {
 }
 
 impl UntrackedFrames {
-    /// `runs` are in order; those that touch or overlap become one.
+    /// Untracked frames that a check found. `runs` are in order; runs that touch or overlap are joined.
     pub(super) fn new(
         check: Check,
         channel: &'static str,
@@ -62,7 +66,7 @@ impl UntrackedFrames {
         self.channel.is_empty() || self.channel.starts_with(name)
     }
 
-    /// The finding on these frames; `tracked` is the number of frames of the point.
+    /// The finding on these frames; `tracked` is the number of frames in which the point has a position.
     fn to_finding(&self, tracked: usize) -> QualityFinding {
         let (what, why) = match self.check {
             Check::FrozenFrames => ("repeat the one before exactly", "frames of the video were doubled"),
@@ -99,7 +103,7 @@ impl UntrackedFrames {
     }
 }
 
-/// Joins runs that touch or overlap; they are in order.
+/// Joins runs that touch or overlap. The runs must be in order.
 pub(super) fn join_runs(runs: impl IntoIterator<Item = Range<usize>>) -> Vec<Range<usize>> {
     let mut joined: Vec<Range<usize>> = vec![];
     for run in runs {
@@ -111,8 +115,8 @@ pub(super) fn join_runs(runs: impl IntoIterator<Item = Range<usize>>) -> Vec<Ran
     joined
 }
 
-/// Frames of each point that nobody tracked, by check. `measured` is the result of
-/// [`super::measure_quality`] for the same recording.
+/// Frames in which a position was written but not tracked, one entry per check and point. `measured` is the
+/// result of [`super::measure_quality`] for the same recording.
 #[must_use]
 pub fn find_untracked_frames(
     recording: &Recording,
@@ -150,7 +154,7 @@ pub fn find_untracked_frames(
     found
 }
 
-/// Findings on frames that nobody tracked.
+/// Findings on frames in which a position was written but not tracked.
 pub(super) fn check_untracked(
     recording: &Recording,
     measured: &Quality,
