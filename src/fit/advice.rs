@@ -14,16 +14,16 @@ use crate::recording::Recording;
 use crate::recording::channel::{Channel, Window};
 use portable_math as math;
 
-/// Relative standard deviation of a careful measurement of a mean deflection or a time interval.
+/// Assumed relative standard deviation of a measured mean deflection or time interval.
 const CAREFUL_SD_RELATIVE: f64 = 0.01;
-/// Relative standard deviation of a careful measurement of an amplitude, a damping or a frequency range.
+/// Assumed relative standard deviation of a measured amplitude, damping or frequency range.
 const ROUGH_SD_RELATIVE: f64 = 0.05;
 /// Head speeds at which the mean deflection is a candidate, as fractions of the largest head speed.
 const SPEED_SHARES: [f64; 3] = [0.25, 0.5, 0.8];
 /// Number of frames over which the head's speed is averaged.
 const SPEED_FRAMES: usize = 20;
-/// Length of the segments in which a drifting frequency is measured, s: short enough to resolve a change
-/// within 0.1 s.
+/// Length, s, of the segments in which a drifting frequency is measured. It is short enough to resolve a
+/// change within 0.1 s.
 const SEGMENT_S: f64 = 0.02;
 
 /// A feature that could be added to the job as a target.
@@ -67,8 +67,9 @@ pub(crate) fn advise_measurements(
     sentences
 }
 
-/// Change of each candidate feature when one parameter moves from its lower to its upper bound, in standard
-/// deviations of the candidate; zero where the model does not show the feature.
+/// Change of each candidate feature, in its own standard deviations, when one parameter moves from its lower
+/// to its upper bound. One row per candidate, one column per parameter; zero where the model does not show
+/// the feature.
 fn candidate_sensitivities(
     candidates: &[CandidateFeature],
     job: &Job,
@@ -169,7 +170,7 @@ fn spectral_readings(aims: &[FitTarget], condition: usize) -> Vec<(Reading, Stri
     bands.into_iter().flat_map(of).collect()
 }
 
-/// Largest speed of the head, m/s.
+/// Largest speed of the recorded head, m/s, averaged over [`SPEED_FRAMES`] frames.
 fn max_head_speed_m_per_s(recording: &Recording) -> Option<f64> {
     let (head, rate_hz) = (&recording.traces().head_x_m, recording.grid().frame_rate_hz);
     let speed = |ends: &[Option<f64>]| {

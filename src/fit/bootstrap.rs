@@ -2,11 +2,11 @@
 //! recording and fitted again, starting from the best point (Efron and Tibshirani, An Introduction to the
 //! Bootstrap, 1993, chapter 6).
 //!
-//! In addition to the standard deviations of the targets, the spread of the refits contains the joint effect
-//! of noise, lost frames and starting state on the features of this blade. The camera errors of each twin are
-//! drawn from their priors. A refit takes damped Gauss-Newton steps from the best point. It uses the Jacobian
-//! at the best point and corrects it by Broyden's rule. The spread of the refits is measured about the best
-//! point, so it includes the bias.
+//! The spread of the refits contains the standard deviations of the targets and, in addition, the joint
+//! effect of noise, lost frames and starting state on the features of this blade. The camera errors of each
+//! twin are drawn from their priors. A refit takes damped Gauss-Newton steps from the best point. It uses the
+//! Jacobian at the best point and corrects it by Broyden's rule. The spread of the refits is measured about
+//! the best point, so it includes the bias.
 
 use super::camera_calibration::draw_camera_errors;
 use super::evaluation::{Evaluation, EvaluationStage, Observed};

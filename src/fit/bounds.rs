@@ -206,7 +206,8 @@ pub enum Prior {
 }
 
 impl Prior {
-    /// Distance of `value`, in the parameter's SI unit, from the mean of the prior, in standard deviations.
+    /// Distance of `value` from the mean of the prior, in standard deviations of the prior; `value` is in the
+    /// SI unit of the parameter.
     pub(crate) fn residual(&self, value: f64) -> f64 {
         match *self {
             Self::Linear { mean, sd } => (value - mean) / sd,
@@ -228,8 +229,8 @@ mod tests {
             for bounds in [log, linear] {
                 assert!((bounds.unit_coordinate(bounds.value_at_unit(unit)) - unit).abs() < 1e-14, "{unit}");
             }
-            // near the ends, u = (1 + sin z) / 2 is quadratic in z, so z loses half of its digits and u loses
-            // none
+            // near both ends of the unit interval, u = (1 + sin z) / 2 is quadratic in the distance of z from
+            // the end: z has only half of the digits of u, but u computed from z has all of them
             assert!((line_to_unit(unit_to_line(unit)) - unit).abs() < 1e-15, "{unit}");
         }
     }

@@ -26,8 +26,8 @@ const MAX_STEPS: usize = 60;
 const MAX_HALVINGS: usize = 12;
 /// Length of a step, in prior standard deviations, below which the descent ends.
 const MIN_STEP: f64 = 1e-12;
-/// Difference between the random seeds of successive cameras, so that no two draws use the same random
-/// numbers.
+/// Difference between the random seeds of successive cameras. It is so large that no two draws use the same
+/// random numbers.
 const CAMERA_SEEDS: u64 = 1 << 40;
 /// Variance of a uniform variable in the unit interval.
 const BOX_VARIANCE: f64 = 1.0 / 12.0;
@@ -100,13 +100,14 @@ impl CameraFit {
         self.free_numbers().count()
     }
 
-    /// All estimated numbers, each as its camera and an index: 0 for the scale, 1 for the offset.
+    /// All estimated scales and offsets. Each is given as its camera and an index: 0 for the scale, 1 for the
+    /// offset.
     fn free_numbers(&self) -> impl Iterator<Item = (&ConditionCamera, usize)> {
         let all = self.0.iter().flat_map(|camera| [0, 1].map(|k| (camera, k)));
         all.filter(|(camera, k)| camera.sds[*k] > 0.0)
     }
 
-    /// Distances of the estimated numbers from their prior means, in prior standard deviations.
+    /// Distances of the estimated scales and offsets from their prior means, in prior standard deviations.
     pub(crate) fn prior_residuals(&self) -> impl Iterator<Item = f64> {
         self.free_numbers().map(|(camera, k)| camera.place[k])
     }
@@ -187,8 +188,9 @@ impl CameraFit {
         Some((jacobian.ncols()..all.ncols()).map(|at| covariance[(at, at)].sqrt()).collect())
     }
 
-    /// Derivatives of all residuals with respect to the camera unknowns, which are in units of their prior
-    /// standard deviations, and the weights of the residuals in the cost. `rows` is the number of residuals.
+    /// Two results: the derivatives of all residuals with respect to the camera unknowns, which are in units
+    /// of their prior standard deviations, and the weights of the residuals in the cost. `rows` is the number
+    /// of residuals.
     fn jacobian(
         &self,
         rows: usize,
@@ -260,7 +262,7 @@ fn linearize_residual(
     let distance = target.distance(value);
     let sd = total_sd(observation, target);
     let per_metre = match target.measure {
-        // a clamped distance has zero slope
+        // a distance from the target that is limited to ln(MAX_RATIO) has zero slope
         _ if distance.abs() >= math::ln(MAX_RATIO) => 0.0,
         ValueComparison::Log => 1.0 / value,
         ValueComparison::Linear { scale } => 1.0 / scale,

@@ -253,7 +253,8 @@ struct CameraRow {
     condition: usize,
     scale_sd: ExactNumber,
     offset_sd_m: ExactNumber,
-    /// Noise floor that is added in quadrature to a feature that is a size; absent for a position.
+    /// Noise floor, m, of a feature that is a size: the size contains this noise, added in quadrature. Absent
+    /// for a position.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     floor_m: Option<ExactNumber>,
 }

@@ -37,7 +37,8 @@ pub(super) struct JobIdentity<'a> {
     conditions: Vec<ConditionIdentity<'a>>,
     camera: Option<Camera>,
     parameters: &'a [FreeParameter],
-    /// Omitted if all constants are exact, so that a job without freed constants keeps its fingerprint.
+    /// Constants that are free within priors. The entry is omitted if all constants are exact, so that a job
+    /// without freed constants keeps its fingerprint.
     #[serde(skip_serializing_if = "Constants::is_none")]
     constants: &'a Constants,
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
@@ -204,7 +205,7 @@ pub enum JobError {
     /// An invalid value.
     #[error("{file}: {key}: {problem}")]
     Value {
-        /// File as named by the user.
+        /// Name of the job file as the user gave it.
         file: String,
         /// The invalid key, preceded by the name of the entry that contains it.
         key: String,

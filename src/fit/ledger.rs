@@ -207,7 +207,8 @@ impl<'a> Ledger<'a> {
         self.limit = limit;
     }
 
-    /// Reason why nothing more can be evaluated, except a used-up budget.
+    /// Reason why no more evaluations can be made; `None` if there is none. A used-up budget is not reported
+    /// here.
     pub(crate) fn stop_reason(&self) -> Option<&StopReason> {
         self.stop.as_ref()
     }

@@ -135,7 +135,7 @@ pub(crate) fn camera_estimates(
     cameras.estimates(held.as_ref(), targets, features)
 }
 
-/// Jacobian `d r / d u` of the residuals `r`, with scales and offsets of the cameras held at their estimates
+/// Jacobian `d r / d u` of the residuals `r`, with scales and offsets of the cameras fixed at their estimates
 /// at the point.
 fn jacobian_with_cameras_held(
     objective: &Objective,
@@ -228,8 +228,8 @@ pub(crate) fn step_in_box(unit: &[f64], step: &[f64]) -> Vec<f64> {
 pub(crate) const Z_95: f64 = 1.96;
 /// Rise in cost at the ends of a 95 % interval (chi-squared with one degree of freedom).
 pub(crate) const CHI_SQUARED_95: f64 = 3.84;
-/// A direction is informative if its singular value, per side length of the unit box, is at least this value.
-/// At this value the 95 % interval along the direction is as wide as the box.
+/// A direction is informative if its singular value, in standard deviations per side length of the unit box,
+/// is at least this value. At this value the 95 % interval along the direction is as wide as the box.
 pub(crate) const MIN_INFORMATIVE: f64 = 2.0 * Z_95;
 /// A singular value below this fraction of the largest singular value counts as a rounding error.
 pub(crate) const ROUNDING_SHARE: f64 = 1e-9;
@@ -384,8 +384,8 @@ mod tests {
         ]
     }
 
-    /// Jacobian with one row for each `(a, b, sd)`: the derivatives of `r = ln(p^a q^b) / sd` by the
-    /// coordinates of the unit box.
+    /// Jacobian with one row for each `(a, b, sd)`: the derivatives of `r = ln(p^a q^b) / sd` with respect to
+    /// the coordinates of the unit box.
     fn rows(of: &[(f64, f64, f64)]) -> DMatrix<f64> {
         let (lp, lq) = (100.0_f64.ln(), 10.0_f64.ln());
         DMatrix::from_fn(of.len(), 2, |row, column| {
@@ -411,8 +411,8 @@ mod tests {
 
     #[test]
     fn two_features_determine_both_and_their_correlation_is_that_of_least_squares() {
-        // for r1 = ln p / 0.01 and r2 = ln(p q) / 0.02, the covariance of ln p and ln q is [[1, -1], [-1, 5]]
-        // 1e-4
+        // for r1 = ln p / 0.01 and r2 = ln(p q) / 0.02, the covariance of ln p and ln q is 1e-4 * [[1, -1],
+        // [-1, 5]]
         let found = SingularDirections::from_jacobian(&rows(&[(1.0, 0.0, 0.01), (1.0, 1.0, 0.02)]));
         assert_eq!(found.rank, 2);
         assert!((found.coordinate_sd(0).0 * 100.0_f64.ln() - 0.01).abs() < 1e-12);

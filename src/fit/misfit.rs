@@ -57,8 +57,8 @@ pub struct ChannelMisfit {
     pub residual_rms_m: f64,
     /// Standard deviation of the noise of the channel, m.
     pub noise_m: f64,
-    /// Sum of the squared residuals in standard deviations of the noise, divided by the number of degrees of
-    /// freedom.
+    /// Chi2 per degree of freedom. Chi2 is the sum of the squared residuals, each in standard deviations of
+    /// the noise.
     pub chi2_per_dof: f64,
     /// Autocorrelation of the residuals at a lag of one frame; `None` without neighbouring frames.
     pub autocorrelation_1: Option<f64>,
@@ -73,8 +73,8 @@ pub struct WorstSegment {
     pub start_s: f64,
     /// Time of the frame after the last compared frame of the segment, s.
     pub end_s: f64,
-    /// Sum of the squared residuals in standard deviations of the noise, divided by the number of degrees of
-    /// freedom.
+    /// Chi2 per degree of freedom. Chi2 is the sum of the squared residuals, each in standard deviations of
+    /// the noise.
     pub chi2_per_dof: f64,
 }
 
@@ -89,8 +89,8 @@ pub struct StageMisfit {
     pub bad_segments: usize,
     /// Number of degrees of freedom: number of measured values minus number of unknowns.
     pub dof: usize,
-    /// Sum of the squared residuals in standard deviations of the noise, divided by the number of degrees of
-    /// freedom; infinite (`null` in a file) if a run of the model fails.
+    /// Chi2 per degree of freedom. Chi2 is the sum of the squared residuals, each in standard deviations of
+    /// the noise; it is infinite (`null` in a file) if a run of the model fails.
     #[serde(deserialize_with = "or_infinite")]
     pub chi2_per_dof: f64,
     /// Parameters at the end of the stage, in SI units.
@@ -151,27 +151,29 @@ pub(crate) fn far_from_priors(nuisances: &[NuisanceResult]) -> Vec<String> {
     nuisances.iter().filter_map(far_from_prior).collect()
 }
 
-/// Evidence: no segment was compared.
+/// Evidence against the model: no segment was compared.
 fn no_segment_compared(stages: &[StageMisfit]) -> Option<String> {
     let compared = stages.last().is_some_and(|stage| stage.segments > 0);
     (!compared).then(|| "no segment of it could be started".to_owned())
 }
 
-/// Evidence: a channel without compared frames.
+/// Evidence against the model: a channel has no compared frames.
 fn unseen_channel(channels: &[ChannelMisfit]) -> Option<String> {
     let unseen = channels.iter().find(|channel| channel.frames == 0)?;
     let (recording, channel) = (&unseen.recording, &unseen.channel);
     Some(format!("no segment of {channel} in `{recording}` could be started"))
 }
 
-/// Evidence: segments with a wrong starting state, or with a motion that the model cannot produce.
+/// Evidence against the model: segments with a wrong starting state, or with a motion that the model cannot
+/// produce.
 fn bad_segments(stages: &[StageMisfit]) -> Option<String> {
     let last = stages.last().filter(|stage| stage.bad_segments > 0)?;
     let (bad, all) = (last.bad_segments, last.segments);
     Some(format!("{bad} of {all} segments fit worse than noise ever does"))
 }
 
-/// Evidence: residuals larger than the noise and the uncertainty of the noise allow.
+/// Evidence against the model: the residuals are larger than the noise and the uncertainty of the noise
+/// allow.
 fn misfit_above_noise(stages: &[StageMisfit]) -> Option<String> {
     let last = stages.last()?;
     let most = 1.0 + Z_95 * math::hypot(2.0 * NOISE_SD_RELATIVE, last.chi2_sd());
@@ -182,8 +184,8 @@ fn misfit_above_noise(stages: &[StageMisfit]) -> Option<String> {
     })
 }
 
-/// Evidence: chi2 per degree of freedom grows with the segment length, because the error of a wrong model
-/// accumulates during a run.
+/// Evidence against the model: chi2 per degree of freedom grows with the segment length, because the error of
+/// a wrong model accumulates during a run.
 fn misfit_growth(stages: &[StageMisfit]) -> Option<String> {
     let [first, .., last] = stages else { return None };
     let most = first.chi2_per_dof * (1.0 + MAX_GROWTH + Z_95 * math::hypot(first.chi2_sd(), last.chi2_sd()));
@@ -198,7 +200,8 @@ fn misfit_growth(stages: &[StageMisfit]) -> Option<String> {
     })
 }
 
-/// Evidence: a constant or a camera far from its prior, because a wrong model distorts all estimated numbers.
+/// Evidence against the model: a constant or a camera error is far from the mean of its prior, because a
+/// wrong model distorts all estimated numbers.
 fn far_from_prior(found: &NuisanceResult) -> Option<String> {
     let apart = (found.estimate - found.prior) / found.prior_sd;
     (apart.abs() > MAX_PRIOR_DISTANCE_SD).then(|| {

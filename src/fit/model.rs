@@ -38,8 +38,8 @@ pub struct Draw {
 
 /// A model whose runs are recorded by cameras.
 pub trait Model: Sync {
-    /// Simulated recording of a condition of the job, counted from 0, by its camera. `values` are the free
-    /// parameters in job order, in SI units.
+    /// Simulates the recording that the camera of a condition takes. `condition` is the index of the
+    /// condition in the job, counted from 0. `values` are the free parameters in job order, in SI units.
     ///
     /// # Errors
     /// [`RunFailure`] when the run ended before anything could be observed.

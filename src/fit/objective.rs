@@ -42,8 +42,9 @@ pub struct Objective<'a> {
 }
 
 impl<'a> Objective<'a> {
-    /// Creates the objective from one axis per free parameter and one target per feature. Targets must be
-    /// finite, not zero where logarithms are compared, and have a standard deviation above zero.
+    /// Creates the objective from one axis per free parameter and one target per feature. A target must be
+    /// finite and have a standard deviation above zero. It must not be zero if values are compared by
+    /// logarithms.
     #[must_use]
     pub fn new(axes: Vec<SearchAxis>, targets: Vec<TargetValue>, model: &'a dyn FeaturePredictor) -> Self {
         Self { axes, targets, model }

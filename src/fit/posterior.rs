@@ -24,8 +24,8 @@ use std::f64::consts::{LN_2, SQRT_2, TAU};
 /// its value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PosteriorParameter {
-    /// Key of a parameter in the scene file, preceded by its table; or name of a recording and key of a
-    /// camera error.
+    /// For a parameter: its key in the scene file, preceded by its table. For a camera error: the name of the
+    /// recording and the key of the error.
     pub name: String,
     /// Smallest and largest value, in the SI unit of the unknown.
     pub bounds: [f64; 2],
@@ -91,7 +91,8 @@ impl Posterior {
         self.unknowns.iter().zip(unit).map(|(unknown, u)| unknown.quantile(*u)).collect()
     }
 
-    /// Logarithm of the prior density with respect to the values; minus infinity outside the bounds.
+    /// Logarithm of the prior density of the values (not of their coordinates); minus infinity outside the
+    /// bounds.
     #[must_use]
     pub fn log_prior(&self, values: &[f64]) -> f64 {
         self.unknowns.iter().zip(values).map(|(unknown, value)| unknown.log_density(*value)).sum()
@@ -204,7 +205,7 @@ impl PosteriorParameter {
         value.clamp(self.bounds[0], self.bounds[1])
     }
 
-    /// Logarithm of the prior density with respect to the value.
+    /// Logarithm of the prior density of the value (not of its coordinate).
     fn log_density(&self, value: f64) -> f64 {
         let [low, high] = self.bounds;
         if !(low..=high).contains(&value) {
@@ -231,7 +232,8 @@ fn normal_probability(from: f64, to: f64) -> f64 {
     if from > 0.0 { above(from) - above(to) } else { above(-to) - above(-from) }
 }
 
-/// Root of the increasing function `of` between `low` and `high`, by bisection to rounding accuracy.
+/// Root of the increasing function `of` in the interval from `low` to `high`, by bisection to rounding
+/// accuracy.
 fn bisect_root(of: impl Fn(f64) -> f64, [mut low, mut high]: [f64; 2]) -> f64 {
     // more than 38 standard deviations from the mean the normal density underflows to zero
     (low, high) = (low.max(-38.0), high.min(38.0));
@@ -251,7 +253,8 @@ mod tests {
         PosteriorParameter { name: String::new(), bounds, is_log, prior }
     }
 
-    /// The transform inverts the integral of the density, so its slope is the reciprocal of the density.
+    /// The transform from the unit interval to the value inverts the cumulative prior distribution, so its
+    /// slope is the reciprocal of the prior density.
     #[test]
     fn uniform_places_have_the_prior_for_density() {
         let kinds = [
@@ -280,7 +283,7 @@ mod tests {
         for (z, within) in [(1.0, 0.682_689_492_137_085_9), (2.0, 0.954_499_736_103_641_6)] {
             assert!((normal_probability(-z, z) - within).abs() < 1e-15);
         }
-        // Abramowitz and Stegun, table 26.1: 1 - P(5) = 2.86651572e-7
+        // Abramowitz and Stegun, table 26.1, for the normal distribution function P: 1 - P(5) = 2.86651572e-7
         assert!((normal_probability(5.0, 38.0) / 2.866_515_718_791_94e-7 - 1.0).abs() < 1e-12);
     }
 }

@@ -21,9 +21,10 @@ use super::objective::Objective;
 use nalgebra::DMatrix;
 use portable_math as math;
 
-/// Dampings of the inner steps: the first hardly damps, the second makes short steps.
+/// Dampings of the inner steps: the first has almost no effect, the second makes the steps short.
 const DAMPINGS: [f64; 2] = [1.0, 3e2];
-/// Number of inner steps at a place. A few suffice, because the linear model starts them near the minimum.
+/// Maximum number of inner steps at one place. A few suffice, because the linear model starts them near the
+/// minimum.
 const INNER_STEPS: usize = 3;
 /// Decrease of the cost in one inner step below which the inner minimisation ends: a fiftieth of the
 /// threshold.
@@ -101,8 +102,8 @@ fn walk_to_ends(ledger: &mut Ledger, walkers: &mut [ProfileWalker]) -> Result<()
     Ok(())
 }
 
-/// Lets each walker continue from the farthest known point within the threshold, if this point lies beyond
-/// its crossing; returns whether any walker continues.
+/// Lets each walker continue from the farthest known point whose cost is within the threshold, if this point
+/// lies beyond the walker's crossing. Returns whether any walker continues.
 fn resume_walkers(ledger: &mut Ledger, walkers: &mut [ProfileWalker]) -> Result<bool, StopReason> {
     let farther: Vec<Option<Evaluation>> =
         walkers.iter().map(|walker| walker.farthest_within_threshold(ledger)).collect();
@@ -174,11 +175,12 @@ struct ProfileWalker {
     most_root: f64,
     start: (f64, f64),
     start_unit: Vec<f64>,
-    /// Last place within the threshold; the next step starts from it.
+    /// Last place at which the cost is within the threshold; the next step starts from it.
     base: ProfilePoint,
     /// Linear model of the residuals.
     model: DMatrix<f64>,
-    /// Coordinate of the current place; `here` is the best point found at this place.
+    /// Coordinate of the current place along the walk; the field `here` is the best point found at this
+    /// place.
     at: f64,
     here: Option<ProfilePoint>,
     /// Best known point near the current place; its coordinate along the walk is replaced by the coordinate
@@ -284,7 +286,7 @@ impl ProfileWalker {
         unit.iter().enumerate().map(|(at, u)| if at == self.axis { self.at } else { *u }).collect()
     }
 
-    /// Farthest evaluated point within the threshold, if it lies beyond the crossing.
+    /// Farthest evaluated point whose cost is within the threshold, if the point lies beyond the crossing.
     fn farthest_within_threshold(&self, ledger: &Ledger) -> Option<Evaluation> {
         let crossing = self.end.flatten()?;
         let limit = self.start.1 + math::powi(self.most_root, 2);
@@ -294,7 +296,7 @@ impl ProfileWalker {
         (along(farthest) > FIRST_STEP_RANGE.0 / 2.0).then(|| farthest.clone())
     }
 
-    /// Continues the walk from a point within the threshold.
+    /// Continues the walk from a point whose cost is within the threshold.
     fn resume_from(&mut self, base: ProfilePoint, model: DMatrix<f64>) {
         self.next_step = first_step(&SingularDirections::from_jacobian(&model), self.axis, self.most_root);
         (self.base, self.model) = (base, model);
@@ -420,7 +422,8 @@ impl ProfileWalker {
     }
 }
 
-/// First step along a coordinate: a fraction of the distance at which the linear model crosses the threshold.
+/// Length of the first step along a coordinate: a fraction of the distance at which the linear model crosses
+/// the threshold.
 fn first_step(directions: &SingularDirections, axis: usize, root: f64) -> f64 {
     let (least, most) = FIRST_STEP_RANGE;
     (FIRST_STEP_SHARE * directions.coordinate_sd(axis).0 * root).clamp(least, most)

@@ -115,7 +115,7 @@ pub struct StartState {
     pub lip_rate_rad_per_s: f64,
 }
 
-/// The second choice among the spectral peaks of the model for a component.
+/// The spectral peak of the model that is the second choice for a component.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RunnerUpPeak {
     /// Frequency of the peak, Hz.
@@ -297,7 +297,7 @@ pub struct FitResult {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{file}: not the result of a fit: {problem}; run `wiperlab fit` again")]
 pub struct ResultError {
-    /// File as named by the user.
+    /// Name of the result file as the user gave it.
     pub file: String,
     /// Description of the problem, with line and column.
     pub problem: String,
@@ -362,7 +362,7 @@ pub(super) fn append_hash(object: &str) -> String {
     with(&text_sha256(with(&"0".repeat(HASH_DIGITS))))
 }
 
-/// Checks that a text has the hash that it contains.
+/// Checks that the hash at the end of a text matches the text.
 ///
 /// # Errors
 /// A description of the mismatch.

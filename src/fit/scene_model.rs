@@ -19,13 +19,13 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
 
 /// Maximum number of evaluations of the right-hand side in a run: a hundred times the number that a run over
-/// one reversal needs. This maximum takes a few seconds.
+/// one reversal needs. A run that reaches this maximum takes a few seconds.
 const MAX_EVALUATIONS: u64 = 20_000_000;
 
 /// Relative tolerance of the model's runs. Features are measured to 1e-3, and a run with 1e-6 has the same
 /// transitions between stick and slip as a run with 1e-8.
 const TOLERANCE: f64 = 1e-6;
-/// Reference angle for a blade that starts upright, rad: the starting angles of this blade are spread by
+/// Reference angle, rad, for a blade that starts upright: the standard deviation of its starting angles is
 /// `spread` times this angle. A blade in use leans by 0.1 to 1 rad.
 const REFERENCE_LEAN_RAD: f64 = 0.1;
 /// Difference between the random seeds of successive conditions, so that no two conditions have the same

@@ -190,7 +190,8 @@ pub(crate) struct TraceHeaderBody {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct HeaderCoordinate {
-    /// Key of a parameter in the scene file, or name of a recording and key of a camera error.
+    /// For a parameter: its key in the scene file. For a camera error: the name of the recording and the key
+    /// of the error.
     pub name: String,
     /// Unit of the value of the unknown.
     pub unit: String,

@@ -15,7 +15,7 @@ pub(crate) const DEFAULT_SEGMENT_S: [f64; 3] = [0.004, 0.008, 0.016];
 /// segments with few frames bias the estimates more strongly.
 const SLOW_HZ: f64 = 4_000.0;
 const EXTRA_SEGMENT_S: f64 = 0.032;
-/// Minimum number of frames in a segment: its starting state uses up four degrees of freedom.
+/// Minimum number of frames in a segment. The starting state of a segment uses up four degrees of freedom.
 pub(crate) const MIN_SEGMENT_FRAMES: usize = 8;
 /// Minimum number of frames in which a fitted channel must be tracked: slightly more than one segment.
 const MIN_TRACKED_FRAMES: usize = 10;

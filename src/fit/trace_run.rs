@@ -292,7 +292,8 @@ impl TraceFindings<'_, '_> {
         }
         found.iter().for_each(|r| channels.entry((r.recording, r.is_drop)).or_default().push(r));
         let ((chi2, dof), data) = (chi2_per_dof(end), end.count_data());
-        // degrees of freedom per measured value, taken as equal for all channels; chi2 is NaN if a run fails
+        // degrees of freedom per measured value, assumed to be equal for all channels; chi2 is NaN if a run
+        // fails
         let share = if chi2.is_nan() || data == 0 { 1.0 } else { dof as f64 / data as f64 };
         let rows = channels.iter();
         let rows = rows.map(|(channel, parts)| self.channel_misfit(*channel, parts, share)).collect();

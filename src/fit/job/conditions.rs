@@ -32,7 +32,7 @@ pub struct JobCondition {
     pub scene: String,
     /// Source of the head's motion: the drive of the scene, or the recorded head.
     pub head: HeadSource,
-    /// Names of parameters, each with the value that replaces that of the scene, in SI units.
+    /// Names of parameters, each with the value, in SI units, that replaces the value in the scene.
     pub set: Vec<(String, f64)>,
     /// Whether the features of the condition are only predicted, never fitted.
     pub held_out: bool,
@@ -127,8 +127,8 @@ pub(super) fn parse_head_source(
     }
 }
 
-/// Parses values by parameter name; `"drive.frequency_hz" = 0.5` and `drive.frequency_hz =
-/// 0.5` are equivalent.
+/// Parses a table that maps parameter names to values. The quoted key `"drive.frequency_hz"` and the dotted
+/// key `drive.frequency_hz` are equivalent.
 fn parse_set_values(
     entry: &str,
     written: &toml::Table,
@@ -181,16 +181,17 @@ pub(super) fn check_not_set(conditions: &[JobCondition], free: &str) -> Result<(
 
 // Calibration errors of cameras.
 
-/// Default relative standard deviation of the scale, for a scale bar of 20 mm read to a tenth
-/// of a millimetre.
+/// Default relative standard deviation of a camera's scale: the reading error of a scale bar of 20 mm that is
+/// read to a tenth of a millimetre.
 pub(super) const DEFAULT_SCALE_SD: f64 = 0.005;
-/// Largest allowed relative standard deviation of the scale; a picture with a less certain scale counts as
-/// not calibrated.
+/// Largest allowed relative standard deviation of a camera's scale. A picture with a less certain scale
+/// counts as not calibrated.
 pub(super) const MAX_SCALE_SD: f64 = 0.1;
-/// Default standard deviation of the position of a marker, m, for a marker placed on its hinge
-/// to a millimetre.
+/// Default standard deviation, m, of the position of a marker relative to its hinge. It applies to a marker
+/// that is placed to a millimetre.
 pub(super) const DEFAULT_OFFSET_SD_M: f64 = 1e-3;
-/// Largest allowed standard deviation of the position of a marker, m: the length of a blade.
+/// Largest allowed standard deviation, m, of the position of a marker relative to its hinge: the length of a
+/// blade.
 pub(super) const MAX_OFFSET_SD_M: f64 = 0.1;
 
 /// Standard deviations of scale and offset of a camera, for a fit of features; 0 fixes the scale or offset at
@@ -199,7 +200,7 @@ pub(super) const MAX_OFFSET_SD_M: f64 = 0.1;
 pub struct FeatureCamera {
     /// Relative standard deviation of the scale.
     pub scale_sd: f64,
-    /// Standard deviation of the offset between the markers of tip and head along the sweep, m.
+    /// Standard deviation, m, of the offset along the sweep between the markers of tip and head.
     pub offset_sd_m: f64,
 }
 

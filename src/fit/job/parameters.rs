@@ -100,10 +100,11 @@ fn check_prior(
 // Constants of the scene that are free within a prior. They are freed because a mass or a damping is never
 // known exactly.
 
-/// Smallest allowed standard deviation of a constant, %; a more precisely known constant must be left fixed.
+/// Smallest allowed standard deviation of the prior of a constant, in % of the constant. A more precisely
+/// known constant must be left fixed.
 const LEAST_PERCENT: f64 = 1e-4;
-/// Largest allowed standard deviation of a constant, %; a less precisely known quantity must be a free
-/// parameter.
+/// Largest allowed standard deviation of the prior of a constant, in % of the constant. A less precisely
+/// known quantity must be a free parameter.
 const MOST_PERCENT: f64 = 50.0;
 
 /// Constants of the scene that are free within a prior.

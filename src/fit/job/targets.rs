@@ -132,8 +132,8 @@ fn find_feature_kind(written: &as_written::Feature) -> Result<&'static ReadingKi
     }
 }
 
-/// Checks an entry that stands for a series of features. Each feature of the series has a different target,
-/// so the targets must be measured on a recording.
+/// Checks an entry that defines a series of features. Each feature of the series has a different target, so
+/// the targets must be measured on a recording.
 fn check_series(entry: &JobEntry, written: &as_written::Feature, measured: bool) -> Result<(), KeyRefusal> {
     if !measured {
         refuse!(
@@ -210,7 +210,8 @@ fn default_min_sd_relative(reading: &Reading) -> f64 {
 /// A feature and the source of its target.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FitTarget {
-    /// The feature, which is computed on recordings of both measurement and model.
+    /// The feature. It is computed in the same way on the measured recording and on the recording of the
+    /// model.
     pub feature: Feature,
     /// Source of the target and its standard deviation.
     pub source: TargetSource,

@@ -12,19 +12,20 @@ use std::f64::consts::PI;
 /// Maximum number of stages: segment lengths usually double from stage to stage, and eight stages cover 4 ms
 /// to half a second.
 const MOST_STAGES: usize = 8;
-/// Default standard deviation of the camera's tilt, degrees, for a camera levelled with a spirit level.
+/// Default standard deviation, degrees, of the camera's tilt from the horizontal. It applies to a camera that
+/// is levelled with a spirit level.
 const TILT_SD_DEG: f64 = 0.3;
-/// Largest allowed standard deviation of the tilt, degrees; a recording with a larger tilt must be levelled
-/// before the fit.
+/// Largest allowed standard deviation, degrees, of the camera's tilt. A recording with a larger tilt must be
+/// levelled before the fit.
 const MOST_TILT_SD_DEG: f64 = 10.0;
-/// Largest allowed standard deviation of the speed at which a marker drifts, m/s; a faster motion must be
+/// Largest allowed standard deviation, m/s, of the speed at which a marker drifts. A faster motion must be
 /// tracked instead.
 const MOST_DRIFT_SD_M_PER_S: f64 = 0.01;
-/// Default standard deviation of the camera's clock against the clock of the drive, s, for a camera that is
-/// started by a trigger. It applies if the drive of the scene moves the head; a recorded head motion is
+/// Default standard deviation, s, of the camera's clock relative to the clock of the drive, for a camera that
+/// is started by a trigger. It applies if the drive of the scene moves the head. A recorded head motion is
 /// already on the clock of the camera.
 const CLOCK_SD_S: f64 = 1e-3;
-/// Largest allowed standard deviation of the camera's clock relative to the clock of the drive, s; a larger
+/// Largest allowed standard deviation, s, of the camera's clock relative to the clock of the drive. A larger
 /// shift must be removed before the fit.
 const MOST_CLOCK_SD_S: f64 = 0.1;
 
@@ -73,20 +74,22 @@ impl TraceChannel {
 /// Standard deviations of the priors of a camera's errors; 0 fixes an error at its nominal value.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CameraPriorSds {
-    /// Standard deviation of the angle from the picture's x axis to the glass, rad.
+    /// Standard deviation, rad, of the angle from the picture's x axis to the glass.
     pub tilt_sd_rad: f64,
     /// Relative standard deviation of the scale.
     pub scale_sd: f64,
-    /// Standard deviation of the position of either marker relative to the point that it marks, m.
+    /// Standard deviation, m, of the position of either marker relative to the point that it marks.
     pub offset_sd_m: f64,
-    /// Standard deviation of the speed at which the positions of the markers drift, m/s.
+    /// Standard deviation, m/s, of the speed at which the positions of the markers drift.
     pub drift_sd_m_per_s: f64,
-    /// Standard deviation of the camera's clock relative to the clock of the drive, s, if the job gives it.
+    /// Standard deviation, s, of the camera's clock relative to the clock of the drive; `None` if the job
+    /// does not give it.
     clock_sd_s: Option<f64>,
 }
 
 impl CameraPriorSds {
-    /// Standard deviation of the camera's clock relative to the clock of the drive, s.
+    /// Standard deviation, s, of the camera's clock relative to the clock of the drive, if `head` is the
+    /// source of the head's motion.
     pub(crate) fn clock_sd_s(&self, head: HeadSource) -> f64 {
         self.clock_sd_s.unwrap_or(match head {
             HeadSource::Recording => 0.0,

@@ -63,15 +63,17 @@ pub(super) fn evolve_population(
     costs.stop
 }
 
-/// Length of the longest principal axis of a population in the unit box, at the start and at convergence.
+/// Lengths, in the unit box, of the longest principal axis of a population: `first` at the start, `last` at
+/// convergence.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PopulationExtent {
     first: f64,
     last: f64,
 }
 
-/// Extent of a population for the whole unit box: along each coordinate, three initial lengths reach from the
-/// middle to beyond the bounds. Below the final length, damped Gauss-Newton steps are more efficient.
+/// Extent of a population that searches the whole unit box. Along each coordinate, three times the initial
+/// length reaches from the middle to beyond the bounds. Below the final length, damped Gauss-Newton steps are
+/// more efficient.
 pub(super) const WIDE_EXTENT: PopulationExtent = PopulationExtent { first: 0.3, last: 0.01 };
 /// Extent of a population for the neighbourhood of a point at which ripples of the cost trap Gauss-Newton
 /// steps.

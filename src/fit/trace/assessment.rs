@@ -56,8 +56,8 @@ pub struct TraceAssessment {
     pub correlation: DMatrix<f64>,
     /// Number of independent combinations of parameters that the recordings or priors determine.
     pub rank: usize,
-    /// Last iterate of the fit with the shorter segments of the previous stage, which starts at the best end;
-    /// `None` if there is no such fit.
+    /// Last iterate of a further fit that starts at the best end and uses the shorter segments of the
+    /// previous stage; `None` if there is no such fit.
     pub shorter: Option<Iterate>,
     /// Number of refitted twins.
     pub twins: usize,

@@ -46,7 +46,7 @@ pub(crate) fn frame_residuals(model: &TraceModel, at: Option<&Iterate>) -> Vec<O
     films.map(|place| known.get(&place).copied()).collect()
 }
 
-/// Half width of the range of a camera's error in the search, in standard deviations of its prior.
+/// Half width of the search range of a camera error, in standard deviations of the prior of this error.
 const CAMERA_RANGE_SD: f64 = 20.0;
 
 /// A recording with its scene and the settings of its fit.
@@ -138,7 +138,7 @@ fn channel_noise(
 /// remaining noise of the two points cannot be equal.
 const MAX_SHARED_NOISE: f64 = 0.9;
 
-/// Lower limit of the standard deviation of the noise, m: the rounding error of simulated traces without
+/// Lower limit, m, of the standard deviation of the noise: the rounding error of simulated traces without
 /// noise.
 const MIN_NOISE_M: f64 = 1e-9;
 

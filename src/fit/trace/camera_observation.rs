@@ -83,8 +83,8 @@ impl CameraObservation {
         }
     }
 
-    /// Initial guesses of the offsets of position and drop, m. They assume that a blade leans equally far to
-    /// both sides and that its head is highest when the blade is upright.
+    /// Initial guesses, m, of the offsets of the tip's position and of the head's drop. They assume that a
+    /// blade leans equally far to both sides and that its head is highest when the blade is upright.
     pub(super) fn guess_offsets_m(&self, tilt_rad: f64) -> [f64; 2] {
         /// The leans (tip position minus head position) are sorted, and this fraction of them is ignored at
         /// each end.
@@ -217,8 +217,8 @@ mod tests {
     use crate::recording::{FrameGrid, Traces};
     use crate::simulate::drive::smooth_head_motion;
 
-    /// A tip that trails its head by 1 mm in both directions; the camera adds `offset_m` to the position
-    /// of the tip.
+    /// Recording of a tip that trails its head by 1 mm, whichever way the head moves. The camera adds
+    /// `offset_m` to the position of the tip; `stroke` is the position of the head as a function of time.
     fn film(offset_m: f64, stroke: impl Fn(f64) -> f64) -> CameraObservation {
         let grid = FrameGrid { start_s: 0.0, frame_rate_hz: 1000.0, frames: 1000 };
         let place = |i: usize| stroke(i as f64 / 1000.0);

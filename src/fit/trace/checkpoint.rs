@@ -48,8 +48,8 @@ pub struct SegmentState {
     pub shown: [f64; 4],
     /// Number of measured values in the segment.
     pub data: usize,
-    /// Sum of the squared residuals in standard deviations of the noise; infinite if the run of the model
-    /// fails.
+    /// Chi2: sum of the squared residuals, each in standard deviations of the noise; infinite if the run of
+    /// the model fails.
     pub chi2: f64,
 }
 

@@ -228,8 +228,8 @@ fn rescue_candidates(
     follows: Option<LinkState>,
     rescue: RescuePolicy,
 ) -> Vec<LinkState> {
-    /// Changes of the angular velocities of neck and lip that are tried, relative to the recorded state,
-    /// rad/s.
+    /// Changes of the angular velocities of neck and lip, rad/s, that are added to the recorded state, one at
+    /// a time.
     const RATES: [[f64; 2]; 4] = [[60.0, 0.0], [-60.0, 0.0], [0.0, 120.0], [0.0, -120.0]];
     let seen = LinkState::from(segment.shown);
     let mut states = vec![seen];

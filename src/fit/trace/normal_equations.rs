@@ -8,8 +8,8 @@ use nalgebra::{DMatrix, DVector};
 use portable_math as math;
 use rayon::prelude::*;
 
-/// Chi2 per datum at which the weight of a segment falls to one half. Thus segments with a wrong starting
-/// state do not dominate the cost.
+/// Chi2 per measured value at which the weight of a segment falls to one half. Thus segments with a wrong
+/// starting state do not dominate the cost.
 const ROBUST_CHI2: f64 = 10.0;
 
 /// Weight of a segment: the derivative of the segment's robust cost with respect to the segment's chi2.
@@ -21,7 +21,7 @@ fn segment_weight(segment: &SegmentState, plain: bool) -> f64 {
 /// where `n` is the number of measured values in a segment and `c` is [`ROBUST_CHI2`]; in the plain phase the
 /// sum of chi2.
 pub(super) fn segments_cost(segments: &[SegmentState], plain: bool) -> f64 {
-    /// Chi2 per datum that is assigned to a segment whose run fails.
+    /// Chi2 per measured value that is assigned to a segment whose run fails.
     const FAILED: f64 = 1e6;
     let one = |segment: &SegmentState| {
         let data = segment.data.max(segment.last - segment.first) as f64;
@@ -104,9 +104,9 @@ pub(super) fn carry_states(
     at: &NormalEquations,
     moved: &DVector<f64>,
 ) -> Vec<SegmentState> {
-    /// Largest allowed changes of a starting state in one step: `ANGLE` for an angle, rad, and `RATE` for an
-    /// angular velocity, rad/s.
+    /// Largest allowed change, rad, of an angle of a starting state in one step.
     const ANGLE: f64 = 0.05;
+    /// Largest allowed change, rad/s, of an angular velocity of a starting state in one step.
     const RATE: f64 = 200.0;
     let mut segments = segments.to_vec();
     for (segment, part) in segments.iter_mut().zip(&at.parts) {
@@ -126,7 +126,7 @@ pub(super) fn carry_states(
 pub(crate) struct TraceCovariance {
     /// Information matrix of the recordings and the priors.
     pub information: DMatrix<f64>,
-    /// Inverse of the information matrix, plus `heads`.
+    /// Covariance from the curvature of the cost: the inverse of the information matrix, plus `heads`.
     pub curvature: DMatrix<f64>,
     /// Sandwich estimate from the scatter of the cost gradients of the segments, plus `heads`.
     pub sandwich: DMatrix<f64>,
@@ -153,8 +153,8 @@ pub(crate) fn trace_covariance(model: &TraceModel, at: &Iterate) -> Option<Trace
     Some(TraceCovariance { information: found.matrix, curvature: curvature + &heads, sandwich, heads })
 }
 
-/// Covariance of the cost gradient due to errors of the recorded head positions. The fitted curve of a head
-/// position is smooth, so its error extends over many segments and does not average out like noise.
+/// Covariance of the cost gradient due to errors of the recorded head positions. The curve fitted to these
+/// positions is smooth, so its error extends over many segments and does not average out like noise.
 fn head_curve_covariance(model: &TraceModel, at: &Iterate) -> Option<DMatrix<f64>> {
     let points = recording_models(model, &at.point)?;
     let n = at.point.len();

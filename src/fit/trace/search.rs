@@ -70,8 +70,9 @@ pub fn search_trace(
     found
 }
 
-/// First point of a start, in the coordinates of the unknowns. Start 0 is in the middle of every range, the
-/// others are at random points given by `seed`. An unknown with a prior always starts at its own `start`.
+/// Point at which a start begins, in the coordinates of the unknowns. Start 0 is in the middle of every
+/// range, the others are at random points given by `seed`. An unknown with a prior always begins at its own
+/// `start`.
 #[must_use]
 pub fn start_point(model: &TraceModel, seed: u64, start: usize) -> Vec<f64> {
     /// Fraction of each range, at either end, in which no search starts; one entry per start. Later starts

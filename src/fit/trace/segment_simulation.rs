@@ -17,8 +17,8 @@ use std::cell::RefCell;
 /// Angles, rad, and rates, rad/s, of neck and lip.
 pub(super) type LinkState = Vector4<f64>;
 
-/// Scales of the four numbers of a starting state: small changes of the two angles (rad) and of the two rates
-/// (rad/s).
+/// Scales of the four numbers of a starting state: 3e-5 rad for the two angles and 0.1 rad/s for the two
+/// angular velocities.
 pub(super) const STATE_STEPS: [f64; 4] = [3e-5, 3e-5, 0.1, 0.1];
 /// Number of values in a starting state.
 const STATES: usize = 4;
@@ -137,7 +137,7 @@ enum UnknownEffect {
 }
 
 impl<'a> RecordingModel<'a> {
-    /// `None` if the scene refuses the point `z`.
+    /// The model of a recording at the point `z` of the search; `None` if the scene refuses `z`.
     pub(super) fn new(
         shoot: &'a TraceRecording,
         number: usize,
@@ -229,7 +229,8 @@ impl<'a> RecordingModel<'a> {
         self.whiten_residuals(frames, &self.simulate_segment(frames, state, &self.none)?)
     }
 
-    /// Residuals whitened to unit variance; `None` if [`Self::linearize_state`] has no derivatives.
+    /// Residuals whitened to unit variance; `None` if the run has no derivatives up to its end, so that
+    /// [`Self::linearize_state`] would fail.
     pub(super) fn differentiable_residuals(
         &self,
         frames: [usize; 2],

@@ -14,7 +14,7 @@ const MIN_BEND_RAD: f64 = 0.15;
 /// Smallest speed of the tip over the glass that counts as sliding, m/s. While the tip sticks, the state has
 /// only three degrees of freedom.
 const MIN_SPEED_M_PER_S: f64 = 0.05;
-/// Half width of the window of frames to which rates are fitted, s: a third of a stick-slip cycle.
+/// Half width, s, of the window of frames to which rates are fitted: a third of a stick-slip cycle.
 const HALF_WIDTH_S: f64 = 3.5e-4;
 
 /// A frame at which a segment may begin, with the state of the blade there.
@@ -94,8 +94,8 @@ fn recorded_state(
             LinkState::new(theta, phi, theta_rate, phi_rate)
         }
         None => {
-            /// Relative step of the lean for the numerical derivative of the static pose with respect to the
-            /// lean.
+            /// Relative change of the lean in the finite difference that gives the derivative of the static
+            /// pose with respect to the lean.
             const NEXT: f64 = 0.02;
             let [theta, phi] = equilibrium_angles(linkage, lean)?;
             let [theta_next, phi_next] = equilibrium_angles(linkage, lean * (1.0 + NEXT))?;
@@ -106,7 +106,7 @@ fn recorded_state(
     Some((state, speed))
 }
 
-/// Half width of the window in which rates are fitted, in frames.
+/// Half width, in frames, of the window in which rates are fitted.
 fn half_width_frames(film: &CameraObservation) -> usize {
     ((HALF_WIDTH_S * film.rate_hz).round() as usize).max(1)
 }
@@ -163,9 +163,9 @@ fn link_rates(linkage: &Linkage, [theta, phi]: [f64; 2], lean_rate: f64, drop_ra
 /// Angles of neck and lip of a blade at rest, with whatever friction force equilibrium requires, for which
 /// the tip is at the distance `lean` from the head along the sweep. They are used if the drop is not tracked.
 fn equilibrium_angles(linkage: &Linkage, lean: f64) -> Option<[f64; 2]> {
-    /// `LARGEST_RAD` is the largest neck angle that is tried, rad, and `POINTS` the number of neck angles
-    /// that are tried.
+    /// Largest neck angle, rad, that is tried.
     const LARGEST_RAD: f64 = 0.7;
+    /// Number of neck angles that are tried.
     const POINTS: usize = 140;
     let side = 1f64.copysign(lean);
     let phi_of = |theta: f64| {

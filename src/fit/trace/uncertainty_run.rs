@@ -197,8 +197,9 @@ impl<'a> RunProgress<'a> {
     }
 }
 
-/// Follows runs to their ends, several at once. Returns the last iterate of each run, in order; an entry is
-/// `None` if the scene refuses the first point of that run. Returns `None` if the checkpoint requests a stop.
+/// Computes several runs at once, each to its end. Returns the last iterate of each run, in order; an entry
+/// is `None` if the scene refuses the first point of that run. Returns `None` if the checkpoint requests a
+/// stop.
 pub(super) fn follow_runs(
     end: &SearchEnd<'_>,
     runs: &[UncertaintyRun],
@@ -235,8 +236,8 @@ pub(super) fn follow_runs(
 // Profile of the cost: one point on either side of every parameter's estimate, with all other unknowns
 // refitted.
 
-/// Standard deviation of the prior that holds an unknown in place, divided by the standard deviation of its
-/// estimate.
+/// Standard deviation of the narrow prior that fixes an unknown during a profile run, as a fraction of the
+/// standard deviation of the unknown's estimate.
 const PIN_SD: f64 = 1e-3;
 /// Largest allowed factor by which the profile widens an interval.
 const MAX_STRETCH: f64 = 3.0;
@@ -261,7 +262,8 @@ pub(super) fn profile_distances<'s>(
     (0..end.at.point.len()).map(one).collect()
 }
 
-/// Mean and standard deviation of the prior that holds unknown `i` in place.
+/// Mean and standard deviation of the narrow prior that fixes unknown `i` at the distance `moved` from its
+/// estimate.
 fn pin_prior(end: &SearchEnd<'_>, i: usize, moved: f64) -> [f64; 2] {
     [end.at.point[i] + moved, PIN_SD * end.covariance.curvature[(i, i)].sqrt()]
 }
@@ -280,7 +282,8 @@ fn pin_unknown(end: &SearchEnd<'_>, i: usize, moved: f64) -> (TraceModel, Vec<f6
     (pinned, point)
 }
 
-/// Rise in cost above the best end when unknown `i` is held in place; the prior that holds it is not counted.
+/// Rise in cost above the best end when a narrow prior fixes unknown `i`; the cost of this prior is not
+/// counted.
 fn cost_rise(end: &SearchEnd<'_>, i: usize, moved: f64, at: &Iterate) -> f64 {
     let [pinned_at, sd] = pin_prior(end, i, moved);
     let prior = end.model.unknowns.0[i].prior;

@@ -7,7 +7,8 @@ use portable_math as math;
 /// Kind of error of the camera that took a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CameraUnknown {
-    /// Offset between the markers of tip and head along the sweep, m, in addition to the lean of the blade.
+    /// Part of the distance between the markers of tip and head along the sweep, m, that the lean of the
+    /// blade does not explain.
     OffsetX,
     /// Offset of the drop, m: the measured drop of an upright blade.
     OffsetDrop,

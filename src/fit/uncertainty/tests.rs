@@ -100,8 +100,8 @@ fn intervals_of_powers_are_exact_by_the_linear_model_and_by_profiles() {
 
 #[test]
 fn a_profile_lets_the_other_parameter_follow() {
-    // ln p and ln(p q) are known to 0.02 and 0.01, so ln q is known to sqrt(0.02^2 + 0.01^2); without
-    // variation of p it would be 0.01
+    // ln p and ln(p q) have the standard deviations 0.02 and 0.01, so that of ln q is sqrt(0.02^2 + 0.01^2);
+    // with p fixed it would be 0.01
     let found = at(|p, q| Ok(vec![p, p * q]), &[0.02, 0.01], [0.5, 0.5], PROFILE);
     let half = CHI_SQUARED_95.sqrt() * 0.02_f64.hypot(0.01);
     let [lower, upper] = ln_ends(&found.intervals[1]);
@@ -456,8 +456,8 @@ fn what_nothing_elsewhere_meets_stays_identified() {
 
 #[test]
 fn a_better_point_elsewhere_is_assessed_instead() {
-    // at q = 5 the model reaches the second target; in the side valley at q = 1 it misses it by two standard
-    // deviations
+    // at q = 5 the second feature equals its target; in the side valley at q = 1 it differs from its target
+    // by two standard deviations
     let valleys: Features = |p, q| {
         let side = (q.ln() / 0.02).powi(2);
         let deep = ((q / 5.0).ln() / 0.02).powi(2);
