@@ -40,8 +40,9 @@ pub struct CollocationRule {
     /// Coefficients of the expansion of `l_j` in Legendre polynomials: `(2 m + 1) b_j P_m(2 c_j - 1)` for
     /// node `j` and degree `m`, where `c_j` is the position and `b_j` the weight of the node.
     legendre: NodeArray<NodeArray<f64>>,
-    /// Integral (`once`) and double integral (`twice`) of each `l_j` from 0 to each node.
+    /// Integral of each `l_j` from 0 to each node.
     once: NodeArray<NodeArray<f64>>,
+    /// Double integral of each `l_j` from 0 to each node.
     twice: NodeArray<NodeArray<f64>>,
 }
 
@@ -139,7 +140,7 @@ impl CollocationRule {
 
 /// Node `j` of the Gauss-Legendre rule with `nodes` nodes on [0, 1], and its weight, by Newton's method.
 fn gauss_node(nodes: usize, j: usize) -> (f64, f64) {
-    /// More iterations than Newton's method needs from Tricomi's starting value.
+    /// Number of iterations of Newton's method, more than it needs from Tricomi's starting value.
     const ROUNDS: usize = 12;
     let mut z = -math::cos(std::f64::consts::PI * (j as f64 + 0.75) / (nodes as f64 + 0.5));
     let mut slope = 1.0;
@@ -168,7 +169,7 @@ fn legendre_polynomials<R: LaneNumber>(x: R, nodes: usize) -> [R; MOST_NODES + 2
     p
 }
 
-/// Reciprocals `1 / m` by index `m`.
+/// Table of reciprocals: the element with index `m` is `1 / m`.
 const RECIPROCALS: [f64; 2 * MOST_NODES + 4] = {
     let mut shares = [0.0; 2 * MOST_NODES + 4];
     let mut m = 1;
@@ -185,11 +186,11 @@ pub type SquareMatrix<const D: usize> = [[f64; D]; D];
 /// Matrices of `D` equations at the nodes of a step.
 #[derive(Debug, Clone, Copy)]
 pub struct CollocationEquations<const D: usize> {
-    /// Matrix `M` at each node, the factors of the second derivative.
+    /// Matrix `M` of the equations at each node; it multiplies the second derivative of the unknowns.
     pub mass: NodeArray<SquareMatrix<D>>,
-    /// Matrix `D` at each node, the factors of the first derivative.
+    /// Matrix `D` of the equations at each node; it multiplies the first derivative of the unknowns.
     pub damping: NodeArray<SquareMatrix<D>>,
-    /// Matrix `K` at each node, the factors of the unknowns themselves.
+    /// Matrix `K` of the equations at each node; it multiplies the unknowns themselves.
     pub stiffness: NodeArray<SquareMatrix<D>>,
 }
 
@@ -335,7 +336,7 @@ pub fn invert_square<const D: usize>(m: &SquareMatrix<D>) -> SquareMatrix<D> {
 mod tests {
     use super::*;
 
-    /// The rules of Abramowitz and Stegun, table 25.4.
+    /// Nodes and weights agree with Abramowitz and Stegun, table 25.4.
     #[test]
     fn nodes_and_weights_are_those_of_the_table() {
         let five = collocation_rule(5);

@@ -78,8 +78,8 @@ impl<const N: usize> StepStages<N> {
         &self.k[12]
     }
 
-    /// Combined error estimate in units of the tolerance; the step is accepted if it is at most 1. `scale` is
-    /// the tolerated error of each component.
+    /// Combined error estimate in units of the tolerance. The step is accepted if the estimate is at most 1.
+    /// `scale` is the tolerated error of each component of the state.
     #[inline]
     pub(crate) fn error_norm(&self, scale: &[f64; N]) -> f64 {
         let zero = [0.0; N];
@@ -345,7 +345,7 @@ mod tests {
         [y[1], -y[0]]
     }
 
-    /// Phase of the oscillation at the start, rad; neither the even nor the odd derivatives vanish there.
+    /// Phase of the test oscillation at the start, rad. With this phase, no derivative is zero at the start.
     const PHASE: f64 = 0.7;
 
     fn exact(t: f64) -> [f64; 2] {

@@ -79,8 +79,8 @@ pub fn integrate_fixed<const N: usize, const G: usize, P: HybridPhase<N, G>, A: 
 /// If the last step would be shorter than this fraction of a full step, the step before it is lengthened
 /// instead.
 const SHORTEST_LAST_STEP: f64 = 1e-6;
-/// Maximum number of halvings of a step in search of a point from which a guard falls steadily to zero; 2^-50
-/// of a step is below the rounding error of the time.
+/// Maximum number of times that a step is halved to find a point from which a guard falls steadily to zero. A
+/// step times 2^-50 is below the rounding error of the time.
 const MOST_HALVINGS: usize = 50;
 
 /// Number of times that [`runge_kutta_4_step`] evaluates the right-hand side; the derivative at the start is
@@ -128,7 +128,8 @@ impl<const N: usize, const G: usize, P: HybridPhase<N, G>> FixedRun<'_, N, G, P>
         PhaseEnd { t: self.t, y: self.y, cause, first_step: self.steps.step_s }
     }
 
-    /// The end of a step to the time `to`; `None` if the time would not advance or a value is not finite.
+    /// Takes a step to the time `to` and returns the values at its end; `None` if the time would not advance
+    /// or a value is not finite.
     fn take_step(&mut self, to: f64) -> Option<TrialStep<N, G>> {
         if to.partial_cmp(&self.t) != Some(std::cmp::Ordering::Greater) {
             return None;

@@ -103,7 +103,7 @@ pub struct PhaseEnd<const N: usize> {
     pub y: [f64; N],
     /// Cause of the end.
     pub cause: PhaseEndCause,
-    /// Suggested first step of the next phase with similar equations, s.
+    /// Suggested first step, s, for a next phase with similar equations.
     pub first_step: f64,
 }
 
@@ -118,7 +118,8 @@ pub struct WorkCounters {
     pub steps: u64,
     /// Rejected steps.
     pub rejected_steps: u64,
-    /// The phase ends when more right-hand sides than this have been evaluated; `None` for no limit.
+    /// Maximum number of evaluations of the right-hand side; the phase ends when it is exceeded. `None` for
+    /// no limit.
     pub most_rhs_evaluations: Option<u64>,
 }
 

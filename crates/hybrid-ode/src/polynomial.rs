@@ -21,9 +21,9 @@ const MOST_HALVINGS: u32 = 30;
 /// Terms below this fraction of the sum of all absolute terms are rounding errors. They do not decide whether
 /// a guard starts at a zero.
 const NOISE: f64 = 1e-14;
-/// A part of the step on which no Bernstein coefficient exceeds this fraction of the sum of all terms counts
-/// as zero throughout: the signs of its coefficients are rounding errors, and halving it further would take a
-/// billion steps.
+/// If no Bernstein coefficient on a part of the step exceeds this fraction of the sum of all terms, the
+/// polynomial counts as zero on that part. The signs of its coefficients are then rounding errors, and
+/// halving the part further would take a billion steps.
 const FLAT: f64 = 4.0 * f64::EPSILON;
 
 /// First fall of a guard to zero within a step.
@@ -73,8 +73,8 @@ pub(crate) fn first_fall(guard: &TaylorSeries, order: usize, zero_order: usize, 
 /// Quick test that excludes a root: whether all Bernstein coefficients of the first few terms exceed the sum
 /// of the absolute values of the other terms.
 fn is_root_free(c: &[f64]) -> bool {
-    /// Degree of the polynomial of the first few terms, which is written in the Bernstein basis. Higher terms
-    /// decrease faster with the step length.
+    /// Degree of the polynomial that consists of the first few terms. Terms above this degree decrease faster
+    /// with the step length.
     const HEAD: usize = 4;
     /// Reciprocals of the binomial coefficients of degree 4.
     const SHARES: [f64; HEAD + 1] = [1.0, 1.0 / 4.0, 1.0 / 6.0, 1.0 / 4.0, 1.0];
@@ -113,7 +113,8 @@ struct RootSearch<'a> {
     flat: f64,
 }
 
-/// First root in `[low, high]`; `b` holds the Bernstein coefficients on this interval and is overwritten.
+/// First root in `[low, high]`. At the start, `b` contains the Bernstein coefficients on this interval; it is
+/// overwritten.
 fn first_crossing(search: &RootSearch, b: &mut [f64; TERMS], low: f64, high: f64, depth: u32) -> Option<f64> {
     let degree = search.c.len() - 1;
     if b[0] <= 0.0 {
@@ -147,7 +148,7 @@ fn first_crossing(search: &RootSearch, b: &mut [f64; TERMS], low: f64, high: f64
 /// Newton's method starts from the result of false position; a step that leaves the bracket or does not
 /// converge fast is replaced by bisection.
 fn single_root(c: &[f64], mut low: f64, mut high: f64, at_low: f64, at_high: f64) -> f64 {
-    /// More rounds than Newton's method and bisection together need in double precision.
+    /// Maximum number of rounds, more than Newton's method and bisection together need in double precision.
     const ROUNDS: usize = 80;
     let mut x = low + (high - low) * at_low / (at_low - at_high);
     let mut before = high - low;

@@ -15,9 +15,9 @@ pub(crate) const FINE_SAMPLES: usize = 9;
 /// Maximum number of halvings of the interval. Two roots that are not separated by then count as one point
 /// where the guard touches zero, and such a point is not a root: 2^-30 of a step is below every tolerance.
 const MOST_HALVINGS: u32 = 30;
-/// A part of the step on which no Bernstein coefficient exceeds this fraction of the largest one counts as
-/// zero throughout: the signs of its coefficients are rounding errors, and halving it further would take a
-/// billion steps.
+/// If no Bernstein coefficient on a part of the step exceeds this fraction of the largest coefficient, the
+/// polynomial counts as zero on that part. The signs of its coefficients are then rounding errors, and
+/// halving the part further would take a billion steps.
 const FLAT: f64 = 8.0 * f64::EPSILON;
 
 const COARSE_TO_BERNSTEIN: [[f64; COARSE_SAMPLES]; COARSE_SAMPLES] = bernstein_from_samples(0);

@@ -39,7 +39,7 @@ pub fn integrate<const N: usize, const G: usize, P: HybridPhase<N, G>, A: Observ
     integrate_with_locator(EventLocator::Bracket, phase, start, stop, relative, work, observe)
 }
 
-/// As [`integrate`], with a given method of event location.
+/// Integrates as [`integrate`] does, but with the given method of event location.
 pub fn integrate_with_locator<const N: usize, const G: usize, P: HybridPhase<N, G>, A: ObserverReply>(
     locator: EventLocator,
     phase: &P,
@@ -86,13 +86,13 @@ pub fn integrate_with_locator<const N: usize, const G: usize, P: HybridPhase<N, 
     }
 }
 
-/// Largest and smallest allowed factor between two successive step sizes (Hairer's code), and the safety
-/// factor by which the predicted step size is multiplied.
+/// Three factors of the step size control: the largest and the smallest allowed ratio of a step size to the
+/// previous step size (Hairer's code), and the safety factor that multiplies the predicted step size.
 const GROWTH: (f64, f64, f64) = (6.0, 1.0 / 3.0, 0.9);
 /// Exponent of the last step's error in the formula for the step size (the beta of Hairer's code, section
 /// IV.2).
 const STABILISATION: f64 = 0.04;
-/// Lower limit of the error in the step size control, so that one step with a very small error does not make
+/// Lower limit of the error in the step size control. Without it, one step with a very small error would make
 /// the next step too long.
 const NEGLIGIBLE: f64 = 1e-4;
 /// Smallest allowed estimate of the first step, in units of the rounding error of the time; error control
@@ -326,7 +326,8 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> AdaptiveRun<'a, N
         /// Maximum number of corrections; one is usual, because the root of the dense output is accurate to
         /// the order of that output.
         const ROUNDS: usize = 4;
-        /// Fraction of the step above which a correction is dropped, because the guard only grazes zero.
+        /// Largest allowed correction of the time of an event, as a fraction of the step. A larger correction
+        /// is dropped, because the guard then only grazes zero.
         const GRAZING: f64 = 1e-3;
         /// Span over which the slope of the guard is measured, as a fraction of the step. The relative error
         /// of a correction is about equal to this fraction.

@@ -51,12 +51,12 @@ pub(super) struct SlackVariable<'a, const N: usize, const G: usize, P: HybridPha
 }
 
 impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> SlackVariable<'a, N, G, P> {
-    /// The guard with index `guard`; `step_s` is the length of the step in which it falls, s.
+    /// The guard with index `guard`; `step_s` is the length, s, of the step in which the guard falls.
     pub(super) fn new(phase: &'a P, guard: usize, step_s: f64, work: &'a mut WorkCounters) -> Self {
         Self { phase, guard, probe_s: PROBE * step_s, work }
     }
 
-    /// Counts right-hand sides that a step of the integration method has evaluated.
+    /// Adds to the work counters the right-hand sides that a step of the integration method has evaluated.
     pub(super) fn count_evaluations(&mut self, evaluations: u64) {
         self.work.rhs_evaluations += evaluations;
     }
@@ -86,9 +86,9 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> SlackVariable<'a,
         value > 0.0 && -self.guard_rate(at, &flow) * ahead_s >= LEAST_FALL * value
     }
 
-    /// Point where the guard is zero, starting from a point `from` where it falls. `advance` returns the
-    /// state at a given time by one step of the integration method from `from`; such a step costs `cost`
-    /// right-hand sides. `None` if the guard turns before it reaches zero.
+    /// Point where the guard is zero, found from a point `from` where the guard falls. `advance` returns the
+    /// state at a given time after one step of the integration method from `from`; each such step evaluates
+    /// `cost` right-hand sides. `None` if the guard turns before it reaches zero.
     pub(super) fn land_on_zero(
         &mut self,
         from: &StatePoint<N>,

@@ -33,8 +33,9 @@ pub struct TaylorExpansion<const N: usize, const G: usize> {
     pub states: [[f64; N]; TERMS],
     /// Coefficients of the guards, one row per power; the first is infinity for a guard that does not apply.
     pub guards: [[f64; G]; TERMS],
-    /// Absolute values of the last but one and of the last Taylor coefficient of further quantities that
-    /// follow from the states, divided by the scale of these quantities. They limit the step length, too.
+    /// Absolute values of the last two Taylor coefficients of further quantities that are functions of the
+    /// states, divided by the scale of these quantities; the coefficient of higher order is second. They
+    /// limit the step length, too.
     pub followers: [f64; 2],
     /// Series of the exponent `x >= 0`, if the equations contain a term in `exp(-x)` that may vary much over
     /// a step.
@@ -83,7 +84,7 @@ impl<const N: usize, const G: usize> TaylorExpansion<N, G> {
         /// Largest allowed change of the exponent over the step, as a fraction of the order: at the end of
         /// the series each term is then at most this fraction of the term before it.
         const SHARE: f64 = 0.25;
-        /// Exponent above which the exponential is below rounding.
+        /// Value of `x` above which `exp(-x)` is below rounding errors.
         const NEGLIGIBLE: f64 = 40.0;
         let Some(exponent) = &self.exponent else { return h };
         let varies = h * exponent[1..=self.order].iter().rev().fold(0.0, |sum, c| sum * h + c.abs());
@@ -140,7 +141,8 @@ impl<const N: usize, const G: usize> DenseOutput<N> for TaylorExpansion<N, G> {
 
 /// Order of the series for a tolerance. The order of least work is `1 - ln(relative)/2` if the terms decrease
 /// geometrically (Jorba and Zou 2005, section 3.1). A few orders more are used, because the coefficients of
-/// oscillations decrease faster. The optimum is flat: for an oscillation, adding 2 to 6 takes the same time.
+/// oscillations decrease faster. The optimum is flat: for an oscillation, 2 to 6 additional orders take the
+/// same time.
 pub(crate) fn order_for_tolerance(relative: f64) -> usize {
     const MORE: f64 = 3.0;
     /// Smallest allowed order; a lower order would derive the step length from too few coefficients.
@@ -219,7 +221,8 @@ fn correct_root<const N: usize, const G: usize, P: TaylorPhase<N, G>>(
     h: f64,
     work: &mut WorkCounters,
 ) -> f64 {
-    /// Fraction of the step above which a correction is dropped, because the guard only grazes zero.
+    /// Largest allowed correction of the time of an event, as a fraction of the step. A larger correction is
+    /// dropped, because the guard then only grazes zero.
     const GRAZING: f64 = 1e-2;
     if x <= 0.0 {
         return x;

@@ -7,7 +7,7 @@ use portable_math as math;
 /// Scale of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum AxisScale {
-    /// Equal differences have equal lengths.
+    /// Linear: equal differences between values have equal lengths on the axis.
     #[default]
     Linear,
     /// Logarithmic; values of zero or less are not drawn.
@@ -90,8 +90,9 @@ pub(super) struct CanvasAxis {
     pub scale: AxisScale,
     pub low: f64,
     pub high: f64,
-    /// Canvas coordinates of the low end (`from`) and of the high end (`to`).
+    /// Canvas coordinate of the low end.
     pub from: f64,
+    /// Canvas coordinate of the high end.
     pub to: f64,
 }
 
@@ -180,7 +181,7 @@ impl CanvasAxis {
     }
 }
 
-/// Smallest distance between minor ticks, canvas units, at which they are distinct in print.
+/// Smallest allowed distance, in canvas units, between minor ticks; closer ticks would merge in print.
 const MIN_MINOR_TICK_SPACING: f64 = 1.0 * UNITS_PER_MM;
 
 /// Adds minor ticks to the labelled ticks of a linear axis if there is room: four between two neighbouring

@@ -16,19 +16,21 @@ const MIN_GRID_SIZE: usize = 4;
 /// Approximate maximum number of contours of a map.
 const MOST_LEVELS: f64 = 6.0;
 /// Largest allowed range of the four corner values of a cell, as a fraction of the colour range. A larger
-/// range is a jump, which contours do not cross. For a plane on the coarsest map, four by four, the fraction
-/// is one third.
+/// range is a jump, which contours do not cross. If a plane covers the coarsest map (four by four values),
+/// the range in each cell is one third.
 const MAX_CELL_SPREAD: f64 = 0.35;
 /// Largest allowed ratio of the number of cells with a jump to the number of cells without one. Above this
 /// ratio a map is not smooth and has no contours.
 const MOST_JUMPS: f64 = 0.15;
 /// Width of a contour line, canvas units.
 const CONTOUR_WIDTH: u32 = 3;
-/// Lengths, mm, of the shortest contour line that is drawn and of the shortest that is labelled.
+/// Length, mm, of the shortest contour line that is drawn.
 const MIN_CONTOUR_MM: f64 = 2.5;
+/// Length, mm, of the shortest contour line that has a label.
 const MIN_LABELLED_MM: f64 = 10.0;
-/// Smallest allowed distances, mm, of a contour label from another contour label and from a symbol.
+/// Smallest allowed distance, mm, of a contour label from another contour label.
 const LABELS_APART_MM: f64 = 8.0;
+/// Smallest allowed distance, mm, of a contour label from a symbol.
 const SYMBOL_APART_MM: f64 = 4.0;
 
 /// A side of a grid cell: column and row of the grid point where it starts, and whether it is vertical.

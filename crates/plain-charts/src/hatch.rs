@@ -9,8 +9,8 @@ use super::style::UNITS_PER_MM;
 use super::style::{FRAME, NO_VALUE, Rgb};
 
 const HATCH_GREY: Rgb = (0x66, 0x66, 0x66);
-/// Spacing of the lines, canvas units; doubled until there are at most [`MOST_STROKES`] lines, which limits
-/// the file size.
+/// Smallest spacing, in canvas units, of the lines of a pattern. The spacing is doubled until there are at
+/// most [`MOST_STROKES`] lines, which limits the file size.
 const HATCH_SPACING: f64 = 1.3 * UNITS_PER_MM;
 const MOST_STROKES: usize = 1200;
 /// Largest gap, canvas units, across which two strokes of one line, or two areas of one row, are joined.

@@ -231,7 +231,7 @@ fn cell_rows_svg(
         + &lines.into_iter().map(of).collect::<String>()
 }
 
-/// Half of a whole number, exactly.
+/// Half of the whole number `twice`, written exactly as a decimal number.
 fn format_half(twice: i64) -> String {
     if twice % 2 == 0 { (twice / 2).to_string() } else { format!("{}.5", twice / 2) }
 }
@@ -243,7 +243,7 @@ fn most_common_level(levels: impl Iterator<Item = Option<u32>>) -> Option<u32> {
     counts.into_iter().max_by(|a, b| a.1.cmp(&b.1).then(b.0.cmp(&a.0))).and_then(|(level, _)| level)
 }
 
-/// Left, top, right and bottom edge of the area that the blocks cover, canvas units.
+/// Left, top, right and bottom edge, in canvas units, of the area that the blocks cover.
 fn blocks_extent(columns: &[CellBlock], rows: &[CellBlock]) -> (i64, i64, i64, i64) {
     let least = |blocks: &[CellBlock]| blocks.iter().map(|b| b.0).min().unwrap_or(0);
     let most = |blocks: &[CellBlock]| blocks.iter().map(|b| b.1).max().unwrap_or(0);
@@ -252,9 +252,11 @@ fn blocks_extent(columns: &[CellBlock], rows: &[CellBlock]) -> (i64, i64, i64, i
 
 // Colour bar.
 
-/// Distance of the colour bar from the axes, width of the bar, and height of a pointed end, mm.
+/// Distance of the colour bar from the axes, mm.
 const BAR_GAP_MM: f64 = 2.5;
+/// Width of the colour bar, mm.
 const BAR_MM: f64 = 3.0;
+/// Height of a pointed end of the colour bar, mm.
 const POINT_MM: f64 = 2.0;
 
 /// The linear axis of the colour bar: its low end is at the position `from`, its high end at `to`.
@@ -262,14 +264,14 @@ fn colour_bar_axis(ends: (f64, f64), from: f64, to: f64) -> CanvasAxis {
     CanvasAxis { scale: AxisScale::Linear, low: ends.0, high: ends.1, from, to }
 }
 
-/// Width that the colour bar needs next to the axes, mm.
+/// Width, mm, that the colour bar needs next to the axes.
 pub(super) fn colour_bar_width_mm(heat: &HeatMap, height_mm: f64) -> f64 {
     let Some(ends) = heat.value_range().filter(|_| !heat.without_bar) else { return 0.0 };
     let label_mm = widest_bar_label_mm(&colour_bar_axis(ends, 0.0, height_mm), Y_TICKS_MM);
     BAR_GAP_MM + BAR_MM + TICK_MM + 0.6 + label_mm + LINE_MM
 }
 
-/// Width of the widest label of a colour bar with this tick distance, mm.
+/// Width, mm, of the widest label of a colour bar with ticks at this distance.
 fn widest_bar_label_mm(scale: &CanvasAxis, apart: f64) -> f64 {
     /// Ratio of the width of digits and signs to the mean width of letters.
     const DIGITS: f64 = 1.2;

@@ -15,7 +15,7 @@ use labels::{assign_label_rows, place_legend};
 use panel_layout::{HALF_LABEL_MM, MOST_NAMES, y_axis_ticks};
 pub(super) use panel_layout::{PanelLayout, SMALL_LINE_MM, widest_label_mm};
 
-/// Height of a row of labels above a panel, mm.
+/// Height, mm, of a row of labels above a panel.
 const LABEL_ROW_MM: f64 = SMALL_MM + 0.6;
 
 /// Panel letters; figures with a single panel, or with more panels than letters, have none.
@@ -72,7 +72,7 @@ impl<'a> FigureLayout<'a> {
 
 /// Smallest allowed height of axes, mm: room for two labelled ticks and for equal margins beyond them.
 const MIN_AXES_HEIGHT_MM: f64 = 16.0;
-/// Smallest allowed height per name along a y axis, mm: a line of text and a gap.
+/// Smallest allowed height, mm, per name along a y axis: a line of text and a gap.
 const MIN_CATEGORY_HEIGHT_MM: f64 = 3.0;
 /// Maximum number of rounds in which heights are reduced. One round may not be enough, because labels of
 /// lower panels wrap to more lines and need height again.
@@ -102,14 +102,15 @@ fn spare_height_mm(panel: &Panel) -> f64 {
 
 // Panels side by side.
 
-/// Smallest allowed width, mm, of the axes of a panel in a row, and of a panel without axes.
+/// Smallest allowed width, mm, of the axes of a panel in a row of several panels.
 const MIN_PANEL_WIDTH_MM: f64 = 30.0;
+/// Smallest allowed width, mm, of a panel without axes in a row of several panels.
 const MIN_BARE_WIDTH_MM: f64 = 18.0;
 
 /// Number of panels side by side, and the margins of each column of panels.
 pub(crate) struct PanelColumns {
     pub count: usize,
-    /// Left and right margins of the axes of each column, mm.
+    /// Left and right margin, mm, of the axes of each column.
     margins: Vec<(f64, f64)>,
 }
 

@@ -144,9 +144,9 @@ fn draw_annotation(canvas: &mut Canvas, placed: &PanelLayout, text: &TextAnnotat
 
 /// Mean colour of the heat map under a text with its centre at `middle`; `None` without a heat map.
 fn mean_heat_colour(placed: &PanelLayout, text: &TextAnnotation, middle: f64) -> Option<Rgb> {
-    /// Number of sampled points on either side of the centre of the text, and the fraction of the text's half
-    /// width that they cover.
+    /// Number of sampled points on either side of the centre of the text.
     const PLACES: i32 = 3;
+    /// Fraction of the half width of the text that the sampled points cover.
     const COVERED: f64 = 0.8;
     let heat = placed.panel.heat_map.as_ref()?;
     let step = COVERED * text_width(&text.text, SMALL_MM) / 2.0 * UNITS_PER_MM / f64::from(PLACES);
@@ -300,11 +300,12 @@ fn draw_y_tick(canvas: &mut Canvas, placed: &PanelLayout, tick: &Tick, grid: boo
 const WATERMARK: &str = "synthetic";
 /// Grey of the watermark, with a contrast of 5.7 to 1 on white.
 const WATERMARK_GREY: Rgb = (0x66, 0x66, 0x66);
-/// Distance of a panel letter from the axes below it, and of the watermark from the frame, mm.
+/// Distance, mm, of a panel letter from the axes below it.
 const LETTER_GAP_MM: f64 = 0.6;
+/// Distance, mm, of the watermark from the frame.
 const WATERMARK_INSET_MM: f64 = 0.8;
 
-/// Width that the panel letter takes before the title of a panel without axes, canvas units.
+/// Width, in canvas units, that the panel letter takes before the title of a panel without axes.
 pub(super) const LETTER_WIDTH: f64 = 4.4 * UNITS_PER_MM;
 
 /// Draws the letter of each panel above its upper left corner.

@@ -9,13 +9,13 @@ use super::style::{Rgb, WHITE};
 use super::style::{SHADING_OPACITY, UNITS_PER_MM};
 use portable_math as math;
 
-/// Width of the columns in which the points of a line are thinned, canvas units: one pixel.
+/// Width, in canvas units, of the columns in which the points of a line are thinned: one pixel.
 const THINNING_COLUMN: f64 = 4.0;
 /// Half width of a symbol, canvas units.
 const SYMBOL_HALF_WIDTH: f64 = 0.8 * UNITS_PER_MM;
-/// Smallest radius of the dot that marks a point without neighbours on a line, canvas units.
+/// Smallest allowed radius, in canvas units, of the dot that marks a point without neighbours on a line.
 const MIN_DOT_HALF_WIDTH: u32 = 4;
-/// Half width of the cap at the end of an error bar, canvas units.
+/// Half width, in canvas units, of the cap at the end of an error bar.
 const CAP_HALF_WIDTH: f64 = 0.7 * UNITS_PER_MM;
 /// Width of the line of an error bar, canvas units.
 const ERROR_BAR_WIDTH: u32 = 3;

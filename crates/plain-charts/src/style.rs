@@ -140,8 +140,9 @@ pub(super) const WHITE: Rgb = (255, 255, 255);
 pub(super) const BLACK: Rgb = (0, 0, 0);
 pub(super) const GRID: Rgb = (0xDD, 0xDD, 0xDD);
 pub(super) const FRAME: Rgb = (0x33, 0x33, 0x33);
-/// Near white and near black, which the dark theme does not replace.
+/// Near white: unlike pure white, it is not replaced by the dark theme.
 pub(super) const NEAR_WHITE: Rgb = (0xFE, 0xFE, 0xFE);
+/// Near black: unlike pure black, it is not replaced by the dark theme.
 const NEAR_BLACK: Rgb = (0x01, 0x01, 0x01);
 
 /// A colour in the hexadecimal notation of SVG.
@@ -230,11 +231,13 @@ pub(super) const SMALL_MM: f64 = 2.3;
 pub(super) const LINE_MM: f64 = 4.0;
 pub(super) const EDGE_MM: f64 = 2.0;
 pub(super) const TICK_MM: f64 = 1.0;
-/// Smallest allowed distance between labelled ticks along the x axis and along the y axis, mm.
+/// Smallest allowed distance, mm, between labelled ticks along the x axis.
 pub(super) const X_TICKS_MM: f64 = 18.0;
+/// Smallest allowed distance, mm, between labelled ticks along the y axis.
 pub(super) const Y_TICKS_MM: f64 = 5.5;
-/// Smallest allowed distance between labelled ticks along a logarithmic x axis and a logarithmic y axis, mm.
+/// Smallest allowed distance, mm, between labelled ticks along a logarithmic x axis.
 pub(super) const X_LOG_TICKS_MM: f64 = 7.0;
+/// Smallest allowed distance, mm, between labelled ticks along a logarithmic y axis.
 pub(super) const Y_LOG_TICKS_MM: f64 = 3.6;
 /// Opacity of shaded areas: pale enough for lines and grid to stay readable.
 pub(super) const SHADING_OPACITY: f64 = 0.22;

@@ -6,9 +6,11 @@ use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 
 /// Ratio of the mean width of a sans-serif letter to the font size.
 pub(super) const LETTER: f64 = 0.58;
-/// Ratio of the mean width of a letter to the font size for the widest fallback font of browsers (DejaVu
-/// Sans), plain and bold; lines must fit in this font.
+/// Ratio of the mean width of a plain letter to the font size in DejaVu Sans, the widest fallback font of
+/// browsers. Lines must fit in this font.
 pub(super) const WIDE_LETTER: f64 = 0.63;
+/// Ratio of the mean width of a bold letter to the font size in DejaVu Sans, the widest fallback font of
+/// browsers.
 pub(super) const WIDE_BOLD_LETTER: f64 = 0.7;
 const ELLIPSIS: char = '\u{2026}';
 /// Largest allowed width of the first of two lines, as a fraction of the width of the whole text.

@@ -71,14 +71,14 @@ impl WindowedTransform {
         check_band(Some(band_hz), self.frame_rate_hz)
     }
 
-    /// Root mean square of the motion between two frequencies, m; see [`Spectrum::rms_in_band_m`].
+    /// Root mean square, m, of the motion between two frequencies; see [`Spectrum::rms_in_band_m`].
     pub fn rms_in_band_m(&self, low_hz: f64, high_hz: f64) -> f64 {
         let (p, rate_hz) = (&self.periodogram, self.frame_rate_hz);
         rms_in_band_m(&self.amplitude_m, p.bin_hz(rate_hz), p.noise_bandwidth_hz(rate_hz), (low_hz, high_hz))
     }
 
-    /// Amplitude at a frequency in the first and the second half of the record, m, each by a Hann window of
-    /// its own over the frames present.
+    /// Amplitudes, m, at a frequency: in the first and in the second half of the record. Each half has its
+    /// own Hann window over the frames present.
     pub fn half_amplitudes_m(&self, frequency_hz: f64) -> [f64; 2] {
         let half = self.samples.len() / 2;
         let cycles = frequency_hz * half as f64 / self.frame_rate_hz;
@@ -136,12 +136,12 @@ pub struct Spectrum {
     /// 9 % at 900 Hz and 5,000 frames/s with 40 % of the frames missing at random), unlike the amplitudes of
     /// the components.
     pub amplitude_m: Vec<f64>,
-    /// Root mean square of the noise in a bin, m, from the median over the band.
+    /// Root mean square, m, of the noise in a bin, from the median over the band.
     pub noise_floor_m: f64,
     /// Reciprocal of the length of the record, Hz; the data show no structure finer than this.
     pub resolution_hz: f64,
-    /// Equivalent noise bandwidth of the window over the frames present, Hz (1.5 times the resolution without
-    /// gaps).
+    /// Equivalent noise bandwidth, Hz, of the window over the frames present (1.5 times the resolution
+    /// without gaps).
     pub noise_bandwidth_hz: f64,
     /// Fraction of the frames that have a value.
     pub present: f64,
@@ -157,8 +157,8 @@ impl Spectrum {
         resolvable.find(|c| c.frequency_hz >= low_hz && c.frequency_hz <= high_hz)
     }
 
-    /// Root mean square of the motion between two frequencies, m: Parseval's sum over the bins, corrected for
-    /// the noise bandwidth of the window.
+    /// Root mean square, m, of the motion between two frequencies: Parseval's sum over the bins, corrected
+    /// for the noise bandwidth of the window.
     #[must_use]
     pub fn rms_in_band_m(&self, low_hz: f64, high_hz: f64) -> f64 {
         let bin_hz = self.frequency_hz.get(1).copied().unwrap_or(0.0);

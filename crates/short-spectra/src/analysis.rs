@@ -18,8 +18,9 @@ use portable_math as math;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-/// Longest record that is fitted, frames: three seconds at 5,000 frames/s, which take about one second. The
-/// computing time grows faster than the length; longer records are analysed by their windowed periodogram.
+/// Length, in frames, of the longest record that is fitted: three seconds at 5,000 frames/s, which take about
+/// one second. The computing time grows faster than the length; longer records are analysed by their windowed
+/// periodogram.
 pub const LONGEST_DECOMPOSED: usize = 1 << 14;
 
 /// A record decomposed into trend, components and residual.
@@ -27,17 +28,17 @@ pub const LONGEST_DECOMPOSED: usize = 1 << 14;
 pub struct SpectralAnalysis {
     /// Amplitude spectrum of the record without the removed parts, with the components.
     pub spectrum: Spectrum,
-    /// Frames left out at the start because they contain a step that no model describes. All fields below
-    /// refer to the frames after them.
+    /// Number of frames left out at the start of the record, because they contain a step that no model
+    /// describes. All fields below refer to the remaining frames.
     pub skipped_frames: usize,
-    /// Distance between frames that may have a value: 1, or more if only every second, third ... frame has
-    /// one.
+    /// Distance, in frames, between frames that may have a value: 1, or more if for example only every second
+    /// frame has a value.
     pub stride: usize,
     /// Trend and relaxations that were removed before the components were estimated.
     pub removed: RemovedTrend,
     /// Sum of trend and relaxations in every frame, m.
     pub removed_m: Vec<f64>,
-    /// Amplitude that the removed parts would have in each bin of the spectrum, m.
+    /// Amplitude, m, that the removed parts would have in each bin of the spectrum.
     pub leakage_m: Vec<f64>,
     /// The sum of the components in every frame, m; zero for a long record.
     pub model_m: Vec<f64>,
@@ -47,11 +48,11 @@ pub struct SpectralAnalysis {
     pub oscillations: Vec<Oscillation>,
     /// Frequency over time of the strongest component above the slow components, if there is one.
     pub ridge: Option<Ridge>,
-    /// Power density of the record without the removed parts; `None` if gaps leave no room for tapers, and
-    /// for a long record.
+    /// Power density of the record without the removed parts; `None` for a long record, or if the gaps allow
+    /// no tapers.
     pub multitaper: Option<Multitaper>,
-    /// Noise floor in each bin of the spectrum, m, from the multitaper density of the residual; empty without
-    /// such a density.
+    /// Noise floor, m, in each bin of the spectrum, from the multitaper density of the residual; empty if the
+    /// residual has no multitaper density.
     pub noise_floor_m: Vec<f64>,
 }
 
@@ -71,13 +72,13 @@ pub struct Oscillation {
 }
 
 impl Oscillation {
-    /// Displacement at a time from the record's first frame, m.
+    /// Displacement, m, at the time `time_s` after the first frame of the record.
     #[must_use]
     pub fn displacement_m(&self, time_s: f64) -> f64 {
         self.envelope_m(time_s) * math::cos(TAU * self.frequency_hz * time_s + self.phase_rad)
     }
 
-    /// Amplitude at a time from the record's first frame, m.
+    /// Amplitude, m, at the time `time_s` after the first frame of the record.
     pub fn envelope_m(&self, time_s: f64) -> f64 {
         if time_s < self.begins_s {
             return 0.0;
@@ -272,8 +273,8 @@ impl SpectralAnalysis {
     }
 }
 
-/// An analysis, whether it leaves only noise, and whether its trend has waves as fast as a component. Such a
-/// trend and the component cancel each other even where the record is flat.
+/// An analysis, whether its residual is only noise, and whether its trend has waves as fast as a component. A
+/// trend with such waves and a component may cancel each other even where the record is flat.
 struct Attempt {
     leaves_only_noise: bool,
     trend_competes: bool,

@@ -14,8 +14,9 @@ const MOST_STEPS: usize = 40;
 /// Initial step sizes of the search: for the frequency and for its change over the record, both in cycles in
 /// the record, and for the decay, in nepers.
 const FIRST_STEPS: [f64; 3] = [0.3, 1.0, 1.0];
-/// Number of parameters of a term of the fit, and number of additional parameters of an alternative.
+/// Number of parameters of a term of the fit.
 const TERM_PARAMETERS: f64 = 4.0;
+/// Number of parameters that an alternative has in addition to those of a term of the fit.
 const EXTRA_PARAMETERS: f64 = 1.0;
 /// Distance in frequency, in resolutions, within which terms may be parts of one oscillation.
 const NEARBY_RESOLUTIONS: f64 = 5.0;

@@ -12,8 +12,8 @@ use crate::sampling::{aliased_frequencies_hz, exposure_gain};
 const ATTENUATED_BELOW: f64 = 0.9;
 /// Largest allowed shift of a frequency by a richer trend, in standard deviations.
 const MOST_TREND_SHIFT: f64 = 3.0;
-/// Largest allowed ratio of the residual around a component to its amplitude; above it, a second line or a
-/// drift explains as much.
+/// Largest allowed ratio of the residual around a component to the amplitude of the component. If the ratio
+/// is larger, a second line or a drift is as good an explanation.
 const MOST_RESIDUAL: f64 = 0.25;
 /// Distance in frequency, in resolutions, below which two oscillations may be a single one. At half a
 /// resolution and 50 dB, a single oscillation fits a pair of equal amplitudes as well as two oscillations do.
@@ -59,11 +59,12 @@ pub(super) struct Evidence {
     /// Whether an oscillation with a constant frequency drift or a linearly falling amplitude explains more
     /// than this component does.
     pub unsteady: bool,
-    /// Distance from the nearest other oscillation, in resolutions.
+    /// Distance in frequency from the nearest other oscillation, in resolutions.
     pub nearest: Option<f64>,
-    /// Distance from another oscillation, in resolutions, if one of the two may be a part of the other.
+    /// Distance in frequency from another oscillation, in resolutions, if one of the two may be a part of the
+    /// other.
     pub fragment_distance: Option<f64>,
-    /// Fraction of the segments in which a drifting component was followed.
+    /// Fraction of the segments in which the ridge of a drifting component has points.
     pub followed_share: Option<f64>,
     /// Whether the component is as slow as the waves of a trend to which columns had to be added.
     pub slow: bool,
@@ -76,7 +77,7 @@ pub(super) struct Evidence {
     pub drift: Option<f64>,
     /// Whether the component changes over a record that is too long for a fit.
     pub changes: bool,
-    /// Whether the component stayed at the peak at which it was found while it was fitted.
+    /// Whether the frequency of the component stayed within the peak at which the component was found.
     pub keeps_peak: bool,
 }
 

@@ -15,13 +15,14 @@ pub struct Component {
     /// bound, plus the effect of a removed trend.
     pub frequency_sd_hz: f64,
     /// Lowest and highest frequency of a component that drifts. `frequency_hz` is then the mean: the number
-    /// of cycles counted while the component was followed, divided by the time.
+    /// of cycles counted along the ridge of the component, divided by the duration of the ridge.
     pub range_hz: Option<FrequencyRange>,
     /// Start, s from the first frame analysed; `None` for a component present from the first frame on. If the
     /// component was found in a piece of a long record and is present when the piece starts, the start of the
     /// piece.
     pub begins_s: Option<f64>,
-    /// Amplitude, m; for a decaying component, at its own start or that of the record, whichever is later.
+    /// Amplitude, m. A decaying component has this amplitude at the start of the component or of the record,
+    /// whichever is later.
     pub amplitude_m: f64,
     /// Standard deviation of the amplitude, m.
     pub amplitude_sd_m: f64,
@@ -31,15 +32,15 @@ pub struct Component {
     pub damping_ratio_sd: Option<f64>,
     /// Ratio of the amplitude in the spectrum to the noise floor of the spectrum, dB (`20 log10`).
     pub snr_db: f64,
-    /// Cramér-Rao bound of the frequency, Hz, for this component alone in a record without gaps, in white
-    /// noise of the size found around it.
+    /// Cramér-Rao bound of the frequency, Hz. It assumes that the record has no gaps and contains only this
+    /// component and white noise, as large as the noise measured around the component.
     pub cramer_rao_hz: f64,
     /// Probability that noise alone produces a line as steady as this component (Thomson's F over the
     /// tapers): small for a steady oscillation, near one for a ring-down.
     pub line_probability: Option<f64>,
     /// Method that estimated the component.
     pub estimator: Estimator,
-    /// Shift of the frequency if the trend has two more columns, Hz.
+    /// Shift, Hz, of the frequency if the trend has two more columns.
     pub trend_shift_hz: Option<f64>,
     /// Amplitude of the removed trend at this frequency, m.
     pub leakage_m: Option<f64>,

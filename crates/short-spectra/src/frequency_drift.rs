@@ -16,11 +16,12 @@ const SLOW_COMPONENT: (f64, f64) = (4.0, 0.25);
 /// The lower end of the band is the frequency of the lowest strong component divided by this margin, because
 /// the window hides lower frequencies near the ends of a record.
 const BAND_MARGIN: f64 = 2.0;
-/// A component counts as followed everywhere if it was followed in at least this fraction of the segments.
+/// If a ridge has points in at least this fraction of the segments, it counts as complete: no shorter
+/// segments are tried, and missing points are no reason against the component.
 pub(super) const FULLY_FOLLOWED: f64 = 0.9;
-/// Fractions of the best segment length that are tried if less than `FULLY_FOLLOWED` was followed. A shorter
-/// length is used only if it increases the followed fraction by more than `LEAST_GAIN`, because noise hides a
-/// component in short segments.
+/// Fractions of the best segment length that are tried if the ridge has points in less than `FULLY_FOLLOWED`
+/// of the segments. A shorter length is used only if it increases this share by more than `LEAST_GAIN`,
+/// because noise hides a component in short segments.
 const SHORTER_SEGMENTS: [f64; 3] = [0.8, 0.65, 0.5];
 const LEAST_GAIN: f64 = 0.1;
 /// Standard deviation, in cycles, of the start of a cycle as measured from the phase of the fundamental. The
@@ -29,7 +30,7 @@ const CYCLE_INSTANT_SD: f64 = 0.05;
 /// Distance of two points, in segment lengths, at which their segments share so few frames that the noise of
 /// the points is independent.
 const INDEPENDENT_SEGMENTS: f64 = 0.5;
-/// A drift counts only if it was followed in more than this fraction of the segments.
+/// A drift counts only if its ridge has points in more than this fraction of the segments.
 const LEAST_FOLLOWED: f64 = 0.08;
 /// Smallest range of a drift, in resolutions; a smaller range is that of a slightly broadened line.
 const LEAST_RANGE: f64 = 2.0;
@@ -43,7 +44,7 @@ const LARGE_RESIDUAL: f64 = 0.25;
 /// The frequency over time of the strongest component above the slow components.
 pub(super) struct DriftCourse {
     pub ridge: Ridge,
-    /// Fraction of the segments in which the component was followed.
+    /// Fraction of the segments in which the ridge of the component has points.
     pub followed_share: f64,
     /// Frequency range, if the component drifts.
     pub range: Option<FrequencyRange>,
@@ -71,7 +72,8 @@ impl DriftCourse {
     }
 }
 
-/// Follows the strongest component of a record without its trend and slow oscillations.
+/// Subtracts the trend and the slow oscillations from a record and finds the ridge of the strongest component
+/// that remains.
 pub(super) fn find_drift_course(
     search: &ModelSelector,
     fit: &ModelFit,
@@ -90,9 +92,9 @@ pub(super) fn find_drift_course(
     Some(DriftCourse { ridge, followed_share, range })
 }
 
-/// The ridge for the segment length that shows the component best. If this ridge misses much of the record,
-/// shorter segments are tried and the ridge that misses least is taken: the component may be weak or change
-/// fast in a part of the record.
+/// The ridge for the segment length that shows the component best. If too few segments have a point of this
+/// ridge, shorter segments are tried, and the ridge with the largest share of segments is returned. The
+/// component may be weak or change fast in a part of the record.
 fn select_best_ridge(record: &[Option<f64>], frame_rate_hz: f64, band: (f64, f64)) -> Option<(f64, Ridge)> {
     let cut = |segment_s: Option<f64>| {
         let settings = time_frequency::SpectrogramSettings { segment_s, band_hz: Some(band) };
@@ -109,8 +111,8 @@ fn select_best_ridge(record: &[Option<f64>], frame_rate_hz: f64, band: (f64, f64
     Some(better.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or(best))
 }
 
-/// Band in which the strongest component above the slow ones may lie, Hz. The shortest segment holds a few
-/// cycles of the lower end, so the lower end must not lie far below the component.
+/// Band, Hz, in which the strongest component above the slow ones may lie. The shortest segment contains a
+/// few cycles at the lower end of the band, so the lower end must not lie far below the component.
 fn natural_band_hz(search: &ModelSelector, fit: &ModelFit) -> (f64, f64) {
     let prominent = prominent_peaks(search, fit);
     let slow_hz = dominant_slow_hz(&prominent);
@@ -140,7 +142,7 @@ fn prominent_peaks(search: &ModelSelector, fit: &ModelFit) -> Vec<ProminentPeak>
     sinusoids.chain(left).collect()
 }
 
-/// Frequency of the largest peak, if it is slow, Hz.
+/// Frequency, Hz, of the largest peak, if that peak is slow.
 fn dominant_slow_hz(standing: &[ProminentPeak]) -> Option<f64> {
     let largest = standing.iter().max_by(|a, b| a.amplitude_m.total_cmp(&b.amplitude_m))?;
     let mut above = standing.iter().filter(|s| s.hz > SLOW_COMPONENT.0 * largest.hz).peekable();
@@ -148,7 +150,7 @@ fn dominant_slow_hz(standing: &[ProminentPeak]) -> Option<f64> {
         .then_some(largest.hz)
 }
 
-/// The record without trend, relaxations and the sinusoids below a frequency, m.
+/// The record, m, without the trend, the relaxations and the sinusoids below a given frequency.
 fn remove_slow_parts(search: &ModelSelector, fit: &ModelFit, low_hz: f64) -> Vec<Option<f64>> {
     let (model, low) = (&fit.model, low_hz / search.resolution_hz());
     let mut record = fit.residual_m.clone();
@@ -176,13 +178,13 @@ fn is_fragmented(search: &ModelSelector, fit: &ModelFit, range: &FrequencyRange)
 
 /// Means along a ridge that describe it as one component.
 pub(super) struct RidgeMean {
-    /// Ratio of the number of cycles along the ridge to its duration, Hz.
+    /// Mean frequency, Hz: the number of cycles along the ridge, divided by the duration of the ridge.
     pub frequency_hz: f64,
     pub frequency_sd_hz: f64,
     /// Root of the mean squared amplitude, m.
     pub amplitude_m: f64,
     pub amplitude_sd_m: f64,
-    /// Mean over the points, weighted by their squared amplitudes, dB.
+    /// Mean signal-to-noise ratio, dB, of the points, weighted by their squared amplitudes.
     pub snr_db: f64,
 }
 

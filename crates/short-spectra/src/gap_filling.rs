@@ -16,17 +16,17 @@
 
 use rayon::prelude::*;
 
-/// Longest gap that is filled, frames: filling a longer gap would amplify noise and do more harm than a gap
-/// of weight zero.
+/// Length, in frames, of the longest gap that is filled: filling a longer gap would amplify noise and do more
+/// harm than a gap of weight zero.
 pub(crate) const LONGEST_FILLED_GAP: usize = 4;
 const DIFFERENCE: [f64; 5] = [1.0, -4.0, 6.0, -4.0, 1.0];
 const ORDER: usize = DIFFERENCE.len() - 1;
-/// Maximum number of missing frames in a cluster whose values are solved for together; a larger cluster is
-/// split.
+/// Maximum number of missing frames in a cluster, whose values are computed together by one system of
+/// equations. A larger cluster is split.
 const MOST_UNKNOWNS: usize = 64;
 
-/// Number of frames from which clusters are solved in parallel; for fewer, all clusters take only a few
-/// milliseconds.
+/// Smallest number of frames of a record whose clusters are solved in parallel; in a shorter record, all
+/// clusters together take only a few milliseconds.
 const PARALLEL_FROM: usize = 1 << 17;
 /// Number of clusters that a thread solves at a time.
 const CLUSTERS_AT_ONCE: usize = 256;

@@ -28,11 +28,11 @@ pub(crate) const REFINED_MISSING: f64 = 0.10;
 /// Maximum number of components that are fitted together, largest first; smaller ones keep their start
 /// values.
 pub(super) const MOST_REFINED: usize = MAX_COMPONENTS;
-/// Number of frames per unknown below which the fit would follow the noise.
+/// Minimum number of frames per unknown of the fit. With fewer frames, the fit would follow the noise.
 const FRAMES_PER_UNKNOWN: usize = 4;
 /// The residual counts as white if its mean square is below this multiple of the noise variance that follows
 /// from its fourth differences. With 60 differences, noise exceeds this limit once in a thousand records. A
-/// misfit as large as the noise leaks no more than the noise does.
+/// misfit as large as the noise causes no more leakage than the noise itself.
 const WHITE_RATIO: f64 = 2.0;
 /// Minimum number of fourth differences that can distinguish noise from an oscillation.
 const FEWEST_DIFFERENCES: usize = 20;
@@ -59,7 +59,8 @@ pub(super) struct RefinedComponent {
     pub deviations: Option<RefinedDeviations>,
 }
 
-/// Standard deviations from the normal matrix and the size of a white residual.
+/// Standard deviations that follow from the normal matrix of a fit and the root mean square of its white
+/// residual.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct RefinedDeviations {
     /// Standard deviation of the frequency, cycles in the record.
@@ -79,7 +80,7 @@ pub(super) enum Refinement {
     Refined(RefinedComponent),
 }
 
-/// The results of refining all components together, in the order of their starts.
+/// Refines all components together and returns one result for each element of `starts`, in the same order.
 pub(super) fn refine_peaks(
     samples: &[Option<f64>],
     trend: Trend,

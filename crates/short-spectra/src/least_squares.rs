@@ -16,31 +16,32 @@ use portable_math as math;
 use std::f64::consts::{PI, TAU};
 use std::rc::Rc;
 
-/// Largest allowed shift of the frequency of a steady term during a fit, in resolutions: half way down the
+/// Largest allowed shift, in resolutions, of the frequency of a steady term during a fit: half way down the
 /// lobe of a Hann window (-6 dB at one resolution; the lobe ends at two).
 const MOST_FREQUENCY_SHIFT: f64 = 1.0;
 /// Maximum number of halvings of a step that raises the misfit.
 const MOST_HALVINGS: i32 = 8;
 /// The fit ends with a step that changes all cycles and nepers by less than this.
 const SMALLEST_STEP: f64 = 1e-6;
-/// If the ratio of an eigenvalue of the normal matrix, scaled to a unit diagonal, to its largest eigenvalue
-/// is at most this, the data do not determine the direction of the eigenvector.
+/// Limit of the ratio of an eigenvalue of the normal matrix, scaled to a unit diagonal, to the largest
+/// eigenvalue. If the ratio is at most this limit, the data do not determine the direction of the
+/// eigenvector.
 const SINGULAR_DIRECTION: f64 = 1e-10;
-/// The data determine all directions if every squared pivot of the normal matrix, scaled to a unit diagonal,
-/// exceeds this: each column then keeps at least a thousandth of its length perpendicular to the columns
-/// before it.
+/// Limit of the squared pivots of the normal matrix, scaled to a unit diagonal. If all of them exceed it, the
+/// data determine all directions: each column then keeps at least a thousandth of its length perpendicular to
+/// the columns before it.
 const WELL_POSED_PIVOT: f64 = 1e-6;
-/// Largest allowed growth of an oscillation over the record, nepers: a growth by a factor of 400 is a
+/// Largest allowed growth, in nepers, of an oscillation over the record: a growth by a factor of 400 is a
 /// transient at the end of the record.
 const MOST_GROWTH: f64 = 6.0;
 /// Largest allowed damping ratio of an oscillation: above a half, almost nothing is left of it after one
 /// cycle.
 const MOST_DAMPING: f64 = 0.5;
-/// Largest allowed decay of a relaxation over the record, nepers: the relaxation is over within a hundredth
-/// of the record.
+/// Largest allowed decay, in nepers, of a relaxation over the record: the relaxation is over within a
+/// hundredth of the record.
 const MOST_RELAXED: f64 = 500.0;
-/// Largest allowed growth of a relaxation over the record, nepers; the squares of a larger growth would come
-/// near the largest floating-point number.
+/// Largest allowed growth, in nepers, of a relaxation over the record; the squares of a larger growth would
+/// come near the largest floating-point number.
 const MOST_RELAXED_AT_END: f64 = 330.0;
 
 /// Parameters of a term that a fit moves.
@@ -87,7 +88,7 @@ impl SineTerm {
         Self { cycles, nepers, first: 0, free }
     }
 
-    /// Smallest and largest decay that a fit may reach, nepers.
+    /// Smallest and largest decay, in nepers, that a fit may reach.
     pub(super) fn nepers_bounds(&self) -> (f64, f64) {
         if self.cycles == 0.0 {
             (-MOST_RELAXED_AT_END, MOST_RELAXED)
@@ -268,7 +269,7 @@ impl SineProblem {
         map
     }
 
-    /// The Gauss-Newton step of cycles and nepers of each term; zero for held parameters.
+    /// The Gauss-Newton step of cycles and nepers of each term; zero for fixed parameters.
     fn gauss_newton_step(&self, solved: &SineSolution) -> Option<Vec<[f64; 2]>> {
         let map = self.unknowns_matrix(solved);
         let gram = self.columns.gram_matrix::<COLUMNS_WITH_SLOPES>(&solved.terms);
@@ -319,9 +320,9 @@ struct UnknownIndices {
 /// Standard deviations of one term for white noise of variance one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct TermDeviations {
-    /// Standard deviation of the cycles in the record; 0 if they are held.
+    /// Standard deviation of the cycles in the record; 0 if the fit does not change the cycles.
     pub cycles: f64,
-    /// Standard deviation of the nepers over the record; 0 if they are held.
+    /// Standard deviation of the nepers over the record; 0 if the fit does not change the nepers.
     pub nepers: f64,
     pub amplitude: f64,
 }
@@ -342,7 +343,8 @@ impl SineCovariance {
     }
 }
 
-/// The term that replaces a term whose step leaves its peak or its bounds; `None` for a permitted step.
+/// The term to continue with if a step would move a term out of its peak or its bounds; `None` if the step is
+/// permitted.
 fn constrain_step(start: &SineTerm, now: &SineTerm, step: [f64; 2]) -> Option<SineTerm> {
     let width = now.nepers.abs() / TAU; // the width of a peak grows with its decay
     if (now.cycles + step[0] - start.cycles).abs() > MOST_FREQUENCY_SHIFT + width {

@@ -16,15 +16,16 @@ use std::f64::consts::TAU;
 const BLOCKS: usize = 60;
 /// Maximum number of exponentials: the peak, its mirror image, a residue of the trend and their neighbours.
 const MOST_POLES: usize = 8;
-/// Largest allowed distance of a pole from its peak, cycles in the record.
+/// Largest allowed distance, in cycles in the record, between the frequency of a pole and that of its peak.
+/// It is increased for a pole that decays or grows.
 const FARTHEST_POLE: f64 = 2.0;
 /// Relative precision of a decomposition.
 const PRECISION: f64 = 5.0 * f64::EPSILON;
 /// Maximum number of iterations of a decomposition. One that converges takes a few per row; with gaps in the
 /// record it may not converge.
 const MOST_ITERATIONS: usize = 2000;
-/// Largest allowed growth over the record, nepers. With a larger growth, which a record of mostly gaps may
-/// give, powers of a pole come near the largest floating-point number.
+/// Largest allowed growth, in nepers, of a pole over the record. With a larger growth, which a record of
+/// mostly gaps may give, powers of a pole come near the largest floating-point number.
 const MOST_NEPERS: f64 = 200.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pole {
@@ -67,7 +68,7 @@ fn magnitude(z: &Complex<f64>) -> f64 {
     math::hypot(z.re, z.im)
 }
 
-/// The factor of each exponential from one block to the next.
+/// For each exponential, the factor by which it changes from one block to the next.
 fn block_shifts(sums: &[Complex<f64>]) -> Option<Vec<Complex<f64>>> {
     let rows = sums.len() / 2;
     let columns = sums.len() + 1 - rows;

@@ -23,13 +23,14 @@ const SECOND_PASS_ROUNDS: usize = 5;
 /// Number of cycles in the record below which a step causes peaks of its own: a step that takes a tenth of
 /// the record has its spectrum there.
 pub(super) const STEP_CYCLES: f64 = 8.0;
-/// Half width of the lobe of a Hann window, resolutions: a residual closer to a term belongs to that term.
+/// Half width, in resolutions, of the lobe of a Hann window: a residual peak closer to a term belongs to that
+/// term.
 pub(super) const LOBE: f64 = 2.0;
 /// Decays over the record, nepers, with which a relaxation is tried: at the start of the record or, if
 /// negative, at its end.
 const RELAXATION_NEPERS: [f64; 8] = [5.0, 15.0, 45.0, 135.0, -5.0, -15.0, -45.0, -135.0];
 const MOST_RELAXATIONS: usize = 3;
-/// Number of frames per unknown below which the fit would follow the noise.
+/// Minimum number of frames per unknown of the fit. With fewer frames, the fit would follow the noise.
 const FRAMES_PER_UNKNOWN: usize = 4;
 /// Number of frames per column that a trend alone needs, for example eight for the four columns of a cubic.
 /// This is less than `FRAMES_PER_UNKNOWN`, because noise cannot imitate a trend.
@@ -199,8 +200,8 @@ impl<'a> ModelSelector<'a> {
         self.add_terms(self.fit_model(parts.problem.clone(), &kept, Tolerance::Coarse)?, false)
     }
 
-    /// Continues the decomposition with terms that begin late or end soon, and with pairs of lines found as
-    /// one.
+    /// Continues the decomposition with terms that begin late or end soon, and with pairs of lines that were
+    /// found as a single line.
     pub(super) fn run_second_pass(&self, fit: ModelFit) -> Option<ModelFit> {
         self.add_terms(fit.model, true)
     }
@@ -359,8 +360,8 @@ impl<'a> ModelSelector<'a> {
         Some(SineModel { problem, solution })
     }
 
-    /// The fitted model with these terms, if there are enough frames; frequencies that were held are free
-    /// again.
+    /// The fitted model with these terms, if there are enough frames. Frequencies that were fixed before may
+    /// change again.
     pub(super) fn fit_model(
         &self,
         problem: SineProblem,
@@ -382,7 +383,7 @@ impl<'a> ModelSelector<'a> {
         self.periodogram.sums.present >= each * problem.unknown_count(terms)
     }
 
-    /// The same terms with a richer trend, if there is one.
+    /// The same terms with a richer trend; `None` if the trend cannot become richer.
     pub(super) fn with_richer_trend(&self, parts: &SineModel) -> Option<SineModel> {
         let problem = self.problem_with_trend(parts.trend().next_richer()?);
         self.fit_model(problem, parts.terms(), Tolerance::Fine)
@@ -468,7 +469,8 @@ impl<'a> ModelSelector<'a> {
 pub(super) fn is_in_lobe(cycles: f64, term: &SineTerm) -> bool {
     (cycles - term.cycles).abs() < lobe_half_width(term)
 }
-/// Half width of a term's peak, cycles in the record, from the window's lobe and the decay.
+/// Half width, in cycles in the record, of the peak of a term. It combines the lobe of the window and the
+/// decay of the term.
 pub(super) fn lobe_half_width(term: &SineTerm) -> f64 {
     LOBE + term.nepers.abs() / PI
 }

@@ -28,10 +28,11 @@ pub(crate) const TAPER_RANGE: RangeInclusive<usize> = 2..=50;
 /// Smallest allowed width of the running median that gives a noise floor, in widths of a line, so that a line
 /// does not raise the floor under itself.
 pub(crate) const FLOOR_LINES: f64 = 5.0;
-/// Largest allowed length of a padded record, samples; memory limits it, because every taper keeps its
-/// transform.
+/// Largest allowed length, in samples, of a padded record; memory limits it, because the transform of every
+/// taper is kept.
 const MOST_PADDED: usize = 1 << 24;
-/// Number of values from which threads share the work; fewer take a millisecond or two.
+/// Smallest number of values for which the work is divided among threads; fewer values take a millisecond or
+/// two.
 const PARALLEL_FROM: usize = 1 << 17;
 /// If the sum of the powers of all tapers but one is below this fraction of the sum over all tapers, it is
 /// rounding error.
@@ -48,15 +49,15 @@ pub struct Multitaper {
     pub density_m2_per_hz: Vec<f64>,
     /// Standard deviation of the density's natural logarithm, by the delete-one jackknife over the tapers.
     pub log_density_sd: Vec<f64>,
-    /// Thomson's F for one steady sine in noise, with 2 and `2 tapers - 2` degrees of freedom; valid in bins
-    /// more than half the width of a line from 0 and from half the frame rate. Infinite if the sine leaves no
-    /// residual.
+    /// Thomson's F for one steady sine in noise, with 2 and `2 * tapers - 2` degrees of freedom. It is valid
+    /// in bins whose distance from 0 and from half the frame rate is more than half the width of a line.
+    /// Infinite if the sine explains the bin completely.
     pub line_f: Vec<f64>,
     /// Amplitude, m, of the steady sine that best explains the transforms of all tapers in the bin.
     pub line_amplitude_m: Vec<f64>,
     /// Number of tapers used; long gaps may leave room for fewer than requested.
     pub tapers: usize,
-    /// Reciprocal of the time from the first to the last frame present, Hz.
+    /// Reciprocal, Hz, of the time from the first to the last frame present.
     pub resolution_hz: f64,
     /// Half the width of a steady line, Hz: `(requested tapers + 1) / 2` resolutions.
     pub half_bandwidth_hz: f64,
@@ -215,7 +216,7 @@ fn trim_missing_ends(samples: &[Option<f64>]) -> &[Option<f64>] {
     samples.get(first..end).unwrap_or_default()
 }
 
-/// The values `of(0)`, `of(1)`, ..., `count` in number, computed in parallel if `work` is large.
+/// The `count` values `of(0)`, `of(1)`, ..., computed in parallel if `work` is large.
 fn map_parallel_above<T: Send>(count: usize, work: usize, of: impl Fn(usize) -> T + Sync) -> Vec<T> {
     if work < PARALLEL_FROM {
         (0..count).map(&of).collect()
@@ -392,14 +393,14 @@ const LEAST_ENERGY_SHARE: f64 = 0.1;
 
 /// Tapers that are linear combinations of sine tapers.
 pub(super) struct SineTapers {
-    /// Phase step of the first sine taper from frame to frame, rad.
+    /// Phase step, rad, of the first sine taper from one frame to the next.
     turn: f64,
     /// Coefficients of the sines, one row for each taper.
     rows: DMatrix<f64>,
 }
 
 impl SineTapers {
-    /// At most `count` tapers for a record; fewer if its gaps leave no room.
+    /// At most `count` tapers for a record; fewer if the gaps of the record allow no more.
     pub(super) fn new(samples: &[Option<f64>], count: usize) -> Self {
         let turn = PI / (samples.len() + 1) as f64;
         let sines = DMatrix::identity(count, count) * (2.0 / (samples.len() + 1) as f64).sqrt();

@@ -14,7 +14,7 @@ const DEMODULATED_BLOCKS: usize = 1024;
 /// Number of frames after which a rotated phasor is computed afresh, so that rounding errors do not
 /// accumulate.
 const FRAMES_PER_RESTART: usize = 256;
-/// Distance between the three amplitudes that define a parabola, cycles in the record: an eighth of a
+/// Distance, in cycles in the record, between the three amplitudes that define a parabola: an eighth of a
 /// resolution.
 const PARABOLA_SPACING: f64 = 0.125;
 /// Number of parabolas that are fitted in turn. Each is centred on the vertex of the one before, at most half
@@ -78,8 +78,8 @@ impl WeightedRecord<'_> {
     }
 }
 
-/// Vertex of the parabola through the logarithms of three equidistant amplitudes: its distance from the
-/// middle one, in spacings, and its height.
+/// Vertex of the parabola through the logarithms of three equidistant amplitudes. Returns the distance of the
+/// vertex from the middle amplitude, in spacings, and the height of the vertex.
 pub(super) fn log_parabola_vertex(around: [f64; 3]) -> (f64, f64) {
     let [left, top, right] = around.map(|a| math::ln(a.max(f64::MIN_POSITIVE)));
     let curvature = left - 2.0 * top + right;

@@ -10,7 +10,7 @@ use portable_math as math;
 use rayon::prelude::*;
 use std::f64::consts::{FRAC_1_SQRT_2, LN_2, SQRT_2, TAU};
 
-/// Probability that noise alone causes a component in a spectrum.
+/// Allowed probability that noise alone causes a component to be found in a spectrum.
 const FALSE_ALARM: f64 = 0.01;
 /// Number of independent trials per resolution: a Hann spectrum has more maxima than independent values.
 const TRIALS_PER_RESOLUTION: f64 = 3.0;
@@ -25,8 +25,8 @@ const TREND_MARGIN: f64 = 4.0;
 /// Smallest allowed ratio of the amplitude of a listed component to that of the largest resolvable component:
 /// -50 dB. The part of a tone of twelve cycles that a cubic absorbs appears 56 dB below the tone.
 const DYNAMIC_RANGE: f64 = 3.2e-3;
-/// A maximum counts if, on the way to every larger maximum, the spectrum falls below this fraction of its
-/// height: 3 dB, half the power.
+/// A maximum counts if, on the way to every larger maximum, the spectrum falls below this fraction of the
+/// height of the smaller maximum: 3 dB, half the power.
 const VALLEY_RATIO: f64 = FRAC_1_SQRT_2;
 /// Smallest allowed width, in resolutions, of the band whose median gives the noise floor, so that a
 /// component does not raise the floor under itself.
@@ -34,7 +34,7 @@ const FLOOR_RESOLUTIONS: f64 = 40.0;
 /// Ratio of the standard deviation of the frequency of a spectral maximum to the Cramér-Rao bound; 1.5 to 1.8
 /// was measured at 20 dB.
 const OVER_BOUND: f64 = 1.6;
-/// Error of a frequency after removal of a cubic, in resolutions: 0.03 Hz at 78 Hz in 0.15 s.
+/// Error of a frequency that the removal of a cubic causes, in resolutions: 0.03 Hz at 78 Hz in 0.15 s.
 const TREND_SHARE: f64 = 0.005;
 
 impl WindowedSpectrum<'_> {
@@ -137,8 +137,8 @@ pub(super) fn find_peaks(spectrum: &WindowedSpectrum, band_hz: (f64, f64), most:
     PeakList { floor_m, detection, accepted, listed }
 }
 
-/// Root mean square of the noise in a bin: amplitudes of noise are Rayleigh distributed, with median `rms
-/// sqrt(ln 2)`.
+/// Root mean square of the noise in a bin. Amplitudes of noise are Rayleigh distributed; their median is
+/// `sqrt(ln 2)` times their root mean square.
 fn noise_floor(spectrum: &WindowedSpectrum, (low, high): (f64, f64)) -> f64 {
     let widen = (FLOOR_RESOLUTIONS * spectrum.resolution_hz - (high - low)).max(0.0) / 2.0;
     let bins = spectrum.amplitude_m.len();

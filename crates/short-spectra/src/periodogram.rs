@@ -9,7 +9,8 @@ use std::sync::{Arc, OnceLock};
 /// Number of windows without gaps that a thread keeps: a fit uses records of a few lengths, which are the
 /// same in every run of its model.
 const CACHED_WINDOWS: usize = 16;
-/// Longest padded length of a window that is kept, samples; all kept windows together take a few megabytes.
+/// Largest padded length, in samples, of a window that is kept; all kept windows together take a few
+/// megabytes.
 const LONGEST_CACHED: usize = 1 << 16;
 
 thread_local! {
@@ -81,8 +82,8 @@ impl Periodogram {
         2.0 / self.sums.first
     }
 
-    /// Amplitude in each bin of the weighted spectrum, m; a sine at the frequency of a bin has its own
-    /// amplitude there.
+    /// Amplitude, m, in each bin of the weighted spectrum. For a sine at the frequency of a bin, it equals
+    /// the amplitude of the sine.
     pub(super) fn amplitudes(&self, residual: &[f64]) -> Vec<f64> {
         let scaled = self.amplitude_scale();
         self.transform.magnitudes(residual.iter().zip(self.weights.iter()).map(|(x, w)| x * w * scaled))
@@ -114,13 +115,14 @@ impl Periodogram {
         frame_rate_hz / self.padded as f64
     }
 
-    /// Amplitude of an oscillation of `cycles` cycles in the spectrum, m: `2 |sum w x exp(-2 pi i n t)| / sum
-    /// w`.
+    /// Amplitude, m, in the spectrum at the frequency of `cycles` cycles in the record: `2 * |sum(w * x *
+    /// exp(-2 pi i n t))| / sum(w)`.
     pub(super) fn amplitude_at(&self, values: &[f64], cycles: f64) -> f64 {
         Self::amplitude_with_weights(&self.weights, values, cycles)
     }
 
-    /// Amplitude of an oscillation of `cycles` cycles, m, in the spectrum with the given weights.
+    /// Amplitude, m, in the spectrum with the given weights at the frequency of `cycles` cycles in the
+    /// record.
     pub(super) fn amplitude_with_weights(weights: &[f64], values: &[f64], cycles: f64) -> f64 {
         let turn = std::f64::consts::TAU * cycles / values.len() as f64;
         let add = |(re, im): (f64, f64), (i, (x, w)): (usize, (&f64, &f64))| {
@@ -175,7 +177,8 @@ pub(super) fn upper_median(mut values: Vec<f64>) -> Option<f64> {
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-/// Bin width, resolutions, above which bins miss the top of a sidelobe, which is one resolution wide.
+/// Width of a bin, in resolutions, above which the bins miss the top of a sidelobe; a sidelobe is one
+/// resolution wide.
 const COARSE_BINS: f64 = 0.25;
 /// Number of bins by which the distance of two peaks is reduced if bins are wider than `COARSE_BINS`: half a
 /// bin for each peak, and one bin because the top of a sidelobe may lie between two bins.

@@ -41,8 +41,8 @@ const MAINS_HZ: [usize; 2] = [50, 60];
 /// Highest multiple of the mains frequency that is attributed to a lamp. The flicker of a lamp is strongest
 /// at the second multiple.
 const MOST_MAINS: usize = 12;
-/// Accuracy with which a frequency must be known to be compared with the mains, Hz: different multiples of 50
-/// and 60 Hz are at least 10 Hz apart.
+/// Accuracy, Hz, with which a frequency must be known to be compared with multiples of the mains frequency:
+/// different multiples of 50 and 60 Hz are at least 10 Hz apart.
 const MAINS_WITHIN_HZ: f64 = 0.5;
 
 /// Finds the relations between components; `components` are sorted by falling amplitude.

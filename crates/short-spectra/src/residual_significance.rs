@@ -9,14 +9,16 @@ use super::settings::MIN_CYCLES;
 /// Half width, in resolutions, of the neighbourhood of a component in which the noise is estimated from the
 /// residual. The neighbourhood has 48 independent values of the spectrum, which determine the noise to 10 %.
 pub(super) const NEIGHBOURHOOD: f64 = 12.0;
-/// Smallest allowed half width of the neighbourhood of a slow component, in resolutions, and the factor by
-/// which the detection level rises there. Six values determine the noise poorly: with a probability of one in
-/// 100,000, noise exceeds 5.8 times their rms, but only 3.4 times the rms of many values.
+/// Smallest allowed half width, in resolutions, of the neighbourhood of a slow component in which the noise
+/// is estimated.
 const FEWEST_RESOLUTIONS: f64 = 3.0;
+/// Factor by which the detection level rises for a slow component: only six values of the spectrum may then
+/// determine the noise. With a probability of one in 100,000, noise exceeds 5.8 times the rms of six values,
+/// but only 3.4 times the rms of many values.
 const FEW_VALUES_FACTOR: f64 = 1.7;
-/// Largest ratio of the mean square of the residual to that of the noise floor at which the residual counts
-/// as noise. The floor is a median, accurate to a few hundredths; the residual of a drift or a step is many
-/// times as large.
+/// Largest allowed ratio of the mean square of the residual to that of the noise floor, if the residual is to
+/// count as noise. The floor is a median, accurate to a few hundredths; the residual of a drift or a step is
+/// many times as large.
 const NOISE_RATIO_LIMIT: f64 = 1.5;
 
 impl ModelSelector<'_> {
@@ -29,20 +31,21 @@ impl ModelSelector<'_> {
         parts.solution.misfit < NOISE_RATIO_LIMIT * freedom.max(1.0) * floor_m * floor_m
     }
 
-    /// Amplitude that a term has in the windowed spectrum, m.
+    /// Amplitude, m, that a term has in the windowed spectrum.
     pub(super) fn windowed_amplitude_m(&self, parts: &SineModel, k: usize) -> f64 {
         self.periodogram.amplitude_at(&parts.term_values(k), parts.terms()[k].cycles)
     }
 
-    /// Largest residual peak within the lobe of a term, m; 0 if noise alone may have caused it.
+    /// Amplitude, m, of the largest residual peak within the lobe of a term; 0 if noise alone may have caused
+    /// it.
     pub(super) fn largest_peak_near(&self, fit: &ModelFit, term: &SineTerm) -> f64 {
         let near = fit.peaks.accepted.iter().filter(|p| is_in_lobe(self.cycles_of_peak(p), term));
         near.fold(0.0, |largest: f64, peak| largest.max(peak.amplitude_m))
     }
 
-    /// Largest residual amplitude near a component, m, whether at a peak or not; 0 if noise alone may have
-    /// caused it. A second oscillation too close to be resolved leaves the largest residual at the end of the
-    /// lobe, where it has no peak of its own.
+    /// Largest residual amplitude, m, near a component, whether at a peak or not; 0 if noise alone may have
+    /// caused it. If a second oscillation is too close to be resolved, the residual is largest at the end of
+    /// the lobe, where it has no peak.
     pub(super) fn significant_residual(&self, fit: &ModelFit, term: &SineTerm) -> f64 {
         let most = self.residual_near(fit, term);
         let noise_m = self.noise_floor_near(fit, term.cycles);
@@ -65,20 +68,21 @@ impl ModelSelector<'_> {
         term.cycles <= NEIGHBOURHOOD && !term.is_transient() && self.windowed_amplitude_m(parts, k) > least_m
     }
 
-    /// The noise floor around a frequency, m, at least that of the whole spectrum. It is estimated locally,
+    /// The noise floor, m, around a frequency, at least that of the whole spectrum. It is estimated locally,
     /// because the noise need not be white.
     pub(super) fn noise_floor_near(&self, fit: &ModelFit, cycles: f64) -> f64 {
         let near = self.noise_floor_between(fit, cycles - NEIGHBOURHOOD, cycles + NEIGHBOURHOOD);
         fit.peaks.floor_m.max(near)
     }
 
-    /// The noise floor between two frequencies, cycles in the record, m; 0 if no bin lies between them.
+    /// The noise floor, m, between two frequencies, given in cycles in the record; 0 if no bin lies between
+    /// them.
     pub(super) fn noise_floor_between(&self, fit: &ModelFit, low: f64, high: f64) -> f64 {
         let around = self.residual_between(fit, low, high).to_vec();
         upper_median(around).unwrap_or(0.0) / std::f64::consts::LN_2.sqrt()
     }
 
-    /// Spectrum of the residual between two frequencies, cycles in the record.
+    /// Spectrum of the residual between two frequencies, given in cycles in the record.
     pub(super) fn residual_between<'b>(&self, fit: &'b ModelFit, low: f64, high: f64) -> &'b [f64] {
         let amplitude_m = &fit.amplitude_m[..];
         let bins_a_cycle = 2.0 * (amplitude_m.len() as f64 - 1.0) / self.samples.len() as f64;
@@ -111,7 +115,7 @@ impl ModelSelector<'_> {
         self.periodogram.noise_sd_m(peak.amplitude_m) > fit.peaks.detection * noise_m
     }
 
-    /// Standard deviation of the noise from which a term must stand out, m.
+    /// Standard deviation, m, of the noise with which the amplitude of a term is compared.
     pub(super) fn noise_sd_for_term(&self, fit: &ModelFit, term: &SineTerm) -> f64 {
         let wide_m = if term.is_transient() {
             self.octave_noise_sd(fit, term.cycles)

@@ -23,12 +23,12 @@ const NEPERS_UNTIL_OVER: f64 = 3.5;
 const FRAMES_PER_NEPER: f64 = 4.0;
 /// Number of first frames that are tried in each interval in which the amplitude falls by a neper.
 const STARTS_PER_NEPER: f64 = 3.0;
-/// Probability that noise alone causes an oscillation to be found anywhere in a record.
+/// Allowed probability that noise alone causes an oscillation to be found anywhere in a record.
 const FALSE_ALARM: f64 = 0.01;
 /// Decay over the record, nepers, above which a window that is zero at its ends shows too little of an
 /// oscillation.
 const TRANSIENT_NEPERS: f64 = 8.0;
-/// Smallest allowed width of a band that is used as an octave, cycles in the record: its noise floor is a
+/// Smallest allowed width, in cycles in the record, of a band that is used as an octave: its noise floor is a
 /// median, which needs enough bins.
 const OCTAVE: f64 = 20.0;
 /// Maximum number of steps of the search for the frequency, decay and first frame of a term; each halving
@@ -37,8 +37,8 @@ const MOST_MOVES: usize = 30;
 /// Number of cycles in the record up to which a decaying oscillation may be the residue of a step: twice the
 /// number up to which a step causes peaks.
 const SLOW_CYCLES: f64 = 2.0 * STEP_CYCLES;
-/// A term may have begun at the start of the record already, hidden there by other terms, if it would have
-/// decayed by at most this, in nepers, from the start of the record to its first frame.
+/// Largest allowed decay, in nepers, of a term between the start of the record and its first frame, if the
+/// term is extended to the start. Such a term may have been hidden there by other terms.
 const MOST_NEPERS_LOST: f64 = 2.0;
 /// Fraction of the sum of squares of a record below which a misfit is rounding error, because the misfit is a
 /// difference of such sums.
@@ -58,7 +58,8 @@ impl SineTerm {
         self.cycles > 0.0 && (self.first > 0 || self.nepers > TRANSIENT_NEPERS)
     }
 
-    /// Frames and envelope of the term, from its first frame until it has decayed.
+    /// The frames in which the term is present, each with the value of the envelope, from the first frame
+    /// until the term has decayed.
     fn envelope_values(&self, frames: usize) -> impl Iterator<Item = (usize, f64)> + Clone + use<> {
         let (first, decay) = (self.first, self.nepers / frames as f64);
         let lasts = if decay > 0.0 { (NEPERS_UNTIL_OVER / decay).ceil() as usize } else { frames };
@@ -74,7 +75,7 @@ struct Trial {
     padded: usize,
     /// Distance between two first frames that are tried, in frames.
     step: usize,
-    /// Bins of the transform to try, with the standard deviation of the noise there, m.
+    /// Bins of the transform to try, each with the standard deviation, m, of the noise there.
     bins: Vec<(usize, f64)>,
 }
 
@@ -88,8 +89,9 @@ struct Decays {
 }
 
 impl Decays {
-    /// Keeps a decaying oscillation if it stands out more or explains more than those before. The oscillation
-    /// lowers the sum of squares by twice `square`; `half` is `square` in units of the variance of the noise.
+    /// Keeps a decaying oscillation if it stands out more from the noise, or lowers the sum of squares more,
+    /// than the oscillations before it. It lowers the sum of squares by twice `square`; `half` is `square`
+    /// divided by the variance of the noise.
     fn keep_larger(&mut self, term: SineTerm, half: f64, square: f64) {
         if self.stands_out.is_none_or(|(least, _)| half > least) {
             self.stands_out = Some((half, term));
@@ -99,8 +101,8 @@ impl Decays {
         }
     }
 
-    /// The oscillation that stands out most and, with `both`, the one that explains most, if it is a
-    /// different one.
+    /// The oscillation that stands out most from the noise. With `both`, also the oscillation that lowers the
+    /// sum of squares most, if it is a different one.
     fn terms(self, both: bool) -> impl Iterator<Item = SineTerm> {
         let (first, second) = (self.stands_out.map(|met| met.1), self.explains.map(|met| met.1));
         first.into_iter().chain(second.filter(|second| both && Some(*second) != first))
@@ -207,8 +209,8 @@ impl ModelSelector<'_> {
         with
     }
 
-    /// Largest residual amplitude under the envelope of a term around its frequency, m; 0 if noise alone may
-    /// have caused it.
+    /// Largest residual amplitude, m, under the envelope of a term and near its frequency; 0 if noise alone
+    /// may have caused it.
     pub(super) fn residual_in_envelope(&self, fit: &ModelFit, term: &SineTerm) -> f64 {
         let frames = self.samples.len();
         let values = term.envelope_values(frames).map(|(i, e)| e * fit.residual_m[i].unwrap_or(0.0));
@@ -224,13 +226,15 @@ impl ModelSelector<'_> {
         if most * most > least { 2.0 * most / energy } else { 0.0 }
     }
 
-    /// Ratio of the amplitude of a term to the noise of its estimate under its own envelope.
+    /// Ratio of the amplitude of a term to the noise in an estimate of this amplitude over the frames of the
+    /// term's envelope.
     pub(super) fn level_in_envelope(&self, fit: &ModelFit, term: &SineTerm, amplitude_m: f64) -> f64 {
         let noise_m = self.octave_noise_sd(fit, term.cycles);
         amplitude_m * self.envelope_energy(term).1.sqrt() / (2.0 * noise_m)
     }
 
-    /// Number of frames of a term's envelope, and the sum of its squares over the frames present.
+    /// Number of frames of the envelope of a term, and the sum of the squares of the envelope over the frames
+    /// present.
     fn envelope_energy(&self, term: &SineTerm) -> (usize, f64) {
         let add =
             |(count, sum): (usize, f64), (i, e): (usize, f64)| (count + 1, sum + self.weights[i] * e * e);
@@ -345,9 +349,9 @@ impl ModelSelector<'_> {
         left_m > fit.peaks.detection * self.octave_noise_sd(fit, term.cycles)
     }
 
-    /// Standard deviation of the noise around a frequency, m: that of the octave below or above, whichever is
-    /// larger. The peak of an oscillation that decays within the record is wider than the neighbourhood of a
-    /// line.
+    /// Standard deviation, m, of the noise around a frequency: that of the octave below or above, whichever
+    /// is larger. The peak of an oscillation that decays within the record is wider than the neighbourhood of
+    /// a line.
     pub(super) fn octave_noise_sd(&self, fit: &ModelFit, cycles: f64) -> f64 {
         let octaves = [(cycles / 2.0).min(cycles - OCTAVE), cycles, (2.0 * cycles).max(cycles + OCTAVE)];
         let floors = octaves.windows(2).map(|side| self.noise_floor_between(fit, side[0], side[1]));
@@ -355,7 +359,7 @@ impl ModelSelector<'_> {
     }
 }
 
-/// Range in which the replacement of the terms `out` may lie, cycles in the record.
+/// Frequency range, in cycles in the record, in which a replacement of the terms `out` may lie.
 fn replacement_range(terms: &[SineTerm], out: &[usize]) -> Range<f64> {
     match out.first().map(|k| &terms[*k]).filter(|term| term.cycles > 0.0) {
         Some(term) => term.cycles - lobe_half_width(term)..term.cycles + lobe_half_width(term),

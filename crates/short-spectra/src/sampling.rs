@@ -18,14 +18,14 @@ pub fn exposure_gain(frequency_hz: f64, exposure_s: f64) -> f64 {
     if half_turns == 0.0 { 1.0 } else { (math::sin(half_turns) / half_turns).abs() }
 }
 
-/// Frequency at which an exposure of `exposure_s` passes half the power, Hz. The same function converts that
+/// Frequency, Hz, at which an exposure of `exposure_s` passes half the power. The same function converts that
 /// frequency back to the exposure.
 pub fn half_power_hz(exposure_s: f64) -> f64 {
     HALF_POWER_CYCLES / exposure_s
 }
 
-/// Frequency at which `frequency_hz` appears at `frame_rate_hz`, Hz: it is folded about the multiples of half
-/// the rate.
+/// Frequency, Hz, at which an oscillation of `frequency_hz` appears at `frame_rate_hz`: it is folded about
+/// the multiples of half the rate.
 #[must_use]
 pub fn alias_hz(frequency_hz: f64, frame_rate_hz: f64) -> f64 {
     if frequency_hz <= frame_rate_hz / 2.0 {
@@ -35,9 +35,9 @@ pub fn alias_hz(frequency_hz: f64, frame_rate_hz: f64) -> f64 {
     rest.min(frame_rate_hz - rest)
 }
 
-/// Every frequency above half of `frame_rate_hz` and up to `up_to_hz` that appears at `frequency_hz`, Hz: `k
-/// rate - f` and `k rate + f`, ascending, without duplicates, at most 1000. Empty for a frequency outside 0
-/// to half the rate.
+/// Every frequency, Hz, above half of `frame_rate_hz` and up to `up_to_hz` that appears at `frequency_hz`: `k
+/// * rate - f` and `k * rate + f`, ascending, without duplicates, at most 1000. Empty for a frequency outside
+/// 0 to half the rate.
 pub(crate) fn aliased_frequencies_hz(frequency_hz: f64, frame_rate_hz: f64, up_to_hz: f64) -> Vec<f64> {
     let half_hz = frame_rate_hz / 2.0;
     if !(half_hz.is_finite() && half_hz > 0.0 && (0.0..=half_hz).contains(&frequency_hz)) {

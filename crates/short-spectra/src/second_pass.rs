@@ -24,9 +24,10 @@ pub(super) struct DoubtfulTerm {
 }
 
 impl ModelSelector<'_> {
-    /// The model with the lowest Bayesian information criterion: the `improved` model, one with another
-    /// ring-down, or one with two lines in the place of one. A model that changes a doubtful term must
-    /// explain more than a constant frequency drift or a linearly falling amplitude of that term would.
+    /// The model with the lowest Bayesian information criterion: the `improved` model, a model with another
+    /// ring-down, or a model with two lines in the place of a single line. A model that changes a doubtful
+    /// term must explain more than a constant frequency drift or a linearly falling amplitude of that term
+    /// would.
     pub(super) fn refine_candidates(&self, fit: &ModelFit, improved: Option<SineModel>) -> Option<SineModel> {
         let parts = &fit.model;
         let terms = parts.terms();
@@ -65,8 +66,8 @@ impl ModelSelector<'_> {
         self.select_best(grown).filter(|grown| self.bic_of(grown) < criterion + DECISIVE_DIFFERENCE)
     }
 
-    /// The fit with two steady lines in the place of one that drifts over `range`, if it leaves only noise;
-    /// `None` for a range wider than two beating lines may cause.
+    /// The fit with two steady lines in the place of a single line that drifts over `range`; `None` if the
+    /// residual is more than noise, or if the range is wider than two beating lines may cause.
     pub(super) fn split_into_pair(&self, fit: &ModelFit, range: &FrequencyRange) -> Option<ModelFit> {
         if range.high_hz - range.low_hz > WIDEST_BEAT * self.resolution_hz() {
             return None;
@@ -108,14 +109,14 @@ fn are_adjacent(term: &SineTerm, other: &SineTerm) -> bool {
 // can also be split into two. A pair is therefore accepted only if it leaves only noise around it, and if
 // neither line explains more by growing or decaying.
 
-/// Initial distances of the lines of a pair from the single term, resolutions; the single term lies between
-/// the two lines or has converged to one of them.
+/// Initial distances, in resolutions, of the two lines of a pair from the single term. The single term lies
+/// between the two lines or has converged to one of them.
 const PAIR_STARTS: [[f64; 2]; 5] = [[-0.35, 0.35], [-0.6, 0.6], [-0.9, 0.9], [0.0, 1.6], [-1.6, 0.0]];
-/// Largest allowed distance of a line of the pair from the single term, in resolutions.
+/// Largest allowed distance, in resolutions, of a line of the pair from the single term.
 const PAIR_REACH: f64 = 2.0;
 
 impl ModelSelector<'_> {
-    /// Models with two steady terms in the place of a doubtful one.
+    /// Models in which two steady terms replace a doubtful term.
     pub(super) fn with_pairs(&self, fit: &ModelFit, doubtful: &[usize]) -> Vec<SineModel> {
         let parts = &fit.model;
         let tried = |one: &usize| {

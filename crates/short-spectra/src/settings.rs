@@ -45,19 +45,19 @@ pub const MIN_SAMPLES: usize = 8;
 /// Minimum number of cycles of a resolvable component: with fewer, the lobe of the window, two resolutions
 /// wide on either side, reaches its own mirror image and the trend.
 pub(crate) const MIN_CYCLES: f64 = 3.0;
-/// Largest allowed length of a padded record, samples; memory limits it.
+/// Largest allowed length, in samples, of a padded record; memory limits it.
 pub(super) const MOST_PADDED: usize = 1 << 26;
 /// Maximum length, in samples, of a record padded by `zero_padding`; a record that would become longer is
-/// padded less. A transform of this length takes about 50 ms; a transform of a million samples padded eightfold
-/// takes half a second.
+/// padded less. A transform of this length takes about 50 ms; a transform of a million samples padded
+/// eightfold takes half a second.
 pub(crate) const LONG_PADDED: usize = 1 << 21;
-/// Padded length from which record and window are transformed in parallel, samples; a shorter transform takes
-/// less than 10 ms.
+/// Smallest padded length, in samples, at which record and window are transformed in parallel; a shorter
+/// transform takes less than 10 ms.
 pub(super) const PADDED_AT_ONCE: usize = 1 << 20;
 /// Fraction of the largest sample below which amplitudes are rounding errors.
 pub(super) const ROUNDING: f64 = 1e-12;
 /// Default frequency of the fastest expected oscillation, Hz.
 pub const FASTEST_HZ: f64 = 1300.0;
-/// Ratio of an amplitude to the noise floor from which a component is clear, dB: at 18 dB the frequency is
+/// Ratio, dB, of an amplitude to the noise floor from which a component is clear: at 18 dB the frequency is
 /// accurate to a few hundredths of a resolution.
 pub(crate) const CLEAR_DB: f64 = 18.0;

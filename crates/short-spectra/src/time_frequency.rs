@@ -33,8 +33,8 @@ use std::ops::RangeInclusive;
 /// Maximum number of frames of a segment whose length is chosen from the data; it limits the bins of a
 /// column.
 const LONGEST_SEGMENT_FRAMES: usize = 2048;
-/// Minimum number of segments that fit end to end into a record, so that a component that lasts half the
-/// record can be followed, too.
+/// Minimum number of segments that fit end to end into a record, so that a component that lasts only half the
+/// record still has a ridge.
 const FEWEST_SEGMENTS: usize = 3;
 /// Ratio of successive segment lengths that are tried.
 const LENGTH_RATIO: f64 = std::f64::consts::SQRT_2;
@@ -116,7 +116,7 @@ impl SegmentBins {
         first..=(bin(high).floor() as usize).clamp(first, self.padded / 2)
     }
 
-    /// Amplitudes of each segment in some of the bins, m; `None` for a segment with too few frames present.
+    /// Amplitudes, m, of each segment in the given bins; `None` for a segment with too few frames present.
     pub(super) fn column_amplitudes(
         &self,
         samples: &[Option<f64>],
@@ -202,8 +202,8 @@ impl SegmentLayout {
 /// Upper end of the default band, as a fraction of half the frame rate: a component at a higher frequency is
 /// as likely to be an alias as not.
 const DEFAULT_BAND_TOP: f64 = 0.9;
-/// Ratio of the lower end of the default band to the frequency of the largest slow component. At this
-/// distance from a ring-down, the flank of its peak has faded in a Hann spectrum of four of its cycles.
+/// Ratio of the lower end of the default band to the frequency of the largest slow component. At this ratio,
+/// the flank of the peak of a ring-down has faded in a Hann spectrum over four cycles of the ring-down.
 const SLOW_COMPONENT_MARGIN: f64 = 4.0;
 /// Number of segments of `SEGMENT_CYCLES` cycles each that a record should hold at the lower end of the
 /// default band.
@@ -228,8 +228,8 @@ pub struct Spectrogram {
     pub time_s: Vec<f64>,
     /// Frequencies of the bins, Hz, from 0 to half the frame rate; at least four bins per resolution.
     pub frequency_hz: Vec<f64>,
-    /// For each segment, the amplitude in each bin, m; a steady sine of amplitude A has the value A at its
-    /// peak. `None` if missing frames leave less than half the window's weight.
+    /// For each segment, the amplitude, m, in each bin; a steady sine of amplitude A has the value A at its
+    /// peak. `None` if the frames present have less than half the weight of the window.
     pub amplitude_m: Vec<Option<Vec<f64>>>,
     /// Length of a segment, s.
     pub segment_s: f64,

@@ -60,8 +60,9 @@ impl RealTransform {
 //
 // The library takes the twiddle factors of a plan from the system's sine and cosine, whose last bits depend
 // on the processor from lengths of 4,096 on. It also orders additions differently for the number types that
-// it knows. A type of our own avoids both. While a plan is made, the type finds for each number that the
-// library passes in the part of a full turn with that cosine, and takes the cosine from libm instead.
+// it knows. Our own number type avoids both. While a plan is made, it finds, for each number that the library
+// passes to it, the fraction of a full turn with that cosine, and takes the cosine of this fraction from libm
+// instead.
 
 thread_local! {
     /// Number of equal parts into which the twiddle factors of the plan being made divide a full turn; zero
@@ -69,8 +70,8 @@ thread_local! {
     static TWIDDLE_DIVISIONS: Cell<usize> = const { Cell::new(0) };
 }
 
-/// Largest difference between the system's cosine and ours: many units in the last place, but much less than
-/// the difference between two cosines of a plan.
+/// Largest allowed difference between the system's cosine and ours: many units in the last place, but much
+/// less than the difference between two cosines of a plan.
 const COSINE_TOLERANCE: f64 = 1e-14;
 
 /// The real number type that a transform computes with, whose cosines are the same on every system.

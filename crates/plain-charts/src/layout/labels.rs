@@ -28,8 +28,8 @@ pub(super) fn assign_label_rows(panel: &Panel, x: &CanvasAxis) -> Vec<Option<usi
     rules.into_iter().map(|row| row.map(|row| row + taken)).chain(captions).collect()
 }
 
-/// The lowest free row for every label, without overlap with the title. `title_ends` are the right ends of
-/// the title lines, canvas units, the lowest line first.
+/// The lowest free row for every label, without overlap with the title. `title_ends` lists the right ends of
+/// the title lines in canvas units, the lowest line first.
 fn stack_labels(labels: &[(&str, f64)], x: &CanvasAxis, title_ends: &[f64]) -> Vec<Option<usize>> {
     let place = |at: f64| x.canvas_position(at).filter(|at| *at >= x.from && *at <= x.to);
     let mut order: Vec<(usize, f64)> =
@@ -52,8 +52,8 @@ fn stack_labels(labels: &[(&str, f64)], x: &CanvasAxis, title_ends: &[f64]) -> V
     rows
 }
 
-/// Left and right end of a label above the panel, canvas units: centred on its position, but moved inside the
-/// axes.
+/// Left and right end, in canvas units, of a label above the panel. The label is centred on its position, but
+/// moved inside the axes.
 pub(crate) fn label_span(label: &str, at: f64, x: &CanvasAxis) -> (f64, f64) {
     let width = text_width(&shorten_to_panel(label, x), SMALL_MM) * UNITS_PER_MM;
     let left = (x.canvas_position(at).unwrap_or(x.from) - width / 2.0).min(x.to - width).max(x.from);
@@ -75,8 +75,8 @@ pub(crate) enum LegendEntry<'a> {
     Hatch(&'a str, HatchPattern),
 }
 
-/// The entries of the legend with their positions, mm, and the position of the top of the first panel, mm.
-/// The legend is above the panels.
+/// The entries of the legend with their positions in mm, and the position of the top of the first panel in
+/// mm. The legend is above the panels.
 pub(super) fn place_legend(figure: &Figure) -> (Vec<(LegendEntry<'_>, f64, f64)>, f64) {
     let mut entries: Vec<LegendEntry<'_>> = Vec::new();
     for panel in &figure.panels {
@@ -105,7 +105,7 @@ pub(super) fn place_legend(figure: &Figure) -> (Vec<(LegendEntry<'_>, f64, f64)>
     (placed, end + 1.0)
 }
 
-/// Width of the graphic sample before the text of a legend entry, mm.
+/// Width, mm, of the graphic sample before the text of a legend entry.
 const LEGEND_SAMPLE_MM: f64 = 8.0;
 
 /// The text of a legend entry, truncated to one line.

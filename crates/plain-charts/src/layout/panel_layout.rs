@@ -108,7 +108,7 @@ impl<'a> PanelLayout<'a> {
         ticks
     }
 
-    /// Left and right end of a tick label of the x axis, canvas units.
+    /// Left and right end, in canvas units, of a tick label of the x axis.
     fn tick_label_span(&self, tick: &Tick) -> Option<(f64, f64)> {
         let at = self.x.canvas_position(tick.value)?;
         let half = text_width(tick.label.as_ref()?, TEXT_MM) * UNITS_PER_MM / 2.0;
@@ -151,17 +151,17 @@ impl<'a> PanelLayout<'a> {
 
 // Ticks of a y axis and the width of their labels.
 
-/// Largest fraction of the column width that names along a y axis may take, and of the height of the axes
-/// that vertical names below an x axis may take.
+/// Largest allowed fraction of the available space for names along an axis: of the column width for names
+/// along a y axis, and of the height of the axes for vertical names below an x axis.
 pub(super) const MOST_NAMES: f64 = 0.4;
-/// Half the width of a label of five digits, mm; a label may be centred on the end of the axis.
+/// Half the width, mm, of a label of five digits; such a label may be centred on the end of the axis.
 pub(super) const HALF_LABEL_MM: f64 = 2.0;
 /// Smallest allowed distance between labelled ticks, mm, on a y axis that would otherwise have fewer than two
 /// labelled ticks: the height of a line of text.
 const CROWDED_Y_TICKS_MM: f64 = LINE_MM;
-/// Height of each line of a name that is wrapped to two lines of small letters, mm.
+/// Height, mm, of each line of a name that is wrapped to two lines of small letters.
 pub(crate) const SMALL_LINE_MM: f64 = SMALL_MM + 0.1;
-/// Vertical gap between neighbouring names that are wrapped to two lines, mm.
+/// Vertical gap, mm, between neighbouring names that are wrapped to two lines.
 const BETWEEN_NAMES_MM: f64 = 0.6;
 
 /// Whether at least two ticks have labels; a single label shows no scale.

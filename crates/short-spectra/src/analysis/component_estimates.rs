@@ -16,8 +16,8 @@ use crate::{Component, Detrend, Estimator, Spectrum, SpectrumSettings};
 use portable_math as math;
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
-/// Ratio of a decay to its standard deviation from which the decay is significant; a smaller decay is held at
-/// zero.
+/// Ratio of a decay to its standard deviation from which the decay is significant; a smaller decay is set to
+/// zero in the fit.
 const SIGNIFICANT_DECAY: f64 = 3.0;
 
 /// An oscillation may be a part of a step if the trend could not grow further and the oscillation has fewer
@@ -51,7 +51,7 @@ pub(super) struct FitReading<'a> {
     /// The model with every decay free and a trend of two more columns. It shows how much the results depend
     /// on the trend.
     richer_trend_model: Option<SineModel>,
-    /// Fit in which every insignificant decay is held at zero, from which frequency and amplitude are
+    /// Fit in which every insignificant decay is fixed at zero, from which frequency and amplitude are
     /// estimated.
     decomposition: ModelFit,
     covariance: SineCovariance,
@@ -256,7 +256,7 @@ impl<'a> FitReading<'a> {
             .min_by(|a, b| a.distance.total_cmp(&b.distance))
     }
 
-    /// Distance of oscillation `k` from the nearest other oscillation, in resolutions.
+    /// Distance in frequency, in resolutions, of oscillation `k` from the nearest other oscillation.
     fn distance_to_nearest(&self, k: usize) -> Option<f64> {
         let terms = self.decomposition.model.terms();
         let others = terms.iter().enumerate().filter(|(j, t)| *j != k && t.cycles > 0.0);
@@ -327,8 +327,8 @@ impl<'a> FitReading<'a> {
         alone.cramer_rao_bound_hz(self.selector.samples.len(), self.selector.frame_rate_hz)
     }
 
-    /// Change of a term by a richer trend: cycles, nepers, and the relative change of its amplitude half way
-    /// through the record.
+    /// Changes of a term when the trend has more columns: of its cycles, of its nepers, and the relative
+    /// change of its amplitude half way through the record.
     fn shift_by_richer_trend(&self, k: usize) -> TermDeviations {
         let Some(richer) = &self.richer_trend_model else {
             return TermDeviations { cycles: 0.0, nepers: 0.0, amplitude: 0.0 };
@@ -342,8 +342,7 @@ impl<'a> FitReading<'a> {
         }
     }
 
-    /// Standard deviation of the white noise that would leave the same residual spectrum around a frequency,
-    /// m.
+    /// Standard deviation, m, of white noise whose spectrum around a frequency equals that of the residual.
     fn noise_sd_near(&self, cycles: f64) -> f64 {
         let ModelFit { model: parts, amplitude_m, .. } = &self.decomposition;
         let bins_a_cycle = 2.0 * (amplitude_m.len() - 1) as f64 / self.selector.samples.len() as f64;
@@ -366,7 +365,8 @@ impl<'a> FitReading<'a> {
 /// Another oscillation that may be a part of the same motion.
 struct Fragment {
     distance: f64,
-    /// Ratio of its amplitude to that of the oscillation under test, at most 1.
+    /// Ratio of the amplitude of this other oscillation to that of the oscillation under test; larger ratios
+    /// are set to 1.
     amplitude_ratio: f64,
 }
 

@@ -17,12 +17,15 @@ use rayon::prelude::*;
 use std::f64::consts::{LN_2, TAU};
 use transients::Transient;
 
-/// Number of pieces of the record, which overlap by half, and number of independent values among them.
+/// Number of pieces, overlapping by half, in which the amplitude and phase of a component are measured.
 const PHASE_SEGMENTS: usize = 31;
+/// Number of independent values among those measured in the overlapping pieces.
 const INDEPENDENT_SEGMENTS: f64 = 16.0;
-/// Largest allowed scatter of a steady line over the pieces: as a fraction of its amplitude
-/// (`STEADY_SCATTER`) or of the noise in a piece (`STEADY_SCATTER_IN_NOISE`), whichever limit is larger.
+/// Largest allowed scatter of a steady line over the pieces, as a fraction of its amplitude. If
+/// `STEADY_SCATTER_IN_NOISE` allows more, that limit applies.
 const STEADY_SCATTER: f64 = 0.25;
+/// Largest allowed scatter of a steady line over the pieces, as a multiple of the noise in a piece. If
+/// `STEADY_SCATTER` allows more, that limit applies.
 const STEADY_SCATTER_IN_NOISE: f64 = 1.7;
 /// Ratio of the width of a uniform distribution to its standard deviation, the square root of 12.
 const UNIFORM_WIDTH_IN_SD: f64 = 3.464_101_615_137_754_6;
@@ -106,7 +109,7 @@ fn assess_component(
     Some((Component { frequency_sd_hz, ..c.clone() }, evidence))
 }
 
-/// Full width of a peak at half its amplitude, Hz; the frequency of a changing oscillation lies within it.
+/// Full width, Hz, of a peak at half its amplitude; the frequency of a changing oscillation lies within it.
 fn half_maximum_width_hz(spectrum: &Spectrum, c: &Component) -> f64 {
     let top = spectrum.frequency_hz.partition_point(|hz| *hz < c.frequency_hz);
     let (before, behind) = spectrum.amplitude_m.split_at(top.min(spectrum.amplitude_m.len()));

@@ -34,8 +34,8 @@ pub(super) const QUADRATURE_COLUMNS: usize = 2;
 pub(super) const COLUMNS_WITH_SLOPES: usize = 4;
 
 impl TermColumn {
-    /// Index of this column of a term in a matrix that holds all four columns of each term after those of the
-    /// trend.
+    /// Index of this column of a term in a matrix that contains first the columns of the trend and then all
+    /// four columns of each term.
     pub(super) fn column_index(self, trend: usize, term: usize) -> usize {
         trend + COLUMNS_WITH_SLOPES * term + self as usize
     }
@@ -106,8 +106,8 @@ impl FixedColumns {
         gram
     }
 
-    /// Inner products of the fixed columns with the columns of the terms, and of the latter with each other,
-    /// over blocks from `first` on.
+    /// Inner products of the fixed columns with the columns of the terms, and of the columns of the terms
+    /// with each other, over blocks from `first` on.
     fn term_products<const EACH: usize>(
         &self,
         terms: &[SineTerm],
@@ -165,8 +165,8 @@ pub(super) fn term_values(term: &SineTerm, [cosine_m, sine_m]: [f64; 2], frames:
     values
 }
 
-/// Cosine and sine of a term in the frames of a block, each frame rotated by the same angle and shrunk by the
-/// same factor from the frame before.
+/// Cosine and sine of a term, times its envelope, in the frames of a block. Each frame follows from the one
+/// before by a rotation through a constant angle and multiplication by a constant factor.
 fn rotate_phasors(term: &SineTerm, first: usize, frames: usize) -> PhasorBlock {
     let angle_per_cycle = |frame: usize| PI * abscissa(frame, frames);
     let mut turning = [[0.0; 3]; BLOCK];

@@ -17,14 +17,15 @@ pub(super) const LINEAR_UNKNOWNS: usize = 5;
 pub(super) const CURVED_UNKNOWNS: usize = 6;
 /// Maximum number of steps; five are usual.
 const MOST_STEPS: usize = 20;
-/// A step is the last if it changes the phase at the ends of the segment by less than this, rad. The
+/// A step is the last if it changes the phase at the ends of the segment by less than this angle, in rad. The
 /// remaining error is of the order of the square of this change.
 const SMALLEST_PHASE_STEP: f64 = 1e-3;
-/// First damping after a step that does not lower the misfit, as a fraction of the normal matrix's diagonal.
+/// First damping after a step that does not lower the misfit, as a fraction of the diagonal of the normal
+/// matrix.
 const FIRST_DAMPING: f64 = 1e-2;
 /// Damping above which the fit stops, because no step lowers the misfit any more.
 const LARGEST_DAMPING: f64 = 1e4;
-/// Number of frames per unknown below which the fit would follow the noise.
+/// Minimum number of frames per unknown of the fit. With fewer frames, the fit would follow the noise.
 const FRAMES_PER_UNKNOWN: usize = 3;
 
 /// Frames of a segment and their weights.
@@ -57,7 +58,8 @@ impl Chirp {
         (a + x * (2.0 * b + 3.0 * x * c)) / PI
     }
 
-    /// Change of the frequency over the whole segment at the rate in its middle, cycles in the segment.
+    /// Change, in cycles in the segment, that the frequency would make over the whole segment at the rate in
+    /// the middle.
     pub(super) fn change(&self) -> f64 {
         4.0 * self.0[4] / PI
     }
@@ -74,7 +76,7 @@ impl Chirp {
         math::hypot(self.0[0], self.0[1])
     }
 
-    /// Phase of the component as a cosine in the middle of the segment, rad.
+    /// Phase, rad, of the component in the middle of the segment, if the component is written as a cosine.
     pub(super) fn phase(&self) -> f64 {
         -math::atan2(self.0[1], self.0[0])
     }
@@ -197,8 +199,8 @@ fn apply_step<const N: usize>(shape: Chirp, step: &SVector<f64, N>) -> Chirp {
 }
 
 impl<const N: usize> ChirpFit<N> {
-    /// Variance of the frequency at `x`, square cycles in the segment, for noise of standard deviation 1 in
-    /// each frame.
+    /// Variance, in squared cycles in the segment, of the frequency at `x` for noise of standard deviation 1
+    /// in each frame.
     pub(super) fn cycles_variance(&self, x: f64) -> f64 {
         let along = [1.0, 2.0 * x, 3.0 * x * x];
         let mut gradient = SVector::<f64, N>::zeros();

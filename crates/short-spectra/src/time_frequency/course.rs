@@ -67,8 +67,8 @@ mod tests {
     const RATE_HZ: f64 = 5000.0;
     const BAND_HZ: (f64, f64) = (400.0, 1500.0);
 
-    /// Times of the points that a ridge has, and of those that are drawn, s; for a record of 0.6 s in
-    /// segments of 28.8 ms.
+    /// Times, s, of all points of a ridge and of those points that belong to a course, for a record of 0.6 s
+    /// in segments of 28.8 ms.
     fn times(at_m: impl Fn(f64) -> f64) -> [Vec<f64>; 2] {
         let record: Vec<Option<f64>> = (0..3000).map(|i| Some(at_m(f64::from(i) / RATE_HZ))).collect();
         let settings = SpectrogramSettings { segment_s: Some(0.0288), band_hz: Some(BAND_HZ) };

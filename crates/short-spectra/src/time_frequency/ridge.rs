@@ -19,9 +19,9 @@ pub struct RidgePoint {
     pub rate_hz_per_s: f64,
     /// Amplitude at that time, m.
     pub amplitude_m: f64,
-    /// Phase of the component as a cosine at that time, rad.
+    /// Phase, rad, at that time, if the component is written as a cosine.
     pub phase_rad: f64,
-    /// Ratio of the amplitude to the amplitude of noise in a bin of the column, `20 log10`, dB.
+    /// Ratio, dB, of the amplitude to the amplitude of noise in a bin of the column (`20 log10`).
     pub snr_db: f64,
     /// Ratio of the residual at the component's frequency to the component's amplitude, both in a bin of the
     /// column.
@@ -56,10 +56,10 @@ pub struct Ridge {
     pub hop_s: f64,
 }
 
-/// Two neighbouring frequencies agree if they differ by at most this, in resolutions.
+/// Two neighbouring frequencies agree if their difference, in resolutions, is at most this value.
 const AGREEMENT_RESOLUTIONS: f64 = 0.25;
-/// Two neighbouring frequencies also agree if they differ by at most this many standard deviations of the
-/// difference.
+/// Two neighbouring frequencies also agree if their difference, in standard deviations of the difference, is
+/// at most this value.
 const AGREEMENT_DEVIATIONS: f64 = 4.0;
 /// Distance of two points, in segment lengths, at which their noise is nearly independent.
 const INDEPENDENT_SEGMENTS: f64 = 0.5;
@@ -139,28 +139,28 @@ fn frequency_range(ridge: &Ridge) -> Option<FrequencyRange> {
     })
 }
 
-/// Change of the frequency in the outer half of a segment next to an interruption, Hz. The component may
+/// Change, Hz, of the frequency in the outer half of a segment next to an interruption. The component may
 /// continue there without a point.
 fn change_beyond_hz(ridge: &Ridge, point: &RidgePoint) -> f64 {
     (point.rate_hz_per_s * ridge.segment_s / 2.0).abs()
 }
 
-/// A third of the difference between the frequency at an end and the frequency extrapolated to that end from
-/// the nearest point, Hz. It is the uncertainty due to a change of the rate there.
+/// Uncertainty, Hz, of the frequency at an end of the record due to a change of the rate there: a third of
+/// the difference from the frequency extrapolated to that end from the nearest point.
 fn end_mismatch_hz(end: &RidgeEnd, point: &RidgePoint) -> f64 {
     let led_hz = point.frequency_hz + point.rate_hz_per_s * (end.time_s - point.time_s);
     (end.frequency_hz - led_hz).abs() / 3.0
 }
 
-/// Half of the change of the frequency within a cycle, Hz: a frequency describes a whole cycle, not an
+/// Half of the change, Hz, of the frequency within a cycle: a frequency describes a whole cycle, not an
 /// instant within it.
 fn change_within_cycle_hz(point: &RidgePoint) -> f64 {
     (point.rate_hz_per_s / point.frequency_hz / 2.0).abs()
 }
 
-/// Bias of a frequency at the turning points of a curved course, Hz: a fit of a constant rate to a segment of
-/// length `T` cuts a corner of curvature `c` by up to `c T^2 / 24`. The curvature is the median change of the
-/// rate over half a segment, divided by the time between.
+/// Bias, Hz, of a frequency at the turning points of a curved course: a fit of a constant rate to a segment
+/// of length `T` cuts a corner of curvature `c` by up to `c T^2 / 24`. The curvature is the median change of
+/// the rate over half a segment, divided by the duration of half a segment.
 fn curvature_bias_hz(ridge: &Ridge) -> f64 {
     let apart = (INDEPENDENT_SEGMENTS * ridge.segment_s / ridge.hop_s).round().max(1.0) as usize;
     let bend = |w: &[RidgePoint]| {

@@ -12,33 +12,33 @@ use crate::periodogram::{self, upper_median};
 use crate::settings::ROUNDING;
 use portable_math as math;
 
-/// Probability that noise alone causes any point of a ridge in a record.
+/// Allowed probability that noise alone causes any point of a ridge in a record.
 const FALSE_ALARM: f64 = 0.01;
 /// Number of independent trials per resolution of each segment: overlapping columns have more maxima than
 /// independent values.
 const TRIALS: f64 = 10.0;
-/// Largest allowed distance of a fitted frequency from the path, in resolutions: half way down the lobe of a
+/// Largest allowed distance, in resolutions, of a fitted frequency from the path: half way down the lobe of a
 /// Hann window.
 const FARTHEST_FROM_PATH: f64 = 1.0;
 /// Standard deviation, in resolutions, of a frequency due to leakage of other components into a fit.
 const LEAKAGE_SD: f64 = 0.002;
-/// Standard deviation of a frequency due to leakage, in resolutions of the fit, at the end of a fit whose
-/// rate may change.
+/// Standard deviation, in resolutions of the fit, that leakage causes in the frequency at the end of a fit
+/// whose rate may change.
 const END_LEAKAGE_SD: f64 = 0.01;
-/// Lengths of the fits at an end of the record, segments: to estimate the change of the rate takes a longer
-/// stretch than to estimate the rate.
+/// Lengths, in segment lengths, of the fits at an end of the record. To estimate the change of the rate takes
+/// a longer stretch than to estimate the rate.
 const END_SEGMENTS: [f64; 6] = [1.75, 1.3, 1.0, 0.75, 0.55, 0.4];
 /// Minimum number of cycles in a fit at an end that is shorter than a segment: other components leak into
 /// short fits.
 const END_CYCLES: f64 = 8.0;
-/// A shorter fit contradicts a longer one if they differ by more than this many standard deviations of the
-/// difference.
+/// Largest allowed difference between the frequencies of a shorter and a longer fit, in standard deviations
+/// of the difference. A larger difference contradicts the longer fit.
 const CONTRADICTS: f64 = 3.5;
 /// Bias of a fitted frequency due to a changing rate, divided by the change of the rate from one segment to
 /// the next: `<x^4>/<x^2>/24` for the sine weights.
 const CURVATURE_BIAS: f64 = 0.4154 / 24.0;
-/// Ratio of the bias of a frequency due to a changing rate to its standard deviation. Above this ratio, a
-/// point is fitted with a changing rate.
+/// If a changing rate causes a bias of the frequency larger than this multiple of the standard deviation of
+/// the frequency, a point is fitted with a changing rate.
 const SIGNIFICANT_CURVATURE: f64 = 0.5;
 /// Largest allowed difference, in resolutions, between the frequency of the ridge at the centre of its
 /// outermost segment and that of a fit at the end of the record. Applies to fits of at least one segment.
@@ -47,8 +47,8 @@ const END_AGREEMENT: f64 = 0.25;
 #[derive(Clone, Copy)]
 pub(super) struct SegmentFit {
     chirp: Chirp,
-    /// Standard deviation of the frequency for noise of standard deviation 1 in each frame, cycles in the
-    /// segment.
+    /// Standard deviation, in cycles in the segment, of the frequency for noise of standard deviation 1 in
+    /// each frame.
     unit_sd: f64,
     /// Residual per frame, m: at frequencies next to the component, and at the component's own frequency.
     residual: ResidualNoise,
@@ -59,7 +59,8 @@ impl SegmentFit {
         Self { chirp: fitted.parameters, unit_sd: fitted.cycles_variance(0.0).sqrt(), residual }
     }
 
-    /// Standard deviation of the noise from which the standard deviations of the fit follow, m.
+    /// Standard deviation, m, of the noise from which the standard deviations of the fitted parameters
+    /// follow.
     fn noise_m(&self) -> f64 {
         self.residual.around_m.max(self.residual.under_m)
     }
@@ -154,8 +155,8 @@ impl<'a> RidgeTracker<'a> {
         fits.into_iter().zip(starts).zip(median_filter(&around_m)).map(usable).collect()
     }
 
-    /// Adds a fit to a column without one, starting from the course of a neighbouring column: the spectrum of
-    /// a fast chirp is flat on top, so the path may miss it.
+    /// Adds a fit to a column without a fit. It starts from the fit of a neighbouring column, because the
+    /// spectrum of a fast chirp is flat on top and the path may miss it.
     pub(super) fn refit_from_neighbours(&self, fits: &[Option<SegmentFit>]) -> Vec<Option<SegmentFit>> {
         let (weights, noise) = (sine_weights(self.layout.frames), self.segment_noise());
         let from = |c: usize, near: usize, segments: f64| {
@@ -345,7 +346,8 @@ fn remove_short_runs(mut points: Vec<Option<RidgePoint>>) -> Vec<Option<RidgePoi
 /// half a resolution in a quarter of a segment moves the frequency by two resolutions within the segment,
 /// about the maximum for a segment of the chosen length.
 const JUMP_SD: f64 = 0.5;
-/// Farthest jump, in standard deviations: six resolutions within a segment.
+/// Largest allowed jump of the path over a quarter of a segment, in units of `JUMP_SD`: six resolutions
+/// within a segment.
 const LONGEST_JUMP: f64 = 3.0;
 
 /// Levels of the bins of the columns, and the distances of bins and columns.

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-/// Pieces of a record that all have the same length, frames.
+/// A length of pieces, in frames, and the choice of the pieces of this length that are analysed.
 struct SegmentScale {
     length: usize,
     /// Maximum number of pieces that are analysed.
@@ -46,7 +46,7 @@ pub(super) struct Transient {
     /// First frame of the stretch that was analysed.
     first: usize,
     resolution_hz: f64,
-    /// Decay of the component up to the end of the stretch, nepers.
+    /// Decay, in nepers, of the component up to the end of the stretch.
     nepers: f64,
 }
 
@@ -174,11 +174,13 @@ fn decay_nepers(c: &Component, lasts_s: f64) -> f64 {
 // times the mean power. Steady lines and noise of any colour are therefore normal, even if most of the pieces
 // contain a step.
 
-/// Probability that noise alone exceeds the level of any piece anywhere in a record.
+/// Allowed probability that noise alone exceeds the level of any piece anywhere in a record.
 const FALSE_ALARM: f64 = 0.01;
-/// The normal power follows from the quantile 1 / `NORMAL_POWER_QUANTILE` of the powers of the pieces. This
-/// quantile is divided by `QUARTER_OF_NOISE`, which is the ratio of the quantile to the mean power for noise.
+/// Reciprocal of the quantile of the powers of the pieces from which the normal power in a bin follows: 4
+/// selects the lower quartile.
 const NORMAL_POWER_QUANTILE: usize = 4;
+/// Ratio of the lower quartile of the power of noise to its mean, `-ln(3/4)`. The normal power is the
+/// quartile over the pieces, divided by this ratio.
 const QUARTER_OF_NOISE: f64 = 0.287_682_072_451_780_9;
 /// Half width, bins, of the neighbourhood whose median is a lower limit of the normal power in a bin. The
 /// limit is needed because the quartile of a few pieces is inaccurate.
