@@ -287,9 +287,9 @@ impl Linkage {
         along + down + turning + springs + self.shoulder.map_or(0.0, |s| s.energy_j(pose.theta))
     }
 
-    /// Power supplied to the blade, W: by the drive and by friction, minus the dissipation of the dampers.
-    /// `force` is the friction force on the tip, N; the force of the drive follows from the momentum along
-    /// the sweep.
+    /// Net power supplied to the blade, W: the powers of the drive and of the friction force, minus the power
+    /// dissipated in the dampers. `force` is the friction force on the tip, N. The force of the drive follows
+    /// from the momentum balance along the sweep.
     #[must_use]
     pub fn power_w(
         &self,

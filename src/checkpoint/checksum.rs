@@ -10,8 +10,8 @@ use sha2::{Digest, Sha256};
 
 const CHECKSUM_KEY: &str = ",\"sha256\":\"";
 const LINE_END: &str = "\"}";
-/// Number of hexadecimal digits of the checksum. They have 64 bits, so that an accidental change of a line
-/// goes unnoticed with a probability of only 1 in 2e19.
+/// Number of hexadecimal digits of the checksum. 16 digits are 64 bits, so the probability that an accidental
+/// change of a line goes unnoticed is about 1 in 2e19.
 const CHECKSUM_DIGITS: usize = 16;
 
 /// Appends the checksum to a JSON object; the result is a line of a journal without its line feed.
@@ -21,10 +21,10 @@ pub fn append_checksum(object: &str) -> String {
     format!("{content}{CHECKSUM_KEY}{}{LINE_END}", hex_checksum(content.as_bytes()))
 }
 
-/// Result of the check of a line.
+/// Result of checking the checksum of a line.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum LineChecksum {
-    /// The checksum is right; contains the bytes of the JSON object without the checksum.
+    /// The checksum is correct. The value contains the bytes of the JSON object without the checksum.
     Valid(Vec<u8>),
     /// The checksum in the line differs from the computed one.
     Broken { found: String, computed: String },

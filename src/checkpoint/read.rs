@@ -56,7 +56,8 @@ impl<R: CheckpointRecord, S: BufRead> CheckpointReader<R, S> {
     }
 }
 
-/// Makes the error for a repeated record; `before` is empty or names the earlier line, such as `of line 3 `.
+/// Makes the error for a record that repeats an earlier one. `before` is a part of the message: it is empty
+/// or names the earlier line, such as `of line 3 `.
 #[must_use]
 pub fn duplicate_record_error<R: CheckpointRecord>(
     file: &str,
@@ -66,8 +67,8 @@ pub fn duplicate_record_error<R: CheckpointRecord>(
     line_error::<R>(file, found.line, format!("the {} {before}a second time", R::KIND.record()))
 }
 
-/// Whether a line is complete: it has a line end, or a checksum, which is the part of a line that is written
-/// last.
+/// Whether a line is complete: it has a line end or a checksum. The checksum is the last part of a line
+/// before the line end.
 fn is_complete(line: &RawLine) -> bool {
     line.ended || LineChecksum::check(strip_byte_order_mark(line.bytes)) != LineChecksum::Absent
 }
@@ -271,7 +272,8 @@ impl<R: CheckpointRecord, S: BufRead> CheckpointReader<R, S> {
         Ok(Some(StoredRecord { record, line: *line - 1 }))
     }
 
-    /// End of the part of the journal that has been read; after the last record, the end of the journal.
+    /// End of the part of the journal that has been read so far. After the last record, this is the end of
+    /// the journal.
     pub(crate) fn end(&self) -> CheckpointEnd {
         self.end
     }

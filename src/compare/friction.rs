@@ -180,7 +180,8 @@ pub(crate) struct LawCoefficient {
     pub name: &'static str,
     /// Symbol in the law.
     pub symbol: &'static str,
-    /// Derivative of the law with respect to the coefficient, at a speed of the tip, m/s.
+    /// Returns the derivative of the friction law with respect to this coefficient, at a speed of the tip in
+    /// m/s.
     slope: fn(&FrictionLaw, f64) -> f64,
 }
 
@@ -195,7 +196,7 @@ pub(crate) const COEFFICIENTS: [LawCoefficient; 3] = [
     LawCoefficient { name: "friction.c", symbol: "C", slope: |_, _| 1.0 },
 ];
 
-/// Half width of an interval of the coefficient of friction, as a function of the speed of the tip, m/s.
+/// Returns the half width of an interval of the coefficient of friction at a speed of the tip in m/s.
 pub(crate) type HalfInterval = Box<dyn Fn(f64) -> f64>;
 
 /// Half width of the 95 % interval of the coefficient of friction, propagated linearly from the intervals and

@@ -83,7 +83,8 @@ fn model_frames(case: &ConditionComparison, model: &TimedRecording) -> Option<Ra
     Some(model.frames_between((model_s(frames.start), model_s(frames.end))))
 }
 
-/// Of the bands in which the job targets a frequency of the deflection, the band with the highest lower end.
+/// Among the bands in which the job targets a frequency of the deflection, returns the band with the highest
+/// lower end.
 fn fastest_band<'a>(case: &ConditionComparison<'a>) -> Option<&'a FeatureBand> {
     case.targets()
         .filter(|aim| matches!(aim.feature.reading, Reading::Frequency(_) | Reading::CycleFrequency { .. }))
@@ -169,7 +170,7 @@ fn choose_ridge(
 /// to a damping ratio of 0.22.
 const MAX_DECAY_PER_CYCLE: f64 = 1.4;
 
-/// The record, m, from which three parts are removed: the trend, oscillations with a frequency below
+/// Returns the record, m, after three parts are removed: the trend, oscillations with a frequency below
 /// `low_hz`, and oscillations that die out within a cycle.
 fn remove_slow_components(analysis: &SpectralAnalysis, rate_hz: f64, low_hz: f64) -> Vec<Option<f64>> {
     // an oscillation that dies out within a cycle belongs to the flip of the blade

@@ -66,9 +66,11 @@ pub struct ParameterLine {
     pub unit: String,
     /// Estimate.
     pub estimate: f64,
-    /// Lower end of the widest of the 95 % intervals of the parameter; `None` if it is open.
+    /// Lower end of the 95 % interval of the parameter. If several methods give an interval, it is the
+    /// lowest of their ends. `None` if the interval is open at this end.
     pub lower_95: Option<f64>,
-    /// Upper end of the widest of the 95 % intervals of the parameter; `None` if it is open.
+    /// Upper end of the 95 % interval of the parameter. If several methods give an interval, it is the
+    /// highest of their ends. `None` if the interval is open at this end.
     pub upper_95: Option<f64>,
     /// Whether the data determine the parameter.
     pub verdict: ParameterVerdict,

@@ -53,14 +53,14 @@ pub(crate) struct DraftFindings {
     pub drop: bool,
     /// Reversals of the head.
     pub reversals: Vec<Reversal>,
-    /// Maximum speed of the head or, if the head was not tracked, of the tip, m/s.
+    /// Maximum speed, m/s, of the head, or of the tip if the head was not tracked.
     pub greatest_speed_m_per_s: f64,
     /// Start and end of the simulated run, s.
     pub run_s: [f64; 2],
     /// Start and end of the fitted part of the recording, s; `None` for the whole recording.
     pub fitted_s: Option<[f64; 2]>,
-    /// Number, counted from 1, of the first reversal after which the tip sticks and slips again; if there is
-    /// none, of the first reversal after which it slips.
+    /// Number, counted from 1, of the first reversal after which the tip sticks and then slips again. If
+    /// there is no such reversal, number of the first reversal after which the tip slips.
     pub shown: Option<usize>,
     /// Components after reversal `shown`.
     pub components: Vec<DraftComponent>,
@@ -69,7 +69,7 @@ pub(crate) struct DraftFindings {
 
 /// A tracked point is used only if it is tracked in at least this fraction of the frames.
 const LEAST_TRACKED_SHARE: f64 = 0.5;
-/// A head that travels less than this distance, m, is refused: a few pixels of the usual 20 um.
+/// Minimum travel of the head, m, for which a draft is made. It is a few pixels of the usual size of 20 um.
 const LEAST_TRAVEL_M: f64 = 5e-5;
 /// Interval between the sampled speeds, s. Each speed is averaged over twice this time, a few cycles of
 /// chatter.
@@ -80,11 +80,11 @@ const MOST_FITTED: usize = 12_000;
 const SHARE_BEFORE_REVERSAL: f64 = 0.3;
 /// Lower and upper limit of the band of a component in a job, divided by the frequency of the component.
 const BAND_FACTORS: [f64; 2] = [0.6, 1.5];
-/// Upper limit of the frequencies of a draft, divided by the Nyquist frequency; above it, the exposure and
-/// the tracker attenuate too much.
+/// Upper limit of the frequency of a component in a draft, as a fraction of the Nyquist frequency. Above this
+/// limit, the exposure and the tracker attenuate an oscillation too much.
 const HIGHEST_SHARE: f64 = 0.8;
-/// Frequency that separates the ring-down of the head (78 Hz in the paper) from the stick-slip cycle (about
-/// 900 Hz), Hz.
+/// Frequency, Hz, that separates the ring-down of the head (78 Hz in the paper) from the stick-slip cycle
+/// (about 900 Hz).
 const BETWEEN_HZ: f64 = 250.0;
 /// Largest relative standard deviation allowed for the frequency of a component in a job.
 const MOST_RELATIVE_SD: f64 = 0.05;

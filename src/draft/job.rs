@@ -13,12 +13,12 @@ use crate::text::{format_digits, format_percent, format_speed, join_with_and, ro
 const TILT_SD_DEG: f64 = 0.3;
 /// Relative standard deviation of the prior for the scale, if it was taken from a ruler in the picture.
 const SCALE_SD: f64 = 0.005;
-/// Standard deviation of the distance between a tracked marker and the point of the blade that it marks, m.
+/// Standard deviation, m, of the distance between a tracked marker and the point of the blade that it marks.
 const OFFSET_SD_M: f64 = 0.002;
-/// Standard deviation of the offset between the clocks of the camera and of the stroke, s, if the head was
+/// Standard deviation, s, of the offset between the clocks of the camera and of the stroke, if the head was
 /// not tracked.
 const CLOCK_SD_S: f64 = 0.005;
-/// Standard deviation of the offset of a position, m, if the stroke does not start at the origin of the
+/// Standard deviation, m, of the offset of a position, if the stroke does not start at the origin of the
 /// picture.
 const ORIGIN_SD_M: f64 = 0.1;
 

@@ -38,7 +38,7 @@ const FREQUENCIES_HZ: [f64; 2] = [0.05, 5.0];
 const COARSE: usize = 200;
 /// Number of steps of the ternary search around the best frequency of the coarse grid.
 const REFINED: usize = 60;
-/// Averaging time of the speed of the tip, s.
+/// Time, s, over which the speed of the tip is averaged.
 const SPEED_S: f64 = 0.01;
 /// The tip counts as sliding if its speed is above this fraction of its maximum speed.
 const SLIDING: f64 = 0.3;

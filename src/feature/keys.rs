@@ -5,10 +5,10 @@ use crate::recording::channel::{Channel, Window};
 use crate::toml_file::{KeyRefusal, NumberPair, check_above_zero, refuse_key};
 use short_spectra::Detrend;
 
-/// Default relative half width of the range of speeds around a given speed. Within this range, several cycles
-/// of chatter occur, and friction hardly changes.
+/// Default half width of the range of speeds around a given speed, as a fraction of that speed. Within this
+/// range, several cycles of chatter occur, and friction hardly changes.
 pub const WIDTH_RELATIVE: f64 = 0.15;
-/// Largest permitted relative half width of the range of speeds around a given speed.
+/// Largest allowed half width of the range of speeds around a given speed, as a fraction of that speed.
 const WIDEST_RELATIVE: f64 = 0.5;
 
 /// The list of keys from which [`Keys`] and the structs of TOML tables are made.

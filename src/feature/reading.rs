@@ -13,8 +13,8 @@ use crate::toml_file::{KeyRefusal, suggest_key};
 use portable_math as math;
 use serde::Serialize;
 
-/// A difference of this size, s, between two values of a time interval counts as large, if the interval may
-/// be zero or negative. It is a tenth of a long stick, which lasts 0.5 s.
+/// Scale, s, of the difference between two values of a time interval that may be zero or negative: a
+/// difference of this size counts as large. It is a tenth of the duration of a long stick, 0.5 s.
 pub(crate) const TIME_SCALE_S: f64 = 0.05;
 /// Default number of bands of a log-spectrum. If the bands span an octave, the width of each band is about
 /// the change of a stick-slip frequency that friction causes.
@@ -32,12 +32,13 @@ pub enum Reading {
     Amplitude(FeatureBand),
     /// Root mean square of the part of a channel that is in a frequency band, m.
     Rms(FeatureBand),
-    /// Level of one band of a log-spectrum, m: the root mean square of the band, to which a floor is added in
-    /// quadrature.
+    /// Level of one band of a log-spectrum, m: `sqrt(rms^2 + floor_m^2)`, where `rms` is the root mean square
+    /// of the part of the channel in the band.
     BandLevel {
         /// The band.
         band: FeatureBand,
-        /// Floor: a root mean square that is added in quadrature, m, so that noise is not fitted.
+        /// Floor, m, that is added in quadrature to the root mean square of the band, so that noise is not
+        /// fitted.
         floor_m: f64,
     },
     /// Damping ratio of the ring-down of the strongest component in a band.
@@ -59,7 +60,7 @@ pub enum Reading {
         window: Window,
         /// Speed of the head, m/s, above 0; the head may move in either direction.
         speed_m_per_s: f64,
-        /// Relative half width of the range of speeds that is used.
+        /// Half width of the range of accepted head speeds, as a fraction of `speed_m_per_s`.
         width_relative: f64,
     },
     /// Time between two instants of a reversal, s.

@@ -60,7 +60,7 @@ pub(super) fn read_rms(band: &FeatureBand, reader: &FeatureReader) -> Result<Fea
     read_band_level(band, 0.0, reader)
 }
 
-/// Root mean square of a band and of a floor, added in quadrature, so that differences far below the floor
+/// Adds the root mean square of a band and a floor in quadrature, so that differences far below the floor
 /// have no weight in a fit.
 pub(super) fn read_band_level(
     band: &FeatureBand,
@@ -73,7 +73,7 @@ pub(super) fn read_band_level(
     Ok(FeatureValue::new(math::hypot(transformed.rms_in_band_m(low, high), floor_m), None))
 }
 
-/// Lowest or highest frequency that the component of a band has in any segment.
+/// Lowest or highest of the frequencies that the component of a band has in the segments of a window.
 pub(super) fn read_cycle_frequency(
     band: &FeatureBand,
     segment_s: f64,

@@ -7,11 +7,11 @@ use serde::Serialize;
 /// Coefficients of the friction law.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FrictionLaw {
-    /// Part of the coefficient that falls with speed, `A`.
+    /// `A`: the part of the friction coefficient that falls with speed, at zero speed.
     pub a: f64,
-    /// Decay of the part `A` with speed, `B`, s/m: this part falls to `1/e` at the speed `1/B`.
+    /// `B`, s/m: rate at which the part `A` falls with speed. At the speed `1/B`, this part is `A/e`.
     pub b_s_per_m: f64,
-    /// Part of the coefficient that does not depend on speed, `C`.
+    /// `C`: the part of the friction coefficient that does not depend on speed.
     pub c: f64,
 }
 

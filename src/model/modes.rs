@@ -72,8 +72,8 @@ pub fn natural_modes(blade: &Linkage, tip: TipConstraint, on_shoulder: bool) -> 
     }
 }
 
-/// Compliance of the tip along the glass at a frequency, Hz: the complex ratio of displacement to force, m/N,
-/// for a tip that slides without friction.
+/// Complex ratio of the tip's displacement along the glass to the force on the tip, m/N, at a frequency in
+/// Hz. The tip slides without friction.
 ///
 /// `H = b^T (k + i w c - w^2 m)^-1 b` with `b = (l1, l2)`, the head at rest.
 #[must_use]
@@ -114,7 +114,7 @@ fn squared_frequencies(m: &Matrix2<f64>, k: &Matrix2<f64>) -> (f64, f64) {
     let a = m.determinant();
     let b = -(m[(0, 0)] * k[(1, 1)] + m[(1, 1)] * k[(0, 0)] - 2.0 * m[(0, 1)] * k[(0, 1)]);
     let c = k.determinant();
-    // the root that is free of cancellation; the other root follows from their product
+    // the root whose formula has no cancellation; the other root follows from the product of both roots
     let far = -0.5 * (b + b.signum() * (b * b - 4.0 * a * c).max(0.0).sqrt());
     let (first, second) = (far / a, if far == 0.0 { 0.0 } else { c / far });
     (first.min(second), first.max(second))

@@ -47,7 +47,8 @@ pub struct BladeTableEntry {
     pub key: &'static str,
     /// Value, in the unit of the key.
     pub value: f64,
-    /// Relative standard deviation that follows from the standard deviations of the inputs alone.
+    /// Standard deviation divided by the value, as propagated from the standard deviations of the inputs
+    /// alone.
     pub relative_uncertainty: f64,
     /// Equation of the value, in the letters of [`super::section`].
     pub equation: &'static str,
@@ -212,7 +213,8 @@ impl LinkSection {
         self.height_m * (t1 + 2.0 * t2) / (3.0 * (t1 + t2))
     }
 
-    /// Polar second moment of the area about its centre, m4: the inertia per density and length of blade.
+    /// Polar second moment of the section's area about its centroid, m4. Multiplied by density and length of
+    /// blade, it is the moment of inertia of the link.
     #[must_use]
     pub fn polar_moment_m4(&self) -> f64 {
         let (h, t1, t2) = (self.height_m, self.top_thickness_m, self.bottom_thickness_m);

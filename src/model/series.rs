@@ -92,9 +92,9 @@ pub struct MotionSeries<const K: usize> {
     pub(super) drop_rate: [f64; K],
     pub(super) left: [LeftFactors; K],
     pub(super) right: [RightFactors; K],
-    /// Coefficients of `p = cos(angle) * rate` and `q = sin(angle) * rate`, of the highest order computed so
-    /// far.
+    /// Coefficients of `p = cos(angle) * rate` of the highest order computed so far.
     pub(super) p: LinkPair,
+    /// Coefficients of `q = sin(angle) * rate` of the highest order computed so far.
     pub(super) q: LinkPair,
 }
 
@@ -139,25 +139,30 @@ pub(super) struct RecurrenceConstants {
     pub arm: LinkPair,
     /// Inverse of the coefficient matrix of the angular accelerations, including friction in slip.
     pub inverse: [LinkPair; 2],
-    /// `w = (l1 cos theta, l2 cos phi)`, `A^-1 w` and `1 / (w.A^-1 w)`, for stick.
+    /// Displacement of the tip per unit angle of each link, `w = (l1 cos theta, l2 cos phi)`, m; for stick.
     pub w: LinkPair,
+    /// Angular accelerations per newton of friction force, `A^-1 w`; for stick.
     pub per_force: LinkPair,
+    /// Friction force per unit of tip acceleration, `1 / (w.A^-1 w)`, kg; for stick.
     pub mobility: f64,
-    /// `drop` and `drop_rest` are coefficients in the equation for the drop's acceleration `u''`: those of
-    /// the angular accelerations, and those of the part of `q'` without them. `normal` has the coefficients
-    /// of the angular accelerations in the equation for the normal force `N`.
+    /// Coefficients of the angular accelerations in the equation for the acceleration `u''` of the drop.
     pub drop: LinkPair,
+    /// Coefficients, in the equation for the acceleration `u''` of the drop, of the part of `q'` that does
+    /// not contain the angular accelerations.
     pub drop_rest: LinkPair,
+    /// Coefficients of the angular accelerations in the equation for the normal force `N`.
     pub normal: LinkPair,
-    /// Moments on neck and lip: `per_normal` per newton of normal force, `per_slip` per newton of friction
-    /// from coefficients of lower orders.
+    /// Moments on neck and lip per newton of normal force.
     pub per_normal: LinkPair,
+    /// Moments on neck and lip per newton of friction force from coefficients of lower orders.
     pub per_slip: LinkPair,
-    /// Cosines and sines of both angles at the instant: in the first two fields times `m_c`, in the last two
-    /// times `m`.
+    /// Cosines of both angles at the instant, times `m_c`.
     pub cos_m_c: LinkPair,
+    /// Sines of both angles at the instant, times `m_c`.
     pub sin_m_c: LinkPair,
+    /// Cosines of both angles at the instant, times `m`.
     pub cos_m: LinkPair,
+    /// Sines of both angles at the instant, times `m`.
     pub sin_m: LinkPair,
     /// Friction coefficient with the sign of the friction force.
     pub mu: f64,

@@ -102,11 +102,11 @@ pub(crate) struct TangentMatrices {
     pub stiffness: [[LaneVector; 3]; 3],
 }
 
-/// Equation in stick for `y1`, the derivative of the sine of the neck's angle. The friction force is
-/// eliminated; `y2`, that of the lip, follows from `y1`.
+/// Equation in stick for `y1`, the derivative of the sine of the neck's angle, after the friction force is
+/// eliminated. The derivative of the sine of the lip's angle, `y2`, follows from `y1`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StickEquation {
-    /// Coefficients of `y1''`, `y1'` and `y1`, with `y2` eliminated.
+    /// Coefficients of `y1''`, `y1'` and `y1` after `y2` is eliminated.
     pub first: [LaneVector; 3],
     /// Coefficients of `y2''`, `y2'` and `y2` before the elimination.
     pub second: [LaneVector; 3],

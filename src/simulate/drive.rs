@@ -133,8 +133,8 @@ const BLOCK_S: f64 = 4e-3;
 /// Minimum number of frames that show the head: cross-validation needs several points per degree of freedom.
 const FEWEST_FRAMES: usize = 10;
 
-/// Time at either end of a recording in which the acceleration of the head is ten times less certain than in
-/// the middle, s. A run avoids these times.
+/// Duration, s, of the part at either end of a recording in which the acceleration of the head is ten times
+/// less certain than in the middle. A run avoids both parts.
 pub(crate) const UNCERTAIN_END_S: f64 = 0.01;
 /// Smallest speed of the head at which a run may start in steady slip, as a fraction of the head's top speed.
 pub(crate) const EVEN_SPEED_SHARE: f64 = 0.2;

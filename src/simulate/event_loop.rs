@@ -38,7 +38,7 @@ pub(super) struct EventLoop<'a> {
     work: WorkCounters,
     transitions: u64,
     lean: ShoulderContact,
-    /// First trial steps of the next stick, slip and flight phase, s.
+    /// First trial step, s, of the next phase of stick, of slip and of flight.
     steps: [Option<f64>; 3],
     recent: ChatterDetector,
     /// Shortest natural period of the links, without preload and damping, s.
@@ -354,7 +354,7 @@ impl<'a> EventLoop<'a> {
     }
 
     fn shorten_slip_step(&mut self) {
-        /// Factor on the first step of the next slip phase; it shortens this step.
+        /// Factor by which the first step of the next slip phase is multiplied to shorten it.
         const SHORTER: f64 = 0.1;
         self.steps[1] = self.steps[1].map(|step| SHORTER * step);
     }

@@ -136,16 +136,18 @@ struct ImpactState {
     impulse: f64,
     normal: f64,
     tangential: f64,
-    /// Work taken up in compression and given back in restitution, both positive.
+    /// Work that the normal force has taken up in compression, as a positive number.
     taken: f64,
+    /// Work that the normal force has given back in restitution, as a positive number.
     given: f64,
     stage: ImpactStage,
 }
 
 /// An impact in dimensionless variables.
 struct ScaledImpact {
-    /// Ratios `W_nt / W_nn` and `W_tt / W_nn`.
+    /// Ratio `W_nt / W_nn`.
     cross: f64,
+    /// Ratio `W_tt / W_nn`.
     along: f64,
     friction: FrictionLaw,
     restitution: f64,
@@ -234,10 +236,11 @@ impl ScaledImpact {
     }
 }
 
-/// Indices of the guards of slip during an impact: the tip comes to rest (`RESTS`), the stage ends
-/// (`CLOSES`), or the tip approaches the glass again during restitution (`REOPENS`).
+/// Index of a guard of slip during an impact: the tip comes to rest.
 const RESTS: usize = 0;
+/// Index of a guard of slip during an impact: the stage (compression or restitution) ends.
 const CLOSES: usize = 1;
+/// Index of a guard of slip during an impact: the tip approaches the glass again during restitution.
 const REOPENS: usize = 2;
 
 /// Slip in one direction as a function of the normal impulse.

@@ -26,7 +26,7 @@ pub struct SweepHeaderBody {
     /// Plan of a sampled study; `None` for a grid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sample: Option<SamplePlan>,
-    /// Columns of the maps, in the order of the values.
+    /// Names of the columns of the maps, in the order of the values of a point.
     pub maps: Vec<String>,
 }
 

@@ -8,7 +8,7 @@ use super::point::PointOutcome;
 use super::study::Study;
 use serde::Serialize;
 
-/// Maximum count of numbers in memory: values of maps and coordinates of points together.
+/// Maximum count of numbers in memory: the values of all maps plus the coordinates of all selected points.
 const MOST_NUMBERS: usize = 2_000_000;
 /// Maximum number of selected points; with this number, the error of a correlation is below 0.01.
 const MOST_POINTS: usize = 200_000;

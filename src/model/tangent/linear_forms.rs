@@ -35,14 +35,15 @@ pub enum ModelChannel {
 /// Derivative of a quantity as a linear form: its coefficients at a few instants.
 #[derive(Debug, Clone, Default)]
 pub struct LinearForm {
-    /// Coefficients of `y1` and `y2`, the derivatives of the sines of both angles, and of the gap's
-    /// derivative.
+    /// Coefficients of the unknowns: `y1` and `y2` (the derivatives of the sines of the angles of neck and
+    /// lip) and the derivative of the gap.
     pub value: [LaneVector; 3],
-    /// Coefficients of the rates of `y1` and `y2`, the derivatives of the sines of both angles, and of the
-    /// gap's derivative.
+    /// Coefficients of the first time derivatives of the unknowns: `y1` and `y2` (the derivatives of the
+    /// sines of the angles of neck and lip) and the derivative of the gap.
     pub rate: [LaneVector; 3],
-    /// Coefficients of the second time derivatives of `y1` and `y2`, the derivatives of the sines of both
-    /// angles, and of the gap's derivative; zero after these are eliminated.
+    /// Coefficients of the second time derivatives of the unknowns: `y1` and `y2` (the derivatives of the
+    /// sines of the angles of neck and lip) and the derivative of the gap. They are zero after the second
+    /// time derivatives are eliminated.
     second: [LaneVector; 3],
     /// Coefficient of the derivative of the position at which the tip sticks.
     pub place: LaneVector,

@@ -7,9 +7,9 @@ use portable_math as math;
 use serde::Serialize;
 use std::sync::Arc;
 
-/// An instant that is less than this number of frames before a knot counts as the knot, so that no tiny piece
-/// remains. The third derivative jumps at the knot; the effect of the jump on the position is 1e18 times
-/// smaller within this time than within a whole frame.
+/// An instant counts as a knot if it precedes the knot by less than this number of frames, so that no tiny
+/// piece remains. The third derivative jumps at the knot; the effect of the jump on the position is 1e18
+/// times smaller within this time than within a whole frame.
 const NEAR_FRAMES: f64 = 1e-6;
 
 /// Position of the head as cubics between knots; only the third derivative jumps at a knot. The outermost

@@ -37,9 +37,10 @@ pub(super) struct SmoothingSpline {
     trend: [f64; SUPPORT],
     pieces: usize,
     pub(super) coefficients: Vec<f64>,
-    /// Cholesky factor of the coefficients' information matrix for unit noise variance per frame.
+    /// Cholesky factor of the information matrix (inverse covariance) of the coefficients, for a noise
+    /// variance of 1 per frame.
     information: CholeskyFactor,
-    /// Noise variance of a single frame, from the scatter of the blocks, m^2.
+    /// Noise variance of a single frame, m^2, estimated from the scatter of the blocks.
     variance_m2: f64,
 }
 
@@ -142,7 +143,7 @@ impl SmoothingSpline {
         self.pieces as f64 / (self.span.1 - self.span.0)
     }
 
-    /// Index of the piece of a frame, and the position in this piece from 0 to 1.
+    /// Index of the piece that contains a frame, and position of the frame within this piece, from 0 to 1.
     fn piece_at(&self, frame: f64) -> (usize, f64) {
         let x = (frame - self.span.0) * self.per_frame();
         let piece = (x as usize).min(self.pieces - 1);

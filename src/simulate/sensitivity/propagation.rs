@@ -58,8 +58,8 @@ pub(super) struct TangentPropagator<'a, O> {
     place: Option<StretchPlace>,
     /// End of the last piece, s.
     end_s: f64,
-    /// Limit for a guard that grazes zero: its rate, divided by the sum of the absolute values of the terms
-    /// of the rate, is below this value.
+    /// A guard counts as grazing zero if its rate, divided by the sum of the absolute values of the terms of
+    /// the rate, is below this limit.
     grazing: f64,
     d_time_s: Vec<f64>,
 }

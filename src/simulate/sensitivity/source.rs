@@ -10,9 +10,11 @@ use crate::simulate::drive::Drive;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum TangentSource {
     Constant(LinkageConstant),
-    /// `HeadScale` changes the head's motion `x(t)` by `x`, `HeadDelay` by `-x'`, `HeadStretch` by `t * x'`.
+    /// Changes the head's motion `x(t)` by `x`.
     HeadScale,
+    /// Changes the head's motion `x(t)` by `-x'`.
     HeadDelay,
+    /// Changes the head's motion `x(t)` by `t * x'`.
     HeadStretch,
 }
 

@@ -38,8 +38,9 @@ pub(super) struct StretchPlace {
     pub lean: ShoulderContact,
     /// Start of the series of the piece, s.
     pub start_s: f64,
-    /// Start of the stretch relative to the start of the series, s, and length of the stretch, s.
+    /// Start of the stretch, s, relative to the start of the series.
     pub from: f64,
+    /// Length of the stretch, s.
     pub length: f64,
     pub rule: &'static CollocationRule,
     /// Rate of change of the fastest derivative, 1/s.

@@ -15,9 +15,9 @@ use hybrid_ode::collocation::{CollocationEquations, CollocationStep, MOST_NODES,
 /// Derivatives with respect to the directions of a block.
 #[derive(Debug, Default)]
 pub(super) struct TangentBlock {
-    /// Derivatives of the sines of both angles and of the gap (the unknowns) at the start of the last
-    /// stretch, and their rates.
+    /// The unknowns at the start of the last stretch: derivatives of the sines of both angles and of the gap.
     pub value: [LaneVector; 3],
+    /// First time derivatives of the unknowns at the start of the last stretch.
     pub rate: [LaneVector; 3],
     /// Derivative of the tip's position in stick, m.
     pub place: LaneVector,
@@ -25,8 +25,9 @@ pub(super) struct TangentBlock {
     pub second: NodeArray<[LaneVector; 3]>,
     /// Derivatives of the state at the end of the last stretch, or at the transition time there.
     pub state: StateTangent,
-    /// `guard` has the derivatives of the guard that has fallen to zero, `time` those of the transition time.
+    /// Derivatives of the guard that has fallen to zero.
     pub guard: LaneVector,
+    /// Derivatives of the transition time, s per unit of each direction.
     pub time: LaneVector,
 }
 

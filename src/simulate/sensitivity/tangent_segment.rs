@@ -204,11 +204,13 @@ pub(super) struct DerivativeSum {
     second: [NodeArray<f64>; 3],
     place: f64,
     own: [f64; MOST_SOURCES],
-    /// Number of unknowns, number of nodes, whether any source contributes directly, and whether any unknown
-    /// has a weight.
+    /// Number of unknowns.
     unknowns: usize,
+    /// Number of nodes.
     nodes: usize,
+    /// Whether any source contributes directly.
     has_own: bool,
+    /// Whether any unknown has a weight.
     has_second: bool,
 }
 

@@ -154,7 +154,7 @@ fn plan_frames(fine: &Recording, camera: &Camera, start_s: f64) -> Result<FrameG
     Ok(FrameGrid { start_s, frame_rate_hz, frames })
 }
 
-/// Instants of the frames and exposure of the camera, in sampling intervals of the fine trace.
+/// Instants of the frames, and exposure of the camera; both are in sampling intervals of the fine trace.
 struct FrameShutter {
     first: f64,
     samples_per_frame: f64,
