@@ -1,5 +1,5 @@
-//! The command-line program: parses the arguments, runs a command, returns the exit code. Only this module
-//! opens files, prints and shows progress; the Python package uses it to read files.
+//! The command-line program: parses the arguments, runs a command and returns the exit code. Only this module
+//! opens files, prints and shows progress. The Python package reads files through it too.
 
 #[macro_use]
 mod output;

@@ -37,7 +37,7 @@ pub struct FigureBlock {
     pub file: String,
     /// Caption: one sentence with the result.
     pub caption: String,
-    /// Further sentences on method and contents; empty for none.
+    /// Further sentences on method and contents of the figure; empty for none.
     pub details: String,
     /// Index of the condition in the job; `None` for a figure of the whole job.
     #[serde(skip)]
@@ -86,7 +86,7 @@ pub(crate) fn about(name: &str, said: &str) -> String {
     [name, said].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join("; ")
 }
 
-/// Sentence for a recording whose head turns in the opposite direction to the model's head.
+/// Sentence for a report in which the recorded head turns in the opposite direction to the model's head.
 pub(crate) const OPPOSED: &str = "The recorded head turns the other way than the model's, so that nothing with a sign can \
      agree: start the scene half a period of its drive later";
 

@@ -77,7 +77,7 @@ pub struct FigureGroup {
     pub figures: Vec<FigureBlock>,
 }
 
-/// Subject of a group of figures, which determines its place on the page.
+/// Subject of a group of figures; it determines the place of the group on the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FigureSubject {

@@ -1,4 +1,4 @@
-//! Runs of a scene with many sets of parameter values.
+//! Runs a scene with many sets of parameter values.
 
 use crate::errors;
 use crate::scene::{PyScene, StopFlag};

@@ -20,7 +20,7 @@ pub struct PyRecording {
     exposure_s: Option<f64>,
 }
 
-/// The frames lie at true times, s, or on the grid of a rate, 1/s.
+/// Times of the frames: the time of each frame, s, or a constant frame rate, 1/s.
 #[derive(FromPyObject)]
 enum PyFrameClock<'py> {
     Times(PyReadonlyArray1<'py, f64>),

@@ -1,5 +1,5 @@
-//! Runs work without the interpreter lock of Python. Ctrl-C ends the work. A forked process creates threads
-//! of its own.
+//! Runs work without holding the interpreter lock of Python, so that other Python threads continue. Ctrl-C
+//! ends the work. After a fork, the new process creates threads of its own.
 
 use crate::errors;
 use pyo3::prelude::*;

@@ -37,8 +37,8 @@ const OUTPUTS: [&str; 5] = [
 /// Number of rounds of timing. Each round times every setting once, so that other load on the machine affects
 /// all settings alike.
 const ROUNDS: u32 = 15;
-/// Number of rounds that time every setting, and a minimum total time per setting. Later rounds time only the
-/// settings whose total time is still below that minimum.
+/// Number of rounds that time every setting, and the minimum total time per setting. Later rounds time only
+/// the settings that have not yet reached this total time.
 const MIN_TIMING: (u32, Duration) = (3, Duration::from_millis(250));
 
 impl AccuracyArgs {
@@ -96,8 +96,8 @@ fn work_precision_diagram(
 ) -> WorkPrecision {
     let run = reference.run_result();
     let length_s = (1e4 * (run.stopped_at_s - scene.start_s)).round() / 1e4;
-    // the error is that of the transition times; without transitions, or if the two reference runs disagree
-    // on them, it is the error of the deflection
+    // the drawn error is that of the transition times; if there are no transitions, or if the two reference
+    // runs have different ones, it is the error of the deflection
     let timed = run.transitions > 0 && reference.lists_agree;
     let (unit, error_label, floor) = if timed {
         (" s", "worst error of a transition time, s", reference.apart_s)

@@ -6,8 +6,8 @@ use clap::Args;
 use std::str::FromStr;
 use std::time::Duration;
 
-/// Parses a whole number of 1 or more. To the error message, [`clap`] adds the name of the option and the
-/// text found.
+/// Parses a whole number of at least 1. [`clap`] adds the name of the option and the refused text to the
+/// error message.
 pub(crate) fn parse_count(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(count) if count > 0 => Ok(count),

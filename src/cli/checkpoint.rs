@@ -1,5 +1,5 @@
-//! A journal on disk. It is locked while it is open, loses at most an incomplete last line, and is kept when
-//! a new journal is begun.
+//! A journal on disk. It is locked while it is open. A crash loses at most an incomplete last line. If a new
+//! journal is begun, the old one is kept under another name.
 //!
 //! Every append waits until its lines are on the disk (`fdatasync`), and the creation of a journal waits
 //! until its name is on the disk. Therefore every record that was counted or reported survives a power
@@ -24,7 +24,7 @@ pub(crate) struct CheckpointWriter {
     path: PathBuf,
     /// The file; `None` before the first line of a new journal.
     file: Option<File>,
-    /// Action on the existing file before the first line is appended.
+    /// Pending action on the existing file, carried out before the first line is appended.
     due: Option<PendingAction>,
     kind: CheckpointKind,
 }
@@ -35,7 +35,7 @@ type OpenedCheckpoint<T> = Outcome<(CheckpointWriter, Option<T>)>;
 /// Function that visits the records of a journal one by one.
 type RecordVisitor<'a, R> = dyn FnMut(StoredRecord<R>) -> Result<(), CheckpointError> + 'a;
 
-/// Action on an existing journal before the first line is appended.
+/// What is done with an existing journal before the first line is appended.
 #[derive(Clone, Copy)]
 enum PendingAction {
     /// Rename the journal, so that hours of work are not lost if `--resume` was forgotten.
@@ -212,9 +212,9 @@ fn lock_file(file: &File, kind: CheckpointKind) -> Result<(), String> {
     }
 }
 
-/// Refuses to replace an existing file by a new journal, unless its first line is incomplete or it is a
-/// journal with the same kind of input file. Fits to features and fits to traces both have a job as their
-/// input file.
+/// Refuses to replace an existing file by a new journal. Allowed are a file whose first line is incomplete,
+/// and a journal with the same kind of input file. Fits to features and fits to traces both have a job as
+/// their input file.
 fn check_same_kind(name: &str, bytes: &[u8], kind: CheckpointKind) -> Outcome<()> {
     if !has_whole_line(bytes) || detect_kind(bytes).is_some_and(|found| found.input() == kind.input()) {
         return Ok(());

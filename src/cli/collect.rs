@@ -89,7 +89,7 @@ impl CollectArgs {
     }
 }
 
-/// Divides the study into `of` shards. Returns the numbers of the shards with a missing point, in ascending
+/// Divides the study into `of` shards, and returns the numbers of the shards that lack a point, in ascending
 /// order.
 fn incomplete_tasks(points: &PointCollection<File>, of: usize) -> Outcome<TaskList> {
     Shard::new(0, of).ok_or_else(|| too_many_shards(of))?;

@@ -66,8 +66,8 @@ pub(crate) fn relative_path(folder: &Path, path: &Path) -> Outcome<String> {
         std::path::absolute(path)
             .map_err(|error| Failure::at(path.display(), format!("cannot be found from here: {error}")))
     };
-    // symbolic links are resolved in the part of the path that exists, since `..` after a link leads to the
-    // parent of its target
+    // only the existing part of the path has its symbolic links resolved; this is needed since `..` after a
+    // link leads to the parent of its target
     let real = |path: &Path| -> Outcome<PathBuf> {
         let full = in_full(path)?;
         let there = full.ancestors().find(|part| part.exists()).unwrap_or(Path::new(""));
@@ -95,7 +95,7 @@ pub(crate) fn write_outputs(
     commit_files(OutputStaging::new(folder, writer, &file_names(files))?, files)
 }
 
-/// Like [`write_outputs`], for files that are not listed in the marker of the folder; the caller ensures that
+/// Like [`write_outputs`], for files that the marker of the folder does not list; the caller ensures that
 /// they replace nothing of value.
 pub(crate) fn write_unmarked(folder: &Path, files: &[(impl AsRef<str>, Vec<u8>)]) -> Outcome<()> {
     OutputFolder::find_writable_ancestor(folder)?;
@@ -303,9 +303,9 @@ impl FigureArgs {
 pub(crate) struct StreamedTable {
     pub file: PendingFile,
     row: String,
-    /// First rows, which are kept in memory until the table has its minimum number of rows; and the number of
-    /// rows that are still missing from that minimum.
+    /// First rows, kept in memory until the table has its minimum number of rows.
     held: String,
+    /// Number of rows that the table still needs to reach its minimum number of rows.
     missing: usize,
     /// Time spent on formatting and writing, which does not count towards the time of the run.
     pub spent: Duration,

@@ -198,13 +198,14 @@ impl LoadedJob {
 type ResumedCheckpoint<'a, R> = Option<(&'a str, &'a CheckpointFile<R>)>;
 type FitOutcome = Result<FitResult, FitError>;
 
-/// Approximate number of iterates per stage of a fit to traces, from the recovery study; used to estimate the
-/// remaining time.
+/// Approximate number of iterates in a stage of a fit to traces, from the recovery study. It serves to
+/// estimate the remaining time.
 const ITERATES_A_STAGE: usize = 14;
-/// Number of starts of the search that most fits need: two starts must agree.
+/// Number of starts of the search that most fits need: the results of two starts must agree.
 const STARTS: usize = 2;
-/// Approximate number of iterates per twin (bootstrap data set), and per side of the profile of a parameter.
+/// Approximate number of iterates of the fit to one twin (bootstrap data set).
 const ITERATES_A_TWIN: usize = 5;
+/// Approximate number of iterates for one side of the profile of a parameter.
 const ITERATES_A_SIDE: usize = 2;
 
 /// The progress bar of a search, and the number of records in its journal.

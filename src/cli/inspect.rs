@@ -240,7 +240,7 @@ impl Inspection {
         }
     }
 
-    /// The verdict as lines of text, the worst first.
+    /// The verdict as lines of text, the most severe finding first.
     pub(crate) fn verdict_lines(&self) -> Vec<String> {
         quality::verdict_lines(&self.measurements, &self.findings)
     }

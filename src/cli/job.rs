@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 /// Name of the job file in the folder of a fit.
 pub(crate) const JOB_FILE: &str = "job.toml";
 
-/// Path of the job file of a job that the user names by this file or by its folder.
+/// Path of a job file; the user may name the file itself or its folder.
 pub(crate) fn job_path(named: &Path) -> PathBuf {
     if named.is_dir() { named.join(JOB_FILE) } else { named.to_owned() }
 }

@@ -96,8 +96,8 @@ pub(crate) fn load_recording(path: &Path) -> Outcome<LoadedRecording> {
     Ok(LoadedRecording { recording, file })
 }
 
-/// Whether a command other than `import` made the trace, according to the marker of its folder; if the marker
-/// does not list the trace, according to the summary of a simulation.
+/// Whether a command other than `import` made the trace. The marker of the folder tells; if the marker does
+/// not list the trace, the summary of a simulation next to it tells.
 fn is_simulated(trace: &Path, text: &str) -> Outcome<bool> {
     let folder = files::containing_folder(trace);
     let (marker, _) = FolderMarker::load(folder)?;

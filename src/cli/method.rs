@@ -49,7 +49,7 @@ pub(crate) enum TransitionsAt {
     Slack,
 }
 
-/// Maximum number of steps of a run, about an hour of computing.
+/// Maximum number of steps of a run; this many steps take about an hour of computing.
 const MOST_STEPS: f64 = 1e10;
 
 impl MethodArgs {

@@ -64,7 +64,8 @@ pub(crate) fn check_stdout() -> Outcome<()> {
     }
 }
 
-/// Prints help from clap to standard output, and refusals, which repeat what was typed, to standard error.
+/// Prints help from clap to standard output. Refusals, which repeat what the user typed, go to standard
+/// error.
 pub(crate) fn print_usage(error: &clap::Error, arguments: &[OsString]) -> Outcome<()> {
     let typed = arguments.iter().any(|word| {
         let word = word.to_string_lossy();

@@ -84,10 +84,12 @@ pub(crate) struct ProgressReporter {
 impl ProgressReporter {
     /// Time between two printed lines of progress.
     const PAUSE: Duration = Duration::from_secs(60);
-    /// Time until the first line of progress; it is short, so that a mistake shows early.
+    /// Time from the start of the work to the first printed line of progress; it is short, so that a mistake
+    /// shows early.
     const FIRST: Duration = Duration::from_secs(10);
 
-    /// A reporter that prints nothing if `says` is false or if the bar is drawn on a terminal.
+    /// A reporter of the progress of `bar`. It prints nothing if `says` is false or if the bar is drawn on a
+    /// terminal.
     pub(crate) fn new(bar: &ProgressBar, says: bool) -> Self {
         let due = (says && bar.is_hidden()).then(|| Instant::now() + Self::FIRST);
         Self { bar: bar.clone(), due: Mutex::new(due) }

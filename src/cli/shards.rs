@@ -17,8 +17,8 @@ pub(crate) fn shard_checkpoint(folder: &Path, shard: Shard) -> PathBuf {
     folder.join(SHARDS_FOLDER).join(shard.file_stem() + ".jsonl")
 }
 
-/// The shards in a folder of results, sorted by the number of shards in their division, then by their number
-/// in it.
+/// The shards in a folder of results, sorted first by the total number of shards (N), then by the number of
+/// the shard (K).
 pub(crate) fn shard_files(folder: &Path) -> Outcome<Vec<(Shard, PathBuf)>> {
     let folder = folder.join(SHARDS_FOLDER);
     if !folder.is_dir() {
@@ -69,7 +69,8 @@ pub(crate) fn scan_shard<R: CheckpointRecord>(
     }
 }
 
-/// The number of shards that occurs most often among the files; if two occur equally often, the larger one.
+/// The total number of shards (N) that occurs most often in the names of the files. If two totals occur
+/// equally often, the larger one.
 pub(crate) fn usual_shard_count(shards: &[(Shard, PathBuf)]) -> usize {
     let mut counts: BTreeMap<usize, usize> = BTreeMap::new();
     shards.iter().for_each(|(shard, _)| *counts.entry(shard.total()).or_default() += 1);

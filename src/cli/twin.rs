@@ -106,8 +106,9 @@ impl TwinArgs {
 
 /// File name of the figure.
 const FIGURE: &str = "twin";
-/// File names of the twin as an export of Tracker, and of its specification with the true values.
+/// File name of the twin in the format of an export of Tracker.
 const EXPORT_FILE: &str = "synthetic-tracker-export.txt";
+/// File name of the specification of the twin, with the true values.
 const SPEC_FILE: &str = "twin.toml";
 
 /// Names of the files that the specification requests.

@@ -32,8 +32,8 @@ impl AnalysedWindow<'_> {
 
 // Spectra of a recording and of a model in the same window.
 
-/// A component of the model is left out if the ratio of its amplitude to that of the model's largest
-/// component is below this value.
+/// A component of the model is not drawn if its amplitude, divided by that of the model's largest component,
+/// is below this value.
 const LEAST_OF_MODEL: f64 = 1e-3;
 
 /// The spectra and components of a recording and of a model in the same window. Leaves out components of the
@@ -92,7 +92,8 @@ pub(super) fn spectrum_curve(analysis: &SpectralAnalysis) -> SpectrumCurve {
     }
 }
 
-/// A level, m, at the frequencies of the spectrum; `None` if level and spectrum have different lengths.
+/// An amplitude level in metres, such as the noise floor, at the frequencies of the spectrum; `None` if level
+/// and spectrum have different lengths.
 pub(super) fn spectrum_level(analysis: &SpectralAnalysis, amplitude_m: &[f64]) -> Option<SpectrumLevel> {
     let frequency_hz = &analysis.spectrum.frequency_hz;
     (amplitude_m.len() == frequency_hz.len())
@@ -135,7 +136,7 @@ pub(crate) struct CoursePoint {
 }
 
 impl AnalysedWindow<'_> {
-    /// The points of the ridge; empty without a ridge.
+    /// The points of the ridge (the strongest frequency in each time segment); empty without a ridge.
     pub(crate) fn frequency_course(&self) -> Vec<CoursePoint> {
         self.analysis.ridge.as_ref().map_or_else(Vec::new, |ridge| {
             ridge.points.iter().map(|p| self.course_point(p, ridge.segment_s)).collect()
@@ -189,7 +190,7 @@ impl AnalysedWindow<'_> {
         }
     }
 
-    /// The parts of the ridge that are drawn, their points against tip speed, and a note on the number of
+    /// The drawn parts of the ridge, the points of these parts against tip speed, and a note on the number of
     /// segments.
     fn drawn_ridge(&self, of: &Spectrogram) -> (Vec<Vec<RidgePoint>>, Vec<SpeedPoint>, String) {
         let Some(ridge) = &self.analysis.ridge else { return Default::default() };
@@ -241,8 +242,8 @@ impl AnalysedWindow<'_> {
 const POINTS_A_CYCLE: f64 = 12.0;
 /// Maximum number of points of a fitted line; more would lie closer together than pixels.
 const MOST_POINTS: f64 = 40_000.0;
-/// A component counts as decaying if its damping ratio exceeds this multiple of the ratio's standard
-/// deviation.
+/// A component counts as decaying if its damping ratio exceeds this number of standard deviations of the
+/// damping ratio.
 const DECAYS: f64 = 3.0;
 
 impl AnalysedWindow<'_> {
@@ -255,7 +256,7 @@ impl AnalysedWindow<'_> {
         let analysis = self.analysis;
         let samples = analysis.residual_m.iter().zip(&analysis.model_m).zip(&analysis.removed_m);
         let samples = samples.map(|((left, m), removed)| left.map(|left| left + m + removed));
-        // root mean square of white noise whose noise floor in the spectrum is `noise_floor_m`
+        // root mean square of the white noise that gives the noise floor `noise_floor_m` in the spectrum
         let noise_m = analysis.spectrum.noise_floor_m
             * (grid.frame_rate_hz / (4.0 * analysis.spectrum.noise_bandwidth_hz)).sqrt();
         RingDown {
@@ -278,7 +279,8 @@ impl AnalysedWindow<'_> {
         }
     }
 
-    /// The largest component that decays; the data drawn with it are this component plus the residual.
+    /// The decaying component with the largest amplitude. The data drawn with this component are its sum with
+    /// the residual of the fit.
     fn largest_decay(&self, time_s: &[f64]) -> Option<ComponentDecay> {
         let analysis = self.analysis;
         let decays = |c: &&Component| {
@@ -302,7 +304,8 @@ impl AnalysedWindow<'_> {
         })
     }
 
-    /// The removed trend at a time after the first frame, m; linear between frames.
+    /// The removed trend in metres at a given time, s, after the first frame; interpolated linearly between
+    /// frames.
     fn removed_trend_m(&self, time_s: f64) -> f64 {
         let place = time_s * self.recording.grid().frame_rate_hz;
         let before = (place.max(0.0) as usize).min(self.analysis.removed_m.len().saturating_sub(1));
@@ -409,7 +412,7 @@ mod tests {
         (window.spectra(), spectrum_curve(&analysed(&quiet)))
     }
 
-    /// Fraction of the bins from number 20 on whose 95 % interval contains the given amplitude.
+    /// Fraction of the frequency bins, from bin 20 upwards, whose 95 % interval contains the given amplitude.
     fn covered(shown: &SpectraPlot, amplitude_m: &[f64]) -> f64 {
         let interval = shown.interval_95.as_ref().unwrap();
         let bins = interval.lower_m.iter().zip(&interval.upper_m).zip(amplitude_m);

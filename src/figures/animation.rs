@@ -34,7 +34,8 @@ pub struct Animation {
     pub linkage: Linkage,
     /// States of the model in the shown part, close enough together for linear interpolation.
     pub samples: Vec<ModelSample>,
-    /// Contact modes of the model, each with its start, s; the first one starts at the first shown instant.
+    /// Contact modes of the model, each with the time, s, at which it starts; the first one starts at the
+    /// first shown instant.
     pub modes: Vec<(f64, TipMode)>,
     /// Intervals in which the model's tip sticks, s.
     pub stick_s: Vec<[f64; 2]>,
@@ -125,8 +126,8 @@ pub(crate) fn describe_pace(pace: &PlaybackPace) -> String {
 // The animation of a condition: the model's reversal in fine steps, and the measured motion on the same
 // clock.
 
-/// Maximum number of states of an animation. A reversal with its release takes about 0.1 s, so that a cycle
-/// of 1 kHz has 25 states.
+/// Maximum number of states of an animation. A reversal with its release takes about 0.1 s, so each cycle of
+/// a 1 kHz oscillation then has 25 states.
 const MOST_SAMPLES: usize = 2500;
 
 /// The animation of a condition; `None` if the model's tip never sticks.
@@ -185,7 +186,8 @@ fn tracked_motion(recording: &Recording, alignment: &Alignment, [from_s, to_s]: 
     }
 }
 
-/// The contact modes in a time interval, each with its start, s; the first starts with the interval.
+/// The contact modes in a time interval, each with the time, s, at which it starts; the first starts with the
+/// interval.
 fn contact_modes(motion: &RunMotion, [from_s, to_s]: [f64; 2]) -> Vec<(f64, TipMode)> {
     let first = motion.samples.iter().rfind(|s| s.time_s <= from_s).map(|s| (from_s, s.mode));
     let inside = motion.transitions.iter().filter(|t| t.time_s > from_s && t.time_s <= to_s);
@@ -252,7 +254,7 @@ pub struct PlaybackPart {
 }
 
 impl PlaybackPart {
-    /// The part, slowed down by a round factor such that its playback takes about `wanted_s`.
+    /// Makes a part whose slow-down factor is a round number, such that its playback takes about `wanted_s`.
     fn with_duration(from_s: f64, to_s: f64, wanted_s: f64) -> Self {
         Self { from_s, to_s, slower: round_to_125(wanted_s / (to_s - from_s)).max(1.0) }
     }
@@ -266,21 +268,24 @@ pub struct PlaybackPace {
     pub parts: Vec<PlaybackPart>,
 }
 
-/// Time for which the final picture stays before the animation starts again, s.
+/// Time, s, for which the final picture stays before the animation starts again.
 const REST_S: f64 = 1.0;
 /// Playback time of the hold and its lead-in, s.
 const HOLD_SHOWN_S: f64 = 7.0;
 /// Playback time of the release and the motion after it, s.
 const RELEASE_SHOWN_S: f64 = 10.0;
-/// Durations in units of the duration of the hold: the motion shown before the hold, the end of the hold that
-/// belongs to the release part, and the motion shown after the hold.
+/// Duration of the motion shown before the hold, divided by the duration of the hold.
 const LEAD_IN: f64 = 0.06;
+/// Duration of the last part of the hold, which is shown with the slower pace of the release, divided by the
+/// duration of the hold.
 const RELEASE_LEAD: f64 = 0.02;
+/// Duration of the motion shown after the hold, divided by the duration of the hold.
 const FOLLOW_UP: f64 = 0.3;
 
 impl PlaybackPace {
-    /// Two parts: the hold of the tip, and its release with some cycles, which is slowed down more than the
-    /// hold. Both are limited to the interval `within`; `None` if both are outside that interval.
+    /// Two parts: the hold of the tip, and the release of the tip with some cycles after it. The second part
+    /// is slowed down more. Both parts are limited to the interval `within`; `None` if both are outside that
+    /// interval.
     #[must_use]
     pub fn around_hold([hold_s, release_s]: [f64; 2], within: [f64; 2]) -> Option<Self> {
         let length = release_s - hold_s;
@@ -334,7 +339,8 @@ pub(super) fn round_to_125(value: f64) -> f64 {
     nearest.unwrap_or(value)
 }
 
-// Strip charts under the drawings: deflection throughout the shown motion, tip velocity in its last part.
+// Strip charts under the drawings: the deflection in the whole shown motion, and the tip velocity in the last
+// part of that motion.
 
 const HEIGHT_MM: f64 = 27.0;
 const MM: f64 = 1e3;

@@ -17,7 +17,7 @@ use portable_math as math;
 pub struct CornerParameter {
     /// Symbol in the equations.
     pub symbol: String,
-    /// The stated interval with its unit, as text.
+    /// The 95 % interval that the page states, with its unit, as text.
     pub words: String,
     /// Estimate.
     pub estimate: f64,
@@ -31,8 +31,8 @@ pub struct CornerParameter {
     pub truth: Option<f64>,
     /// Values of the parameter, each with the ratio of its profile likelihood to the largest likelihood.
     pub profile: Vec<(f64, f64)>,
-    /// Values at which local searches ended. The cost of each exceeds the least cost by at most the
-    /// threshold.
+    /// Values at which local searches ended. Listed are the ends whose cost exceeds the least cost by at most
+    /// the threshold of the 95 % interval.
     pub optima: Vec<f64>,
 }
 
@@ -53,24 +53,26 @@ pub struct CornerPlot {
 const ROW_MM: f64 = 24.0;
 /// Maximum number of parameters drawn; of a longer list only the first ones are drawn.
 const MOST: usize = 8;
-/// Half widths of the joint regions, in standard deviations: square roots of the 95.4 and 68.3 % quantiles of
-/// chi-square with two degrees of freedom.
+/// Label, colour, mark and half width of the joint regions. The half widths are in standard deviations: the
+/// square roots of the 95.4 and 68.3 % quantiles of chi-square with two degrees of freedom.
 const REGIONS: [(&str, Colour, Mark, f64); 2] = [
     ("95 % of a pair", Colour::Blue, Mark::Thin, 2.486),
     ("68 % of a pair", Colour::Blue, Mark::Line, 1.515),
 ];
 /// Number of intervals in the outline of a region and in a curve.
 const POINTS: u32 = 48;
-/// Half width of a cell, half width of its contents, and height of the likelihood curve in it; the distance
-/// between the centres of neighbouring cells is 1.
+/// Half width of a cell; the distance between the centres of neighbouring cells is 1.
 const HALF: f64 = 0.5;
+/// Half width of the contents of a cell; the distance between cell centres is 1.
 const INSIDE: f64 = 0.44;
+/// Height of the likelihood curve in a diagonal cell; the distance between cell centres is 1.
 const CURVE: f64 = 0.72;
-/// Each cell shows at least this range on either side of the estimate, in standard deviations. The second
-/// constant is the margin on either side of the shown range, as a fraction of that range.
+/// Each cell shows at least this number of standard deviations on either side of the estimate.
 const SHOWN_SD: f64 = 2.8;
+/// Margin on either side of the range that a cell shows, as a fraction of that range.
 const ROOM: f64 = 0.06;
-/// Smallest margin that a cell may have, in the unit scale of the search; a smaller range is rounding error.
+/// Smallest margin of a cell, in the unit scale of the search (0 and 1 at the bounds); a smaller value would
+/// be rounding error.
 const LEAST: f64 = 1e-9;
 /// Half width of a two-sided 95 % interval, in standard deviations.
 const Z_95: f64 = 1.96;
@@ -118,7 +120,7 @@ fn corner_parameter(
     let (found, bounds) = (result.parameters.get(&free.name)?, &free.bounds);
     let line = lines.iter().find(|line| line.name == free.name);
     let estimate = bounds.unit_coordinate(found.estimate);
-    // one end of the interval may have been cut at a bound, so the longer half determines the standard
+    // the interval may have been cut at a bound on one side, so the longer half determines the standard
     // deviation
     let half = found.linear_95.map(|ends| {
         ends.iter().map(|end| (bounds.unit_coordinate(*end) - estimate).abs()).fold(0.0, f64::max)
@@ -300,7 +302,8 @@ fn likelihood_height(share: f64) -> f64 {
     -INSIDE + CURVE * share
 }
 
-/// A point given relative to the centre of its cell, in axis coordinates; `None` outside the cell.
+/// Converts a point given relative to the centre of its cell to axis coordinates; `None` if it lies outside
+/// the cell.
 fn clip_to_cell((x, y): (f64, f64), at: (f64, f64)) -> Option<(f64, f64)> {
     (x.abs() <= HALF && y.abs() <= HALF).then_some((at.0 + x, at.1 + y))
 }

@@ -24,7 +24,7 @@ pub struct CycleOverSpeed {
     pub measured: Vec<SpeedPoint>,
     /// The cycle of the model.
     pub model: Vec<SpeedPoint>,
-    /// Names and natural frequencies of the model, Hz.
+    /// Natural frequencies of the model in Hz, each with its name.
     pub natural_hz: Vec<(String, f64)>,
     /// Measured or published target frequencies.
     pub targets: Vec<Target>,
@@ -39,8 +39,8 @@ const AXIS_MARGIN: f64 = 1.12;
 const LABEL_POSITIONS: [f64; 3] = [0.24, 0.52, 0.79];
 /// Number of letters after which the name of a target is cut.
 const MAX_LABEL_LETTERS: usize = 12;
-/// Two lines that are closer than this fraction of the height of the axes have their names at different
-/// positions along the lines.
+/// If the distance between two lines is below this fraction of the height of the axes, their names have
+/// different positions along the lines.
 const CLOSE_LEVELS: f64 = 0.09;
 /// Distance of a name from its line, as a fraction of the height of the axes.
 const LABEL_OFFSET: f64 = 0.022;
@@ -128,8 +128,8 @@ fn cycle_series(shown: &CycleOverSpeed) -> impl Iterator<Item = Series> {
 const COMPONENT_RATIO: f64 = 2.5;
 /// A cycle is called constant if its frequency range is below this fraction of its mean frequency.
 const CONSTANT_TOLERANCE: f64 = 0.03;
-/// The cycle rises or falls with the speed if the mean frequency at the faster half of the points differs
-/// from that at the slower half by more than this fraction of the frequency range.
+/// The cycle frequency is said to rise or fall with the speed if its mean over the faster half of the points
+/// differs from its mean over the slower half by more than this fraction of the frequency range.
 const MIN_SPEED_TREND: f64 = 0.2;
 
 /// The figure of a condition; `None` if neither recording nor model shows a cycle.
@@ -166,8 +166,8 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     Some(case.figure_block("cycle", words, draw_figure(&shown)))
 }
 
-/// Lowest frequency that counts as the stick-slip cycle, Hz. A ridge may jump between the cycle and the slow
-/// swing of the head; so this is the frequency above the highest wide gap in the sorted frequencies, or 0
+/// Lowest frequency, Hz, that counts as the stick-slip cycle. A ridge may jump between the cycle and the slow
+/// swing of the head, so the frequencies are sorted and those below the highest wide gap are excluded; 0
 /// without such a gap.
 fn cycle_threshold_hz(mut all: Vec<f64>) -> f64 {
     all.sort_by(f64::total_cmp);
@@ -202,7 +202,7 @@ fn cycle_points(shown: &CycleOverSpeed) -> &[SpeedPoint] {
     if shown.measured.is_empty() { &shown.model } else { &shown.measured }
 }
 
-/// Mean frequency at the faster half of the points minus that at the slower half, Hz.
+/// Mean frequency, Hz, of the faster half of the points minus that of the slower half.
 fn frequency_rise_hz(points: &[SpeedPoint]) -> f64 {
     let mut by_speed = points.to_vec();
     by_speed.sort_by(|a, b| a.speed_m_per_s.total_cmp(&b.speed_m_per_s));

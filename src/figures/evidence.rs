@@ -49,11 +49,12 @@ pub struct EvidencePlot {
     pub parts: Vec<EvidencePart>,
 }
 
-/// A residual counts as noise only if its root mean square, divided by that of the noise, is at most this
-/// value. The value exceeds 1 since the noise is known only to a few per cent.
+/// Largest ratio of the root mean square of a residual to that of the noise at which the residual still
+/// counts as noise. It exceeds 1 since the noise is known only to a few per cent.
 pub(crate) const NOTHING_LEFT: f64 = 1.1;
-/// Heights of the panels, mm.
+/// Height, mm, of a panel with recording and model.
 const HEIGHT_MM: f64 = 30.0;
+/// Height, mm, of a panel with the residual.
 const RESIDUAL_HEIGHT_MM: f64 = 15.0;
 /// Half width of the interval that contains 95 % of the noise, in standard deviations.
 const NOISE_95: f64 = 1.96;
@@ -140,12 +141,13 @@ fn sample_curve(course: &TimeCurve, factor: f64) -> Option<SampledSeries> {
 
 // Evidence for a condition: whole recording, release, and worst part after the release.
 
-/// Time by which the enlarged part begins before the release, and time by which it ends after the release, s.
+/// The enlarged part begins by the first time, s, before the release and ends by the second time, s, after
+/// it.
 const AROUND_RELEASE_S: (f64, f64) = (0.005, 0.03);
 /// Length of the part with the worst misfit, s: a dozen cycles of the high component.
 const LATE_S: f64 = 0.015;
-/// Minimum fraction of the frames of a part that must have a value. The mean square of few values scatters
-/// more, and could be the largest by chance.
+/// Minimum fraction of the frames in which a part must have a value to be chosen as the worst part. The mean
+/// square of few values scatters more, and could be the largest by chance.
 const LEAST_PRESENT: f64 = 0.5;
 
 /// The figure of a condition; `None` without a recording, or if recording and model move in opposite
@@ -191,8 +193,9 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     Some(case.figure_block("evidence", figure_text(case, &shown, channel, noise_m), draw_figure(&shown)))
 }
 
-/// Start and end, s, of the part of length [`LATE_S`] with the largest mean square residual, within a time
-/// interval. An interval shorter than [`LATE_S`] is returned whole; `None` if the interval contains no value.
+/// Start and end, s, of the part of length [`LATE_S`] within a time interval whose residual has the largest
+/// mean square. An interval shorter than [`LATE_S`] is returned whole; `None` if the interval contains no
+/// value.
 fn worst_s(residual: &MotionTraces, channel: Channel, (from_s, to_s): (f64, f64)) -> Option<(f64, f64)> {
     let first = residual.time_s.partition_point(|t| *t < from_s);
     let end = residual.time_s.partition_point(|t| *t <= to_s);
@@ -226,8 +229,8 @@ fn channel_between(motion: &MotionTraces, channel: Channel, (from_s, to_s): (f64
     all.filter(|(t, _)| **t >= from_s && **t <= to_s).map(|(t, x)| x.map(|x| (*t, x))).collect()
 }
 
-/// A smooth curve from the states of the model. `None` for the head drop, or if the frames of the recording
-/// are at least as close together as these states.
+/// A curve through the model's own states, which are denser than the frames. `None` for the head drop, or if
+/// the frames of the recording are at least as dense as the states.
 fn model_states_curve(
     case: &ConditionComparison,
     channel: Channel,

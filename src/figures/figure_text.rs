@@ -6,9 +6,9 @@ use crate::model::parameters;
 use crate::text::{join_with_and, truncate_text};
 use plain_charts::Figure;
 
-/// Maximum numbers of letters of a title and of a name in a heading. Longer ones are cut, so that room for
-/// the figure is left.
+/// Maximum number of letters of a title in a heading. A longer title is cut to leave room for the figure.
 const TITLE_LETTERS: usize = 120;
+/// Maximum number of letters of a name in a heading. A longer name is cut to leave room for the figure.
 const NAME_LETTERS: usize = 50;
 
 impl ConditionComparison<'_> {

@@ -47,14 +47,16 @@ pub struct FrictionPlot {
     pub over_cycles: Vec<(f64, f64)>,
     /// Speeds and coefficients, averaged over stick-slip cycles of the model.
     pub of_model: Vec<(f64, f64)>,
-    /// Speed bins: lower edge, upper edge, and fraction of the slip time.
+    /// Speed bins: lower edge, m/s, upper edge, m/s, and fraction of the slip time that the tip spends in the
+    /// bin.
     pub shares: Vec<(f64, f64, f64)>,
     /// Mean speed of the head, m/s.
     pub head: Option<f64>,
 }
 
-/// Heights of the panels, mm.
+/// Height, mm, of the panel with the friction law.
 const HEIGHT_MM: f64 = 56.0;
+/// Height, mm, of the panel with the fractions of slip time.
 const SHARES_HEIGHT_MM: f64 = 26.0;
 const MILLIMETRES: f64 = 1e3;
 const PERCENT: f64 = 100.0;
@@ -95,7 +97,8 @@ pub fn draw_figure(law: &FrictionPlot) -> Figure {
     )
 }
 
-/// The law at all speeds, the law at the speeds of the run, the true law, and the measured points.
+/// Curves and points: the law at all drawn speeds, the law at the speeds that occur in the run, the true law,
+/// and the measured points.
 fn law_series(law: &FrictionPlot) -> Vec<Series> {
     let series = |label: &str, colour, mark, points: &[(f64, f64)]| {
         Series::new(
@@ -141,10 +144,11 @@ fn coefficient_axis(law: &FrictionPlot) -> ChartAxis {
 
 // The friction law of a condition.
 
-/// Number of intervals of the curve, and number of speed bins.
+/// Number of intervals into which the drawn curve is divided.
 const CURVE_POINTS: usize = 200;
+/// Number of speed bins.
 const SPEED_BINS: usize = 30;
-/// Ratio of the speed at which the curve ends to the largest speed of the tip.
+/// Ratio of the highest drawn speed of the curve to the largest speed of the tip in the run.
 const SPEED_MARGIN: f64 = 1.15;
 
 /// The figure of a condition; `None` for a model that never slips.

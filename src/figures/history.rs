@@ -34,18 +34,22 @@ pub struct TimeHistory {
     pub zoom_s: Option<(f64, f64)>,
 }
 
-/// Heights of the panels, mm: four quantities with their residuals and a few windows fit on a page.
+/// Height, mm, of a panel of the whole motion; four quantities with their residuals and a few windows fit on
+/// a page.
 const HEIGHT_MM: f64 = 24.0;
+/// Height, mm, of a panel of the enlarged part.
 const ENLARGED_HEIGHT_MM: f64 = 32.0;
+/// Height, mm, of a panel with a residual.
 const RESIDUAL_HEIGHT_MM: f64 = 13.0;
-/// Height of the row of a window, and minimum height of the panel of windows, mm; in a lower panel its label
-/// would not fit.
+/// Height, mm, of the row of one window in the panel of windows.
 const ROW_MM: f64 = 3.0;
+/// Minimum height, mm, of the panel of windows; in a lower panel its label would not fit.
 const LEAST_ROWS_MM: f64 = 12.0;
-/// A quantity whose values span less than this, m, is drawn in micrometres.
+/// A quantity is drawn in micrometres if the difference between its largest and smallest value is below this,
+/// m.
 const MICROMETRES_BELOW_M: f64 = 2e-4;
 
-/// Channels of the enlarged figure; the head's path is omitted, since it is only a parabola there.
+/// Channels of the enlarged figure. The position of the head is omitted, since it is only a parabola there.
 const ENLARGED: [Channel; 3] = [Channel::TipX, Channel::Deflection, Channel::HeadDrop];
 
 /// Draws the whole motion.
@@ -160,8 +164,8 @@ fn draw_residual_panel(history: &TimeHistory, channel: Channel, shown_s: (f64, f
     Some(Panel::new(x, y, RESIDUAL_HEIGHT_MM, [series]))
 }
 
-/// An axis symmetric about zero that ends slightly beyond 1, 2 or 5 times a power of ten, so that even a low
-/// panel has a tick on either side of zero.
+/// An axis that is symmetric about zero. Its ends are slightly beyond a number of the form 1, 2 or 5 times a
+/// power of ten, so that even a low panel has a tick on either side of zero.
 pub(super) fn symmetric_axis(axis: ChartAxis, points: &[Option<(f64, f64)>]) -> ChartAxis {
     const BEYOND: f64 = 1.2;
     const MOST: f64 = 1.15;
@@ -197,8 +201,8 @@ pub(super) fn length_unit(values: impl Iterator<Item = f64>) -> (&'static str, f
 
 // Shaded spans of the stick intervals.
 
-/// Neighbouring sticks are drawn as one span if their durations and the gap between them are below this
-/// fraction of the shown time, which is less than a millimetre on a page.
+/// Neighbouring sticks are drawn as one span if their durations and the gap between them are all below this
+/// fraction of the shown time. On a page, this is less than a millimetre.
 const MIN_STICK_GAP: f64 = 0.005;
 
 const STICKS_LABEL: &str = "tip sticks (model)";
@@ -225,8 +229,8 @@ pub(crate) fn stick_spans(stick_s: &[(f64, f64)], (from, to): (f64, f64)) -> Vec
 
 // Thinning of long lines.
 
-/// Number of parts into which a thinned line is divided; on a page, each is a third of a millimetre wide,
-/// about a line width.
+/// Number of equal parts into which the time axis of a thinned line is divided; on a page, each part is a
+/// third of a millimetre wide, about a line width.
 const THINNING_PARTS: usize = 400;
 
 /// The lowest and the highest point in each of [`THINNING_PARTS`] parts of a time interval, in order of time.
@@ -261,8 +265,8 @@ pub(crate) fn thin_points(points: &[Option<(f64, f64)>], (from, to): (f64, f64))
 const MAX_FULL_FRAMES: usize = 20_000;
 
 /// The frames of a long motion that its figures show: all frames of the enlarged part and, in each of
-/// [`THINNING_PARTS`] parts of the whole interval, the frames with the extrema of each column. Three
-/// unthinned motions of a million frames would need more memory than the rest of a report.
+/// [`THINNING_PARTS`] parts of the whole interval, the frames in which a column has its lowest or highest
+/// value. Three unthinned motions of a million frames would need more memory than the rest of a report.
 pub(super) fn thin_frames(
     motion: MotionTraces,
     (from, to): (f64, f64),

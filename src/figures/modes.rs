@@ -10,12 +10,14 @@ use portable_math as math;
 
 /// Number of frequencies of the compliance curve.
 const POINTS: usize = 600;
-/// Factor by which the frequency axis extends beyond the lowest and the highest mode.
+/// The frequency axis begins at the lowest mode divided by this factor and ends at the highest mode
+/// multiplied by it.
 const BEYOND: f64 = 4.0;
-/// Heights of the panels of the compliance and of a mode shape, mm.
+/// Height, mm, of the panel of the compliance.
 const ANSWER_MM: f64 = 52.0;
+/// Height, mm, of the panel of a mode shape.
 const SHAPE_MM: f64 = 44.0;
-/// Angle from the vertical, rad, of the more inclined link in a drawn mode shape.
+/// Angle from the vertical, rad, of that link of a drawn mode shape which is inclined more.
 const SWING: f64 = 0.35;
 /// Half width of the panel of a mode shape, in lengths of the blade.
 const HALF_WIDTH: f64 = 0.5;
@@ -85,7 +87,7 @@ fn draw_receptance_panel(blade: &Linkage, sides: &[bool], (low, high): (f64, f64
     Panel { vertical_lines: rules.collect(), ..Panel::new(x, y, ANSWER_MM, series) }
 }
 
-/// The links at both ends of a swing, drawn to scale over the upright blade.
+/// The links at the two extreme positions of a mode, drawn to scale over the upright blade.
 fn draw_mode_shape(blade: &Linkage, on_shoulder: bool, number: usize, mode: &NaturalMode) -> Panel {
     let largest = mode.lip_over_neck.abs().max(1.0);
     let (neck, lip) = (SWING / largest, SWING * mode.lip_over_neck / largest);

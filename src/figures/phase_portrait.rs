@@ -82,8 +82,8 @@ fn draw_panel(part: &PortraitPart, frames: Mark) -> Panel {
 /// axis.
 fn deflection_limits_mm(part: &PortraitPart) -> (f64, f64) {
     const AXIS_MARGIN: f64 = 0.05;
-    // smallest margin, relative to the largest value; a smaller margin would be rounding error and too small
-    // for tick labels
+    // smallest allowed margin of the axis, as a fraction of the largest absolute value; a smaller margin
+    // would be rounding error and too small for tick labels
     const LEAST_SPAN: f64 = 1e-4;
     let all = part.measured.iter().chain(&part.model).flatten().map(|(x, _)| x * 1e3);
     let (low, high) = value_span(all.filter(|x| x.is_finite()));
@@ -91,8 +91,8 @@ fn deflection_limits_mm(part: &PortraitPart) -> (f64, f64) {
     (low - room, high + room)
 }
 
-/// Upper limit of the ratio of the velocity noise (standard deviation) to the velocity range of a part, so
-/// that neighbouring cycles remain distinct.
+/// Largest allowed ratio of the standard deviation of the velocity noise to the velocity range of a part.
+/// With less noise than this, neighbouring cycles remain distinct.
 pub(crate) const MAX_VELOCITY_NOISE: f64 = 0.1;
 /// Longest time allowed between the two frames of a central difference, in periods of the fastest component.
 /// A fifth of a period reduces the velocity amplitude by 6 %, in recording and model alike; at 900 Hz with 2
@@ -134,14 +134,15 @@ impl CentralDifference {
         2.0 * self.half_frames as f64 / self.frame_rate_hz
     }
 
-    /// Standard deviation of the velocity, m/s: `sqrt(2)` times the standard deviation of the white position
-    /// noise, m, divided by the time between the two frames.
+    /// Standard deviation, m/s, of the noise of the velocity: `sqrt(2)` times the standard deviation of the
+    /// white position noise, m, divided by the time between the two frames, s.
     pub(crate) fn noise_m_per_s(&self, noise_m: f64) -> f64 {
         noise_m * std::f64::consts::SQRT_2 / self.frame_gap_s()
     }
 
-    /// Ratio of the velocity amplitude given by the difference to the true one, at a frequency, Hz:
-    /// `sin(x)/x`, where `x` is pi times the frequency times the time between the two frames.
+    /// Ratio of the velocity amplitude that the central difference gives to the true amplitude, for an
+    /// oscillation at the given frequency, Hz: `sin(x)/x`, where `x` is pi times the frequency times the time
+    /// between the two frames.
     pub(crate) fn velocity_gain(&self, frequency_hz: f64) -> f64 {
         let x = std::f64::consts::PI * frequency_hz * self.frame_gap_s();
         if x > 0.0 { math::sin(x) / x } else { 1.0 }
@@ -168,7 +169,7 @@ impl CentralDifference {
     }
 }
 
-/// Velocity range (peak to peak), m/s; `None` if there is no state.
+/// Largest minus smallest tip velocity, m/s, of the given states; `None` if there is no state.
 pub(crate) fn swing_m_per_s(states: &[PhasePoint]) -> Option<f64> {
     let velocities = || states.iter().flatten().map(|(_, v)| *v).filter(|v| v.is_finite());
     velocities().reduce(f64::max).zip(velocities().reduce(f64::min)).map(|(high, low)| high - low)
@@ -177,23 +178,23 @@ pub(crate) fn swing_m_per_s(states: &[PhasePoint]) -> Option<f64> {
 // Parts of the portrait: one after the release, and one at the top speed of the head. If the tip sticks at
 // that time, the second part is at the top speed of the tip.
 
-/// Numbers of cycles that remain readable: few of the low component, whose loops shift, and more of the high
-/// component, whose loops repeat.
+/// Number of cycles of the low component that are drawn; few, since its loops shift from cycle to cycle.
 const LOW_CYCLES: f64 = 3.0;
+/// Number of cycles of the high component that are drawn; more, since its loops repeat.
 const HIGH_CYCLES: f64 = 12.0;
-/// Longest duration that a part may have, s; a part has this duration if no frequency is known: some tens of
-/// cycles of the high component.
+/// Longest duration of a part, s: some tens of cycles of the high component. A part has this duration if no
+/// frequency is known.
 const LONGEST_S: f64 = 0.06;
-/// Minimum number of samples of the model in half the time between the two frames of a difference, so that
-/// linear interpolation follows the path of the model.
+/// Minimum number of samples of the model in the time from the middle frame of a central difference to either
+/// of its two frames. Linear interpolation between them then follows the path of the model.
 const SAMPLES_APART: f64 = 2.0;
-/// The tip may stick for at most this fraction of a part.
+/// Largest allowed fraction of the duration of a part in which the tip sticks.
 const MOST_STUCK: f64 = 0.8;
 
-/// Noise below this, m, is rounding error: it is far below the resolution of a camera.
+/// Position noise below this value, m, is rounding error: it is far below the resolution of a camera.
 const ROUNDING_M: f64 = 1e-12;
 
-/// A part of the motion: its name in the panel, its name in the caption, start and end, s.
+/// A part of the motion, with its name in the panel, its name in the caption, and its start and end, s.
 struct PortraitSpan {
     name: String,
     said: String,
@@ -297,7 +298,7 @@ fn peak_velocity(
     inside.max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Total duration of stick within `length_s` after an instant, s.
+/// Total time, s, for which the tip sticks within `length_s` after an instant.
 fn stick_duration_s(case: &ConditionComparison, from_s: f64, length_s: f64) -> f64 {
     let from_s = from_s - case.alignment.shift_s;
     let inside_s = |[start, end]: &[f64; 2]| (end.min(from_s + length_s) - start.max(from_s)).max(0.0);
@@ -307,9 +308,10 @@ fn stick_duration_s(case: &ConditionComparison, from_s: f64, length_s: f64) -> f
 /// The chosen central difference, and the values from which it was chosen.
 struct VelocityEstimate {
     difference: CentralDifference,
-    /// Noise of the recorded tip, m.
+    /// Standard deviation of the position noise of the recorded tip, m.
     noise_m: Option<f64>,
-    /// Smallest velocity range of the model in any part, m/s. The range in a recording would include noise.
+    /// Velocity range of the model, m/s, in the part in which it is smallest. The range in a recording would
+    /// include noise.
     swing_m_per_s: Option<f64>,
     fastest_hz: Option<f64>,
 }
@@ -418,7 +420,7 @@ fn figure_text(
 }
 
 impl VelocityEstimate {
-    /// Sentences on the difference used and on the velocity noise.
+    /// Sentences on the chosen central difference and on the velocity noise.
     fn describe(&self) -> String {
         let CentralDifference { half_frames, .. } = self.difference;
         let frames = if half_frames == 1 {
@@ -500,7 +502,7 @@ mod tests {
         (tip, (0..frames).map(|i| amplitude_m * angular * phase(i).cos()).collect())
     }
 
-    /// Root mean square of the velocities minus `share` times the exact velocities, m/s.
+    /// Root mean square, m/s, of the differenced velocities minus `share` times the exact velocities.
     fn off(difference: CentralDifference, tip: &[Option<f64>], exact: &[f64], share: f64) -> f64 {
         let found = difference.phase_points(tip, tip);
         let squares: Vec<f64> = found
@@ -543,8 +545,8 @@ mod tests {
                 "{noise} of {swing}"
             );
         }
-        // with a velocity range of 0.1 m/s, the noise of every permitted difference is too large, so the
-        // longest permitted one is used
+        // with a velocity range of 0.1 m/s, every permitted difference gives too much noise, so the longest
+        // permitted one is chosen
         let drowned = CentralDifference::for_noise(2e5, NOISE_M, 0.1, Some(FASTEST_HZ));
         assert_eq!(drowned.half_frames, 22);
         assert!(drowned.noise_m_per_s(NOISE_M) > MAX_VELOCITY_NOISE * 0.1);

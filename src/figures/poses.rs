@@ -27,7 +27,7 @@ pub struct ReversalPose {
     pub head_m_per_s: f64,
 }
 
-/// Longest time allowed between a hold and the reversal, as a fraction of the duration of the run.
+/// Longest allowed time between a hold and the reversal, as a fraction of the duration of the run.
 const NEAR_TURN: f64 = 0.05;
 /// Ratio of the deflection at the pose `half way` to the deflection at the start of the hold.
 const HALF_WAY: f64 = 0.5;
@@ -69,7 +69,7 @@ fn build_pose(samples: &[ModelSample], name: &'static str, at: usize, turn_s: f6
     }
 }
 
-/// Start and end of the longest stick at or near the reversal, s.
+/// Start and end, s, of the longest stick of the tip at or near the reversal of the head.
 fn rest_span_s(motion: &RunMotion, turn_s: f64) -> Option<[f64; 2]> {
     let span = motion.samples.last()?.time_s - motion.samples.first()?.time_s;
     let near =
@@ -77,8 +77,8 @@ fn rest_span_s(motion: &RunMotion, turn_s: f64) -> Option<[f64; 2]> {
     motion.stick_s.iter().filter(near).max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0]))).copied()
 }
 
-/// Index of the first sample, from index `from` on, whose deflection is at most `share` times that of sample
-/// `from`.
+/// Index of the first sample, from index `from` on, whose deflection is at most `share` times the deflection
+/// of sample `from`.
 fn head_over_tip_index(samples: &[ModelSample], from: usize, share: f64) -> Option<usize> {
     let deflection = |s: &ModelSample| s.tip_x_m - s.head_x_m;
     let after = samples.get(from..)?;
@@ -224,25 +224,31 @@ const HEIGHT_MM: f64 = 40.0;
 
 // The following constants are in lengths of the upright blade, so that every blade fits its drawing.
 
-/// Smallest half width of a drawing; margin next to the tip of a blade that leans farther than that; half
-/// width of the glass. All are in lengths of the upright blade.
+/// Smallest half width of a drawing, in lengths of the upright blade.
 const HALF_WIDTH: f64 = 0.5;
+/// Margin next to the tip if the blade leans farther than the smallest half width, in lengths of the upright
+/// blade.
 const BESIDE_TIP: f64 = 0.1;
+/// Half width of the glass, in lengths of the upright blade.
 const GLASS: f64 = 0.85;
-/// Heights of the lower and the upper end of a drawing above the glass, in lengths of the upright blade.
+/// Height of the lower end of a drawing above the glass, in lengths of the upright blade.
 const FOOT: f64 = -0.5;
+/// Height of the upper end of a drawing above the glass, in lengths of the upright blade.
 const TOP: f64 = 1.34;
 /// Half width and height of the drawn head, in lengths of the upright blade.
 const HEAD: (f64, f64) = (0.16, 0.14);
-/// Length of the longest arrow, size of its barbs, and heights at which the arrows of velocity and friction
-/// are drawn, in lengths of the upright blade.
+/// Length of the longest arrow, in lengths of the upright blade.
 const ARROW: f64 = 0.36;
+/// Size of the barbs of an arrow, in lengths of the upright blade.
 const BARB: f64 = 0.06;
+/// Height above the glass at which the velocity arrow is drawn, in lengths of the upright blade.
 const VELOCITY_AT: f64 = 1.24;
+/// Height above the glass at which the friction arrow is drawn, in lengths of the upright blade.
 const FRICTION_AT: f64 = -0.13;
-/// Height of the time label, and distance of the state label below it in a drawing of the smallest width, in
-/// lengths of the upright blade.
+/// Height of the time label above the glass, in lengths of the upright blade.
 const TEXT_AT: f64 = -0.28;
+/// Distance of the state label below the time label in a drawing of the smallest width, in lengths of the
+/// upright blade.
 const TEXT_APART: f64 = 0.13;
 /// Maximum length of the scale bar, its height above the glass, and the distance of its label above it, in
 /// lengths of the upright blade.
@@ -271,7 +277,7 @@ pub fn draw_figure(shown: &PoseSequence) -> Figure {
     }
 }
 
-/// Speed of the head, m/s, and friction force, N, that the longest arrows show.
+/// Speed of the head, m/s, and friction force, N, that an arrow of the maximum length represents.
 pub(super) struct ArrowScale {
     pub speed_m_per_s: f64,
     pub force_n: f64,

@@ -1,5 +1,5 @@
 //! Profile likelihoods: rise of the cost along each parameter while the other parameters are refitted, and
-//! the intervals that follow from it.
+//! the confidence intervals from it.
 
 use super::figure_text::parameter_symbol;
 use crate::compare::ParameterLine;
@@ -58,11 +58,13 @@ pub struct ProfilePlot {
 
 /// Height of a panel, mm.
 const HEIGHT_MM: f64 = 29.0;
-/// Upper end of the cost axis, in units of the threshold; values with a higher cost are excluded anyway.
+/// Upper end of the axis of the cost rise, in units of the threshold of the 95 % interval; values with a
+/// higher cost are excluded anyway.
 const SHOWN: f64 = 3.0;
-/// Names, symbols and heights (in units of the threshold) of the intervals; they are drawn between the two
-/// branches of the profile.
+/// Name of the stated interval, and the height at which it is drawn, in units of the threshold.
 const STATED: (&str, f64) = ("95 % interval, as stated", 1.2);
+/// Name, colour, symbol and height, in units of the threshold, of the other intervals. They are drawn between
+/// the two branches of the profile.
 const INTERVALS: [(&str, Colour, MarkerShape, f64); 3] = [
     ("profile", Colour::Blue, MarkerShape::Disc, 1.6),
     ("linear model", Colour::Orange, MarkerShape::Square, 2.05),
@@ -132,8 +134,8 @@ fn closed_interval(parameter: &FreeParameter, found: &ParameterResult) -> [Optio
     found.profile_95.map(|end| end.filter(inside))
 }
 
-/// Ratio of the half width of the drawn parabola to that of the linear interval; large enough that the
-/// parabola reaches the top of the axes.
+/// Ratio of the half width of the drawn parabola to that of the 95 % interval of the linear model; large
+/// enough that the parabola reaches the top of the axes.
 const REACH: f64 = 2.0;
 
 /// Rise of the cost according to the linear model: a parabola in the search scale that crosses the threshold
@@ -273,8 +275,8 @@ fn x_limits(profile: &ParameterProfile, top: f64) -> (f64, f64) {
     (low - room, high + room)
 }
 
-/// Value at which the profile crosses the top, interpolated between a point above the top and its neighbour
-/// below.
+/// Value of the parameter at which the profile crosses the top of the axes, interpolated between a point
+/// above the top and its neighbour below it.
 fn crossing_at_top(profile: &ParameterProfile, at: usize, (value, rise): (f64, f64), top: f64) -> f64 {
     let neighbours =
         [at.checked_sub(1), at.checked_add(1)].into_iter().flatten().filter_map(|i| profile.points.get(i));

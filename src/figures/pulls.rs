@@ -29,8 +29,9 @@ pub struct PullPlot {
     pub without: Vec<String>,
 }
 
-/// Height of a row, and minimum height of the axes, mm.
+/// Height of the row of a feature, mm.
 const ROW_MM: f64 = 5.0;
+/// Minimum height of the axes, mm.
 const LEAST_MM: f64 = 14.0;
 /// Half width of the interval that contains 95 % of the pulls of a correct model, in standard deviations.
 const WITHIN_95: f64 = 1.96;

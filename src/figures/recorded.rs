@@ -9,7 +9,7 @@ use plain_charts::{Colour, Figure, ShadedSpan};
 
 /// Maximum number of reversals that are named in a figure.
 const MOST_NAMED: usize = 6;
-/// Maximum number of gaps that are marked; these are the longest ones.
+/// Maximum number of gaps that are marked. If there are more, the longest ones are marked.
 const MOST_GAPS: usize = 20;
 /// A gap is marked if it has at least this number of frames; a shorter gap would not be visible.
 const LEAST_GAP: usize = 3;

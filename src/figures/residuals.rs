@@ -23,7 +23,7 @@ pub struct ResidualDiagnostics {
     pub histogram: Vec<(f64, f64, f64)>,
     /// Lags, s, and the autocorrelation of the residual.
     pub correlation: Vec<(f64, f64)>,
-    /// Value that the absolute autocorrelation of white noise exceeds at 5 % of the lags.
+    /// Value that the absolute autocorrelation of white noise exceeds at 5 % of the lags on average.
     pub white_95: f64,
     /// Frequencies, Hz, each with the ratio of the power density of the residual to that of the noise.
     pub spectrum: Vec<(f64, f64)>,
@@ -34,7 +34,7 @@ pub struct ResidualDiagnostics {
 /// Height of a panel, mm.
 const HEIGHT_MM: f64 = 40.0;
 const MILLISECONDS: f64 = 1e3;
-/// Number of intervals of the noise curve.
+/// Number of intervals into which the drawn density of the noise is divided.
 const POINTS: u32 = 60;
 
 /// Draws the figure.
@@ -121,7 +121,7 @@ fn draw_growth(shown: &ResidualDiagnostics) -> Option<Panel> {
 const HISTOGRAM_BINS: usize = 40;
 /// Minimum half width of the range of the histogram, in standard deviations of the noise.
 const MIN_HISTOGRAM_RANGE: f64 = 4.0;
-/// Maximum lag of the autocorrelation, frames; [`MAX_LAG_FRACTION`] may limit it further.
+/// Maximum lag of the autocorrelation in frames; [`MAX_LAG_FRACTION`] may limit it further.
 const MAX_LAGS: usize = 60;
 /// Maximum lag of the autocorrelation, as a fraction of the length of the recording.
 const MAX_LAG_FRACTION: f64 = 0.25;
@@ -129,12 +129,13 @@ const MAX_LAG_FRACTION: f64 = 0.25;
 const MIN_FRAMES: usize = 50;
 /// Maximum number of points of the spectrum; neighbouring frequencies are averaged.
 const MAX_SPECTRUM_POINTS: usize = 300;
-/// Number of tapers of the spectrum.
+/// Number of tapers of the multitaper spectrum.
 const TAPERS: usize = 9;
 /// Half width of a two-sided 95 % interval, in standard deviations.
 const Z_95: f64 = 1.96;
-/// A residual counts as white noise if its root mean square, divided by that of the noise, is below 1 plus
-/// this value, and the absolute correlation of neighbouring frames is below this value.
+/// A residual counts as white noise if two conditions are met: the ratio of its root mean square to that of
+/// the noise is below 1 plus this value, and the absolute correlation of neighbouring frames is below this
+/// value.
 const WHITE_NOISE_TOLERANCE: f64 = 0.1;
 
 /// The figure of a condition; `None` without a recording, with too few frames, or if recording and model move
@@ -209,7 +210,8 @@ fn histogram_bins(values: &[f64]) -> Vec<(f64, f64, f64)> {
     counts.into_iter().enumerate().map(bin).collect()
 }
 
-/// Lags, s, from one frame upwards, and the autocorrelation from the pairs of frames that both have a value.
+/// Lags, s, from one frame upwards, each with the autocorrelation of the residual at that lag, computed from
+/// the pairs of frames that both have a value.
 fn autocorrelation(left: &[Option<f64>], rate_hz: f64) -> Vec<(f64, f64)> {
     let values = || left.iter().flatten();
     let count = values().count().max(1) as f64;

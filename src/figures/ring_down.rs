@@ -55,9 +55,11 @@ pub struct RingDown {
     pub decay: Option<ComponentDecay>,
 }
 
-/// Heights of the panels, mm.
+/// Height, mm, of the panel of data and fit.
 const HEIGHT_MM: f64 = 48.0;
+/// Height, mm, of the panel of the residual.
 const RESIDUAL_HEIGHT_MM: f64 = 24.0;
+/// Height, mm, of the panel of the decaying component.
 const DECAY_HEIGHT_MM: f64 = 42.0;
 
 /// Draws the figure.

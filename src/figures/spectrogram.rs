@@ -57,7 +57,7 @@ pub struct SpectrogramPlot {
     /// Frequencies, ascending, Hz.
     pub frequency_hz: Vec<f64>,
     /// Amplitude of a sine, m: one list per instant, with one value per frequency; `None` if too few frames
-    /// are tracked.
+    /// are tracked around that instant.
     pub amplitude_m: Vec<Vec<Option<f64>>>,
     /// Whether the frequency axis is logarithmic.
     pub log_frequency: bool,
@@ -73,13 +73,14 @@ pub struct SpectrogramPlot {
     pub over_speed: Vec<SpeedPoint>,
 }
 
-/// Heights of the two panels, mm.
+/// Height, mm, of the map.
 const HEIGHT_MM: f64 = 72.0;
+/// Height, mm, of the panel of the ridge against tip speed.
 const SPEED_HEIGHT_MM: f64 = 38.0;
-/// Fraction of the cells, those of smallest amplitude, whose values are below that of the first colour; they
-/// contain only noise.
+/// The first colour of the scale is chosen so that this fraction of the cells has smaller amplitudes; these
+/// cells contain only noise.
 const UNDER_COLOURS: f64 = 0.1;
-/// The range of colours begins and ends at multiples of this, dB.
+/// The colour scale begins and ends at multiples of this level, dB.
 const STEP_DB: f64 = 5.0;
 /// Amplitude of 0 dB, m.
 const REFERENCE_M: f64 = 1e-6;
@@ -203,8 +204,8 @@ pub(crate) fn describe_ridge_segments(
 
 // Data of a spectrogram and of its ridge.
 
-/// Copies times, frequencies and amplitudes of a spectrogram, up to a number of frequency bins, to a plot;
-/// also the parts of its ridge, with gaps between them.
+/// Copies times, frequencies and amplitudes of a spectrogram to a plot, up to the given number of frequency
+/// bins. Also copies the parts of its ridge, with gaps between them.
 pub(super) fn fill_map(
     plot: SpectrogramPlot,
     spectrogram: &time_frequency::Spectrogram,
@@ -234,12 +235,13 @@ pub(super) fn fill_map(
 
 /// Number of letters after which a name is cut in a map.
 const MAX_LABEL_LETTERS: usize = 14;
-/// Distance of a name from its line, and smallest distance of two lines whose names are both above them, as
-/// fractions of the height of the map.
+/// Distance of a name from its line, as a fraction of the height of the map.
 const LABEL_OFFSET: f64 = 0.05;
+/// If two lines are closer than this fraction of the height of the map, the name of the lower line is below
+/// that line.
 const CLOSE_TARGETS: f64 = 0.1;
-/// Range of the middle of a name along the time axis, as fractions of the width of the map, so that the name
-/// stays inside the axes.
+/// Limits for the position of the middle of a name along the time axis, as fractions of the width of the map;
+/// they keep the name inside the axes.
 const LABEL_LIMITS: (f64, f64) = (0.3, 0.7);
 
 /// Target lines over the ridges; met and missed targets have different styles.

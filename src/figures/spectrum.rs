@@ -39,7 +39,7 @@ pub struct SpectraPlot {
     pub targets: Vec<Target>,
     /// Noise floor of the measured spectrum, m.
     pub noise_floor_m: Option<f64>,
-    /// Noise floor as a function of frequency; drawn instead of the constant one.
+    /// Noise floor as a function of frequency; if present, it is drawn instead of the constant noise floor.
     pub noise_floor: Option<SpectrumLevel>,
     /// 95 % interval of the measured spectrum, from its noise floor.
     pub interval_95: Option<AmplitudeInterval>,
@@ -192,7 +192,7 @@ pub struct AmplitudeInterval {
 }
 
 impl SpectrumLevel {
-    /// The lowest positive level at or above a frequency, m.
+    /// The smallest positive amplitude, m, of the level at frequencies of at least `lowest_hz`.
     pub(super) fn lowest_m(&self, lowest_hz: f64) -> Option<f64> {
         let all = self.frequency_hz.iter().zip(&self.amplitude_m);
         let shown = all.filter(|(f, a)| **f >= lowest_hz && **a > 0.0 && a.is_finite());
@@ -200,8 +200,8 @@ impl SpectrumLevel {
     }
 }
 
-/// Radius of the circle that contains 95 % of the noise around the complex amplitude of a bin, in units of
-/// the root mean square of the noise: `sqrt(-ln 0.05)` (Rayleigh distribution of the magnitude).
+/// Ratio of the radius of the circle that contains 95 % of the noise around the complex amplitude of a bin to
+/// the root mean square of that noise: `sqrt(-ln 0.05)` (Rayleigh distribution of the magnitude).
 const CIRCLE_95: f64 = 1.730_818_382_602_285_7;
 
 impl AmplitudeInterval {

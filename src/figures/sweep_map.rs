@@ -14,8 +14,9 @@ use plain_charts::{
 };
 use std::collections::BTreeMap;
 
-/// Heights of a map and of a curve, mm.
+/// Height of a map, mm.
 const MAP_MM: f64 = 56.0;
+/// Height of a curve, mm.
 const CURVE_MM: f64 = 46.0;
 
 /// Draws the map with index `at`; the figure has no panels if there is no such map.
@@ -160,7 +161,8 @@ impl<'a> DisplayAxis<'a> {
 
 // Hatch patterns for missing values.
 
-/// Replacement patterns, in order, for reasons whose own pattern is already in use.
+/// Hatch patterns, in order of preference, for reasons whose own pattern is already in use for another
+/// reason.
 const FALLBACK_PATTERNS: [HatchPattern; 9] = [
     HatchPattern::Dotted,
     HatchPattern::DashedUpright,
@@ -173,7 +175,8 @@ const FALLBACK_PATTERNS: [HatchPattern; 9] = [
     HatchPattern::Crossed,
 ];
 
-/// The pattern of each reason in a study; reasons share a pattern only if none is left.
+/// The hatch pattern of each reason for missing values in a study; two reasons share a pattern only if no
+/// pattern is free.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(in crate::figures) struct ReasonPatterns(BTreeMap<MissingReason, HatchPattern>);
 
@@ -205,8 +208,8 @@ impl ReasonPatterns {
         Self(given)
     }
 
-    /// One hatch for each reason that occurs in a map, in the order of the table of reasons; `cell` returns
-    /// the rectangle of a point.
+    /// One hatch for each reason for missing values in a map, in the order of the table of reasons; `cell`
+    /// returns the rectangle of a point.
     pub(crate) fn reason_hatches(
         &self,
         reasons: &[Option<MissingReason>],
@@ -222,8 +225,8 @@ impl ReasonPatterns {
     }
 }
 
-/// The pattern of a reason if no other reason of the study uses it. No pattern is plain grey, which would
-/// look like a value in a print without colours.
+/// The hatch pattern of a reason for missing values, if no other reason of the study uses it. No pattern is
+/// plain grey, which would look like a value in a print without colours.
 fn default_pattern(reason: MissingReason) -> HatchPattern {
     match reason {
         MissingReason::ContactLost => HatchPattern::Rising,
@@ -299,7 +302,7 @@ pub(in crate::figures) fn axis_label(axis: &SweepAxis) -> String {
 /// Quantiles of the values that set the first and the last colour if values outside them are outliers.
 const COLOUR_QUANTILES: [f64; 2] = [0.02, 0.98];
 /// The smallest or largest value counts as an outlier if its distance from the nearer quantile exceeds this
-/// multiple of the range between the quantiles.
+/// fraction of the distance between the two quantiles.
 const OUTLIER_DISTANCE: f64 = 0.25;
 /// Minimum number of values that a map needs before any of them can count as an outlier.
 const MIN_OUTLIER_SAMPLES: usize = 8;
@@ -314,8 +317,8 @@ pub(super) fn colour_limits(values: &[Option<f64>]) -> Option<(f64, f64)> {
     sorted.sort_by(f64::total_cmp);
     let last = sorted.len() - 1;
     let [low, high] = COLOUR_QUANTILES.map(|share| share * last as f64);
-    // indices rounded inwards, so that the extreme of a few values is not its own quantile and can be an
-    // outlier
+    // the indices of the quantiles are rounded inwards; otherwise the extreme of a few values would be its
+    // own quantile and could not be an outlier
     let (low, high) = (sorted[low.ceil() as usize], sorted[high.floor() as usize]);
     let between = high - low;
     let end = |share: f64, extreme: f64| {

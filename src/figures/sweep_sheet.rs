@@ -10,8 +10,9 @@ use plain_charts::{
     COLUMN_WIDTH_MM, ChartAxis, Colour, ColourMap, FULL_WIDTH_MM, Figure, HeatMap, Panel, TextAnnotation,
 };
 
-/// Heights of a panel and of a row of the table of correlations, mm.
+/// Height of a panel, mm.
 const PANEL_MM: f64 = 42.0;
+/// Height, mm, of a row of the table of correlations.
 const ROW_MM: f64 = 7.0;
 /// Minimum height of the table of correlations, in rows; the label of the colour bar needs this height.
 const FEWEST_ROWS: usize = 5;

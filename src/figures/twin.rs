@@ -8,10 +8,11 @@ use plain_charts::{ChartAxis, Colour, ErrorBar, FULL_WIDTH_MM, Figure, Mark, Pan
 
 /// Number of samples of the motion per frame.
 pub(crate) const MOTION_SAMPLES: f64 = 8.0;
-/// Number of frames in an enlarged part, and number of these frames before the release.
+/// Number of frames in an enlarged part.
 const ENLARGED: f64 = 40.0;
+/// Number of frames of an enlarged part that are before the release.
 const BEFORE: f64 = 10.0;
-/// A stick counts as late if it ends after this fraction of the run.
+/// A stick counts as late if it ends after this fraction of the duration of the run.
 const LATE: f64 = 0.75;
 /// Height of a panel, mm.
 const PANEL_MM: f64 = 40.0;
@@ -33,8 +34,8 @@ pub(crate) struct TwinPlot<'a> {
     pub stick_s: &'a [[f64; 2]],
 }
 
-/// Draws the deflection, for the whole run and around two releases (of the longest stick and of a late
-/// stick), and the errors of the camera.
+/// Draws three panels of the deflection (the whole run, the release after the longest stick, and the release
+/// after a late stick) and a panel of the errors of the camera.
 pub(crate) fn draw_figure(twin: &TwinPlot) -> Figure {
     let words = figure_text(twin);
     let mut panels = vec![draw_run_panel(twin)];
@@ -78,7 +79,8 @@ fn figure_text(twin: &TwinPlot) -> FigureText {
     }
 }
 
-/// Noise of the deflection, m; the noise of the tip and that of the head are independent.
+/// Standard deviation of the noise of the deflection, m; the noise of the tip and that of the head are
+/// independent.
 fn deflection_noise_m(twin: &TwinPlot) -> f64 {
     std::f64::consts::SQRT_2 * twin.noise_m
 }

@@ -16,15 +16,18 @@ const SHOWN: [(&str, &str); 4] = [
     ("still stuck", "at the release"),
     ("after", "after the flip"),
 ];
-/// Maximum number of frames between an instant of the model and the nearest frame in which head and tip are
-/// tracked.
+/// Largest allowed distance, in frames, from an instant of the model to the nearest frame in which head and
+/// tip are tracked.
 const NEAR: usize = 5;
 /// Height of a panel, mm.
 const DRAWING_MM: f64 = 42.0;
-/// Number of pixels across a panel; then the part of the video frame that is resampled, in lengths of the
-/// blade: half width about the head, and heights above the glass. This part is larger than any panel.
+/// Number of pixels across a panel.
 const FRAME_POINTS: usize = 256;
+/// Half width, about the head, of the part of the video frame that is resampled, in lengths of the blade;
+/// larger than any panel.
 const FRAME_HALF: f64 = 1.5;
+/// Heights above the glass of the lower and upper end of the part of the video frame that is resampled, in
+/// lengths of the blade.
 const FRAME_HEIGHTS: [f64; 2] = [-0.3, 1.3];
 /// Margin around the links, in lengths of the blade.
 const ROOM: f64 = 0.12;
@@ -101,8 +104,8 @@ impl VideoFrames {
     }
 }
 
-/// The tracked frame nearest to a time of the recording, s. `None` if no height was tracked, since the
-/// position of the picture is then unknown.
+/// The tracked frame nearest to a time, s, of the recording. `None` if no height was tracked, since the place
+/// of the links in the picture is then unknown.
 fn instant(
     case: &ConditionComparison,
     film: &RecordingVideo<'_>,

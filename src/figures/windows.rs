@@ -40,8 +40,9 @@ pub struct WindowOverview {
     pub instants: Vec<(String, f64)>,
 }
 
-/// Heights of the panels, mm.
+/// Height, mm, of the panel of the analysed quantity.
 const HEIGHT_MM: f64 = 46.0;
+/// Height, mm, of the panel of the head.
 const HEAD_HEIGHT_MM: f64 = 26.0;
 /// Colours of the windows, in the order of the windows.
 const COLOURS: [Colour; 6] =

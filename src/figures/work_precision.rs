@@ -96,7 +96,8 @@ pub fn draw_figure(shown: &WorkPrecision) -> Figure {
     }
 }
 
-/// Factor by which a logarithmic axis extends beyond the data.
+/// A logarithmic axis begins at the smallest value divided by this factor and ends at the largest value
+/// multiplied by it.
 const ROOM: f64 = 1.5;
 
 fn value_range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {

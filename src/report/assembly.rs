@@ -105,7 +105,8 @@ fn fill_report_sections(
     }
 }
 
-/// The condition whose friction figure is also that of the condition `of`, since both have the same run.
+/// The condition whose friction figure also applies to the condition `of`: both have the same run, or are one
+/// and the same condition.
 fn shared_law_case<'a, 'b>(
     cases: &'b [ConditionComparison<'a>],
     of: usize,
@@ -200,7 +201,7 @@ fn fit_notes(measured: &[FittedRecording], result: &FitResult) -> Vec<String> {
     let mut notes: Vec<String> =
         result.notes.iter().filter(|note| !result.gate.notes.contains(note)).cloned().collect();
     let freed = result.nuisances.iter().any(|nuisance| nuisance.recording.is_none());
-    // a fit to traces in which no constants are fitted already has such a note
+    // if no constants are fitted, a fit to traces already has such a note
     let exact = match (freed, &result.misfit) {
         (true, _) => Some("every number of the scene that is not freed"),
         (false, None) => Some("every other number of the scene"),

@@ -87,7 +87,7 @@ pub(super) fn data_banner(report: &Report) -> String {
     }
 }
 
-/// Figures of a subject, and number of figures that precede them on the page.
+/// Figures of a subject, and the number of figures that come before them on the page.
 fn figures_of_subject(report: &Report, subject: FigureSubject) -> (Vec<&FigureBlock>, usize) {
     let groups = || report.figures.iter();
     let before = groups().take_while(|group| group.subject != subject).map(|group| group.figures.len()).sum();
@@ -193,7 +193,8 @@ fn commands_html(p: &Provenance) -> String {
     )
 }
 
-/// A row of the table of events: its name, its value for a run, and whether every value except `none` is bad.
+/// A row of the table of events: its name, the function that returns its text for a run, and whether every
+/// text except `none` means something bad.
 type EventRow = (&'static str, fn(&RunSummary) -> String, bool);
 
 const EVENT_ROWS: [EventRow; 12] = [
@@ -228,8 +229,8 @@ const EVENT_ROWS: [EventRow; 12] = [
 ];
 
 const NO_EVENTS: &str = "none";
-/// Smaller forces, N, are shown as zero, since they are rounding errors; the preload of the blade is about
-/// 0.1 N.
+/// Forces below this value, N, are shown as zero, since they are rounding errors; the preload of the blade is
+/// about 0.1 N.
 const ROUNDING_N: f64 = 1e-9;
 
 fn force_text(newtons: f64) -> String {

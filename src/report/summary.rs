@@ -15,7 +15,7 @@ use crate::text::{
 };
 use serde::Serialize;
 
-/// A run visibly deviates from the recording if the ratio of its residual to the noise exceeds this value.
+/// Ratio of the residual of a run to the noise above which the run deviates visibly from the recording.
 const SEEN: f64 = 3.0;
 /// The deviation of the model from a met target is mentioned if it exceeds this number of standard deviations
 /// of the target.
@@ -144,7 +144,8 @@ fn trace_headline(report: &Report, misfit: &TraceMisfit) -> Statement {
     Statement::with_details(words, details, Some(misfit.explained))
 }
 
-/// Sentence on the residual of one run of the model from start to end; the fit itself uses shorter segments.
+/// Sentence on the residual of a single run of the model over the whole recording; the fit itself uses
+/// shorter segments.
 fn single_run_sentence(report: &Report) -> Option<Sentence> {
     let (condition, r) = farthest_residual(report)?;
     let ratio = r.rms_over_noise.filter(|ratio| *ratio > NOTHING_LEFT)?;
@@ -171,8 +172,8 @@ fn channel_point_name(channel: &str) -> &str {
     }
 }
 
-/// Index of the condition in which the residual of one run of the model is largest relative to the noise; and
-/// that residual.
+/// Index of the condition with the largest ratio of residual to noise in a single run of the model, and that
+/// residual.
 pub(in crate::report) fn farthest_condition(
     conditions: &[ComparisonSummary],
 ) -> Option<(usize, &ResidualSummary)> {
@@ -204,8 +205,8 @@ fn count_met_targets(report: &Report) -> (bool, String) {
     (met == all, count)
 }
 
-/// Sentences on the missed targets, then on met targets from which the model deviates by more than [`FAR_SD`]
-/// standard deviations.
+/// Sentences on the missed targets. After them come sentences on met targets from which the model deviates by
+/// more than [`FAR_SD`] standard deviations.
 fn missed_target_sentences(report: &Report) -> Vec<Sentence> {
     let apart = |c: &TargetComparison| c.model.zip(c.target_sd).map(|(m, sd)| (m - c.target).abs() / sd);
     let far = |c: &&TargetComparison| c.pass && apart(c).is_some_and(|sds| sds > FAR_SD);

@@ -116,7 +116,8 @@ fn verdict_statements(report: &Report) -> Vec<Statement> {
     found
 }
 
-/// Statement that the features are met only with estimated camera errors far from their priors.
+/// Statement that the features are met only if the camera errors are far from the values that their priors
+/// expect.
 fn far_camera_statement(report: &Report) -> Option<Statement> {
     let reasons = far_from_priors(&report.nuisances);
     let is_far = report.misfit.is_none() && !reasons.is_empty();
@@ -141,7 +142,7 @@ fn residual_sentence(c: &ChannelMisfit) -> Sentence {
     Sentence::default().with_name(&c.recording).with_words(words)
 }
 
-/// Singular and plural of the counted nouns.
+/// Singular and plural of the nouns that are counted in statements.
 const NOUNS: [[&str; 2]; 3] =
     [["value that was", "values that were"], ["component", "components"], ["feature", "features"]];
 

@@ -41,8 +41,8 @@ pub struct CombinationLine {
     pub words: String,
     /// Whether the features determine the product.
     pub determined: bool,
-    /// Standard deviation of the natural logarithm of the product; for an undetermined product, the largest
-    /// value that the bounds of the search allow.
+    /// Standard deviation of the natural logarithm of the product. For an undetermined product, this is the
+    /// largest value that the bounds of the search allow.
     pub sd_relative: f64,
 }
 

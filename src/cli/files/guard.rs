@@ -136,7 +136,7 @@ impl OutputGuard {
         Err(other_recording_failure(&self.folder.join(name), &why, advice))
     }
 
-    /// Refuses to put a trace next to the description of another recording.
+    /// Refuses to write a trace into a folder whose description belongs to another recording.
     fn refuse_contradiction(&self, names: &[&str]) -> Outcome<()> {
         let other = match self.writer.maker {
             OutputCommand::Simulate => Some(DESCRIPTION_FILE).filter(|name| self.folder.join(name).exists()),

@@ -31,8 +31,9 @@ pub(crate) struct MarkedFile {
     pub version: String,
     /// SHA-256 of the contents; CRLF counts as LF, and a byte-order mark is ignored.
     pub sha256: String,
-    /// Hash of the file that this one replaces, if the same command had made it. Until all files are renamed,
-    /// or if the program is killed before that, the disk may contain either of the two.
+    /// Hash of the previous file of this name, if the same command had made that file. The previous contents
+    /// remain on the disk until all files are renamed, or if the program is killed before that; so the disk
+    /// may contain either version.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub replaces: Option<String>,
 }
@@ -150,9 +151,9 @@ impl OutputCommand {
         matches!(self, Self::Import | Self::Simulate | Self::Twin)
     }
 
-    /// Whether a run of the command replaces the whole previous run: files of the previous run that are not
-    /// written again are removed. This is not so for an import, which keeps exports, and for init, demo and
-    /// figures, which write next to files of other commands.
+    /// Whether the command removes those files of its previous run that it does not write again. An import
+    /// does not, since it keeps exports. Neither do init, demo and figures, which write next to files of
+    /// other commands.
     pub(crate) fn replaces_last_run(self) -> bool {
         !matches!(self, Self::Demo | Self::Figures | Self::Import | Self::Init)
     }

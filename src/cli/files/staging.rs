@@ -21,8 +21,9 @@ use tempfile::NamedTempFile;
 
 /// Prefix and suffix of temporary names.
 const TEMPORARY_NAME: (&str, &str) = (".wiperlab-", ".tmp");
-/// A temporary file that is older than this and has no lock was left by a program that was killed: a program
-/// locks its temporary files within microseconds of their creation, until it ends.
+/// An unlocked temporary file that is older than this was left by a program that was killed. A running
+/// program locks a temporary file within microseconds of its creation, and keeps it locked until the program
+/// ends.
 const ABANDONED_AFTER: Duration = Duration::from_secs(60);
 
 /// Files of a command under temporary names. If the value is dropped before [`OutputStaging::commit`], the

@@ -17,8 +17,8 @@ pub(crate) struct FramePictures {
 }
 
 impl FramePictures {
-    /// The pictures of the recording at `path`; `None` if its description names none, or if the tracks were
-    /// interpolated to a grid, whose frames are not those of the pictures.
+    /// The pictures of the recording at `path`. `None` if its description names none, or if the tracks were
+    /// interpolated to a grid: the frames of the grid are not those of the pictures.
     pub(crate) fn load(path: &Path, loaded: &LoadedRecording) -> Outcome<Option<Self>> {
         let file = loaded.file.as_ref().filter(|_| loaded.recording.describe_resampling().is_none());
         let Some((file, video)) = file.and_then(|file| Some((file, file.video.as_ref()?))) else {
@@ -73,8 +73,8 @@ impl PictureSource for FramePictures {
     }
 }
 
-/// Sort key that puts frame9 before frame10: numbers are compared by their number of digits, then as text.
-/// Equal keys are ordered by the whole name.
+/// Sort key that puts frame9 before frame10: of two numbers, the one with fewer digits comes first; numbers
+/// with equally many digits are compared as text. Names with equal keys are ordered by the whole name.
 fn natural_sort_key(name: &str) -> (Vec<(usize, String)>, String) {
     let mut parts: Vec<(bool, String)> = Vec::new();
     for letter in name.chars() {

@@ -12,11 +12,10 @@ use std::time::Duration;
 /// Shortest walltime that is accepted, s; Slurm counts walltimes in minutes.
 const SHORTEST_S: u64 = 60;
 
-/// Time by which a task ends before its walltime, as a fraction of the walltime. It allows for points in
-/// progress and for a late start.
+/// A task ends before its walltime by this fraction of the walltime. This leaves time for points in progress
+/// and for a late start.
 const MARGIN: f64 = 0.05;
-/// Limits, s, of the time by which a task ends before its walltime: it is at least the first and at most the
-/// second number.
+/// Shortest and longest time, s, by which a task ends before its walltime.
 const MARGINS_S: (u64, u64) = (30, 300);
 
 /// An array of tasks, and the final job that runs after them.

@@ -8,26 +8,29 @@ use crate::simulate::ModelSample;
 use plain_charts::{ChartAxis, Colour, Mark, Panel, Series, TextAnnotation, value_span};
 
 const MM: f64 = 1e3;
-/// Estimated width of axes that take half of the page, mm; determines the scale of the drawing.
+/// Estimated width, mm, of axes that take half of the page width; it determines the scale of the drawing.
 const AXES_MM: f64 = 70.0;
 /// Smallest and largest height that the drawing may have, mm.
 const HEIGHT_MM: (f64, f64) = (50.0, 80.0);
-/// Margins above the blade (for head and labels) and below the glass, in lengths of the blade.
+/// Margin above the blade, for head and labels, in lengths of the blade.
 const ABOVE: f64 = 0.42;
+/// Margin below the glass, in lengths of the blade.
 const BELOW: f64 = 0.13;
-/// Smallest distance allowed between two pose names in one row, and distance between rows of names, mm.
+/// Smallest allowed horizontal distance, mm, between two pose names in one row.
 const LABEL_MM: f64 = 10.0;
+/// Vertical distance, mm, between two rows of pose names.
 const ROW_MM: f64 = 3.2;
 /// Distance between the middle of a text and the left or right end of the drawing, mm.
 const MARGIN_MM: f64 = 5.0;
-/// Half width and height of the drawn head, in lengths of the blade; not to scale.
+/// Half width of the drawn head, in lengths of the blade; not to scale.
 pub(super) const HEAD_HALF_WIDTH: f64 = 0.22;
+/// Height of the drawn head, in lengths of the blade; not to scale.
 pub(super) const HEAD_HEIGHT: f64 = 0.14;
 
 /// Name and joints of a pose; the joints are those of [`linkage_points_mm`].
 type LabelledPose = (&'static str, [(f64, f64); 3]);
 
-/// Upper hinge of the neck, hinge between neck and lip, and lip tip, mm.
+/// Positions, mm, of the upper hinge of the neck, the hinge between neck and lip, and the tip of the lip.
 pub(super) fn linkage_points_mm(linkage: &Linkage, sample: &ModelSample) -> [(f64, f64); 3] {
     joint_positions(linkage, sample).map(|(x, y)| (MM * x, MM * y))
 }
@@ -78,11 +81,12 @@ fn text_at(text: &str, at: (f64, f64)) -> TextAnnotation {
     TextAnnotation::new(text, Colour::Black, at)
 }
 
-/// The panel of the enlarged tip. With margins, it is as wide as the path of the tip in the last shown part,
-/// in which the tip slips.
+/// The panel with the enlarged tip. It shows the path of the tip in the last shown part, in which the tip
+/// slips, with a margin at either end.
 pub(super) fn draw_tip_panel(animation: &Animation, height_mm: f64) -> Panel {
-    /// Margins at both ends of the path of the tip, and below the glass, in units of the length of that path.
+    /// Margin at either end of the path of the tip, as a fraction of the length of that path.
     const ROOM: f64 = 0.12;
+    /// Margin below the glass, as a fraction of the length of the path of the tip.
     const UNDER: f64 = 0.3;
     let [from_s, to_s] = animation.pace.last_part_s();
     let tips =
@@ -110,8 +114,8 @@ fn pose_labels(poses: &[LabelledPose], height: f64, row: f64, apart: f64) -> Vec
     labels
 }
 
-/// The drawn poses: at both ends of the hold and, if the head passes over the resting tip during the hold, at
-/// that instant.
+/// The drawn poses: one at the start and one at the end of the hold. If the head passes over the resting tip
+/// during the hold, there is a pose at that instant too.
 fn key_poses(animation: &Animation) -> Vec<LabelledPose> {
     let [from_s, to_s] = animation.hold_s;
     let at = |time_s: f64| animation.samples.iter().find(|s| s.time_s >= time_s);

@@ -12,8 +12,9 @@ use std::fmt::Write;
 /// Largest position error allowed for a drawn point, in canvas units: a fiftieth of a millimetre, less than a
 /// line width.
 const TOLERANCE: f64 = 0.3;
-/// Half widths of the tip's symbol and of the cross at a measured point, in canvas units.
+/// Half width of the symbol at the tip, in canvas units.
 const TIP_HALF_WIDTH: f64 = 20.0;
+/// Half width of the cross at a measured point, in canvas units.
 const CROSS_HALF_WIDTH: f64 = 15.0;
 /// Distance of the mode symbol below the tip, in canvas units.
 const SYMBOL_OFFSET: f64 = 40.0;
@@ -63,8 +64,8 @@ fn pose_key_frames(animation: &Animation, plot: &PanelPlacement) -> KeyFrames<6>
     animation.samples.iter().filter_map(point).collect()
 }
 
-/// Key frames of `N` consecutive numbers of each pose, beginning at index `from`; superfluous key frames are
-/// left out.
+/// Key frames with `N` of the six coordinates of each pose, beginning at index `from`; superfluous key frames
+/// are left out.
 fn select_numbers<const N: usize>(poses: &KeyFrames<6>, from: usize) -> KeyFrames<N> {
     let some: KeyFrames<N> =
         poses.iter().map(|(share, all)| (*share, std::array::from_fn(|k| all[from + k]))).collect();
@@ -96,7 +97,8 @@ fn moving_group(
     format!("<g transform=\"translate({})\">{motion}{contents}</g>\n", format_translation(first))
 }
 
-/// A link from the joint whose coordinates begin at index `from` to the next joint.
+/// A moving line for the link from one joint to the next; the coordinates of the first joint begin at index
+/// `from` of a pose.
 fn moving_link(animation: &Animation, poses: &KeyFrames<6>, from: usize, width: u32) -> String {
     let keys: KeyFrames<4> = select_numbers(poses, from);
     let Some((_, first)) = keys.first() else { return String::new() };
@@ -154,7 +156,8 @@ fn enlarged_tip(animation: &Animation, plot: &PanelPlacement) -> String {
         measured_crosses(animation, plot),
     ]
     .concat();
-    // the id contains the position: animations on one page with the same id also have the same clipping frame
+    // the id contains the position, so animations on one page share an id only if their clipping frames are
+    // equal
     let name = format!("frame-{x}-{y}-{width}-{height}").replace('.', "_");
     let frame = format!(
         "<clipPath id=\"{name}\"><rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"/></clipPath>"
@@ -178,8 +181,8 @@ fn moving_head(animation: &Animation, plot: &PanelPlacement) -> String {
     )
 }
 
-/// Changes of visibility of a contact mode: fractions of the playback time, each with `true` if the tip is in
-/// that mode from then on.
+/// Times at which a contact mode begins or ends, as fractions of the playback time; each has `true` if the
+/// mode begins.
 fn mode_intervals(animation: &Animation, mode: TipMode) -> Vec<(f64, bool)> {
     let mut spells: Vec<(f64, bool)> = animation
         .modes
@@ -258,7 +261,8 @@ fn mode_and_pace_text(animation: &Animation, plot: &PanelPlacement, close: &Pane
     modes.chain(paces).collect()
 }
 
-/// Changes of visibility of a part of the motion; the last part stays visible to the end.
+/// Times at which the text of a part of the motion appears and disappears, as fractions of the playback time;
+/// the last part stays visible to the end.
 fn part_visibility(animation: &Animation, part: &PlaybackPart) -> Vec<(f64, bool)> {
     let [from_s, to_s] = animation.pace.span_s();
     let mut spells = vec![(0.0, part.from_s <= from_s)];
@@ -271,8 +275,8 @@ fn part_visibility(animation: &Animation, part: &PlaybackPart) -> Vec<(f64, bool
     spells
 }
 
-/// Crosses at the measured tip (drawn on the glass) and at the measured head, from the nearest frame; hidden
-/// while not tracked.
+/// Crosses at the measured tip (drawn on the glass) and at the measured head, in the frame nearest to the
+/// shown instant. A cross is hidden while its point is not tracked.
 fn measured_crosses(animation: &Animation, plot: &PanelPlacement) -> String {
     let Some(measured) = &animation.measured else { return String::new() };
     let length = drawing::blade_length_mm(&animation.linkage);
@@ -342,11 +346,11 @@ fn time_cursors(animation: &Animation, strips: &[PanelPlacement]) -> String {
 
 // Key frames and SMIL elements.
 
-/// Key frames: a fraction of the playback time with the values at that time.
+/// Key frames. Each is a time, as a fraction of the playback time, with the values at that time.
 pub(super) type KeyFrames<const N: usize> = Vec<(f64, [f64; N])>;
 
-/// The key frames that suffice for linear interpolation to stay within `tolerance` (Douglas and Peucker, with
-/// time as the abscissa).
+/// Leaves out key frames that linear interpolation between the others reproduces within `tolerance`
+/// (Douglas-Peucker algorithm with time as the abscissa).
 pub(super) fn simplify_key_frames<const N: usize>(
     values: &[(f64, [f64; N])],
     tolerance: f64,
@@ -367,7 +371,8 @@ pub(super) fn simplify_key_frames<const N: usize>(
     values.iter().zip(kept).filter(|(_, kept)| *kept).map(|(value, _)| *value).collect()
 }
 
-/// Largest deviation of the values of a key frame from linear interpolation between two other key frames.
+/// Deviation of a key frame from linear interpolation between two other key frames: the largest absolute
+/// difference of any of its values.
 fn deviation_from_line<const N: usize>(
     from: &(f64, [f64; N]),
     to: &(f64, [f64; N]),

@@ -15,8 +15,8 @@ use crate::text::{
     format_times, join_with_and,
 };
 
-/// Time by which the enlarged part begins before the release, and time by which it ends after the release, s:
-/// a few cycles of the high component.
+/// The enlarged part begins by the first time, s, before the release and ends by the second time, s, after
+/// it; it shows a few cycles of the high component.
 const ZOOM_S: (f64, f64) = (0.005, 0.03);
 /// If there are at most this many reversals, all are marked. Otherwise only the first is marked, since the
 /// labels need room.
@@ -58,7 +58,7 @@ fn build_history(case: &ConditionComparison) -> TimeHistory {
     }
 }
 
-/// Time interval around the release of the tip, limited to the recording, s.
+/// Time interval, s, from shortly before to shortly after the release of the tip, limited to the recording.
 fn release_s(shown: &TimedRecording) -> Option<(f64, f64)> {
     let (grid, release_s) = (shown.recording.grid(), shown.instant_s(InstantKind::Release)?);
     let last_s = grid.time_s(grid.frames.saturating_sub(1));
@@ -139,7 +139,7 @@ fn enlarged_text(case: &ConditionComparison, history: &TimeHistory) -> FigureTex
     FigureText { caption, details: details.join(" ") }
 }
 
-/// Clause on the sources of the drawn motions.
+/// Clause that names the drawn motions: the recording over the model, or the model without a recording.
 fn whose_motion(case: &ConditionComparison) -> String {
     match case.recording() {
         Some(_) => format!("{} over the fitted model", case.source_kind()),
@@ -147,8 +147,8 @@ fn whose_motion(case: &ConditionComparison) -> String {
     }
 }
 
-/// The compared channel, the root mean square of its residual, m, and the ratio of this root mean square to
-/// the noise.
+/// The compared channel, the root mean square of its residual, m, and the ratio of that value to the root
+/// mean square of the noise.
 fn rms_difference(
     case: &ConditionComparison,
     within_s: Option<(f64, f64)>,
@@ -302,7 +302,7 @@ fn describe_release(case: &ConditionComparison) -> Option<String> {
     ))
 }
 
-/// Time from the turn of the head in words: "4.2 ms after" or "4.2 ms before".
+/// An instant relative to the turn of the head, in words: "4.2 ms after" or "4.2 ms before".
 fn format_turn_offset(after_s: f64) -> String {
     format!("{} {}", format_milliseconds(after_s.abs()), if after_s < 0.0 { "before" } else { "after" })
 }

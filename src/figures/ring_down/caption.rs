@@ -23,7 +23,7 @@ pub(crate) fn lowest_window(case: &ConditionComparison, all: &[FitWindow]) -> Op
     lowest.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// The figure is drawn only if the component nearest to the target has at least this amplitude, in standard
+/// Smallest amplitude of the component nearest to the target for which the figure is drawn, in standard
 /// deviations of the noise.
 const LEAST_OVER_NOISE: f64 = 2.0;
 

@@ -30,12 +30,13 @@ pub struct SpectrogramComparison {
     pub sides: Vec<(SpectrogramSide, SpectrogramPlot)>,
 }
 
-/// Heights of the maps and of the panels of ridges below them, mm.
+/// Height of a map, mm.
 const HEIGHT_MM: f64 = 56.0;
+/// Height of a panel of ridges, mm.
 const RIDGE_HEIGHT_MM: f64 = 40.0;
-/// Maximum number of columns and of rows of a map, so that files stay small; a cell is still narrower than a
-/// millimetre.
+/// Maximum number of columns of a map, which keeps files small; a cell is still narrower than a millimetre.
 const MOST_COLUMNS: usize = 64;
+/// Maximum number of rows of a map, which keeps files small.
 const MOST_ROWS: usize = 48;
 
 impl SpectrogramSide {
@@ -87,8 +88,8 @@ pub fn draw_comparison(shown: &SpectrogramComparison) -> Figure {
     }
 }
 
-/// Merges neighbouring columns and rows into their largest amplitude, which preserves thin lines, and drops
-/// frequencies that are not shown.
+/// Merges neighbouring columns and rows of a spectrogram. A merged cell has the largest amplitude of its
+/// cells, which preserves thin lines. Frequencies that are not shown are dropped.
 fn coarsen_spectrogram(shown: &SpectrogramPlot) -> SpectrogramPlot {
     let (low, high) = shown.shown_hz.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
     let from = shown.frequency_hz.partition_point(|f| *f < low);

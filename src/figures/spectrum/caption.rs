@@ -13,11 +13,12 @@ use crate::text::{
 };
 use short_spectra::{SpectralAnalysis, SpectrumSettings};
 
-/// The spectra are shown up to the largest of three frequencies: this multiple of the upper end of the band
-/// of the fit, `MIN_TOP_HZ`, and the highest frequency of a component. Above it, a fast camera records only
-/// noise.
+/// The highest shown frequency is at least this multiple of the upper end of the band of the fit. It is also
+/// at least `MIN_TOP_HZ` and at least the highest frequency of a component. Above it, a fast camera records
+/// only noise.
 const BAND_MARGIN: f64 = 10.0;
 
+/// The highest shown frequency of the spectra is at least this, Hz.
 const MIN_TOP_HZ: f64 = 5e3;
 
 /// The spectra in the order of the job, then the ring-down. Long windows need much memory, so they are

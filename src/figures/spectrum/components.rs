@@ -93,8 +93,8 @@ fn source_series(
     [(clear, true), (not_clear, false)].map(of).into_iter().filter(|s| !s.points.is_empty())
 }
 
-/// Labels above the panel, with lines to their symbols; at most `most` labels, those of clear components
-/// first.
+/// Labels above the panel, with lines to their symbols. There are at most `most` labels; clear components
+/// come first.
 pub(super) fn component_labels(
     components: &[LabelledComponent],
     most: usize,

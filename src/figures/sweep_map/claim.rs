@@ -11,10 +11,10 @@ use portable_math as math;
 const CLEAR: f64 = 0.5;
 /// Trends are stated only if at least this fraction of the points has a value.
 const MOSTLY_KNOWN: f64 = 0.5;
-/// Number of significant digits of that end of the range that has the larger absolute value.
+/// Number of significant digits with which the larger end (by absolute value) of a range is written.
 const DIGITS: i32 = 3;
-/// Both ends of a range have the same number of decimals if the power of ten of the end with the larger
-/// absolute value is in this interval.
+/// Powers of ten of the larger end (by absolute value) of a range for which both ends are written with the
+/// same number of decimals.
 const PLAIN: std::ops::RangeInclusive<i32> = -3..=4;
 
 /// Range and trends of a map.
@@ -56,8 +56,8 @@ impl MapClaim {
         format!("{}: {}", self.name, join_trend(&self.range, &self.trend))
     }
 
-    /// Range and trends in at most `letters` letters: all trends in words, all trends by symbols, only the
-    /// strongest trend, or no trend.
+    /// Range and trends in at most `letters` letters. The first version that fits is returned: all trends in
+    /// words, all trends by symbols, only the strongest trend, or no trend.
     pub(crate) fn fit_in_letters(&self, letters: usize) -> String {
         let ways =
             [&self.trend, &self.short_trend, &self.strongest].map(|trend| join_trend(&self.range, trend));

@@ -13,8 +13,8 @@ use portable_math as math;
 
 const ROW_MM: f64 = 5.5;
 const LEAST_HEIGHT_MM: f64 = 16.0;
-/// Margin of the axis beyond the outermost finite ends of the intervals, as a fraction of the span of these
-/// ends.
+/// Margin of the axis beyond the lowest and the highest finite end of the intervals, as a fraction of the
+/// distance between these two ends.
 const ROOM: f64 = 0.12;
 /// Margin of the axis if the intervals have only one finite end, as a fraction of the value of that end.
 const ALONE: f64 = 0.1;
@@ -159,8 +159,8 @@ fn interval_bar(line: &ParameterLine, y: f64, (log, low, high): (bool, f64, f64)
     ErrorBar::Horizontal { y, from: line.lower_95.unwrap_or(beyond.0), to: line.upper_95.unwrap_or(beyond.1) }
 }
 
-/// Whether the axis is logarithmic, and the ends of the axis, which are slightly beyond every finite end of
-/// an interval, every estimate and every true value.
+/// Whether the axis is logarithmic, and the two ends of the axis. These are slightly beyond every estimate,
+/// every true value and every finite end of an interval.
 fn axis_range(having: &[(&ComparedFit, &ParameterLine)]) -> (bool, f64, f64) {
     let ends =
         having.iter().flat_map(|(_, p)| [Some(p.estimate), p.lower_95, p.upper_95, p.truth.map(|t| t.value)]);

@@ -17,8 +17,8 @@ const MICROMETRES: f64 = 1e6;
 /// Note in the subtitle if both synthetic and other recordings are drawn.
 const MIXED: &str = "some recordings are synthetic: no camera took those marked so";
 
-/// A kind of windows, which is the same for all windows of a group: the channel, the instants at which the
-/// windows begin and end, and their number among the windows of this kind in a fit.
+/// What the windows of a group have in common: the channel, the instants at which they begin and end, and
+/// their number. In each fit, windows with equal channel and instants are numbered from 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct WindowKind {
     channel: Channel,
@@ -55,8 +55,8 @@ pub(super) fn spectra_figures(fits: &[ComparisonInput]) -> Vec<FigureBlock> {
     (1..).zip(drawn).map(block).collect()
 }
 
-/// The target components of a fit, each numbered from 0 among those with the same channel and the same kind of
-/// window.
+/// The target components of a fit. Components of one fit whose windows have the same channel, start and end
+/// are numbered from 0.
 fn group_members<'a>(fitted: &'a ComparisonInput<'a>) -> Vec<SpectrumGroupMember<'a>> {
     let anchor = |end: WindowEnd| if let WindowEnd::Found { anchor, .. } = end { Some(anchor) } else { None };
     let mut found: Vec<SpectrumGroupMember> = Vec::new();
@@ -168,16 +168,18 @@ fn draw_figure(group: &[&SpectrumGroupMember]) -> Option<(Figure, String, String
 
 // Panels.
 
-/// Maximum number of fits whose spectra share a panel: with their recordings these are six curves, and more
-/// would hide each other.
+/// Maximum number of fits whose spectra share a panel. With their recordings, three fits give six curves;
+/// more curves would hide each other.
 const MOST_OVER_EACH_OTHER: usize = 3;
-/// Heights of a panel with all spectra and of a panel with those of one fit, mm.
+/// Height, mm, of a panel with the spectra of all fits.
 const HEIGHT_MM: f64 = 70.0;
+/// Height, mm, of a panel with the spectra of one fit.
 const EACH_HEIGHT_MM: f64 = 36.0;
-/// Factor by which the frequency axis extends beyond the bands of the components; then the upper and the
-/// lower end of the amplitude axis, as multiples of the highest peak.
+/// Factor by which the frequency axis extends beyond the bands of the components, at either end.
 const BAND_MARGIN: f64 = 2.0;
+/// Upper end of the amplitude axis, as a multiple of the highest peak.
 const OVER_PEAK: f64 = 2.0;
+/// Lower end of the amplitude axis, as a multiple of the highest peak.
 const UNDER_PEAK: f64 = 2e-4;
 /// Styles of models that share a panel.
 const MODEL_LOOKS: [(Colour, Mark); MOST_OVER_EACH_OTHER] =

@@ -34,8 +34,8 @@ fn fit_sentence(entry: &ComparedFit) -> Sentence {
     if met == components.len() { line } else { line.with_words("; missed: ").with_names(missed) }
 }
 
-/// Maximum number of pairs that are listed; for more pairs only the counts by parameter are stated, since the
-/// table lists all pairs.
+/// Maximum number of pairs of intervals that are listed. If there are more, only their counts by parameter
+/// are stated, since the table lists all pairs.
 const MOST_PAIRS: usize = 12;
 
 type SharedPair<'a> = (&'a SharedParameter, &'a IntervalPair);

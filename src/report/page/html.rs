@@ -27,7 +27,7 @@ pub(in crate::report) fn keys_html(keys: &[impl AsRef<str>]) -> String {
     keys.iter().map(|key| breakable_key(key.as_ref())).collect::<Vec<_>>().join(", ")
 }
 
-/// The meaning of a number, with the related keys of the scene in small print.
+/// The meaning of a number in words, with the related keys of the scene in small print.
 pub(in crate::report) fn words_with_keys(words: &str, keys: &[&str]) -> String {
     let words = escape_text(&capitalise(words));
     if keys.is_empty() {
@@ -115,7 +115,8 @@ pub(in crate::report) fn verdict_cell(good: bool, words: [&str; 2]) -> HtmlCell 
     if good { (escape_text(words[0]), CellStyle::Good) } else { (escape_text(words[1]), CellStyle::Bad) }
 }
 
-/// Heads of columns, in the program's own words. Each group is a style and its heads, separated by `|`.
+/// Head cells of the columns of a table, in the program's own words. Each group is a cell style and the heads
+/// with that style, separated by `|`.
 pub(in crate::report) fn column_heads(groups: &[(CellStyle, &str)]) -> Vec<HtmlCell> {
     groups
         .iter()
