@@ -249,7 +249,7 @@ fn times_with_too_few_digits_say_how_to_count_the_rows() {
     assert!(
         refused.contains("column time: found `")
             && refused.contains(
-                "there are as many rows as frames, so that every row may be one (--columns frame=row,...)"
+                "the file has as many rows as frames, so each row is probably one frame (--columns frame=row,...)"
             ),
         "{refused}"
     );

@@ -330,7 +330,7 @@ fn the_severity_follows_the_share_and_the_finding_names_the_frames() {
             vec![100..110, 300..310, 500..510, 600..610, 700..710],
             Severity::Caution,
             "50 of 1000 frames (5.0 %) repeat the last position exactly: frames 100 to 109, 300 to 309, 500 to \
-             509, 600 to 609 and 1 more runs",
+             509, 600 to 609 and 1 more run",
         ),
         (
             vec![100..120, 300..331],

@@ -65,7 +65,7 @@ pub(crate) fn implied_rate_finding(file: &str, implied_hz: f64, playback: bool) 
 pub(crate) fn rate_difference(used: &FrameRate, other: &FrameRate) -> Option<QualityFinding> {
     let difference = used.difference(other);
     let found = format!(
-        "{} says {} frames/s, but {} say {}: they differ by {:.2} %, and so would every frequency",
+        "{} says {} frames/s, but {}: {} frames/s. They differ by {:.2} %; a wrong rate changes every frequency by as much",
         used.source,
         used.describe(),
         other.source,

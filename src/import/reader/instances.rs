@@ -40,7 +40,8 @@ pub(crate) struct PointFields {
 pub(crate) struct InstanceFields {
     pub has_frame: bool,
     pub has_time: bool,
-    /// Index in each row of the cell with the frame number or the time; messages use it to name the place.
+    /// Index, within a row, of the cell that contains the frame number or the time. Error messages use it to
+    /// give the column.
     pub clock_cell: usize,
     pub points: Vec<PointFields>,
 }

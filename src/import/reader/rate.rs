@@ -59,10 +59,9 @@ pub(crate) struct FrameRate {
     /// Text that says where the rate comes from.
     pub source: String,
 }
-
 impl FrameRate {
-    /// A rate that a person or a camera states. If it has decimals, its error is half a unit of the last one,
-    /// and at least the error of an oscillator.
+    /// A rate that a person or a camera states. Its error is half a unit of its last decimal place, but at least
+    /// [`OSCILLATOR_ERROR`]. A rate without decimals has the error [`OSCILLATOR_ERROR`].
     pub(crate) fn stated(hz: f64, source: impl Into<String>) -> Self {
         let written = hz.to_string();
         let decimals = written.split_once('.').map_or(0, |(_, decimals)| decimals.len());

@@ -84,8 +84,8 @@ impl<'a> DelimitedTable<'a> {
         rows
     }
 
-    /// Splits a row of names that blanks separate, above rows of numbers with another delimiter, into as many
-    /// cells as the rows have.
+    /// If blanks separate the names above the numbers, and another delimiter separates the numbers, splits the
+    /// row of names at the blanks. It does so only if this gives as many cells as a row of numbers has.
     fn split_aligned_names(&self, head: &mut [TextRow]) {
         let numbers =
             |row: &&TextRow| row.cells.len() > 1 && row.cells.iter().all(|cell| self.is_value(cell));
@@ -346,7 +346,7 @@ mod tests {
         }
         for time in ["10:00:00.5", "2021-02-03T10:00:00.0+01:00"] {
             assert!(
-                says(time).contains("export times as seconds, or use a column of frame numbers"),
+                says(time).contains("export times as seconds, or name a column that counts frames"),
                 "{}",
                 says(time)
             );

@@ -305,8 +305,8 @@ fn read_times(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<Vec<f64
         if times.last() == Some(&time) && !repeats_row_above(rows, row) && are_rows_frames(rows, declared) {
             let remedy = (
                 "a value after that of the row above",
-                "export the times with more digits, or name a column that counts frames; there are as many rows as \
-                 frames, so that every row may be one (--columns frame=row,...)",
+                "export the times with more digits, or name a column that counts frames; the file has as many \
+                 rows as frames, so each row is probably one frame (--columns frame=row,...)",
             );
             let (place, found) = (rows.export.row_location(rows.clock, row), format_number(time));
             return Err(ImportError::cell(place, CellProblem::Duplicate, ("time", &found), remedy));

@@ -92,7 +92,11 @@ impl UntrackedFrames {
             _ => format!("{} to {}", run.start, run.end - 1),
         });
         let more = self.runs.len().saturating_sub(NAMED_RUNS);
-        let more = if more > 0 { format!(" and {more} more runs") } else { String::new() };
+        let more = if more > 0 {
+            format!(" and {more} more run{}", if more == 1 { "" } else { "s" })
+        } else {
+            String::new()
+        };
         let words = format!(
             "{count} of {tracked} frames ({:.1} %) {what}: frames {}{more}",
             100.0 * share,

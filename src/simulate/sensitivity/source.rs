@@ -26,8 +26,8 @@ pub(super) const MOST_SOURCES: usize = 24;
 pub(super) struct HeadPolynomial<'a> {
     start_s: f64,
     position_m: f64,
-    /// Coefficients of the velocity, m/s^(k+1), up to the last nonzero one; a recorded head has few
-    /// coefficients.
+    /// Coefficients of the velocity; that of the power `k` of time is in m/s^(k+1). Zeros at the end are left
+    /// out, because the polynomial of a recorded head is short.
     velocity: &'a [f64],
 }
 
