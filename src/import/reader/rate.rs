@@ -59,6 +59,7 @@ pub(crate) struct FrameRate {
     /// Text that says where the rate comes from.
     pub source: String,
 }
+
 impl FrameRate {
     /// A rate that a person or a camera states. Its error is half a unit of its last decimal place, but at least
     /// [`OSCILLATOR_ERROR`]. A rate without decimals has the error [`OSCILLATOR_ERROR`].
