@@ -21,6 +21,6 @@ pub use plain_charts::number::{
 };
 pub use plain_charts::printable::{escape_controls, make_printable};
 pub(crate) use unit::{
-    choose_prefix, format_degrees, format_length, format_milliseconds, format_percent, format_signed_percent,
-    format_speed, label_with_unit,
+    choose_prefix, format_degrees, format_length, format_milliseconds, format_percent, format_rate,
+    format_signed_percent, format_speed, label_with_unit,
 };

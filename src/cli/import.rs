@@ -89,8 +89,8 @@ pub(crate) struct ImportOptionArgs {
     /// Treat positions with a lower confidence than this as missing, 0 to 1
     #[arg(long, value_name = "P", allow_negative_numbers = true)]
     pub min_likelihood: Option<f64>,
-    /// Treat positions that nobody tracked as missing: exact repeats, straight lines between others, outliers,
-    /// doubtful ones
+    /// Treat positions that nobody tracked as missing: exact repeats, straight lines between others,
+    /// outliers, doubtful ones
     #[arg(long)]
     pub drop_untracked: bool,
     /// Measure the tilt of the camera from the path of the tip, and rotate both tracks by it

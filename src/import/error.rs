@@ -187,7 +187,7 @@ impl ImportError {
     }
 
     /// Error for a row with another number of cells than the table.
-    pub(crate) fn ragged(place: TextLocation, found: usize, expected: usize) -> Self {
+    pub(crate) fn ragged_row(place: TextLocation, found: usize, expected: usize) -> Self {
         let advice = "complete the row from what the tracking program shows (a missing value is an empty cell), or \
             export again";
         Self::format(

@@ -41,6 +41,11 @@ pub(crate) fn format_speed(metres_per_s: f64) -> String {
     format!("{} mm/s", format_digits(metres_per_s * 1e3, 3))
 }
 
+/// A rate with at most seven significant digits, without trailing zeros.
+pub(crate) fn format_rate(hz: f64) -> String {
+    format!("{:.6e}", hz).parse::<f64>().map_or_else(|_| hz.to_string(), |rounded| rounded.to_string())
+}
+
 /// A time, s, as milliseconds with one decimal. A time of 10 s or more, such as the time of a clock, stays in
 /// seconds.
 pub(crate) fn format_milliseconds(seconds: f64) -> String {

@@ -294,7 +294,12 @@ fn an_uneven_clock_is_a_finding_and_raises_no_other() {
         let instants = ReversalInstants::find_instants(&recording);
         let found = collect_findings(&recording, &measured, &Optics::default(), &instants, &[]);
         let lines: Vec<String> =
-            found.iter().filter(|f| f.severity > Severity::Note).map(QualityFinding::to_line).collect();
+            // (48 frames/s are few for a blade)
+            found
+                .iter()
+                .filter(|f| f.severity > Severity::Note && f.check.name() != "frame-rate")
+                .map(QualityFinding::to_line)
+                .collect();
         println!("{clock} {seed}: {lines:?} noise {:?}", measured.tip_x.noise_m);
         recordings += 1;
         let [line] = &lines[..] else { panic!("{clock} {seed}: {lines:?}") };

@@ -100,7 +100,8 @@ fn is_window_table(table: &DelimitedTable) -> bool {
     let is_series = |name: &&str| {
         table.parse_cell(name) == CellNumber::Text && ColumnMeaning::parse(name) == ColumnMeaning::Other
     };
-    let whole = |row: &TextRow| matches!(table.parse_cell(row.first_cell()), CellNumber::Value(value) if value.fract() == 0.0);
+    let is_whole = |number| matches!(number, CellNumber::Value(value) if value.fract() == 0.0);
+    let whole = |row: &TextRow| is_whole(table.parse_cell(row.first_cell()));
     of_time
         && !series.is_empty()
         && series.iter().all(is_series)

@@ -88,7 +88,7 @@ impl TableColumns {
     }
 
     /// All columns that are read.
-    fn used(&self) -> Vec<usize> {
+    fn used_columns(&self) -> Vec<usize> {
         let of_points = self
             .points
             .iter()
@@ -98,7 +98,7 @@ impl TableColumns {
 
     /// Columns of times or frame numbers that are not read, with their meaning.
     fn unused_clocks(&self, table: &DelimitedTable) -> Vec<(usize, ColumnMeaning)> {
-        let used = self.used();
+        let used = self.used_columns();
         let names = self.header.and_then(|row| table.head.get(row)).map_or(&[][..], |row| &row.cells);
         let meanings = names.iter().enumerate().filter(|(column, _)| !used.contains(column));
         meanings.filter_map(|(column, name)| Some((column, ColumnMeaning::parse_clock(name)?))).collect()
@@ -141,7 +141,7 @@ impl TableColumns {
         let filled = table.head.iter().skip(self.start).map(TextRow::used_width).collect::<Vec<_>>();
         TableLayout {
             start: self.start,
-            width: self.used().into_iter().max().map_or(0, |last| last + 1),
+            width: self.used_columns().into_iter().max().map_or(0, |last| last + 1),
             most: named.max(usual_width(filled)),
             frame: self.frame,
             time: self.time.map(|time| time.0),
@@ -166,7 +166,7 @@ impl TableColumns {
             }
             None => String::new(),
         };
-        let used = self.used();
+        let used = self.used_columns();
         let names = table.head[header].cells.iter().enumerate();
         let other: Vec<&str> = names
             .filter(|(column, name)| !used.contains(column) && !name.is_empty())

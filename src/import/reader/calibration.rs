@@ -3,7 +3,7 @@
 //! user for it.
 
 use super::column::{CoordinateUnit, TimeUnit};
-use super::rate::{FrameRate, RATE_AGREEMENT, format_rate, has_uneven_clock, implied_rate};
+use super::rate::{FrameRate, RATE_AGREEMENT, has_uneven_clock, implied_rate};
 use crate::import::error::{ImportError, ImportProblem, ImportResult};
 use crate::import::options::{CoordinateScale, ImportOptions, TimeColumn};
 use crate::import::reader::findings;
@@ -12,6 +12,7 @@ use crate::import::reader::track_file::TrackFile;
 use crate::import::source::ImportReport;
 use crate::recording::files::YAxis;
 use crate::recording::quality::QualityFinding;
+use crate::text::format_rate;
 
 /// If the times imply a frame rate of at most this value, 1/s, they look like frame numbers: no camera that
 /// films a wiper is so slow.
@@ -175,9 +176,9 @@ fn frame_rate(
     let records: Vec<FrameRate> = exports
         .iter()
         .filter_map(|export| export.facts.frame_rate_hz.as_ref())
-        .map(|(hz, record)| FrameRate::stated(*hz, record))
+        .map(|(hz, record)| FrameRate::from_statement(*hz, record))
         .collect();
-    let declared = options.frame_rate_hz.map(|hz| FrameRate::stated(hz, "--frame-rate-hz"));
+    let declared = options.frame_rate_hz.map(|hz| FrameRate::from_statement(hz, "--frame-rate-hz"));
     if let Some(used) = declared.as_ref().or(records.first()) {
         if let Some(other) = records.iter().find(|record| used.difference(record) > RATE_AGREEMENT) {
             let problem = format!(

@@ -2,11 +2,12 @@
 //! times, lost points, doubtful units.
 
 use super::column::CoordinateUnit;
-use super::rate::{FrameRate, find_quantum_s, format_rate};
+use super::rate::{FrameRate, find_quantum_s};
 use super::track_file::Clock;
 use crate::import::options::CoordinateScale;
 use crate::recording::clock::OFF_GRID_LIMIT_FRAMES;
 use crate::recording::quality::{Check, QualityFinding, Severity};
+use crate::text::format_rate;
 use std::collections::BTreeMap;
 
 /// Minimum number of consecutive frames at exactly (0, 0) for a finding about a lost point. In a single

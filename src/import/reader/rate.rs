@@ -2,6 +2,7 @@
 
 use super::track_file::{Clock, TrackFile};
 use crate::recording::clock;
+use crate::text::format_rate;
 
 /// Largest allowed relative difference between two statements of the frame rate, in addition to their errors.
 /// If they differ by more, the import is refused.
@@ -61,9 +62,9 @@ pub(crate) struct FrameRate {
 }
 
 impl FrameRate {
-    /// A rate that a person or a camera states. Its error is half a unit of its last decimal place, but at least
-    /// [`OSCILLATOR_ERROR`]. A rate without decimals has the error [`OSCILLATOR_ERROR`].
-    pub(crate) fn stated(hz: f64, source: impl Into<String>) -> Self {
+    /// A rate that a person or a camera states. Its error is half a unit of its last decimal place, but at
+    /// least [`OSCILLATOR_ERROR`]. A rate without decimals has the error [`OSCILLATOR_ERROR`].
+    pub(crate) fn from_statement(hz: f64, source: impl Into<String>) -> Self {
         let written = hz.to_string();
         let decimals = written.split_once('.').map_or(0, |(_, decimals)| decimals.len());
         let half_digit = if decimals > 0 { 0.5 / portable_math::powi(10.0, decimals as i32) } else { 0.0 };
@@ -85,11 +86,6 @@ impl FrameRate {
     pub(crate) fn describe(&self) -> String {
         format!("{} +- {}", format_rate(self.hz), format_rate(self.hz * self.error))
     }
-}
-
-/// A rate with at most seven significant digits, without trailing zeros.
-pub(crate) fn format_rate(hz: f64) -> String {
-    format!("{:.6e}", hz).parse::<f64>().map_or_else(|_| hz.to_string(), |rounded| rounded.to_string())
 }
 
 /// The frame rate that the times of an export's longest clock imply.

@@ -84,8 +84,8 @@ impl<'a> DelimitedTable<'a> {
         rows
     }
 
-    /// If blanks separate the names above the numbers, and another delimiter separates the numbers, splits the
-    /// row of names at the blanks. It does so only if this gives as many cells as a row of numbers has.
+    /// If blanks separate the names above the numbers, and another delimiter separates the numbers, splits
+    /// the row of names at the blanks. It does so only if this gives as many cells as a row of numbers has.
     fn split_aligned_names(&self, head: &mut [TextRow]) {
         let numbers =
             |row: &&TextRow| row.cells.len() > 1 && row.cells.iter().all(|cell| self.is_value(cell));
@@ -195,7 +195,7 @@ impl<'a> DelimitedTable<'a> {
 
     /// Error for a row whose number of cells differs from that of the other rows.
     pub(crate) fn ragged_error(&self, line: usize, found: usize, expected: usize) -> ImportError {
-        ImportError::ragged(self.location(line, 1), found, expected)
+        ImportError::ragged_row(self.location(line, 1), found, expected)
     }
 
     /// Error for a cell that is not a number.

@@ -8,6 +8,7 @@ use super::motion::{LARGEST_VIEW_M, head_height_m, largest_travel_m};
 use super::regression::fit_rows;
 use crate::recording::Recording;
 use crate::recording::channel::{Channel, ReversalInstants, median_in_place};
+use crate::text::format_rate;
 use portable_math as math;
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -180,7 +181,8 @@ fn check_rate(motion: &MotionSummary, measured: &Quality) -> Option<QualityFindi
     let kind = (Check::FrameRate, Severity::Caution);
     if rate_hz < LEAST_RATE_HZ && !super::checks::is_playback_rate(rate_hz) {
         let found = format!(
-            "{rate_hz} frames/s over {:.1} s show no vibration of a blade, which has 9 Hz or more",
+            "{} frames/s over {:.1} s show no vibration of a blade, which has 9 Hz or more",
+            format_rate(rate_hz),
             measured.duration_s
         );
         let advice = "check --frame-rate-hz: it is the rate of recording, usually 1000 frames/s or more";

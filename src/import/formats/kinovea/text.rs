@@ -75,7 +75,7 @@ impl TrackBlock {
         let expected = self.rows.as_ref().map_or(CELLS, |rows| rows.0);
         let first = self.rows.is_none() && found > CELLS && found % 2 == 1;
         if found != expected && !first {
-            return Err(ImportError::ragged(place, found, expected));
+            return Err(ImportError::ragged_row(place, found, expected));
         }
         let mut numbers = vec![];
         for (at, cell) in cells.iter().enumerate() {

@@ -142,8 +142,8 @@ fn read_piece(record: &SampledRecord, settings: &SpectrumSettings, piece: &Unusu
     found.filter(passes).map(Transient::with_persistence_doubt).collect()
 }
 
-/// The components of `analysis`, which covers the frames between two steps of a piece of the record. `start` is
-/// the index in the record of the first frame of the piece.
+/// The components of `analysis`, which covers the frames between two steps of a piece of the record. `start`
+/// is the index in the record of the first frame of the piece.
 fn stretch_transients(
     analysis: SpectralAnalysis,
     start: usize,
