@@ -35,9 +35,9 @@ pub fn alias_hz(frequency_hz: f64, frame_rate_hz: f64) -> f64 {
     rest.min(frame_rate_hz - rest)
 }
 
-/// Every frequency, Hz, above half of `frame_rate_hz` and up to `up_to_hz` that appears at `frequency_hz`. They
-/// are `k * rate - f` and `k * rate + f`, ascending, without duplicates, at most 1000. Empty for a frequency
-/// outside 0 to half the rate.
+/// Every frequency, Hz, above half of `frame_rate_hz` and up to `up_to_hz` that appears at `frequency_hz`.
+/// They are `k * rate - f` and `k * rate + f`, ascending, without duplicates, at most 1000. Empty for a
+/// frequency outside 0 to half the rate.
 pub(crate) fn aliased_frequencies_hz(frequency_hz: f64, frame_rate_hz: f64, up_to_hz: f64) -> Vec<f64> {
     let half_hz = frame_rate_hz / 2.0;
     if !(half_hz.is_finite() && half_hz > 0.0 && (0.0..=half_hz).contains(&frequency_hz)) {
