@@ -203,6 +203,12 @@ def test_what_a_notebook_shows_is_escaped(recording: wl.Recording) -> None:
     assert (found._repr_svg_() or "").startswith("<svg")
 
 
+def test_masked_values_are_missing() -> None:
+    column = np.ma.masked_array([1, 2, 3], mask=[False, True, False])
+    recording = wl.Recording.from_arrays({"tip_x_m": column}, 100.0, synthetic=True)
+    assert np.array_equal(recording["tip_x_m"], [1.0, np.nan, 3.0], equal_nan=True)
+
+
 def test_frames_at_uneven_times_keep_them(recording: wl.Recording) -> None:
     time_s = np.cumsum(np.resize([0.0199, 0.0213, 0.0204], len(recording)))
     uneven = wl.Recording.from_arrays(recording.columns, time_s=time_s, frame_rate_sd_hz=0.01, synthetic=True)

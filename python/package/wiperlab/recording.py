@@ -30,7 +30,7 @@ COLUMNS = ("tip_x_m", "tip_y_m", "head_x_m", "head_y_m", "tip_confidence", "head
 def _fill_masked(column: ArrayLike) -> NDArray[np.float64]:
     """The numbers of a column; a masked one is missing."""
     if isinstance(column, np.ma.MaskedArray):
-        column = column.astype(np.float64).filled(np.nan)
+        column = np.ma.filled(np.ma.asarray(column, dtype=np.float64), np.nan)
     return np.ascontiguousarray(column, dtype=np.float64)
 
 
