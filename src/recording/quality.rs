@@ -50,13 +50,15 @@ pub fn collect_findings(
     import: &[QualityFinding],
 ) -> Vec<QualityFinding> {
     // (this check needs the original frames: resampling to a grid changes repeated positions and exact lines)
-    let untracked = untracked::check_untracked(recording, measured, optics);
+    let untracked = find_untracked_frames(recording, measured, optics);
     let recording = &*recording.resample_to_grid();
     let columns = measurement::measured_columns(recording.traces(), measured);
     let mut found = import.to_vec();
     found.extend(checks::check_clock(recording));
-    let motion = measure_motion(recording, measured, instants);
-    found.extend(columns::check_columns(recording.traces(), measured, instants));
+    let rest = leave_out_filled(recording, measured, &untracked);
+    let (tracked, quality) = rest.as_ref().map_or((recording, measured), |(rest, quality)| (rest, quality));
+    let motion = measure_motion(tracked, quality, instants);
+    found.extend(columns::check_columns(tracked.traces(), quality, instants));
     found.extend(mechanism::check_mechanism(&motion, measured));
     found.extend(
         columns.iter().filter_map(|column| prefilter::check_prefilter(column, measured.frame_rate_hz)),
@@ -70,10 +72,28 @@ pub fn collect_findings(
     for column in &columns {
         found.extend(checks::check_track_column(column, recording.grid(), optics));
     }
-    found.extend(untracked);
+    found.extend(untracked::describe_untracked(recording.traces(), &untracked));
     // (a stable sort keeps the order of the checks within a severity)
     found.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
     found
+}
+
+/// The recording and its quality without repeated and interpolated positions, whose noise is too small.
+/// `None` if there are none, or if the frames were resampled to a grid and are others than the untracked ones.
+fn leave_out_filled(
+    recording: &Recording,
+    measured: &Quality,
+    untracked: &[UntrackedFrames],
+) -> Option<(Recording, Quality)> {
+    let is_filled =
+        |found: &&UntrackedFrames| matches!(found.check, Check::HeldPoints | Check::InterpolatedPoints);
+    let filled: Vec<UntrackedFrames> = untracked.iter().filter(is_filled).cloned().collect();
+    if filled.is_empty() || recording.describe_resampling().is_some() {
+        return None;
+    }
+    let rest = recording.clone().with_traces(drop_untracked(recording.traces().clone(), &filled)).ok()?;
+    let quality = measure_quality(&rest, measured.exposure_s());
+    Some((rest, quality))
 }
 
 /// Smallest amplitude of an oscillation that is visible in single frames, in standard deviations of the

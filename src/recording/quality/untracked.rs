@@ -159,13 +159,8 @@ pub fn find_untracked_frames(
 }
 
 /// Findings on frames in which a position was written but not tracked.
-pub(super) fn check_untracked(
-    recording: &Recording,
-    measured: &Quality,
-    optics: &Optics,
-) -> Vec<QualityFinding> {
-    let Traces { tip_x_m, head_x_m, .. } = recording.traces();
-    let found = find_untracked_frames(recording, measured, optics);
+pub(super) fn describe_untracked(traces: &Traces, found: &[UntrackedFrames]) -> Vec<QualityFinding> {
+    let Traces { tip_x_m, head_x_m, .. } = traces;
     let of = |untracked: &UntrackedFrames| {
         let x = if untracked.concerns("tip") { tip_x_m } else { head_x_m };
         untracked.to_finding(x.iter().flatten().count())
