@@ -79,7 +79,7 @@ pub fn collect_findings(
 }
 
 /// The recording and its quality without repeated and interpolated positions, whose noise is too small.
-/// `None` if there are none, or if the frames were resampled to a grid and are others than the untracked ones.
+/// `None` if there are none, or if the frames were resampled to a grid and differ from the untracked ones.
 fn leave_out_filled(
     recording: &Recording,
     measured: &Quality,
