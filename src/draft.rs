@@ -83,12 +83,10 @@ impl CommentedToml {
 /// Role of a parameter of the blade in a first job.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum ParameterRole {
-    /// Must be measured on the blade by the user. In the job, the parameter is free with a prior of this
-    /// relative standard deviation; for `None`, it is held constant.
-    Yours(Option<f64>),
-    /// Poorly known before a fit. Free with a prior of this relative standard deviation around the value of
-    /// the example.
-    Guessed(f64),
+    /// Must be measured on the blade by the user. Free within the default prior of its kind.
+    Yours,
+    /// Poorly known before a fit. Free within the default prior of its kind around the value of the example.
+    Guessed,
     /// Fitted between two bounds.
     Fitted([f64; 2]),
     /// Fitted between two bounds. Each bound is one of these two numbers divided by the maximum head speed in
@@ -111,37 +109,25 @@ const NECK_HZ: [f64; 2] = [60.0, 600.0];
 /// Bounds of the ratio of shoulder stiffness to neck stiffness: from a negligible shoulder to a nearly rigid
 /// one.
 const SHOULDER: [f64; 2] = [4.0, 60.0];
-/// Role of a mass or an inertia of a part, which is weighed or computed from the cross section of the part.
-const WEIGHED: ParameterRole = ParameterRole::Yours(Some(0.05));
-/// Role of the preload, which is read from a scale on which the blade is pressed.
-const PRELOAD: ParameterRole = ParameterRole::Yours(Some(0.05));
-/// Role of a length, which is measured on a picture of the cross section; a fit holds it constant.
-const MEASURED: ParameterRole = ParameterRole::Yours(None);
-/// Role of a natural frequency or an angle, which is known from a blade of the same kind.
-const SIMILAR: ParameterRole = ParameterRole::Guessed(0.2);
-/// Role of a damping ratio. Its prior has the largest standard deviation that a job allows, because the
-/// damping ratios of different rubbers differ severalfold.
-const UNKNOWN: ParameterRole = ParameterRole::Guessed(0.5);
-
 /// Parameters of the blade, the shoulder and the friction in the order of a draft, with their roles.
 pub(crate) const PARAMETER_PLAN: [(&str, ParameterRole); 21] = [
-    ("blade.head_mass_kg", WEIGHED),
-    ("blade.neck_mass_kg", WEIGHED),
-    ("blade.lip_mass_kg", WEIGHED),
-    ("blade.neck_length_m", MEASURED),
-    ("blade.lip_length_m", MEASURED),
-    ("blade.neck_centre_m", MEASURED),
-    ("blade.lip_centre_m", MEASURED),
-    ("blade.neck_inertia_kg_m2", WEIGHED),
-    ("blade.lip_inertia_kg_m2", WEIGHED),
-    ("blade.preload_force_n", PRELOAD),
-    ("blade.head_natural_frequency_hz", SIMILAR),
+    ("blade.head_mass_kg", ParameterRole::Yours),
+    ("blade.neck_mass_kg", ParameterRole::Yours),
+    ("blade.lip_mass_kg", ParameterRole::Yours),
+    ("blade.neck_length_m", ParameterRole::Yours),
+    ("blade.lip_length_m", ParameterRole::Yours),
+    ("blade.neck_centre_m", ParameterRole::Yours),
+    ("blade.lip_centre_m", ParameterRole::Yours),
+    ("blade.neck_inertia_kg_m2", ParameterRole::Yours),
+    ("blade.lip_inertia_kg_m2", ParameterRole::Yours),
+    ("blade.preload_force_n", ParameterRole::Yours),
+    ("blade.head_natural_frequency_hz", ParameterRole::Guessed),
     ("blade.neck_natural_frequency_hz", ParameterRole::Fitted(NECK_HZ)),
-    ("blade.lip_natural_frequency_hz", SIMILAR),
-    ("blade.head_damping_ratio", UNKNOWN),
-    ("blade.neck_damping_ratio", UNKNOWN),
-    ("blade.lip_damping_ratio", UNKNOWN),
-    ("shoulder.contact_angle_rad", SIMILAR),
+    ("blade.lip_natural_frequency_hz", ParameterRole::Guessed),
+    ("blade.head_damping_ratio", ParameterRole::Guessed),
+    ("blade.neck_damping_ratio", ParameterRole::Guessed),
+    ("blade.lip_damping_ratio", ParameterRole::Guessed),
+    ("shoulder.contact_angle_rad", ParameterRole::Guessed),
     ("shoulder.stiffness_ratio", ParameterRole::Fitted(SHOULDER)),
     ("friction.a", ParameterRole::Fitted(FALLING)),
     ("friction.b_s_per_m", ParameterRole::FittedOverSpeed(DECAY)),

@@ -1,6 +1,6 @@
 //! A job with the scenes and recordings that it names, read from the disk.
 
-use super::load::{LoadedRecording, load_recording, read_driven_scene};
+use super::load::{LoadedRecording, load_recording, read_driven_scene, read_scene_for_segments};
 use super::prelude::*;
 use crate::fit::job::Job;
 use crate::fit::{MeasuredRecording, Problem};
@@ -51,7 +51,8 @@ impl LoadedJob {
         };
         let scene_files = job.conditions.iter().map(|condition| found("scene", &condition.scene));
         let scene_files = scene_files.collect::<Result<Vec<_>, _>>()?;
-        let scenes = scene_files.iter().map(|file| read_driven_scene(file));
+        let read = if job.traces.is_empty() { read_driven_scene } else { read_scene_for_segments };
+        let scenes = scene_files.iter().map(|file| read(file));
         let (scenes, drivers): (Vec<_>, Vec<_>) = scenes.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
         let doubts = scene_files.iter().zip(&scenes);
         let doubts = doubts.map(|(file, scene)| (file.clone(), scene.find_implausible())).collect();

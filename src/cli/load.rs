@@ -8,6 +8,7 @@ use crate::recording::Recording;
 use crate::recording::files::{DESCRIPTION_FILE, RecordingFile, TRACE_FILE, read_recording};
 use crate::recording::quality::{Check, QualityFinding, Severity};
 use crate::simulate::scene::Scene;
+use crate::simulate::scene::error::SceneError;
 use crate::text::{sha256, text_sha256};
 
 /// Reads a scene that the user named, with the recording that drives it, if there is one.
@@ -17,8 +18,23 @@ pub(crate) fn read_scene(path: &Path) -> Outcome<Scene> {
 
 /// Like [`read_scene`], but also returns the path of the recording that drives the scene, if there is one.
 pub(crate) fn read_driven_scene(path: &Path) -> Outcome<(Scene, Option<PathBuf>)> {
+    read_scene_with(path, |file, text, recording| Scene::parse_with_recording(file, text, recording))
+}
+
+/// Like [`read_driven_scene`], for a scene whose runs start from recorded states.
+pub(crate) fn read_scene_for_segments(path: &Path) -> Outcome<(Scene, Option<PathBuf>)> {
+    read_scene_with(path, |file, text, recording| Scene::parse_for_segments(file, text, recording))
+}
+
+/// Loads the recording with a given path, or says why it cannot be loaded.
+type LoadNamed<'a> = &'a mut dyn FnMut(&str) -> Result<Recording, String>;
+
+fn read_scene_with(
+    path: &Path,
+    parse: impl FnOnce(&str, &str, LoadNamed<'_>) -> Result<Scene, SceneError>,
+) -> Outcome<(Scene, Option<PathBuf>)> {
     let mut driver = None;
-    let recording = |named: &str| {
+    let mut recording = |named: &str| {
         let place = files::resolve_existing_path(path, named)?;
         let loaded = load_recording(&place).map_err(|failure| failure.to_string())?;
         if let Some(said) = loaded.recording.describe_resampling() {
@@ -27,7 +43,7 @@ pub(crate) fn read_driven_scene(path: &Path) -> Outcome<(Scene, Option<PathBuf>)
         driver = Some(place);
         Ok(loaded.recording)
     };
-    let scene = Scene::parse_with_recording(&path.display().to_string(), &files::read_toml(path)?, recording);
+    let scene = parse(&path.display().to_string(), &files::read_toml(path)?, &mut recording);
     scene.map(|scene| (scene, driver)).map_err(Failure::input)
 }
 

@@ -14,9 +14,8 @@ use short_spectra::{Component, ComponentVerdict, SpectrumSettings};
 pub(super) enum DraftHead {
     /// The motion of the head in the recording.
     Recorded,
-    /// A cosine of the time on the clock of the recording; `origin_m` is the position along the sweep at
-    /// which the stroke starts, in the coordinates of the recording, m.
-    Cosine { stroke: Stroke, origin_m: f64 },
+    /// A cosine of the time on the clock of the recording.
+    Cosine { stroke: Stroke },
 }
 
 /// A spectral component that a job can compare.
@@ -129,10 +128,10 @@ impl DraftFindings {
             tracked(&traces.head_x_m)
         ));
         if !enough(&traces.head_x_m) {
-            let EstimatedStroke { stroke, origin_m } = estimate_stroke(recording, known).ok_or(no_head)?;
+            let EstimatedStroke { stroke, .. } = estimate_stroke(recording, known).ok_or(no_head)?;
             let span_s = [grid.start_s, grid.time_s(grid.frames.saturating_sub(1))];
             return Ok(Self {
-                head: DraftHead::Cosine { stroke, origin_m },
+                head: DraftHead::Cosine { stroke },
                 ..Self::from_driving_trace(recording, exposure_s, &traces.tip_x_m, span_s)
             });
         }

@@ -5,6 +5,8 @@ use super::findings::{DraftComponent, DraftFindings, DraftHead};
 use super::{ParameterRole, plan_parameters};
 use crate::fit::job::Job;
 use crate::fit::measure_targets;
+use crate::fit::nuisance_parameters::default_prior_sd;
+use crate::model::parameters::find_parameter;
 use crate::recording::Recording;
 use crate::text::{format_digits, format_percent, format_speed, join_with_and, round_to_digits};
 
@@ -18,10 +20,6 @@ const OFFSET_SD_M: f64 = 0.002;
 /// Standard deviation, s, of the offset between the clocks of the camera and of the stroke, if the head was
 /// not tracked.
 const CLOCK_SD_S: f64 = 0.005;
-/// Standard deviation, m, of the offset of a position, if the stroke does not start at the origin of the
-/// picture.
-const ORIGIN_SD_M: f64 = 0.1;
-
 /// Writes a job for a recording; `paths` are the paths of recording and scene, relative to the job. The job
 /// contains only components that can be measured on the recording.
 pub(crate) fn write_job(
@@ -68,7 +66,8 @@ fn write_head(found: &DraftFindings, [recording, scene]: [&str; 2], shoulder: bo
 
 fn add_nuisances(text: CommentedToml, shoulder: bool) -> CommentedToml {
     let line = |(name, role): (&str, ParameterRole)| match role {
-        ParameterRole::Yours(Some(sd)) | ParameterRole::Guessed(sd) => {
+        ParameterRole::Yours | ParameterRole::Guessed => {
+            let sd = find_parameter(name).and_then(default_prior_sd)?;
             Some(format!("    {{ name = \"{name}\", sd = \"{}\" }},", format_percent(sd)))
         }
         _ => None,
@@ -140,15 +139,9 @@ fn add_traces(text: CommentedToml, found: &DraftFindings) -> CommentedToml {
         DraftHead::Recorded => {
             text.add_numbers(&[("tilt_sd_deg", TILT_SD_DEG), ("offset_sd_m", OFFSET_SD_M)])
         }
-        // the clock and the origin of the camera are not those of the stroke
-        DraftHead::Cosine { origin_m, .. } => {
-            let is_near = origin_m.abs() < OFFSET_SD_M;
-            let why = (!is_near).then_some("The origin of the picture is not where the stroke starts.");
-            text.add_comment("How far the clock of the camera is from that of the stroke.")
-                .add_number("clock_sd_s", CLOCK_SD_S)
-                .add_comments(why)
-                .add_number("offset_sd_m", if is_near { OFFSET_SD_M } else { ORIGIN_SD_M })
-        }
+        DraftHead::Cosine { .. } => text
+            .add_comment("How far the clock of the camera is from that of the stroke.")
+            .add_numbers(&[("clock_sd_s", CLOCK_SD_S), ("offset_sd_m", OFFSET_SD_M)]),
     }
 }
 

@@ -3,9 +3,10 @@
 use super::findings::{DraftFindings, DraftHead};
 use super::stroke::Stroke;
 use super::{CommentedToml, ParameterRole, plan_parameters};
+use crate::fit::nuisance_parameters::default_prior_sd;
 use crate::fit::result::{FitResult, NuisanceResult};
 use crate::model::parameters;
-use crate::model::parameters::SAME_LENGTH_ADVICE;
+use crate::model::parameters::{ModelParameter, SAME_LENGTH_ADVICE};
 use crate::simulate::drive::Drive;
 use crate::simulate::scene::error::SceneError;
 use crate::simulate::scene::{Scene, StartKind};
@@ -43,7 +44,7 @@ pub(crate) fn write_scene(
         DraftHead::Cosine { stroke, .. } => add_cosine_drive(example, stroke),
     };
     let rate_hz = found.frame_rate_hz.max(SAMPLE_RATE_HZ);
-    Ok(add_run(drive, found.run_s, rate_hz).into_text())
+    Ok(add_run(drive, RECORDED_START, found.run_s, rate_hz).into_text())
 }
 
 /// Writes a scene without a recording.
@@ -54,7 +55,7 @@ pub(crate) fn write_scene_alone(shoulder: bool) -> Result<String, SceneError> {
     let head =
         CommentedToml::default().add_comment("A blade, its friction and its drive, for `wiperlab simulate`.");
     let drive = add_cosine_drive(write_blade(head, shoulder)?.add_empty_line(), DEFAULT_STROKE);
-    Ok(add_run(drive, DEFAULT_RUN_S, SAMPLE_RATE_HZ).into_text())
+    Ok(add_run(drive, STEADY_START, DEFAULT_RUN_S, SAMPLE_RATE_HZ).into_text())
 }
 
 /// Adds the title, the blade, the shoulder and the friction.
@@ -88,19 +89,19 @@ fn write_blade(head: CommentedToml, shoulder: bool) -> Result<CommentedToml, Sce
         }
         let unit = if row.unit == "1" { String::new() } else { format!(", {}", row.unit) };
         let (how, what) = (capitalise(row.quantity.measurement_method()), capitalise(row.meaning));
-        let mark = if let ParameterRole::Yours(_) = role { format!("{YOURS_MARK}: ") } else { String::new() };
-        text = text.add_comment(&format!("{mark}{what}{unit}. {how}. {}.", describe_role(role)));
+        let mark = if role == ParameterRole::Yours { format!("{YOURS_MARK}: ") } else { String::new() };
+        text = text.add_comment(&format!("{mark}{what}{unit}. {how}. {}.", describe_role(row, role)));
         text = text.add_number(key, example.value(name).unwrap_or_default());
     }
     Ok(text)
 }
 
-fn describe_role(role: ParameterRole) -> String {
+fn describe_role(parameter: &ModelParameter, role: ParameterRole) -> String {
+    let known = || format_percent(default_prior_sd(parameter).unwrap_or_default());
     match role {
-        ParameterRole::Yours(None) => "The fit holds it".to_owned(),
-        ParameterRole::Yours(Some(sd)) => format!("The fit takes it as good to {}", format_percent(sd)),
-        ParameterRole::Guessed(sd) => {
-            format!("The fit takes it as good to {}, as nobody knows it well", format_percent(sd))
+        ParameterRole::Yours => format!("The fit takes it as good to {}", known()),
+        ParameterRole::Guessed => {
+            format!("The fit takes it as good to {}, as nobody knows it well", known())
         }
         ParameterRole::Fitted(_) | ParameterRole::FittedOverSpeed(_) => {
             "The fit finds it between wide bounds".to_owned()
@@ -119,12 +120,25 @@ fn add_cosine_drive(text: CommentedToml, stroke: Stroke) -> CommentedToml {
     if stroke.delay_s == 0.0 { text } else { text.add_number("delay_s", stroke.delay_s) }
 }
 
-fn add_run(text: CommentedToml, [start_s, stop_s]: [f64; 2], rate_hz: f64) -> CommentedToml {
+/// Start of the run of a scene of a recording. A blade with the user's numbers need not slide steadily at the
+/// first frame.
+const RECORDED_START: [&str; 2] =
+    ["The run starts with the blade upright; a fit starts from the states in the recording.", "upright"];
+/// Start of the run of a scene without a recording.
+const STEADY_START: [&str; 2] =
+    ["The run starts where the tip slides evenly, in the equilibrium of that speed.", "steady-slide"];
+
+fn add_run(
+    text: CommentedToml,
+    [comment, kind]: [&str; 2],
+    [start_s, stop_s]: [f64; 2],
+    rate_hz: f64,
+) -> CommentedToml {
     text.add_empty_line()
-        .add_comment("The run starts where the tip slides evenly, in the equilibrium of that speed.")
+        .add_comment(comment)
         .add_line("[start]")
         .add_number("time_s", start_s)
-        .add_text("kind", "steady-slide")
+        .add_text("kind", kind)
         .add_table("run")
         .add_numbers(&[("stop_s", stop_s), ("sample_rate_hz", rate_hz), ("relative_tolerance", 1e-8)])
         .add_line("outputs = [\"trace\", \"events\"]")
@@ -184,7 +198,7 @@ fn describe_estimate(result: &FitResult, name: &str) -> Option<String> {
     }
     let of_scene = |nuisance: &&NuisanceResult| nuisance.recording.is_none() && nuisance.name == name;
     let constant = result.nuisances.iter().find(of_scene)?;
-    let (prior, sd) = (format_digits(constant.prior, DIGITS), format_digits(constant.prior_sd, 2));
+    let (prior, sd) = (format_digits(constant.prior?, DIGITS), format_digits(constant.prior_sd?, 2));
     Some(format!(
         "freed around {prior} with standard deviation {sd}; 95 %: {}",
         ends(constant.lower_95, constant.upper_95)

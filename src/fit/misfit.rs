@@ -203,7 +203,7 @@ fn misfit_growth(stages: &[StageMisfit]) -> Option<String> {
 /// Evidence against the model: a constant or a camera error is far from the mean of its prior, because a
 /// wrong model distorts all estimated numbers.
 fn far_from_prior(found: &NuisanceResult) -> Option<String> {
-    let apart = (found.estimate - found.prior) / found.prior_sd;
+    let apart = (found.estimate - found.prior?) / found.prior_sd?;
     (apart.abs() > MAX_PRIOR_DISTANCE_SD).then(|| {
         let of = found.recording.as_ref().map_or(String::new(), |recording| format!(" of `{recording}`"));
         format!(
@@ -265,8 +265,8 @@ mod tests {
         let nuisance = |estimate| NuisanceResult {
             recording: Some("a".to_owned()),
             name: "scale_relative".to_owned(),
-            prior: 0.0,
-            prior_sd: 0.005,
+            prior: Some(0.0),
+            prior_sd: Some(0.005),
             estimate,
             lower_95: None,
             upper_95: None,

@@ -38,8 +38,7 @@ impl FreedConstant {
 #[error("{0}")]
 pub struct NuisanceError(String);
 
-/// Constants that a job frees: in the order of the job's list, or in the order of their names if the job
-/// frees all constants.
+/// Constants that a job frees: in the order of the job's list, or else in the order of their names.
 ///
 /// # Errors
 /// [`NuisanceError`] for a listed constant that a scene does not have, or whose values differ between scenes.
@@ -47,7 +46,11 @@ pub(crate) fn free_constants(job: &Job, scenes: &[Scene]) -> Result<Vec<FreedCon
     match &job.constants {
         Constants::Exact => Ok(Vec::new()),
         Constants::Listed(list) => list.iter().map(|one| free_listed_constant(one, job, scenes)).collect(),
-        Constants::All { sd_relative } => Ok(free_all_constants(*sd_relative, job, scenes)),
+        Constants::All { sd_relative } => {
+            let few_percent = |parameter: &ModelParameter| is_constant(parameter).then_some(*sd_relative);
+            Ok(free_all_constants(few_percent, job, scenes))
+        }
+        Constants::Default => Ok(free_all_constants(default_prior_sd, job, scenes)),
     }
 }
 
@@ -79,20 +82,61 @@ fn free_listed_constant(
     Ok(FreedConstant { name: name.clone(), value, sd_relative: *sd_relative })
 }
 
-/// All constants that are known to a few percent and have the same value in all scenes, with the names that
-/// the first scene uses.
-fn free_all_constants(sd_relative: f64, job: &Job, scenes: &[Scene]) -> Vec<FreedConstant> {
+/// All constants for which `prior_sd` gives a standard deviation and that have the same value in all scenes,
+/// with the names that the first scene uses.
+fn free_all_constants(
+    prior_sd: impl Fn(&ModelParameter) -> Option<f64>,
+    job: &Job,
+    scenes: &[Scene],
+) -> Vec<FreedConstant> {
     let Some((scene, others)) = scenes.split_first() else { return Vec::new() };
     let is_set = |name: &str| {
         job.conditions.iter().flat_map(|c| &c.set).any(|(set, _)| is_same_quantity(set, name))
             || find_free_parameter(job, name).is_some()
     };
-    let is_freed = |(name, value): &(&str, f64)| {
-        let usable = *value > 0.0 && find_parameter(name).is_some_and(is_constant) && !is_set(name);
-        usable && others.iter().all(|other| other.value(name) == Some(*value))
+    let freed = |(name, value): (&str, f64)| {
+        let sd_relative = find_parameter(name).and_then(&prior_sd)?;
+        let usable = value > 0.0 && !is_set(name);
+        let same = others.iter().all(|other| other.value(name) == Some(value));
+        (usable && same).then(|| FreedConstant { name: name.to_owned(), value, sd_relative })
     };
-    let freed = |(name, value): (&str, f64)| FreedConstant { name: name.to_owned(), value, sd_relative };
-    scene.written_values().filter(is_freed).map(freed).collect()
+    scene.written_values().filter_map(freed).collect()
+}
+
+/// Default standard deviation of the prior of a constant's natural logarithm: how well the constant of a real
+/// blade is known from a balance, a picture of the section, or a similar blade. `None` for a quantity that is
+/// no constant of the blade.
+///
+/// The default priors apply if a job does not say what is known of the constants.
+pub(crate) fn default_prior_sd(parameter: &ModelParameter) -> Option<f64> {
+    use ParameterQuantity as Q;
+    /// Masses and forces are weighed. A balance reads to a percent, but the piece that is cut from the blade
+    /// does not end where a link ends.
+    const WEIGHED: f64 = 0.05;
+    /// Inertias and centres of mass follow from the contour of the section, with its density taken as
+    /// uniform.
+    const COMPUTED: f64 = 0.1;
+    /// Lengths between hinges are read off a picture of the section: 0.1 mm of 5 mm.
+    const READ: f64 = 0.02;
+    /// The natural frequency of the lip is heard or filmed on the free blade.
+    const HEARD: f64 = 0.05;
+    /// Natural frequencies and the angle of the shoulder are known from a blade of the same kind.
+    const SIMILAR: f64 = 0.1;
+    /// The damping of rubber varies with its age and temperature: a factor of 1.5.
+    const DAMPING: f64 = 0.405;
+    let frequency_sd = match parameter.quantity {
+        Q::HeadMass | Q::NeckMass | Q::LipMass | Q::Preload => return Some(WEIGHED),
+        Q::NeckInertia | Q::LipInertia | Q::NeckCentre | Q::LipCentre => return Some(COMPUTED),
+        Q::NeckLength | Q::LipLength => return Some(READ),
+        Q::HeadDamping | Q::NeckDamping | Q::LipDamping | Q::ShoulderDamping => return Some(DAMPING),
+        Q::ShoulderAngle => return Some(SIMILAR),
+        Q::LipStiffness => HEARD,
+        Q::HeadStiffness | Q::NeckStiffness | Q::ShoulderStiffness => SIMILAR,
+        Q::FrictionA | Q::FrictionB | Q::FrictionC => return None,
+        Q::DriveAmplitude | Q::DriveFrequency | Q::Restitution => return None,
+    };
+    // a stiffness varies with the square of the frequency
+    Some(if parameter.unit == "Hz" { frequency_sd } else { 2.0 * frequency_sd })
 }
 
 /// Whether a parameter is a constant that is known to a few percent. Lengths and centres of mass count as

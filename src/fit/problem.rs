@@ -264,7 +264,13 @@ fn check_scene(
         |place: String| |problem: SceneError| ProblemError::Scene { place, problem: problem.to_string() };
     let mut scene = match (condition.head, measured) {
         (HeadSource::Recording, Some(measured)) => {
-            let driven = scene.drive_by_recording(&measured.recording);
+            let mut driven = scene.drive_by_recording(&measured.recording);
+            if driven.is_err() && !job.traces.is_empty() {
+                // segments start from recorded states
+                let mut upright = scene.clone();
+                upright.start = StartKind::Upright;
+                driven = upright.drive_by_recording(&measured.recording);
+            }
             driven.map_err(refused(format!("`{}`, `drive`", condition.name)))?
         }
         _ => scene.clone(),
@@ -460,10 +466,7 @@ mod tests {
         let [trace] = whole.traces() else { panic!() };
         assert_eq!(trace.channels, [job::TraceChannel::TipX, job::TraceChannel::HeadDrop]);
         assert_eq!((trace.head, trace.frames.start), (job::HeadSource::Recording, 0));
-        assert_eq!(
-            (whole.segment_s(), whole.constants()),
-            (&crate::fit::trace_data::DEFAULT_SEGMENT_S[..], &[][..])
-        );
+        assert_eq!(whole.segment_s(), [0.004, 0.008, 0.016]);
         let refused = |trace: &str| made("", trace).err().unwrap().to_string();
         let short = refused("segment_s = [1e-4]");
         assert!(short.starts_with("trace 1, `segment_s`: found 0.0001 s, which is "), "{short}");
@@ -484,6 +487,14 @@ mod tests {
         let mass = all.constants().iter().find(|freed| freed.name == "blade.lip_mass_kg").unwrap();
         let [low, high] = mass.range();
         assert!(low < mass.value && mass.value < high && ((high / low).ln() - 0.3).abs() < 1e-12);
+        assert!(with("nuisance = \"exact\"").unwrap().constants().is_empty());
+        let usual = with("").unwrap();
+        let prior =
+            |name: &str| usual.constants().iter().find(|freed| freed.name == name).unwrap().sd_relative;
+        assert_eq!(
+            ["blade.lip_mass_kg", "blade.lip_length_m", "blade.lip_centre_m"].map(prior),
+            [0.05, 0.02, 0.1]
+        );
         let absent = with("nuisance = [{ name = \"contact.restitution\", sd = \"3 %\" }]").err().unwrap();
         assert!(absent.to_string().starts_with("nuisance `contact.restitution`: found "), "{absent}");
     }

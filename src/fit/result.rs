@@ -86,10 +86,10 @@ pub struct NuisanceResult {
     /// Key of the constant in the scene file, or a camera error: `tilt_rad`, `scale_relative`, `offset_x_m`,
     /// `offset_drop_m`, `clock_s` or a drift.
     pub name: String,
-    /// Mean of the prior, in the unit that `name` states.
-    pub prior: f64,
-    /// Standard deviation of the prior, in the unit that `name` states.
-    pub prior_sd: f64,
+    /// Mean of the prior, in the unit that `name` states; `None` if nothing is known before the fit.
+    pub prior: Option<f64>,
+    /// Standard deviation of the prior, in the unit that `name` states; `None` without a prior.
+    pub prior_sd: Option<f64>,
     /// Estimated value, in the unit that `name` states.
     pub estimate: f64,
     /// Lower end of the 95 % interval; `None` if unknown.
@@ -293,6 +293,17 @@ pub struct FitResult {
     pub version: String,
 }
 
+/// A result with what follows from it, as written to `result.json`.
+#[derive(Serialize)]
+struct ResultFile<'a> {
+    /// Whether the model explains the recordings; `None` if the search did not end.
+    explained: Option<bool>,
+    /// Whether constants were free.
+    constants: &'static str,
+    #[serde(flatten)]
+    result: &'a FitResult,
+}
+
 /// Error for a file that is not a valid result.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{file}: not the result of a fit: {problem}; run `wiperlab fit` again")]
@@ -309,7 +320,13 @@ impl FitResult {
     #[must_use]
     pub fn to_json(&self) -> String {
         // serialisation cannot fail: keys are strings, and numbers that are not finite become `null`
-        append_hash(&serde_json::to_string_pretty(self).unwrap_or_default())
+        let ended = !matches!(self.status, FitStatus::Interrupted | FitStatus::BudgetExhausted);
+        let file = ResultFile {
+            explained: ended.then(|| self.explains_recordings()),
+            constants: self.constants_word(),
+            result: self,
+        };
+        append_hash(&serde_json::to_string_pretty(&file).unwrap_or_default())
     }
 
     /// Reads a `result.json`; `file` is its name in error messages.
@@ -327,6 +344,11 @@ impl FitResult {
     pub(crate) fn parameter_estimates(&self, job: &Job) -> Vec<f64> {
         let estimate = |p: &FreeParameter| self.parameters.get(&p.name).map_or(f64::NAN, |p| p.estimate);
         job.parameters.iter().map(estimate).collect()
+    }
+
+    /// `"free"` if constants of the scene were estimated within priors, `"held"` if all count as exact.
+    pub(crate) fn constants_word(&self) -> &'static str {
+        if self.nuisances.iter().any(|nuisance| nuisance.recording.is_none()) { "free" } else { "held" }
     }
 
     /// Whether every component is within its tolerance.

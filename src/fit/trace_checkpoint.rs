@@ -238,6 +238,8 @@ pub(super) fn camera_unknown_key(what: CameraUnknown) -> [&'static str; 2] {
     match what {
         CameraUnknown::OffsetX => ["offset_x_m", "m"],
         CameraUnknown::OffsetDrop => ["offset_drop_m", "m"],
+        CameraUnknown::TipAlong => ["tip_along_lip_m", "m"],
+        CameraUnknown::TipAcross => ["tip_across_lip_m", "m"],
         CameraUnknown::DriftX => ["drift_x_m_per_s", "m/s"],
         CameraUnknown::DriftDrop => ["drift_drop_m_per_s", "m/s"],
         CameraUnknown::Scale => ["scale_relative", "1"],

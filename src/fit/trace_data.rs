@@ -1,20 +1,21 @@
 //! Traces of a job matched with their recordings: channels, frames and segment lengths.
 
 use super::job::{CameraPriorSds, HeadSource, Job, TraceChannel, TraceTarget};
+use crate::fit::trace::first_segment_s;
 use crate::recording::Recording;
 use crate::recording::channel::{Channel, ReversalInstants, Window};
 use crate::simulate::drive::smooth_head_motion;
 use crate::simulate::scene::Scene;
 use std::ops::Range;
 
-/// Default segment lengths of the stages, s. The first is short enough for convergence from the middle of the
-/// bounds; the last is the longest for which the motion fitted with shorter segments reliably gives starting
-/// states.
-pub(crate) const DEFAULT_SEGMENT_S: [f64; 3] = [0.004, 0.008, 0.016];
-/// Frame rate, Hz, below which a further stage with segments of [`EXTRA_SEGMENT_S`] is added, because short
-/// segments with few frames bias the estimates more strongly.
-const SLOW_HZ: f64 = 4_000.0;
-const EXTRA_SEGMENT_S: f64 = 0.032;
+/// Default segment lengths of the stages, in first segment lengths of the blade. The first is short enough for
+/// convergence from the middle of the bounds; the last is the longest for which the motion fitted with shorter
+/// segments reliably gives starting states.
+const DEFAULT_SEGMENTS: [f64; 3] = [1.0, 2.0, 4.0];
+/// If the shortest segments have fewer frames than this, a further stage with segments of [`EXTRA_SEGMENT`] is
+/// added, because short segments with few frames bias the estimates more strongly.
+const FEW_FRAMES: f64 = 16.0;
+const EXTRA_SEGMENT: f64 = 8.0;
 /// Minimum number of frames in a segment. The starting state of a segment uses up four degrees of freedom.
 pub(crate) const MIN_SEGMENT_FRAMES: usize = 8;
 /// Minimum number of frames in which a fitted channel must be tracked: slightly more than one segment.
@@ -65,8 +66,10 @@ pub(crate) fn prepare_traces(
     let rates_hz = job.traces.iter().filter_map(|aim| Some(recordings.get(aim.condition)?.as_ref()?.grid()));
     let slowest_hz = rates_hz.map(|grid| grid.frame_rate_hz).fold(f64::INFINITY, f64::min);
     let usual = || {
-        let extra = (slowest_hz < SLOW_HZ).then_some(EXTRA_SEGMENT_S);
-        DEFAULT_SEGMENT_S.into_iter().chain(extra).collect()
+        let shortest_s =
+            scenes.iter().map(|scene| first_segment_s(&scene.linkage)).fold(f64::INFINITY, f64::min);
+        let extra = (slowest_hz * shortest_s < FEW_FRAMES).then_some(EXTRA_SEGMENT);
+        DEFAULT_SEGMENTS.into_iter().chain(extra).map(|length| length * shortest_s).collect()
     };
     let mut stages = job.traces.first().and_then(|trace| trace.segment_s.clone()).unwrap_or_else(usual);
     for (number, aim) in (1..).zip(&job.traces) {

@@ -13,8 +13,8 @@ use super::targets::measure_targets;
 use super::trace::{
     Iterate, SearchEnd, SegmentResiduals, SegmentState, TraceAssessment, TraceDescent, TraceModel,
     TraceRecording, TraceSearchOutcome, TraceSearchSettings, TraceUnknown, UncertaintyRun, UnknownKind,
-    chi2_per_dof, first_iterate, next_iterate, search_trace, segment_residuals, start_point,
-    undersampled_mode,
+    chi2_per_dof, describe_start_limits, first_iterate, next_iterate, search_trace, segment_residuals,
+    start_point, undersampled_mode,
 };
 use super::trace_checkpoint::{
     HeaderCoordinate, IterateRecord, TraceCheckpoint, TraceHeader, TraceHeaderBody, camera_unknown_key,
@@ -239,7 +239,6 @@ impl TraceFindings<'_, '_> {
         let first = self.problem.job().parameters.len();
         let all = self.model.unknowns.0.iter().zip(&end.point).enumerate().skip(first);
         let nuisance = |(at, (unknown, z)): (usize, (&TraceUnknown, &f64))| {
-            let [mean, sd] = unknown.prior.unwrap_or([unknown.start, f64::INFINITY]);
             let ends = self.searched.assessment.as_ref().map(|known| known.estimates[at].widest_95());
             let (recording, name) = match &unknown.kind {
                 UnknownKind::Parameter { name, .. } => (None, name.clone()),
@@ -250,8 +249,8 @@ impl TraceFindings<'_, '_> {
             NuisanceResult {
                 recording,
                 name,
-                prior: unknown.value(mean),
-                prior_sd: sd * unknown.slope(mean),
+                prior: unknown.prior.map(|[mean, _]| unknown.value(mean)),
+                prior_sd: unknown.prior.map(|[mean, sd]| sd * unknown.slope(mean)),
                 estimate: unknown.value(*z),
                 lower_95: ends.map(|ends| ends[0]),
                 upper_95: ends.map(|ends| ends[1]),
@@ -388,10 +387,20 @@ impl TraceFindings<'_, '_> {
                  may give nearly the same frames, so that more starts were compared; film faster if you can"
             ));
         }
+        for (film, shoot) in self.model.recordings.iter().enumerate() {
+            if !end.segments.iter().any(|segment| segment.recording == film) {
+                notes.push(format!(
+                    "{}: {}",
+                    self.recording_name(film),
+                    describe_start_limits(&shoot.observation)
+                ));
+            }
+        }
         if self.problem.constants().is_empty() {
             notes.push(
                 "masses, inertias, dampings, preload and every other constant of the scene are taken as exact: the \
-                 intervals do not include their errors; `nuisance = \"3 %\"` in the job adds them"
+                 intervals do not include their errors; without `nuisance` in the job they are free within the \
+                 default priors"
                     .to_owned(),
             );
         }

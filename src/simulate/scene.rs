@@ -75,6 +75,41 @@ impl Scene {
         text: &str,
         recording: impl FnOnce(&str) -> Result<Recording, String>,
     ) -> Result<Self, SceneError> {
+        let scene = Self::parse_any_start(file, text, recording)?;
+        scene.check_start()?;
+        Ok(scene)
+    }
+
+    /// Like [`Self::parse_with_recording`], for a scene whose runs start from recorded states: a start in steady
+    /// slip that does not exist is replaced by an upright blade.
+    ///
+    /// # Errors
+    /// As [`Self::parse_with_recording`].
+    pub(crate) fn parse_for_segments(
+        file: &str,
+        text: &str,
+        recording: impl FnOnce(&str) -> Result<Recording, String>,
+    ) -> Result<Self, SceneError> {
+        Ok(Self::parse_any_start(file, text, recording)?.with_possible_start())
+    }
+
+    /// The same scene, with an upright blade at the start if steady slip is impossible there.
+    pub(crate) fn with_possible_start(mut self) -> Self {
+        if self.check_start().is_err() {
+            self.start = StartKind::Upright;
+        }
+        self
+    }
+
+    fn check_start(&self) -> Result<(), SceneError> {
+        run::check_steady_start(&self.file, self.start_s, self.start, &self.linkage, &self.drive)
+    }
+
+    fn parse_any_start(
+        file: &str,
+        text: &str,
+        recording: impl FnOnce(&str) -> Result<Recording, String>,
+    ) -> Result<Self, SceneError> {
         let written: SceneFile = toml_file::parse_toml(file, text)?;
         toml_file::check_format(file, written.format)?;
         let mut reader = SceneReader { file, text, values: BTreeMap::new() };
@@ -95,7 +130,6 @@ impl Scene {
             Some((place, path)) => recorded_drive(&place, recording(&path), [start_s, run.stop_s])?,
             None => cosine_drive(&values, delay_s),
         };
-        run::check_steady_start(file, start_s, start, &linkage, &drive)?;
         Ok(Self {
             file: file.to_owned(),
             title: written.title,
@@ -170,7 +204,7 @@ impl Scene {
         scene.values.retain(|name, _| !name.starts_with("drive."));
         (scene.start_s, scene.run.stop_s) = (start_s, stop_s);
         scene.drive = Drive::Recorded(Arc::new(motion));
-        run::check_steady_start(&self.file, scene.start_s, scene.start, &scene.linkage, &scene.drive)?;
+        scene.check_start()?;
         Ok(scene)
     }
 

@@ -10,6 +10,7 @@ pub const JOB: &str = r#"format = 1
 title = "A small trace"
 scene = "../../data/scenes/actual-blade.toml"
 seed = 3
+nuisance = "exact"
 
 [[recording]]
 name = "film"

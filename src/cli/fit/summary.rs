@@ -152,7 +152,10 @@ pub(crate) fn print_nuisances(list: &[NuisanceResult]) {
     for n in list {
         let name = n.recording.as_ref().map_or_else(|| n.name.clone(), |of| format!("{of}: {}", n.name));
         let interval = text::format_interval(n.lower_95, n.upper_95, format_value);
-        let (prior, sd) = (format_value(n.prior), format_value(n.prior_sd));
-        print_line!("{name:<36} {:>11}  {interval:<25} {prior} +- {sd}", format_value(n.estimate));
+        let known = n.prior.zip(n.prior_sd).map_or_else(
+            || "nothing".to_owned(),
+            |(prior, sd)| format!("{} +- {}", format_value(prior), format_value(sd)),
+        );
+        print_line!("{name:<36} {:>11}  {interval:<25} {known}", format_value(n.estimate));
     }
 }

@@ -37,7 +37,8 @@ pub(crate) struct JobFile {
     /// Free parameters.
     #[serde(default)]
     pub parameter: Vec<JobParameterTable>,
-    /// Constants of the scene that are free within priors, in a job with [[trace]]: "3 %" for all, or a list.
+    /// Constants of the scene that are free within priors, in a job with [[trace]]: "exact" for none, "3 %"
+    /// for all, or a list; if left out, every constant within the default prior of its kind.
     pub nuisance: Option<JobNuisanceEntry>,
     /// Recordings of which every frame is fitted.
     #[serde(default)]
@@ -294,7 +295,7 @@ impl<'de> Visitor<'de> for RecordingCameraVisitor {
 
 /// Constants that are free within a prior: all of them with one deviation, or those of a list.
 #[derive(Debug, JsonSchema)]
-#[schemars(untagged, extend("x-expected" = "a percentage such as \"3 %\", or a list such as [{ name = \"blade.lip_mass_kg\", sd = \"5 %\" }]"))]
+#[schemars(untagged, extend("x-expected" = "\"exact\", a percentage such as \"3 %\", or a list such as [{ name = \"blade.lip_mass_kg\", sd = \"5 %\" }]"))]
 pub(crate) enum JobNuisanceEntry {
     All(String),
     Listed(Vec<ListedNuisance>),
@@ -324,7 +325,7 @@ impl<'de> Visitor<'de> for NuisanceVisitor {
     type Value = JobNuisanceEntry;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a percentage such as \"3 %\", or a list such as [{ name = \"blade.lip_mass_kg\", sd = \"5 %\" }]")
+        f.write_str("\"exact\", a percentage such as \"3 %\", or a list such as [{ name = \"blade.lip_mass_kg\", sd = \"5 %\" }]")
     }
 
     fn visit_str<E: Error>(self, value: &str) -> Result<JobNuisanceEntry, E> {

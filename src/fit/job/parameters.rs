@@ -100,6 +100,8 @@ fn check_prior(
 // Constants of the scene that are free within a prior. They are freed because a mass or a damping is never
 // known exactly.
 
+/// Word in a job for constants that are all exact.
+const EXACT_WORD: &str = "exact";
 /// Smallest allowed standard deviation of the prior of a constant, in % of the constant. A more precisely
 /// known constant must be left fixed.
 const LEAST_PERCENT: f64 = 1e-4;
@@ -113,6 +115,9 @@ const MOST_PERCENT: f64 = 50.0;
 pub enum Constants {
     /// No constant is free: all constants are exact.
     Exact,
+    /// Every constant that has a default prior, except those that are zero, free parameters, or set by a
+    /// condition.
+    Default,
     /// All masses, inertias, stiffnesses and dampings, the preload and the shoulder angle of a scene, except
     /// those that are zero, free parameters, or set by a condition.
     All {
@@ -151,7 +156,9 @@ pub(super) fn check_constants(
     free: &[FreeParameter],
     known: &[&str],
 ) -> Result<Constants, KeyRefusal> {
-    let Some(nuisance) = &written.nuisance else { return Ok(Constants::Exact) };
+    let Some(nuisance) = &written.nuisance else {
+        return Ok(if written.trace.is_empty() { Constants::Exact } else { Constants::Default });
+    };
     if written.trace.is_empty() {
         refuse!(
             "nuisance",
@@ -159,8 +166,10 @@ pub(super) fn check_constants(
         );
     }
     let list = match nuisance {
+        JobNuisanceEntry::All(text) if text == EXACT_WORD => return Ok(Constants::Exact),
         JobNuisanceEntry::All(text) => {
-            return Ok(Constants::All { sd_relative: parse_percentage("nuisance", text)? });
+            let words = "\"exact\", or a percentage such as \"3 %\"";
+            return Ok(Constants::All { sd_relative: parse_percentage("nuisance", text, words)? });
         }
         JobNuisanceEntry::Listed(list) => list,
     };
@@ -187,18 +196,18 @@ fn check_nuisance(
         refuse!(key, "the [[parameter]] `{free}` is free already; give it a `prior`, and remove it here");
     }
     let sd_relative = match (&written.sd, written.sd_relative) {
-        (Some(text), None) => parse_percentage(&key, text)?,
+        (Some(text), None) => parse_percentage(&key, text, "a percentage such as \"3 %\"")?,
         (None, Some(relative)) => check_percentage(&key, 100.0 * relative)?,
         _ => refuse!(key, "expected either `sd`, such as \"3 %\", or `sd_relative`, such as 0.03"),
     };
     Ok(NuisanceParameter { name: name.clone(), sd_relative })
 }
 
-/// Parses `3 %` as 0.03.
-fn parse_percentage(key: &str, text: &str) -> Result<f64, KeyRefusal> {
+/// Parses `3 %` as 0.03; `expected` is what a refusal says was expected.
+fn parse_percentage(key: &str, text: &str, expected: &str) -> Result<f64, KeyRefusal> {
     match text.trim().strip_suffix('%').and_then(|number| number.trim().parse().ok()) {
         Some(percent) => check_percentage(key, percent),
-        None => refuse!(key, "found \"{text}\", expected a percentage such as \"3 %\""),
+        None => refuse!(key, "found \"{text}\", expected {expected}"),
     }
 }
 

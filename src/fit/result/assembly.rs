@@ -172,8 +172,8 @@ pub(in crate::fit) fn camera_nuisance_results(job: &Job, found: &[CameraEstimate
     let nuisance = |found: &CameraEstimate| NuisanceResult {
         recording: job.conditions.get(found.condition).map(|condition| condition.name.clone()),
         name: found.name.to_owned(),
-        prior: 0.0,
-        prior_sd: found.prior_sd,
+        prior: Some(0.0),
+        prior_sd: Some(found.prior_sd),
         estimate: found.estimate,
         lower_95: found.half_95.map(|half| found.estimate - half),
         upper_95: found.half_95.map(|half| found.estimate + half),

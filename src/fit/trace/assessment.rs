@@ -4,6 +4,7 @@ use super::checkpoint::{Iterate, chi2_per_dof};
 use super::levenberg_marquardt::MAX_STEPS;
 use super::model::TraceModel;
 use super::normal_equations::trace_covariance;
+use super::prior_conflict::prior_conflicts;
 use super::search::{TraceDescent, is_same_end, other_ends};
 use super::uncertainty_run::{SearchEnd, UncertaintyRun, Z_95, profile_distances};
 use super::unknowns::UnknownKind;
@@ -102,6 +103,7 @@ pub(super) fn assess_end(
     let lengths = shorter.and_then(|shorter| compare_segment_lengths(model, at, shorter, sd));
     let (biases, disagreement) = lengths.unwrap_or_else(|| (vec![0.0; n], None));
     doubts.extend(disagreement);
+    doubts.extend(prior_conflicts(end));
     let estimate = |i: usize| {
         let (unknown, z, bias) = (&model.unknowns.0[i], at.point[i], biases[i]);
         let [below, above] = distances[i].map(|end| math::hypot(end, Z_95 * bias));

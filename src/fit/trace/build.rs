@@ -9,6 +9,7 @@ use crate::fit::trace::checkpoint::{Iterate, TraceSearchSettings};
 use crate::fit::trace::levenberg_marquardt::{first_iterate, refit_plain};
 use crate::fit::trace::model::{TraceModel, TraceRecording};
 use crate::fit::trace::segment_simulation::segment_residuals;
+use crate::fit::trace::segmentation::first_segment_s;
 use crate::fit::trace::unknowns::{CameraUnknown, TraceUnknown, TraceUnknowns, UnknownKind};
 use crate::fit::trace_data::TraceData;
 use crate::recording::Recording;
@@ -18,7 +19,7 @@ use crate::recording::noise_model::{
 };
 use crate::recording::quality::{CameraTilt, measure_quality, measure_tilt};
 use crate::simulate::drive::{Drive, HeadMotionError, smooth_head_motion};
-use crate::simulate::scene::Scene;
+use crate::simulate::scene::{Scene, StartKind};
 use portable_math as math;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -83,6 +84,8 @@ impl TraceModel {
 fn build_recording(source: &TraceSource<'_>) -> Result<TraceRecording, HeadMotionError> {
     let TraceSource { recording, traced, exposure_s, .. } = *source;
     let mut scene = source.scene.clone();
+    // every segment has its own starting state, so none is sought at the start of the scene
+    scene.start = StartKind::Upright;
     let own_head = traced.head == HeadSource::Recording;
     if own_head {
         scene.drive = Drive::Recorded(Arc::new(smooth_head_motion(recording)?));
@@ -101,7 +104,17 @@ fn build_recording(source: &TraceSource<'_>) -> Result<TraceRecording, HeadMotio
         frames: [traced.frames.start, traced.frames.end],
     };
     let shared = [shared.tip_x, shared.head_y].map(|shared| shared.map(|shared| shared.noise_m));
-    let film = CameraObservation::new(recording, &scene.drive, own_head, settings, &shared);
+    let glass = measure_glass(recording);
+    let first_segment_s = first_segment_s(&scene.linkage);
+    let film = CameraObservation::new(
+        recording,
+        &scene.drive,
+        own_head,
+        settings,
+        &shared,
+        glass.as_ref(),
+        first_segment_s,
+    );
     Ok(TraceRecording { scene, observation: film })
 }
 
@@ -168,34 +181,85 @@ fn constant_unknown(freed: &FreedConstant) -> TraceUnknown {
     }
 }
 
-/// Unknowns of the camera of a recording. A quantity whose prior has zero width is not estimated.
-fn camera_unknowns(film: usize, source: &TraceSource<'_>, data: &CameraObservation) -> Vec<TraceUnknown> {
-    let (doubt, head) = (&source.traced.camera, source.traced.head);
-    let has_drop = data.settings.head_drop;
-    let tilt_rad = recorded_tilt_rad(source.recording);
-    let [offset_x_m, offset_drop_m] = data.guess_offsets_m(tilt_rad);
-    let with_drop = |sd: f64| if has_drop { sd } else { 0.0 };
-    let rows = [
-        (CameraUnknown::OffsetX, doubt.offset_sd_m, offset_x_m),
-        (CameraUnknown::OffsetDrop, with_drop(doubt.offset_sd_m), offset_drop_m),
-        (CameraUnknown::DriftX, doubt.drift_sd_m_per_s, 0.0),
-        (CameraUnknown::DriftDrop, with_drop(doubt.drift_sd_m_per_s), 0.0),
-        (CameraUnknown::Scale, doubt.scale_sd, 0.0),
-        (CameraUnknown::Tilt, with_drop(doubt.tilt_sd_rad), tilt_rad),
-        (CameraUnknown::Clock, doubt.clock_sd_s(head), 0.0),
-    ];
-    let unknown = |(what, sd, start): (CameraUnknown, f64, f64)| {
-        let (kind, unit) = (UnknownKind::Camera { film, what }, what.coordinate_unit());
-        let reach = CAMERA_RANGE_SD * sd / unit;
-        let (prior, start) = (Some([0.0, sd / unit]), (start / unit).clamp(-reach, reach));
-        TraceUnknown { kind, range: [-reach, reach], prior, start }
-    };
-    rows.into_iter().filter(|(_, sd, _)| *sd > 0.0).map(unknown).collect()
+/// What is known of a camera error before the fit; `size` is its standard deviation or, without a prior, half
+/// of the range in which it is sought, and 0 for an error that is not estimated.
+struct CameraPrior {
+    what: CameraUnknown,
+    /// Mean of the prior.
+    mean: f64,
+    size: f64,
+    /// Whether nothing is known but the range.
+    is_flat: bool,
+    start: f64,
 }
 
-/// Tilt of the camera from the path of the tip on the glass, rad; 0 if the path does not show it clearly.
-fn recorded_tilt_rad(recording: &Recording) -> f64 {
+impl CameraPrior {
+    /// A normal prior around `mean`.
+    fn normal(what: CameraUnknown, mean: f64, size: f64) -> Self {
+        Self { what, mean, size, is_flat: false, start: mean }
+    }
+
+    fn unknown(&self, film: usize) -> TraceUnknown {
+        let unit = self.what.coordinate_unit();
+        let (mean, size, start) = (self.mean / unit, self.size / unit, self.start / unit);
+        let reach = if self.is_flat { size } else { CAMERA_RANGE_SD * size };
+        let centre = if self.is_flat { start } else { mean };
+        let range = [centre - reach, centre + reach];
+        TraceUnknown {
+            kind: UnknownKind::Camera { film, what: self.what },
+            range,
+            prior: (!self.is_flat).then_some([mean, size]),
+            start: start.clamp(range[0], range[1]),
+        }
+    }
+}
+
+/// Unknowns of the camera of a recording. A quantity whose prior has zero width is not estimated.
+///
+/// Nothing is known of the picture's zero: the drop is counted from an arbitrary height, and without a tracked
+/// head the positions along the sweep are counted from an arbitrary place. The tilt is known from the path of
+/// the tip on the glass, where this path shows it.
+fn camera_unknowns(film: usize, source: &TraceSource<'_>, data: &CameraObservation) -> Vec<TraceUnknown> {
+    let TraceData { camera: doubt, head, .. } = source.traced;
+    let linkage = &source.scene.linkage;
+    let [angle_rad, angle_sd_rad] = data.tilt_rad;
+    let [along_m, drop_m] = data.guess_offsets_m(angle_rad, linkage);
+    let zero = |what, start| CameraPrior {
+        what,
+        mean: 0.0,
+        size: if doubt.offset_sd_m > 0.0 { linkage.l1_m + linkage.l2_m } else { 0.0 },
+        is_flat: true,
+        start,
+    };
+    let normal = CameraPrior::normal;
+    let with_drop = |sd: f64| if data.settings.head_drop { sd } else { 0.0 };
+    // with one channel alone, the lip's length and the marker's place on it cannot be told apart
+    let with_tip = |sd: f64| if data.settings.tip_x { with_drop(sd) } else { 0.0 };
+    let along = match head {
+        HeadSource::Scene => zero(CameraUnknown::OffsetX, along_m),
+        HeadSource::Recording => {
+            CameraPrior { start: along_m, ..normal(CameraUnknown::OffsetX, 0.0, doubt.offset_sd_m) }
+        }
+    };
+    let drop = zero(CameraUnknown::OffsetDrop, drop_m);
+    let tilt_sd_rad =
+        if doubt.tilt_sd_rad > 0.0 { math::hypot(doubt.tilt_sd_rad, angle_sd_rad) } else { 0.0 };
+    let rows = [
+        along,
+        CameraPrior { size: with_drop(drop.size), ..drop },
+        normal(CameraUnknown::TipAlong, 0.0, with_tip(doubt.offset_sd_m)),
+        normal(CameraUnknown::TipAcross, 0.0, with_tip(doubt.offset_sd_m)),
+        normal(CameraUnknown::DriftX, 0.0, doubt.drift_sd_m_per_s),
+        normal(CameraUnknown::DriftDrop, 0.0, with_drop(doubt.drift_sd_m_per_s)),
+        normal(CameraUnknown::Scale, 0.0, doubt.scale_sd),
+        normal(CameraUnknown::Tilt, angle_rad, with_drop(tilt_sd_rad)),
+        normal(CameraUnknown::Clock, 0.0, doubt.clock_sd_s(*head)),
+    ];
+    rows.iter().filter(|row| row.size > 0.0).map(|row| row.unknown(film)).collect()
+}
+
+/// The glass in the picture, from the path of the tip; `None` if the path does not show it.
+fn measure_glass(recording: &Recording) -> Option<CameraTilt> {
     let instants = ReversalInstants::find_instants(recording);
-    let found = measure_tilt(recording, &instants, &measure_quality(recording, None));
-    found.ok().filter(CameraTilt::is_clear).map_or(0.0, |tilt| tilt.angle_rad)
+    measure_tilt(recording, &instants, &measure_quality(recording, None)).ok()
 }

@@ -1,10 +1,15 @@
 //! A recording in the form in which a trace fit uses it.
 
+use super::segmentation::equilibrium_angles;
+use crate::model::Linkage;
 use crate::recording::Recording;
+use crate::recording::channel::median_in_place;
 use crate::recording::noise_model::{AutoregressiveNoise, Whitener};
+use crate::recording::quality::CameraTilt;
 use crate::simulate::drive::HeadSpline;
 use crate::simulate::scene::Drive;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, SMatrix, SVector};
+use portable_math as math;
 use std::sync::Arc;
 
 /// Channels and frames of a recording that are fitted, its exposure time and its noise.
@@ -42,19 +47,96 @@ pub struct CameraObservation {
     /// Mean of `head_m` over the fitted frames, m. A tilt of the camera rotates the picture about this
     /// position.
     pub centre_m: f64,
+    /// Angle from the picture's x axis to the glass and its standard deviation, rad, from the path of the tip;
+    /// both are 0 if the path shows no clear angle.
+    pub tilt_rad: [f64; 2],
+    /// Greatest speed of the head in the fitted frames, m/s.
+    pub head_speed_m_per_s: f64,
+    /// Length of the shortest segments, s: the time scale of the blade.
+    pub first_segment_s: f64,
     pub settings: ObservationSettings,
+}
+
+/// Maximum number of frames from which the offsets are guessed.
+const GUESS_FRAMES: usize = 10_000;
+/// Minimum number of frames from which the offsets are guessed: the cubic has four coefficients.
+const FEWEST_POINTS: usize = 20;
+/// The leans (tip position minus head position) are sorted, and this fraction of them is ignored at each end.
+const LEAN_TAIL: f64 = 0.1;
+
+/// Lean and drop, m, at which a blade is upright that leans to both sides; `points` are its leans and drops,
+/// and `ends` the usual leans to either side. `None` if the drops are no function of the lean.
+fn upright_point(points: &[[f64; 2]], ends: [f64; 2]) -> Option<[f64; 2]> {
+    /// The offset is sought within this fraction of the distance between `ends`, around the middle.
+    const SOUGHT: f64 = 0.5;
+    /// Number of offsets that are tried in each round.
+    const TRIED: usize = 21;
+    /// Factor by which the distance between two offsets shrinks from round to round.
+    const FINER: f64 = 0.1;
+    /// Number of rounds; in the last one, neighbouring offsets differ by 2e-5 of the distance between `ends`.
+    const ROUNDS: usize = 4;
+    let reach = ends[1] - ends[0];
+    let (mut middle, mut width) = (0.5 * (ends[0] + ends[1]), SOUGHT * reach);
+    let mut best: Option<(f64, [f64; 2])> = None;
+    for _ in 0..ROUNDS {
+        let place = |k: usize| middle + width * (k as f64 / (TRIED - 1) as f64 - 0.5);
+        let tried = (0..TRIED).filter_map(|k| {
+            let (left_over, drop) = fit_drops(points, place(k), reach)?;
+            Some((left_over, [place(k), drop]))
+        });
+        best = best.into_iter().chain(tried).min_by(|a, b| a.0.total_cmp(&b.0));
+        middle = best?.1[0];
+        width *= FINER;
+    }
+    best.map(|(_, point)| point)
+}
+
+/// Sum of the squared residuals, m^2, of a cubic in the squared lean that is fitted to the drops, and the drop
+/// of the upright blade, m. The leans are counted from `offset_m`.
+fn fit_drops(points: &[[f64; 2]], offset_m: f64, reach_m: f64) -> Option<(f64, f64)> {
+    const TERMS: usize = 4;
+    let mut normal = SMatrix::<f64, TERMS, TERMS>::zeros();
+    let mut right = SVector::<f64, TERMS>::zeros();
+    let mut squares = 0.0;
+    for [lean, drop] in points {
+        let square = math::powi((lean - offset_m) / reach_m, 2);
+        let powers = SVector::<f64, TERMS>::from_fn(|k, _| math::powi(square, k as i32));
+        normal += powers * powers.transpose();
+        right += powers * *drop;
+        squares += drop * drop;
+    }
+    let coefficients = normal.cholesky()?.solve(&right);
+    Some((squares - coefficients.dot(&right), coefficients[0]))
+}
+
+/// Offset of the drop, m, with which the drops are, in the median, those of the blade at rest with the same
+/// lean; 0 without such a drop.
+fn drop_offset_at_rest(points: &[[f64; 2]], linkage: &Linkage) -> f64 {
+    /// Number of points that are compared.
+    const COMPARED: usize = 200;
+    let apart = points.len().div_ceil(COMPARED).max(1);
+    let above = |[lean, drop]: &[f64; 2]| {
+        let [theta, phi] = equilibrium_angles(linkage, *lean)?;
+        let upright = |length: f64, angle: f64| length * (1.0 - math::cos(angle));
+        Some(drop - upright(linkage.l1_m, theta) - upright(linkage.l2_m, phi))
+    };
+    let mut offsets: Vec<f64> = points.iter().step_by(apart).filter_map(above).collect();
+    median_in_place(&mut offsets).unwrap_or(0.0)
 }
 
 impl CameraObservation {
     /// Data of a recording. `drive` moves the head in the model of the recording. `shared` is the noise in
     /// each frame, m, that tip and head have in common, along the sweep and in height; it is subtracted from
-    /// the tip's position and from the head's height.
+    /// the tip's position and from the head's height. `glass` is the glass in the picture: heights of the head
+    /// are counted from a curved glass below it.
     pub(crate) fn new(
         recording: &Recording,
         drive: &Drive,
         own_head: bool,
         settings: ObservationSettings,
         shared: &[Option<Vec<Option<f64>>>; 2],
+        glass: Option<&CameraTilt>,
+        first_segment_s: f64,
     ) -> Self {
         let (grid, traces) = (recording.grid(), recording.traces());
         let times_s: Vec<f64> = (0..grid.frames).map(|i| grid.time_s(i)).collect();
@@ -70,46 +152,62 @@ impl CameraObservation {
             Drive::Recorded(spline) if own_head => Some(Arc::clone(spline)),
             _ => None,
         };
+        let mut drop_m = data(settings.head_drop, &traces.head_y_m, &shared[1], -1.0);
+        if let Some((tilt, curvature)) = glass.and_then(|tilt| Some((tilt, tilt.curvature?))) {
+            for (i, drop) in drop_m.iter_mut().enumerate() {
+                let along = traces.tip_x_m[i].unwrap_or(head_m[i]) - tilt.centre_m[0];
+                *drop = drop.map(|drop| drop + 0.5 * curvature.per_m * along * along);
+            }
+        }
+        let tilt = glass.filter(|tilt| tilt.is_clear());
+        let moves = head_m[first..last].windows(2).map(|pair| (pair[1] - pair[0]).abs());
+        let head_speed_m_per_s = grid.frame_rate_hz * moves.fold(0.0, f64::max);
         Self {
             tip_x_m: data(settings.tip_x, &traces.tip_x_m, &shared[0], 1.0),
-            drop_m: data(settings.head_drop, &traces.head_y_m, &shared[1], -1.0),
+            drop_m,
+            tilt_rad: tilt.map_or([0.0; 2], |tilt| [tilt.angle_rad, tilt.sd_rad]),
             times_s,
             rate_hz: grid.frame_rate_hz,
             head_m,
             own_head,
             own_curve,
             centre_m,
+            head_speed_m_per_s,
+            first_segment_s,
             settings,
         }
     }
 
-    /// Initial guesses, m, of the offsets of the tip's position and of the head's drop. They assume that a
-    /// blade leans equally far to both sides and that its head is highest when the blade is upright.
-    pub(super) fn guess_offsets_m(&self, tilt_rad: f64) -> [f64; 2] {
-        /// The leans (tip position minus head position) are sorted, and this fraction of them is ignored at
-        /// each end.
-        const TAIL: f64 = 0.1;
-        /// The blade counts as nearly upright in this fraction of the frames: those with the smallest drops.
-        const UPRIGHT: f64 = 0.005;
+    /// Initial guesses, m, of the offsets of the tip's position and of the head's drop.
+    ///
+    /// A blade that leans to both sides has its least drop where it is upright, and the drop is a function of
+    /// the square of the lean: the offset along the sweep is the one with which a cubic in this square fits
+    /// the drops best. A blade that leans to one side does not show where it is upright; its lean is taken as
+    /// measured, and its drop as that of the blade at rest with this lean.
+    pub(super) fn guess_offsets_m(&self, tilt_rad: f64, linkage: &Linkage) -> [f64; 2] {
         let [first, last] = self.settings.frames;
-        let sorted = |mut values: Vec<f64>| {
-            values.sort_by(f64::total_cmp);
-            values
-        };
-        let at = |values: &[f64], share: f64| {
-            values.get((share * values.len() as f64) as usize).copied().unwrap_or(0.0)
-        };
-        let leans = sorted((first..last).filter_map(|i| Some(self.tip_x_m[i]? - self.head_m[i])).collect());
+        let apart = (last - first).div_ceil(GUESS_FRAMES).max(1);
+        let lean = |i: usize| Some(self.tip_x_m[i]? - self.head_m[i]);
         let level = |i: usize| Some(self.drop_m[i]? + tilt_rad * (self.head_m[i] - self.centre_m));
-        let drops = sorted((first..last).filter_map(level).collect());
-        let [low, high] = [at(&leans, TAIL), at(&leans, 1.0 - TAIL)];
+        let frames = || (first..last).step_by(apart);
+        let mut leans: Vec<f64> = frames().filter_map(lean).collect();
+        leans.sort_by(f64::total_cmp);
+        let at = |share: f64| leans.get((share * leans.len() as f64) as usize).copied().unwrap_or(0.0);
+        let (low, high) = (at(LEAN_TAIL), at(1.0 - LEAN_TAIL));
         // (if the offset is larger than the lean, all measured leans have the same sign, although the blade
         // leans to both sides)
         let both_sides = (low < 0.0 && high > 0.0) || self.reverses();
-        let middle = if both_sides { 0.5 * (low + high) } else { 0.0 };
-        let upright =
-            if drops.is_empty() { 0.0 } else { at(&drops, UPRIGHT) + 2.0 * self.settings.noise[1].sd() };
-        [middle, if both_sides { upright } else { 0.0 }]
+        let points: Vec<[f64; 2]> = frames().filter_map(|i| Some([lean(i)?, level(i)?])).collect();
+        if !both_sides {
+            let along = if self.own_head { 0.0 } else { at(0.5) };
+            let leans = points.iter().map(|[lean, drop]| [lean - along, *drop]).collect::<Vec<_>>();
+            return [along, drop_offset_at_rest(&leans, linkage)];
+        }
+        let middle = 0.5 * (low + high);
+        if points.len() < FEWEST_POINTS {
+            return [middle, 0.0];
+        }
+        upright_point(&points, [low, high]).unwrap_or([middle, 0.0])
     }
 
     /// Whether the head reverses its motion within the fitted frames, so that the blade leans to both sides.
@@ -242,17 +340,36 @@ mod tests {
             noise,
             frames: [0, grid.frames],
         };
-        CameraObservation::new(&recording, &drive, true, settings, &[None, None])
+        CameraObservation::new(&recording, &drive, true, settings, &[None, None], None, 0.004)
+    }
+
+    fn linkage() -> Linkage {
+        let text = include_str!("../../../data/scenes/actual-blade.toml");
+        crate::simulate::scene::Scene::parse("actual-blade.toml", text).unwrap().linkage
+    }
+
+    /// A blade leans further to one side than to the other, as friction depends on speed; its drop is a
+    /// function of the square of its lean alone.
+    #[test]
+    fn a_blade_that_leans_unequally_far_to_both_sides_shows_where_it_is_upright() {
+        let ends = [-1.1e-3, 1.7e-3];
+        for (offset_m, zero_m) in [(0.0, 0.0), (2.8e-4, 4e-3), (-1.3e-4, -0.1)] {
+            let lean = |k: usize| ends[0] + (ends[1] - ends[0]) * k as f64 / 499.0;
+            let drop = |lean: f64| 40.0 * lean * lean + 3e6 * math::powi(lean, 4) + zero_m;
+            let points: Vec<[f64; 2]> = (0..500).map(|k| [lean(k) + offset_m, drop(lean(k))]).collect();
+            let found = upright_point(&points, ends.map(|end| end + offset_m)).unwrap();
+            assert!((found[0] - offset_m).abs() < 1e-7 && (found[1] - zero_m).abs() < 1e-9, "{found:?}");
+        }
     }
 
     #[test]
     fn a_marker_that_is_farther_off_than_the_blade_leans_is_found_where_the_head_turns() {
         let there_and_back = |t: f64| 0.05 * (1.0 - (6.0 * (t + 0.1)).cos());
         for offset_m in [0.0, 3e-4, -1.5e-3, 4e-3] {
-            let [found, _] = film(offset_m, there_and_back).guess_offsets_m(0.0);
+            let [found, _] = film(offset_m, there_and_back).guess_offsets_m(0.0, &linkage());
             assert!((found - offset_m).abs() < 1e-5, "{found} {offset_m}");
         }
         // if the head moves only one way, nothing shows how far the blade leans to the other side
-        assert_eq!(film(1.5e-3, |t| 0.05 * t).guess_offsets_m(0.0), [0.0, 0.0]);
+        assert_eq!(film(1.5e-3, |t| 0.05 * t).guess_offsets_m(0.0, &linkage()), [0.0, 0.0]);
     }
 }

@@ -1,7 +1,7 @@
 //! Fits the starting state of each segment while the parameters and the camera errors are held fixed.
 
 use super::checkpoint::SegmentState;
-use super::segment_simulation::{LinkState, RecordingModel, STATE_STEPS};
+use super::segment_simulation::{LinkState, RecordingModel};
 use nalgebra::{DMatrix, DVector, Matrix4};
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -228,16 +228,17 @@ fn rescue_candidates(
     follows: Option<LinkState>,
     rescue: RescuePolicy,
 ) -> Vec<LinkState> {
-    /// Changes of the angular velocities of neck and lip, rad/s, that are added to the recorded state, one at
-    /// a time.
-    const RATES: [[f64; 2]; 4] = [[60.0, 0.0], [-60.0, 0.0], [0.0, 120.0], [0.0, -120.0]];
+    /// Changes of the angular velocities of neck and lip, rad per first segment length, that are added to the
+    /// recorded state, one at a time.
+    const RATES: [[f64; 2]; 4] = [[0.24, 0.0], [-0.24, 0.0], [0.0, 0.48], [0.0, -0.48]];
+    let per_s = 1.0 / point.observation.first_segment_s;
     let seen = LinkState::from(segment.shown);
     let mut states = vec![seen];
     if rescue == RescuePolicy::Thorough {
         states.extend(weakest_direction_states(point, segment).unwrap_or_default());
     }
     states.extend(follows);
-    states.extend(RATES.map(|[neck, lip]| seen + LinkState::new(0.0, 0.0, neck, lip)));
+    states.extend(RATES.map(|[neck, lip]| seen + LinkState::new(0.0, 0.0, neck * per_s, lip * per_s)));
     states
 }
 
@@ -246,16 +247,15 @@ fn rescue_candidates(
 fn weakest_direction_states(point: &RecordingModel<'_>, segment: &SegmentState) -> Option<Vec<LinkState>> {
     let state = segment.start_state();
     let jacobian = point.linearize_state(segment.frames(), &state)?.by_state;
-    let scaled = Matrix4::from_fn(|a, b| {
-        jacobian.column(a).dot(&jacobian.column(b)) * STATE_STEPS[a] * STATE_STEPS[b]
-    });
+    let steps = point.state_steps();
+    let scaled = Matrix4::from_fn(|a, b| jacobian.column(a).dot(&jacobian.column(b)) * steps[a] * steps[b]);
     let eigen = scaled.symmetric_eigen();
     let mut order = [0, 1, 2, 3];
     order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
     let mut states = Vec::new();
     for &i in &order[..2] {
         let sd = 1.0 / eigen.eigenvalues[i].max(1e-9).sqrt();
-        let direction = LinkState::from_fn(|k, _| eigen.eigenvectors[(k, i)] * STATE_STEPS[k]);
+        let direction = LinkState::from_fn(|k, _| eigen.eigenvectors[(k, i)] * steps[k]);
         states.extend([3.0, -3.0, 10.0, -10.0, 30.0, -30.0].map(|times| state + direction * (times * sd)));
     }
     Some(states)

@@ -57,7 +57,7 @@ pub(super) fn refit_plain(model: &TraceModel, mut at: Iterate) -> Option<Iterate
 #[must_use]
 pub fn next_iterate(model: &TraceModel, settings: &TraceSearchSettings, before: &Iterate) -> Option<Iterate> {
     if !before.settled {
-        return Some(outer_step(model, before));
+        return Some(outer_step(model, before, holds_constants(settings, before)));
     }
     let bad = before.count_bad_segments();
     let stage = before.stage + 1;
@@ -183,9 +183,15 @@ fn carry_state_over(
     point.end_state([old.first, segment.first], &old.start_state())
 }
 
-/// One outer step. If no step of the unknowns lowers the cost, only the starting states are fitted; if this
+/// Whether the constants are held at their prior means: in all stages but the last, because far from the minimum
+/// they would take over the misfit of the parameters.
+fn holds_constants(settings: &TraceSearchSettings, at: &Iterate) -> bool {
+    at.stage + 1 < settings.segment_s.len()
+}
+
+/// One outer step; with `held`, constants stay where they are. If no step of the unknowns lowers the cost, only the starting states are fitted; if this
 /// does not lower the cost either, the iterate is settled.
-pub(super) fn outer_step(model: &TraceModel, before: &Iterate) -> Iterate {
+pub(super) fn outer_step(model: &TraceModel, before: &Iterate, held: bool) -> Iterate {
     const TRIALS: usize = 6;
     let number = before.number + 1;
     let used_up = number >= MAX_STEPS;
@@ -194,15 +200,15 @@ pub(super) fn outer_step(model: &TraceModel, before: &Iterate) -> Iterate {
         return stay();
     };
     let mut damping = before.damping;
-    // The plain phase (cost chi2) ends when a step changes every unknown by less than a hundredth of a
-    // standard deviation. The robust phase only prepares the plain phase and may end earlier.
+    // The plain phase (cost chi2) ends when a step is shorter than a hundredth of a standard
+    // deviation. The robust phase only prepares the plain phase and may end earlier.
     let (least_gain, least_move) = if before.plain { (1e-4, 1e-2) } else { (1e-2, 0.3) };
     // both thresholds scale with the misfit per datum, because a large remaining misfit also makes the
     // estimates less certain
     let unit = (before.cost / before.count_data().max(1) as f64).max(1.0);
     let (least_gain, least_move) = (least_gain * unit, least_move * unit.sqrt());
     for _ in 0..TRIALS {
-        let tried = damped_step(model, &before.point, &at, damping)
+        let tried = damped_step(model, &before.point, &at, damping, held)
             .and_then(|point| accept_if_lower(model, before, &at, point));
         if let Some(found) = tried {
             let gain = before.cost - found.cost;
@@ -220,10 +226,10 @@ pub(super) fn outer_step(model: &TraceModel, before: &Iterate) -> Iterate {
     }
 }
 
-/// Largest change of any coordinate between `from` and `to`, in standard deviations of that coordinate with
-/// all other coordinates fixed.
+/// Length of the step between `from` and `to` in standard deviations (Mahalanobis distance).
 fn step_in_sds(normal: &DMatrix<f64>, from: &[f64], to: &[f64]) -> f64 {
-    (0..from.len()).map(|i| ((to[i] - from[i]) * normal[(i, i)].sqrt()).abs()).fold(0.0, f64::max)
+    let step = DVector::from_iterator(from.len(), to.iter().zip(from).map(|(to, from)| to - from));
+    step.dot(&(normal * &step)).max(0.0).sqrt()
 }
 
 /// The iterate at `point`, if it has a lower cost than `before`.
@@ -234,7 +240,7 @@ fn accept_if_lower(
     point: Vec<f64>,
 ) -> Option<Iterate> {
     let moved = DVector::from_iterator(point.len(), point.iter().zip(&before.point).map(|(a, b)| a - b));
-    let mut segments = carry_states(&before.segments, at, &moved);
+    let mut segments = carry_states(model, &before.segments, at, &moved);
     let points = recording_models(model, &point)?;
     update_states(&points, &mut segments, MAX_STATE_STEPS);
     rescue_states(&points, &mut segments, MAX_STATE_STEPS, RescuePolicy::Beyond(4.0));

@@ -74,21 +74,28 @@ pub(super) fn normal_equations(
     Some(NormalEquations { matrix: total, slope, parts })
 }
 
-/// The point after a damped step of the unknowns, within their ranges.
+/// The point after a damped step of the unknowns, within their ranges; with `held`, constants stay where they
+/// are.
 pub(super) fn damped_step(
     model: &TraceModel,
     z: &[f64],
     at: &NormalEquations,
     damping: f64,
+    held: bool,
 ) -> Option<Vec<f64>> {
     /// Largest allowed change of a parameter's coordinate in one step: a factor of 1.6 in the value of a
     /// logarithmic parameter, half of the range of a linear parameter.
     const LONGEST: f64 = 0.5;
-    let mut damped = at.matrix.clone();
+    let (mut damped, mut slope) = (at.matrix.clone(), at.slope.clone());
     for i in 0..z.len() {
         damped[(i, i)] += damping * at.matrix[(i, i)] + 1e-9;
+        if held && model.unknowns.is_constant(i) {
+            damped.row_mut(i).fill(0.0);
+            damped.column_mut(i).fill(0.0);
+            (damped[(i, i)], slope[i]) = (1.0, 0.0);
+        }
     }
-    let mut step = -damped.cholesky()?.solve(&at.slope);
+    let mut step = -damped.cholesky()?.solve(&slope);
     let longest = model.unknowns.parameters().map(|i| step[i].abs()).fold(0.0, f64::max);
     if longest > LONGEST {
         step *= LONGEST / longest;
@@ -100,21 +107,24 @@ pub(super) fn damped_step(
 /// The segments after the step `moved` of the unknowns. Each starting state takes the step that the linear
 /// model gives for it, limited in length.
 pub(super) fn carry_states(
+    model: &TraceModel,
     segments: &[SegmentState],
     at: &NormalEquations,
     moved: &DVector<f64>,
 ) -> Vec<SegmentState> {
     /// Largest allowed change, rad, of an angle of a starting state in one step.
     const ANGLE: f64 = 0.05;
-    /// Largest allowed change, rad/s, of an angular velocity of a starting state in one step.
-    const RATE: f64 = 200.0;
+    /// Largest allowed change, rad per first segment length, of an angular velocity of a starting state in one
+    /// step.
+    const RATE: f64 = 0.8;
     let mut segments = segments.to_vec();
     for (segment, part) in segments.iter_mut().zip(&at.parts) {
         let Some(part) = part else { continue };
         let follow = &part.move_by_unknown * moved;
         let step = -LinkState::from_fn(|i, _| part.move_held[i] + follow[i]);
         let angle = ANGLE / step[0].abs().max(step[1].abs()).max(1e-9);
-        let rate = RATE / step[2].abs().max(step[3].abs()).max(1e-9);
+        let longest = RATE / model.recordings[segment.recording].observation.first_segment_s;
+        let rate = longest / step[2].abs().max(step[3].abs()).max(1e-9);
         segment.start = (segment.start_state() + step * angle.min(rate).min(1.0)).into();
     }
     segments

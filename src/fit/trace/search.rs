@@ -7,7 +7,7 @@ use super::model::TraceModel;
 use super::normal_equations::{recording_models, trace_covariance};
 use super::segment_simulation::RecordingModel;
 use super::uncertainty_run::{MAX_STARTS, SearchEnd, follow_runs};
-use super::unknowns::TraceUnknown;
+use super::unknowns::{TraceUnknown, UnknownKind};
 use crate::model::modes::{TipConstraint, natural_modes};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -71,8 +71,8 @@ pub fn search_trace(
 }
 
 /// Point at which a start begins, in the coordinates of the unknowns. Start 0 is in the middle of every
-/// range, the others are at random points given by `seed`. An unknown with a prior always begins at its own
-/// `start`.
+/// range, the others are at random points given by `seed`. A camera error and an unknown with a prior always begin at
+/// their own `start`.
 #[must_use]
 pub fn start_point(model: &TraceModel, seed: u64, start: usize) -> Vec<f64> {
     /// Fraction of each range, at either end, in which no search starts; one entry per start. Later starts
@@ -83,7 +83,8 @@ pub fn start_point(model: &TraceModel, seed: u64, start: usize) -> Vec<f64> {
     let place = |unknown: &TraceUnknown| {
         let share = edge + (1.0 - 2.0 * edge) * generator.random::<f64>();
         let [low, high] = unknown.range;
-        if start == 0 || unknown.prior.is_some() { unknown.start } else { low + share * (high - low) }
+        let is_known = unknown.prior.is_some() || matches!(unknown.kind, UnknownKind::Camera { .. });
+        if start == 0 || is_known { unknown.start } else { low + share * (high - low) }
     };
     model.unknowns.0.iter().map(place).collect()
 }

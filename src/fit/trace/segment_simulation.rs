@@ -12,14 +12,15 @@ use crate::simulate::sensitivity::{
 };
 use crate::simulate::{RunStatus, SolverOptions};
 use nalgebra::{DMatrix, DVector, Vector4};
+use portable_math as math;
 use std::cell::RefCell;
 
 /// Angles, rad, and rates, rad/s, of neck and lip.
 pub(super) type LinkState = Vector4<f64>;
 
-/// Scales of the four numbers of a starting state: 3e-5 rad for the two angles and 0.1 rad/s for the two
-/// angular velocities.
-pub(super) const STATE_STEPS: [f64; 4] = [3e-5, 3e-5, 0.1, 0.1];
+/// Scales of the four numbers of a starting state: rad for the two angles, and rad per first segment length for
+/// the two angular velocities.
+const STATE_STEPS: [f64; 4] = [3e-5, 3e-5, 4e-4, 4e-4];
 /// Number of values in a starting state.
 const STATES: usize = 4;
 /// Integration tolerance of the run of a segment. The resulting error is a thousandth of the tracking noise.
@@ -28,8 +29,9 @@ const TOLERANCE: f64 = 1e-8;
 const ACCURACY: f64 = 1e-5;
 /// Maximum number of evaluations of the right-hand side in the run of a segment.
 const MOST_EVALUATIONS: u64 = 400_000;
-/// Channels that are averaged over the exposure of every frame.
-const CHANNELS: [Channel; 3] = [Channel::TipX, Channel::HeadX, Channel::HeadDrop];
+/// Channels that are averaged over the exposure of every frame. The last one counts only if the place of the
+/// tip's marker on the lip is estimated.
+const CHANNELS: [Channel; 4] = [Channel::TipX, Channel::HeadX, Channel::HeadDrop, Channel::LipAngle];
 
 thread_local! {
     /// Workspace for the runs of the current thread.
@@ -42,9 +44,11 @@ struct SegmentObservation {
     first: usize,
     /// Number of directions along which the run is differentiated.
     directions: usize,
-    /// Means over the exposure of each frame, m: positions of tip and head along the sweep and drop of the
-    /// head, one row per frame.
-    means: Vec<[f64; 3]>,
+    /// Number of channels that are known.
+    channels: usize,
+    /// Means over the exposure of each frame, one row per frame: positions of tip and head along the sweep and
+    /// drop of the head, m, and angle of the lip, rad.
+    means: Vec<[f64; 4]>,
     /// Derivatives of the means, ordered by frame, then channel, then direction.
     slopes: Vec<f64>,
     /// State at the end of the run.
@@ -79,11 +83,11 @@ impl TangentObserver for ShutterAverage<'_> {
             } else {
                 (piece.weights_at(time.max(piece.start_s)), 1.0)
             };
-            for (k, channel) in CHANNELS.into_iter().enumerate() {
+            for (k, channel) in CHANNELS.into_iter().take(shot.channels).enumerate() {
                 shot.means[self.frame][k] += share * piece.channel_value(channel, &weights);
                 if shot.directions > 0 {
                     piece.channel_derivatives(channel, &weights, &mut self.row);
-                    let at = (self.frame * CHANNELS.len() + k) * shot.directions;
+                    let at = (self.frame * shot.channels + k) * shot.directions;
                     for (sum, slope) in shot.slopes[at..].iter_mut().zip(&self.row) {
                         *sum += share * slope;
                     }
@@ -114,6 +118,8 @@ pub(super) struct RecordingModel<'a> {
     pub observation: &'a CameraObservation,
     pub camera: CameraParameters,
     pub scene: Scene,
+    /// Whether the place of the tip's marker on the lip is estimated.
+    has_tip_marker: bool,
     none: TangentSeeds,
     states: TangentSeeds,
     all: TangentSeeds,
@@ -181,7 +187,17 @@ impl<'a> RecordingModel<'a> {
         }
         let none = TangentSeeds::new(&scene, &[]).ok()?;
         let all = TangentSeeds::new(&scene, &directions).ok()?;
-        Some(Self { observation: film, camera: view, scene, none, states, all, effects })
+        let has_tip_marker = effects.iter().any(|effect| {
+            matches!(effect, UnknownEffect::Picture(CameraUnknown::TipAlong | CameraUnknown::TipAcross, ..))
+        });
+        Some(Self { observation: film, camera: view, scene, has_tip_marker, none, states, all, effects })
+    }
+
+    /// Scales of the four numbers of a starting state, rad and rad/s.
+    pub(super) fn state_steps(&self) -> [f64; 4] {
+        let [neck, lip, neck_rate, lip_rate] = STATE_STEPS;
+        let per_s = 1.0 / self.observation.first_segment_s;
+        [neck, lip, neck_rate * per_s, lip_rate * per_s]
     }
 
     /// The state of the blade at the start of the next segment, right after the frames `frames`; `None` if
@@ -207,7 +223,8 @@ impl<'a> RecordingModel<'a> {
             // the run ends slightly after the end of the last exposure
             None => film.times_s[last - 1] - clock_s + lead + 1e-9,
         };
-        let (means, slopes) = (vec![[0.0; 3]; count], vec![0.0; count * CHANNELS.len() * directions]);
+        let channels = CHANNELS.len() - usize::from(!self.has_tip_marker);
+        let (means, slopes) = (vec![[0.0; 4]; count], vec![0.0; count * channels * directions]);
         let mut average = ShutterAverage {
             times_s: &film.times_s[first..last],
             clock_s,
@@ -215,7 +232,15 @@ impl<'a> RecordingModel<'a> {
             stop_s: scene.run.stop_s,
             frame: 0,
             row: vec![0.0; directions],
-            shot: SegmentObservation { first, directions, means, slopes, end: None, is_known: true },
+            shot: SegmentObservation {
+                first,
+                directions,
+                channels,
+                means,
+                slopes,
+                end: None,
+                is_known: true,
+            },
         };
         let effort = SolverOptions { most_evaluations: MOST_EVALUATIONS, ..SolverOptions::new(TOLERANCE) };
         let run = RUNNER.with_borrow_mut(|runner| runner.run_scene(&scene, effort, seeds, &mut average));
@@ -292,14 +317,27 @@ impl<'a> RecordingModel<'a> {
         finite.then_some(LinearizedSegment { residuals, by_state, by_unknown })
     }
 
+    /// Distance, m, from the edge of the lip to its marker along the sweep, at an angle of the lip.
+    fn marker_shift(&self, lip: f64) -> f64 {
+        let [along_m, across_m] = self.camera.tip_marker_m;
+        if self.has_tip_marker { along_m * math::sin(lip) + across_m * math::cos(lip) } else { 0.0 }
+    }
+
+    /// Derivative of [`Self::marker_shift`] with respect to the angle of the lip, m/rad.
+    fn marker_slope(&self, lip: f64) -> f64 {
+        let [along_m, across_m] = self.camera.tip_marker_m;
+        along_m * math::cos(lip) - across_m * math::sin(lip)
+    }
+
     /// Position of the tip and drop of the head as the picture shows them, m, from the true means of tip,
-    /// head and drop.
-    fn project_to_picture(&self, frame: usize, [tip, head, drop]: [f64; 3]) -> [f64; 2] {
+    /// head and drop, and the angle of the lip.
+    fn project_to_picture(&self, frame: usize, [tip, head, drop, lip]: [f64; 4]) -> [f64; 2] {
         let (film, view) = (self.observation, &self.camera);
         let scale = 1.0 + view.scale;
         let shown = if film.own_head { film.head_m[frame] } else { scale * head };
         let along = film.head_m[frame] - film.centre_m;
         let [offset_x_m, offset_drop_m] = view.offsets_m(film.after_middle_s(frame));
+        let tip = tip + self.marker_shift(lip);
         [
             shown + scale * (tip - head - view.tilt_rad * drop) + offset_x_m,
             scale * drop - view.tilt_rad * along + offset_drop_m,
@@ -352,8 +390,11 @@ impl<'a> RecordingModel<'a> {
         let (film, view) = (self.observation, &self.camera);
         let scale = 1.0 + view.scale;
         self.add_to_column(shot, column, |i, _| {
-            let of = |k: usize| shot.slopes[(i * CHANNELS.len() + k) * shot.directions + direction];
-            let [tip, head, drop] = [of(0), of(1), of(2)];
+            let of = |k: usize| shot.slopes[(i * shot.channels + k) * shot.directions + direction];
+            let [mut tip, head, drop] = [of(0), of(1), of(2)];
+            if self.has_tip_marker {
+                tip += self.marker_slope(shot.means[i][3]) * of(3);
+            }
             let shown = if film.own_head { 0.0 } else { scale * head };
             [slope * (shown + scale * (tip - head - view.tilt_rad * drop)), slope * scale * drop]
         });
@@ -371,11 +412,14 @@ impl<'a> RecordingModel<'a> {
         let (film, view) = (self.observation, &self.camera);
         let scale = 1.0 + view.scale;
         self.add_to_column(shot, column, |i, _| {
-            let (frame, [tip, head, drop]) = (shot.first + i, shot.means[i]);
+            let (frame, [tip, head, drop, lip]) = (shot.first + i, shot.means[i]);
+            let tip = tip + self.marker_shift(lip);
             let shown = if film.own_head { 0.0 } else { head };
             let by_value = match what {
                 CameraUnknown::OffsetX => [1.0, 0.0],
                 CameraUnknown::OffsetDrop => [0.0, 1.0],
+                CameraUnknown::TipAlong => [scale * math::sin(lip), 0.0],
+                CameraUnknown::TipAcross => [scale * math::cos(lip), 0.0],
                 CameraUnknown::DriftX => [film.after_middle_s(frame), 0.0],
                 CameraUnknown::DriftDrop => [0.0, film.after_middle_s(frame)],
                 CameraUnknown::Scale => [shown + tip - head - view.tilt_rad * drop, drop],

@@ -4,18 +4,45 @@ use super::camera_observation::CameraObservation;
 use super::segment_simulation::LinkState;
 use super::unknowns::CameraParameters;
 use crate::model::Linkage;
+use crate::model::modes::body_frequencies;
+use crate::recording::channel::median_in_place;
 use crate::simulate::scene::Scene;
+use crate::text::format_trimmed;
 use nalgebra::{DMatrix, DVector};
 use portable_math as math;
 
-/// Smallest angle between neck and lip, rad, at which the two coordinates of the tip determine both angles.
-/// In a nearly straight blade they do not.
+/// Smallest angle between neck and lip, rad, at which the two coordinates of the tip determine both angles. In
+/// a nearly straight blade they do not.
 const MIN_BEND_RAD: f64 = 0.15;
-/// Smallest speed of the tip over the glass that counts as sliding, m/s. While the tip sticks, the state has
-/// only three degrees of freedom.
-const MIN_SPEED_M_PER_S: f64 = 0.05;
-/// Half width, s, of the window of frames to which rates are fitted: a third of a stick-slip cycle.
-const HALF_WIDTH_S: f64 = 3.5e-4;
+/// A blade counts as straight if it is bent in less than this fraction of the frames in which the tip slides.
+const LEAST_BENT: f64 = 0.5;
+/// A straight blade starts only where its lean is at least this fraction of its usual lean: it passes a smaller
+/// one while it flips.
+const LEAST_LEAN: f64 = 0.5;
+/// Smallest speed of the tip over the glass that counts as sliding, as a fraction of the greatest speed of the
+/// head. While the tip sticks, the state has only three degrees of freedom.
+const MIN_SPEED: f64 = 0.1;
+/// A speed of the tip over the glass counts as sliding only if it exceeds this number of its standard
+/// deviations.
+const SPEED_DEVIATIONS: f64 = 5.0;
+/// Half width of the window of frames to which rates are fitted, as a fraction of the first segment length: a
+/// third of a stick-slip cycle.
+const HALF_WIDTH: f64 = 0.0875;
+
+/// First segment length, s, for a blade whose lip oscillates at `USUAL_LIP_HZ` by itself: a few stick-slip
+/// cycles.
+const USUAL_SEGMENT_S: f64 = 0.004;
+const USUAL_LIP_HZ: f64 = 608.0;
+
+/// Length of the shortest segments, s, for a blade: [`USUAL_SEGMENT_S`] for blades of the usual size. For
+/// others it is longer or shorter by a power of 4, because rounded lengths do not depend on a small error of
+/// the lip's frequency.
+pub(crate) fn first_segment_s(linkage: &Linkage) -> f64 {
+    let lip_hz = body_frequencies(linkage).lip_hz;
+    let quarters = math::ln(USUAL_LIP_HZ / lip_hz) / math::ln(4.0);
+    let steps = if quarters.is_finite() { quarters.round().clamp(-6.0, 6.0) } else { 0.0 };
+    USUAL_SEGMENT_S * math::powi(4.0, steps as i32)
+}
 
 /// A frame at which a segment may begin, with the state of the blade there.
 #[derive(Debug, Clone, Copy)]
@@ -37,11 +64,17 @@ pub(super) fn segment_boundaries(
     let step = ((length_s * film.rate_hz).round() as usize).max(4);
     // rates from one-sided windows are inaccurate
     let inner = half_width_frames(film)..film.times_s.len().saturating_sub(half_width_frames(film));
+    let least_lean_m = usual_lean_of_straight_blade(scene, film, view).map(|usual| LEAST_LEAN * usual);
+    let least_speed = least_sliding_speed(film);
     let usable = |frame: usize| -> Option<SegmentBoundary> {
         inner.contains(&frame).then_some(())?;
-        let (state, speed) = recorded_state(scene, film, view, frame)?;
-        let bent = (state[1] - state[0]).abs() > MIN_BEND_RAD && speed.abs() > MIN_SPEED_M_PER_S;
-        bent.then_some(SegmentBoundary { frame, state })
+        let seen = recorded_motion(scene, film, view, frame)?;
+        (seen.speed_m_per_s.abs() > least_speed).then_some(())?;
+        let state = match least_lean_m {
+            Some(least) => seen.lean[0].abs().ge(&least).then(|| seen.state_at_rest(scene))??,
+            None => seen.bent_state(scene)?,
+        };
+        Some(SegmentBoundary { frame, state })
     };
     let mut found: Vec<SegmentBoundary> = Vec::new();
     let mut place = from;
@@ -64,15 +97,99 @@ pub(super) fn segment_boundaries(
     found
 }
 
-/// State of the blade, and speed of the tip over the glass, m/s, at the instant when the shutter opens for a
-/// frame. Both are computed from parabolas fitted to the neighbouring frames.
-fn recorded_state(
+/// Says which frames of a recording can start a segment, with the numbers.
+pub(crate) fn describe_start_limits(film: &CameraObservation) -> String {
+    let mm = |speed: f64| format_trimmed(1e3 * speed, 3);
+    format!(
+        "a segment starts where the tip moves over the glass at more than {} mm/s: a tenth of the head's greatest \
+         speed of {} mm/s, and {SPEED_DEVIATIONS} deviations of a measured speed of the tip, which is known to {} mm/s",
+        mm(least_sliding_speed(film)),
+        mm(film.head_speed_m_per_s),
+        mm(speed_sd(film))
+    )
+}
+
+/// Smallest speed of the tip over the glass, m/s, that counts as sliding.
+fn least_sliding_speed(film: &CameraObservation) -> f64 {
+    (MIN_SPEED * film.head_speed_m_per_s).max(SPEED_DEVIATIONS * speed_sd(film))
+}
+
+/// Standard deviation, m/s, of the tip's speed from the noise of the frames to which it is fitted.
+fn speed_sd(film: &CameraObservation) -> f64 {
+    let half = half_width_frames(film) as f64;
+    let squares = half * (half + 1.0) * (2.0 * half + 1.0) / 3.0;
+    film.settings.noise[0].sd() * film.rate_hz / squares.sqrt()
+}
+
+/// Usual size of the lean, m, of a blade that is nearly straight while the tip slides; `None` for a blade that
+/// bends, or whose drop is not tracked.
+fn usual_lean_of_straight_blade(
+    scene: &Scene,
+    film: &CameraObservation,
+    view: &CameraParameters,
+) -> Option<f64> {
+    /// Number of frames that are looked at.
+    const FRAMES: usize = 400;
+    let [from, to] = film.settings.frames;
+    let apart = (to - from).div_ceil(FRAMES).max(1);
+    let frames = (from..to).step_by(apart);
+    let least_speed = least_sliding_speed(film);
+    let seen = frames.filter_map(|frame| recorded_motion(scene, film, view, frame));
+    let sliding: Vec<RecordedMotion> =
+        seen.filter(|seen| seen.drop.is_some() && seen.speed_m_per_s.abs() > least_speed).collect();
+    let bent = sliding.iter().filter(|seen| seen.bent_state(scene).is_some()).count();
+    if sliding.is_empty() || bent as f64 >= LEAST_BENT * sliding.len() as f64 {
+        return None;
+    }
+    median_in_place(&mut sliding.iter().map(|seen| seen.lean[0].abs()).collect::<Vec<_>>())
+}
+
+/// Motion of the blade at the instant when the shutter opens for a frame, from parabolas that are fitted to the
+/// neighbouring frames.
+struct RecordedMotion {
+    /// Distance of the tip from the head along the sweep, m, and its rate, m/s.
+    lean: [f64; 2],
+    /// Drop of the head, m, and its rate, m/s; `None` if it is not tracked.
+    drop: Option<[f64; 2]>,
+    /// Speed of the tip over the glass, m/s.
+    speed_m_per_s: f64,
+}
+
+impl RecordedMotion {
+    /// State of a bent blade; without a drop, that of [`Self::state_at_rest`]. `None` if the blade is nearly
+    /// straight or the tip is out of reach.
+    fn bent_state(&self, scene: &Scene) -> Option<LinkState> {
+        let state = match self.drop {
+            None => self.state_at_rest(scene)?,
+            Some([drop, drop_rate]) => {
+                let [theta, phi] = link_angles(&scene.linkage, self.lean[0], drop)?;
+                let [theta_rate, phi_rate] =
+                    link_rates(&scene.linkage, [theta, phi], self.lean[1], drop_rate);
+                LinkState::new(theta, phi, theta_rate, phi_rate)
+            }
+        };
+        ((state[1] - state[0]).abs() > MIN_BEND_RAD).then_some(state)
+    }
+
+    /// State of a blade whose angles are those at rest with the same lean.
+    fn state_at_rest(&self, scene: &Scene) -> Option<LinkState> {
+        /// Relative change of the lean in the finite difference that gives the derivative of the static pose
+        /// with respect to the lean.
+        const NEXT: f64 = 0.02;
+        let [lean, lean_rate] = self.lean;
+        let [theta, phi] = equilibrium_angles(&scene.linkage, lean)?;
+        let [theta_next, phi_next] = equilibrium_angles(&scene.linkage, lean * (1.0 + NEXT))?;
+        let per_length = lean_rate / (NEXT * lean);
+        Some(LinkState::new(theta, phi, (theta_next - theta) * per_length, (phi_next - phi) * per_length))
+    }
+}
+
+fn recorded_motion(
     scene: &Scene,
     film: &CameraObservation,
     view: &CameraParameters,
     frame: usize,
-) -> Option<(LinkState, f64)> {
-    let linkage = &scene.linkage;
+) -> Option<RecordedMotion> {
     let start_s = film.times_s[frame] - film.lead_s();
     let head = scene.drive.motion_at(start_s - view.clock_s);
     let scale = 1.0 + view.scale;
@@ -85,30 +202,16 @@ fn recorded_state(
         Some((film.drop_m[k]? + view.tilt_rad * along - view.offsets_m(film.after_middle_s(k))[1]) / scale)
     });
     film.tip_x_m[frame].or(film.drop_m[frame])?;
-    let speed = lean_rate + head.velocity_m_per_s;
-    let state = match fall {
-        Some((drop, drop_rate)) => {
-            let lean = lean + view.tilt_rad * drop;
-            let [theta, phi] = link_angles(linkage, lean, drop)?;
-            let [theta_rate, phi_rate] = link_rates(linkage, [theta, phi], lean_rate, drop_rate);
-            LinkState::new(theta, phi, theta_rate, phi_rate)
-        }
-        None => {
-            /// Relative change of the lean in the finite difference that gives the derivative of the static
-            /// pose with respect to the lean.
-            const NEXT: f64 = 0.02;
-            let [theta, phi] = equilibrium_angles(linkage, lean)?;
-            let [theta_next, phi_next] = equilibrium_angles(linkage, lean * (1.0 + NEXT))?;
-            let per_length = lean_rate / (NEXT * lean);
-            LinkState::new(theta, phi, (theta_next - theta) * per_length, (phi_next - phi) * per_length)
-        }
-    };
-    Some((state, speed))
+    Some(RecordedMotion {
+        lean: [lean + fall.map_or(0.0, |(drop, _)| view.tilt_rad * drop), lean_rate],
+        drop: fall.map(|(drop, rate)| [drop, rate]),
+        speed_m_per_s: lean_rate + head.velocity_m_per_s,
+    })
 }
 
 /// Half width, in frames, of the window in which rates are fitted.
 fn half_width_frames(film: &CameraObservation) -> usize {
-    ((HALF_WIDTH_S * film.rate_hz).round() as usize).max(1)
+    ((HALF_WIDTH * film.first_segment_s * film.rate_hz).round() as usize).max(1)
 }
 
 /// Value and slope (per second) of a parabola, or of a line, that is fitted to the frames around `frame`.
@@ -162,7 +265,7 @@ fn link_rates(linkage: &Linkage, [theta, phi]: [f64; 2], lean_rate: f64, drop_ra
 
 /// Angles of neck and lip of a blade at rest, with whatever friction force equilibrium requires, for which
 /// the tip is at the distance `lean` from the head along the sweep. They are used if the drop is not tracked.
-fn equilibrium_angles(linkage: &Linkage, lean: f64) -> Option<[f64; 2]> {
+pub(super) fn equilibrium_angles(linkage: &Linkage, lean: f64) -> Option<[f64; 2]> {
     /// Largest neck angle, rad, that is tried.
     const LARGEST_RAD: f64 = 0.7;
     /// Number of neck angles that are tried.

@@ -117,8 +117,11 @@ impl<'a> SearchEnd<'a> {
             return Vec::new();
         }
         let shorter = (self.at.stage > 0).then_some(UncertaintyRun::Shorter);
+        // the interval of an unknown with a prior comes from the curvature alone, which includes the prior
+        let unknowns = &self.model.unknowns;
+        let without_prior = unknowns.parameters().filter(|&i| unknowns.0[i].prior.is_none());
         let sides = |unknown| [false, true].map(|above| UncertaintyRun::Side { unknown, above });
-        let sides = self.model.unknowns.parameters().flat_map(sides);
+        let sides = without_prior.flat_map(sides);
         shorter.into_iter().chain(sides).chain((0..self.settings.twins).map(UncertaintyRun::Twin)).collect()
     }
 
@@ -136,7 +139,7 @@ impl<'a> SearchEnd<'a> {
             return None;
         }
         let (model, first) = self.start_run(run);
-        Some(before.map_or(first, |before| outer_step(&model, before)))
+        Some(before.map_or(first, |before| outer_step(&model, before, false)))
     }
 
     /// The model of a run, and its first iterate.
@@ -193,7 +196,7 @@ impl<'a> RunProgress<'a> {
 
     fn next_iterate(&mut self, end: &SearchEnd<'a>) -> Iterate {
         let (model, first) = self.start.get_or_insert_with(|| end.start_run(self.run));
-        self.last.as_ref().map_or_else(|| first.clone(), |last| outer_step(model, last))
+        self.last.as_ref().map_or_else(|| first.clone(), |last| outer_step(model, last, false))
     }
 }
 

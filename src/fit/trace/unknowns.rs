@@ -7,11 +7,16 @@ use portable_math as math;
 /// Kind of error of the camera that took a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CameraUnknown {
-    /// Part of the distance between the markers of tip and head along the sweep, m, that the lean of the
-    /// blade does not explain.
+    /// Part of the distance between the markers of tip and head along the sweep, m, that neither the lean of the
+    /// blade nor the place of the tip's marker on the lip explains: the head's marker, or the picture's zero.
     OffsetX,
     /// Offset of the drop, m: the measured drop of an upright blade.
     OffsetDrop,
+    /// Distance of the tip's marker beyond the edge of the lip, along the lip, m. The marker turns with the lip.
+    TipAlong,
+    /// Distance of the tip's marker from the middle of the lip, across the lip, m; positive where an upright
+    /// lip has it at larger positions along the sweep. The marker turns with the lip.
+    TipAcross,
     /// Rate of change of [`Self::OffsetX`], m/s; `OffsetX` itself is the offset at the middle of the fitted
     /// frames.
     DriftX,
@@ -32,6 +37,7 @@ impl CameraUnknown {
     pub(super) fn coordinate_unit(self) -> f64 {
         match self {
             Self::OffsetX | Self::OffsetDrop | Self::DriftX | Self::DriftDrop => 1e-4,
+            Self::TipAlong | Self::TipAcross => 1e-4,
             Self::Scale | Self::Tilt => 1e-2,
             Self::Clock => 1e-4,
         }
@@ -110,6 +116,8 @@ pub struct TraceUnknowns(pub Vec<TraceUnknown>);
 pub(crate) struct CameraParameters {
     pub offset_x_m: f64,
     pub offset_drop_m: f64,
+    /// Distances of the tip's marker from the edge of the lip, along and across the lip, m.
+    pub tip_marker_m: [f64; 2],
     pub drift_x_m_per_s: f64,
     pub drift_drop_m_per_s: f64,
     pub scale: f64,
@@ -138,6 +146,12 @@ impl TraceUnknowns {
         (0..self.0.len()).filter(|&i| self.is_parameter(i))
     }
 
+    /// Whether unknown `i` is a constant: a parameter of the scene that starts at the mean of its prior.
+    pub(super) fn is_constant(&self, i: usize) -> bool {
+        let unknown = &self.0[i];
+        self.is_parameter(i) && unknown.prior.is_some_and(|[mean, _]| mean == unknown.start)
+    }
+
     /// Name of unknown `i`, if it is a parameter of the scene.
     pub(super) fn parameter_name(&self, i: usize) -> Option<&str> {
         match &self.0[i].kind {
@@ -156,6 +170,7 @@ impl TraceUnknowns {
         CameraParameters {
             offset_x_m: value(CameraUnknown::OffsetX),
             offset_drop_m: value(CameraUnknown::OffsetDrop),
+            tip_marker_m: [value(CameraUnknown::TipAlong), value(CameraUnknown::TipAcross)],
             drift_x_m_per_s: value(CameraUnknown::DriftX),
             drift_drop_m_per_s: value(CameraUnknown::DriftDrop),
             scale: value(CameraUnknown::Scale),

@@ -184,11 +184,15 @@ fn worst_segments_table(list: &[ChannelMisfit]) -> String {
 
 pub(super) fn nuisances_table(list: &[NuisanceResult]) -> String {
     let head = [(Words, "estimated besides|recording"), (Number, "known beforehand|estimate|95 % interval")];
+    let known = |n: &NuisanceResult| match (n.prior, n.prior_sd) {
+        (Some(prior), Some(sd)) => format!("{} \u{b1} {}", format_number(prior), format_number(sd)),
+        _ => "nothing".to_owned(),
+    };
     let row = |n: &NuisanceResult| -> Vec<HtmlCell> {
         vec![
             (parameter_html(&n.name), Words),
             (n.recording.as_deref().map_or_else(|| escape_text("all"), isolate_name), Name),
-            (format!("{} \u{b1} {}", format_number(n.prior), format_number(n.prior_sd)), Number),
+            (known(n), Number),
             (format_number(n.estimate), Number),
             (format_interval(n.lower_95, n.upper_95, format_number), Number),
         ]

@@ -93,8 +93,8 @@ fn everywhere(t: &str) -> Report {
         nuisances: vec![NuisanceResult {
             recording: Some(own()),
             name: own(),
-            prior: 0.0,
-            prior_sd: 1.0,
+            prior: Some(0.0),
+            prior_sd: Some(1.0),
             estimate: 0.1,
             lower_95: None,
             upper_95: None,

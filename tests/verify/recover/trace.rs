@@ -5,9 +5,11 @@ use wiperlab::fit::job::Job;
 use wiperlab::fit::result::{FitResult, FitStatus};
 use wiperlab::fit::uncertainty::ParameterVerdict;
 use wiperlab::fit::{MeasuredRecording, Problem};
-use wiperlab::recording::Recording;
+use wiperlab::model::parameters::find_parameter;
+use wiperlab::recording::{FrameGrid, Recording};
 use wiperlab::simulate::SolverOptions;
 use wiperlab::simulate::scene::Scene;
+use wiperlab::simulate::sensitivity::{TangentObserver, TangentSeeds, TangentSegment, run_with_tangents};
 use wiperlab::simulate::twin::{Camera, TrackingModel, add_tracking_noise, film_scene};
 
 const SCENE: &str = include_str!("../../../data/scenes/actual-blade.toml");
@@ -23,6 +25,7 @@ const JOB: &str = r#"format = 1
 title = "Recovery of a trace"
 scene = "scene.toml"
 seed = 1
+nuisance = "exact"
 
 [[recording]]
 path = "twin"
@@ -115,6 +118,121 @@ fn a_marker_that_drifts_is_found_where_that_is_asked_for() {
     let (lower, upper) = (drift.lower_95.unwrap(), drift.upper_95.unwrap());
     assert!(lower < CREEP && CREEP < upper && upper - lower < CREEP, "{lower} to {upper}");
     assert!(fitted("", recording()).nuisances.iter().all(|nuisance| !nuisance.name.starts_with("drift")));
+}
+
+/// A real picture has its zero anywhere: at the bottom of the frame, far below the glass.
+#[test]
+fn the_zero_of_the_picture_does_not_matter() {
+    let whole = recording();
+    let mut traces = whole.traces().clone();
+    for column in [&mut traces.tip_y_m, &mut traces.head_y_m] {
+        column.iter_mut().flatten().for_each(|y| *y += 0.1);
+    }
+    let [moved, before] =
+        [Recording::new("twin", whole.grid(), traces, true).unwrap(), whole].map(|film| fitted("", film));
+    assert_found(&moved);
+    for (name, found) in &moved.parameters {
+        let half = 0.5 * (found.upper_95.unwrap() - found.lower_95.unwrap());
+        assert!((found.estimate - before.parameters[name].estimate).abs() < 0.05 * half, "{name}");
+    }
+}
+
+/// Angles of the lip at the instants of a run that are listed in rising order.
+struct LipAngles {
+    times_s: Vec<f64>,
+    angles: Vec<f64>,
+}
+
+impl TangentObserver for LipAngles {
+    fn observe_segment(&mut self, piece: &TangentSegment<'_>) {
+        while let Some(time) = self.times_s.get(self.angles.len()).filter(|time| **time <= piece.end_s) {
+            self.angles.push(piece.sample_at(time.max(piece.start_s)).pose.phi);
+        }
+    }
+}
+
+#[test]
+fn a_marker_that_is_beside_the_edge_of_the_lip_turns_with_the_lip() {
+    let (along_m, across_m) = (2e-4, -1e-4);
+    let whole = recording();
+    let (mut traces, grid) = (whole.traces().clone(), whole.grid());
+    let times_s: Vec<f64> = (0..grid.frames).map(|i| grid.time_s(i)).collect();
+    let mut seen = LipAngles { times_s, angles: Vec::new() };
+    let nothing = TangentSeeds::new(&scene(), &[]).unwrap();
+    run_with_tangents(&scene(), SolverOptions::new(1e-8), &nothing, &mut seen);
+    assert_eq!(seen.angles.len(), grid.frames);
+    for (x, angle) in traces.tip_x_m.iter_mut().zip(&seen.angles) {
+        *x = x.map(|x| x + along_m * angle.sin() + across_m * angle.cos());
+    }
+    let found = fitted("", Recording::new("twin", grid, traces, true).unwrap());
+    assert_found(&found);
+    for (name, truth) in [("tip_along_lip_m", along_m), ("tip_across_lip_m", across_m)] {
+        let marker = found.nuisances.iter().find(|nuisance| nuisance.name == name).unwrap();
+        let half = 0.5 * (marker.upper_95.unwrap() - marker.lower_95.unwrap());
+        assert!((marker.estimate - truth).abs() < 1.5 * half && half < 5e-5, "{name}: {marker:?}");
+    }
+}
+
+/// Factor of a quantity of this unit if lengths are `length` times as large and times `time` times as long;
+/// densities stay the same.
+fn unit_factor(unit: &str, length: f64, time: f64) -> f64 {
+    let (mass, force) = (length.powi(3), length.powi(4) / time.powi(2));
+    match unit {
+        "1" | "rad" => 1.0,
+        "Hz" => 1.0 / time,
+        "m" => length,
+        "kg" => mass,
+        "kg m2" | "kg m^2" => mass * length * length,
+        "N" => force,
+        "N/m" => force / length,
+        "N s/m" => force * time / length,
+        "N m/rad" => force * length,
+        "N m s/rad" => force * length * time,
+        "s/m" => time / length,
+        other => panic!("{other}"),
+    }
+}
+
+/// A blade in other units of length and time is the same blade, so its fit takes the same course.
+#[test]
+fn blades_of_other_sizes_and_speeds_are_fitted_like_the_usual_one() {
+    for (length, time) in [(10.0, 10.0), (0.1, 0.3), (1.0, 30.0)] {
+        let whole = recording();
+        let grid = whole.grid();
+        let slower =
+            FrameGrid { start_s: grid.start_s * time, frame_rate_hz: grid.frame_rate_hz / time, ..grid };
+        let mut traces = whole.traces().clone();
+        for column in [&mut traces.tip_x_m, &mut traces.tip_y_m, &mut traces.head_x_m, &mut traces.head_y_m] {
+            column.iter_mut().flatten().for_each(|x| *x *= length);
+        }
+        let factor = |name: &str| unit_factor(find_parameter(name).unwrap().unit, length, time);
+        let mut other = scene();
+        for (name, value) in scene().written_values() {
+            other = other.with_parameter(name, value * factor(name)).unwrap();
+        }
+        (other.start_s, other.run.stop_s) = (other.start_s * time, other.run.stop_s * time);
+        let stiffer = |end: f64| end * factor("blade.neck_stiffness_n_m_per_rad");
+        let job = JOB.replace("0.0009", &stiffer(0.0009).to_string());
+        let job = Job::parse("job.toml", &job.replace("0.0038", &stiffer(0.0038).to_string())).unwrap();
+        let film = Recording::new("twin", slower, traces, true).unwrap();
+        let measured = MeasuredRecording { recording: film, exposure_s: Some(CAMERA.exposure_s * time) };
+        let result = Problem::new(job, vec![other], vec![measured]).unwrap().fit().unwrap();
+        assert!(result.misfit.as_ref().unwrap().explained, "{length} {time}: {:?}", result.misfit);
+        for (name, found) in &result.parameters {
+            assert_eq!(
+                found.verdict,
+                ParameterVerdict::Identified,
+                "{length} {time} {name}: {:?}",
+                found.reasons
+            );
+            let truth = scene().value(name).unwrap() * factor(name);
+            assert!(
+                (found.estimate / truth - 1.0).abs() < 0.01,
+                "{length} {time} {name}: {}",
+                found.estimate
+            );
+        }
+    }
 }
 
 #[test]

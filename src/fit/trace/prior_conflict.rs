@@ -1,0 +1,134 @@
+//! Whether the estimates of the constants contradict what was known of them.
+//!
+//! With a right model and honest priors, the distance of the estimates from the prior means has the covariance
+//! `P - C` (prior less posterior). Constants that are jointly too far from their priors, and parameters that
+//! move when the priors are made wider, show that a prior or the model is wrong.
+
+use super::uncertainty_run::SearchEnd;
+use nalgebra::{DMatrix, DVector};
+use portable_math as math;
+
+/// Standard normal quantile of the test of all constants together: one right fit in a hundred fails it.
+const Z_99: f64 = 2.326_347_874_040_841;
+/// Smallest fraction of the prior variance of a direction that the recordings must remove; in other directions
+/// the estimates stay at the prior means whatever the recordings show.
+const LEAST_REMOVED: f64 = 0.05;
+/// Largest shift of an estimate by priors of twice the width, in its standard deviations with these priors.
+const MAX_SHIFT_SD: f64 = 1.0;
+/// Number of constants that a doubt names.
+const NAMED: usize = 3;
+
+/// Reasons to doubt all parameters because the constants, or the priors of parameters, are contradicted.
+pub(super) fn prior_conflicts(end: &SearchEnd<'_>) -> Vec<String> {
+    let known: Vec<(usize, f64, f64)> = (0..end.at.point.len())
+        .filter(|&i| end.model.unknowns.is_parameter(i))
+        .filter_map(|i| {
+            let [pull, per_unit] = end.model.unknowns.0[i].prior_residual(end.at.point[i])?;
+            Some((i, pull, per_unit))
+        })
+        .collect();
+    if known.is_empty() {
+        return Vec::new();
+    }
+    let Some(posterior) = end.covariance.information.clone().cholesky().map(|c| c.inverse()) else {
+        return Vec::new();
+    };
+    let reduced = |a: usize, b: usize| posterior[(known[a].0, known[b].0)] * known[a].2 * known[b].2;
+    let removed = DMatrix::from_fn(known.len(), known.len(), |a, b| f64::from(a == b) - reduced(a, b));
+    let pulls: Vec<f64> = known.iter().map(|(_, pull, _)| *pull).collect();
+    let name = |i: usize| end.model.unknowns.parameter_name(i).unwrap_or_default();
+    let mut doubts = Vec::new();
+    if are_jointly_improbable(&removed, &pulls) {
+        let mut furthest = known.clone();
+        furthest.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
+        let named = furthest.iter().take(NAMED);
+        let named: Vec<String> =
+            named.map(|(i, pull, _)| format!("{} by {pull:+.1} deviations", name(*i))).collect();
+        doubts.push(format!(
+            "the {} constants contradict what was known of them, foremost {}",
+            known.len(),
+            named.join(", ")
+        ));
+    }
+    let moved = shifts_by_wider_priors(&end.covariance.information, &known);
+    let free = end.model.unknowns.parameters().filter(|&i| end.model.unknowns.0[i].prior.is_none());
+    let furthest = free.map(|i| (i, moved[i])).max_by(|a, b| a.1.total_cmp(&b.1));
+    if let Some((i, shift)) = furthest.filter(|(_, shift)| *shift > MAX_SHIFT_SD) {
+        doubts.push(format!(
+            "{} moves by {shift:.1} deviations if the priors of the constants are twice as wide",
+            name(i)
+        ));
+    }
+    doubts
+}
+
+/// Whether constants with these pulls, which are their distances from the prior means in prior standard
+/// deviations, lie further out than one fit in a hundred does. `removed` is the covariance of the pulls.
+fn are_jointly_improbable(removed: &DMatrix<f64>, pulls: &[f64]) -> bool {
+    let eigen = removed.clone().symmetric_eigen();
+    let pulls = DVector::from_column_slice(pulls);
+    let directions = (0..pulls.len()).filter(|&k| eigen.eigenvalues[k] > LEAST_REMOVED);
+    let squares: Vec<f64> = directions
+        .map(|k| math::powi(eigen.eigenvectors.column(k).dot(&pulls), 2) / eigen.eigenvalues[k])
+        .collect();
+    squares.iter().sum::<f64>() > chi_squared_99(squares.len())
+}
+
+/// The 99 % quantile of chi2 with `freedoms` degrees of freedom (Wilson and Hilferty 1931).
+fn chi_squared_99(freedoms: usize) -> f64 {
+    let spread = 2.0 / (9.0 * freedoms.max(1) as f64);
+    freedoms as f64 * math::powi(1.0 - spread + Z_99 * spread.sqrt(), 3)
+}
+
+/// Sizes of the shifts of all unknowns if the priors `known` are twice as wide, in standard deviations with these
+/// priors; zeros if the recordings alone do not determine the unknowns.
+fn shifts_by_wider_priors(information: &DMatrix<f64>, known: &[(usize, f64, f64)]) -> Vec<f64> {
+    /// Fraction of the information of a prior that is lost if its standard deviation doubles.
+    const LOST: f64 = 0.75;
+    let (mut wider, n) = (information.clone(), information.nrows());
+    let mut slope = DVector::zeros(n);
+    for (i, pull, per_unit) in known {
+        wider[(*i, *i)] -= LOST * per_unit * per_unit;
+        slope[*i] += LOST * pull * per_unit;
+    }
+    let Some(wider) = wider.cholesky() else { return vec![0.0; n] };
+    let (shift, variance) = (wider.solve(&slope), wider.inverse());
+    (0..n).map(|i| shift[i].abs() / variance[(i, i)].sqrt()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_quantiles_are_those_of_a_table() {
+        // Abramowitz and Stegun, table 26.8
+        for (freedoms, exact) in [(1, 6.635), (5, 15.086), (20, 37.566)] {
+            assert!((chi_squared_99(freedoms) / exact - 1.0).abs() < 0.01, "{freedoms}");
+        }
+        assert!(chi_squared_99(0) == 0.0);
+    }
+
+    #[test]
+    fn pulls_count_only_where_the_recordings_say_something() {
+        let removed = DMatrix::from_diagonal(&DVector::from_vec(vec![1.0, 0.0]));
+        assert!(!are_jointly_improbable(&removed, &[2.0, 0.0]));
+        assert!(are_jointly_improbable(&removed, &[3.0, 0.0]));
+        assert!(!are_jointly_improbable(&DMatrix::zeros(2, 2), &[0.0, 0.0]));
+        // the second constant is known half from the recordings, and its pull is as improbable as twice the first
+        let half = DMatrix::from_diagonal(&DVector::from_vec(vec![1.0, 0.25]));
+        assert!(are_jointly_improbable(&half, &[0.0, 1.6]));
+    }
+
+    /// Two unknowns whose sum is measured exactly, the second known beforehand as 0 with deviation 1 and found
+    /// at 0.8: with a prior of twice the width it is found at 0.94.
+    #[test]
+    fn a_wider_prior_moves_an_estimate_as_a_new_fit_would() {
+        let (data, prior) = (4.0, 1.0);
+        let estimate = |prior: f64| data / (data + prior);
+        let information = DMatrix::from_element(1, 1, data + prior);
+        let [shift] = shifts_by_wider_priors(&information, &[(0, estimate(1.0), 1.0)])[..] else { panic!() };
+        let exact = (estimate(0.25) - estimate(1.0)) * (data + 0.25f64).sqrt();
+        assert!((shift - exact).abs() < 1e-12, "{shift} {exact}");
+    }
+}
