@@ -192,6 +192,9 @@ fn holds_constants(settings: &TraceSearchSettings, at: &Iterate) -> bool {
 /// One outer step; with `held`, constants stay where they are. If no step of the unknowns lowers the cost, only the starting states are fitted; if this
 /// does not lower the cost either, the iterate is settled.
 pub(super) fn outer_step(model: &TraceModel, before: &Iterate, held: bool) -> Iterate {
+    /// Smallest decrease of the cost by which fits of the starting states alone go on: a tenth of a standard
+    /// deviation.
+    const LEAST_STATE_GAIN: f64 = 1e-2;
     const TRIALS: usize = 6;
     let number = before.number + 1;
     let used_up = number >= MAX_STEPS;
@@ -219,7 +222,7 @@ pub(super) fn outer_step(model: &TraceModel, before: &Iterate, held: bool) -> It
         damping *= 10.0;
     }
     match refit(model, before.clone(), MAX_STATE_STEPS, RescuePolicy::Beyond(3.0)) {
-        Some(found) if before.cost - found.cost > least_gain => {
+        Some(found) if before.cost - found.cost > LEAST_STATE_GAIN * unit => {
             Iterate { damping: FIRST_DAMPING, settled: used_up, number, ..found }
         }
         _ => stay(),
