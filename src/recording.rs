@@ -9,7 +9,7 @@ pub mod clock;
 pub mod files;
 mod frame_times;
 pub mod motion_traces;
-pub mod noise_model;
+pub mod noise;
 pub mod quality;
 pub mod video;
 

@@ -11,8 +11,7 @@ use crate::recording::alignment::Alignment;
 use crate::recording::channel::{Channel, InstantKind, ReversalInstants, Window};
 use crate::recording::files::RecordingFile;
 use crate::recording::motion_traces::MotionTraces;
-use crate::recording::noise_model::{RecordingNoise, measure_noise};
-use crate::recording::quality::noise_floor;
+use crate::recording::noise::{ChannelNoise, RecordingNoise, measure_noise, noise_floor};
 use crate::recording::video::RecordingVideo;
 use rayon::prelude::*;
 use short_spectra::Target;
@@ -137,17 +136,16 @@ impl<'a> ConditionComparison<'a> {
         self.measured_side().unwrap_or_else(|| self.model_side())
     }
 
-    /// Standard deviation of the noise of a recorded channel, m. As in a fit to traces, the noise along the
-    /// sweep is measured on the head, whose motion is smooth, and the noise in height on the tip, which stays
-    /// on the glass. If this fails, the scatter from frame to frame is used. `None` without a recording or
-    /// without noise.
+    /// Standard deviation of the noise of a recorded channel, m, as in a fit to traces. If its measurement
+    /// fails, the scatter from frame to frame is used. `None` without a recording or without noise.
     pub(crate) fn noise_m(&self, channel: Channel) -> Option<f64> {
         let noise = self.noise.as_ref()?;
-        let along_m = noise.along_sweep.as_ref().map(|found| found.noise.sd());
+        let sd_m = |found: &Option<ChannelNoise>| found.as_ref().map(|found| found.noise.sd());
         let known_m = match channel {
-            Channel::TipX | Channel::HeadX => along_m,
-            Channel::Deflection => along_m.map(|m| m * std::f64::consts::SQRT_2),
-            Channel::HeadDrop => noise.upwards.as_ref().map(|found| found.noise.sd()),
+            Channel::TipX => sd_m(&noise.tip_x),
+            Channel::HeadX => sd_m(&noise.head_x),
+            Channel::Deflection => noise.deflection_m(),
+            Channel::HeadDrop => sd_m(&noise.head_y),
         };
         known_m.or_else(|| noise_floor(&channel.samples(self.recording()?))).filter(|noise_m| *noise_m > 0.0)
     }

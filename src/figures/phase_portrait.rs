@@ -4,7 +4,6 @@ use super::{FigureBlock, FigureText};
 use crate::compare::{ConditionComparison, TimedRecording};
 use crate::figures::full_figure;
 use crate::recording::channel::{Channel, InstantKind};
-use crate::recording::quality::noise_floor;
 use crate::simulate::ModelSample;
 use crate::text::{format_digits, format_milliseconds, format_percent, format_speed, join_with_and};
 use plain_charts::{ChartAxis, Colour, Figure, Mark, Panel, Series, value_span};
@@ -319,7 +318,7 @@ struct VelocityEstimate {
 fn estimate_velocities(case: &ConditionComparison, spans: &[PortraitSpan]) -> VelocityEstimate {
     let rate_hz = case.measured_or_model().recording.grid().frame_rate_hz;
     let shortest = CentralDifference::of_neighbouring_frames(rate_hz);
-    let noise_m = case.recording().and_then(|r| noise_floor(&r.traces().tip_x_m));
+    let noise_m = case.noise_m(Channel::TipX);
     let noise_m = noise_m.filter(|noise_m| *noise_m > ROUNDING_M);
     let model = case.model_side();
     let swing =

@@ -4,7 +4,7 @@
 use crate::scenes::committed;
 use short_spectra::sampling::exposure_gain;
 use std::f64::consts::{PI, TAU};
-use wiperlab::recording::quality::noise_floor;
+use wiperlab::recording::noise::noise_floor;
 use wiperlab::recording::{FrameGrid, Recording, Traces};
 use wiperlab::simulate::SolverOptions;
 use wiperlab::simulate::twin::film::{

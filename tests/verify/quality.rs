@@ -6,6 +6,7 @@ use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::{PI, TAU};
 use wiperlab::recording::channel::ReversalInstants;
+use wiperlab::recording::noise::{noise_floor, quantisation_step};
 use wiperlab::recording::quality::*;
 use wiperlab::recording::{FrameGrid, Recording, Traces};
 

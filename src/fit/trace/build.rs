@@ -14,9 +14,7 @@ use crate::fit::trace::unknowns::{CameraUnknown, TraceUnknown, TraceUnknowns, Un
 use crate::fit::trace_data::TraceData;
 use crate::recording::Recording;
 use crate::recording::channel::ReversalInstants;
-use crate::recording::noise_model::{
-    AutoregressiveNoise, ChannelNoise, SharedNoise, measure_common_noise, measure_noise,
-};
+use crate::recording::noise::{AutoregressiveNoise, measure_noise};
 use crate::recording::quality::{CameraTilt, measure_quality, measure_tilt};
 use crate::simulate::drive::{Drive, HeadMotionError, smooth_head_motion};
 use crate::simulate::scene::{Scene, StartKind};
@@ -90,11 +88,8 @@ fn build_recording(source: &TraceSource<'_>) -> Result<TraceRecording, HeadMotio
     if own_head {
         scene.drive = Drive::Recorded(Arc::new(smooth_head_motion(recording)?));
     }
-    let (shared, found) = (measure_common_noise(recording), measure_noise(recording));
-    let noise = [
-        channel_noise(traced, recording, found.along_sweep, shared.tip_x.as_ref()),
-        channel_noise(traced, recording, found.upwards, shared.head_y.as_ref()),
-    ];
+    let found = measure_noise(recording);
+    let noise = [found.own_tip_x(), found.own_head_y()].map(|own| channel_noise(traced, recording, own));
     let has = |channel| traced.channels.contains(&channel);
     let settings = ObservationSettings {
         tip_x: has(TraceChannel::TipX) || has(TraceChannel::Deflection),
@@ -103,7 +98,7 @@ fn build_recording(source: &TraceSource<'_>) -> Result<TraceRecording, HeadMotio
         noise,
         frames: [traced.frames.start, traced.frames.end],
     };
-    let shared = [shared.tip_x, shared.head_y].map(|shared| shared.map(|shared| shared.noise_m));
+    let shared = [found.common.tip_x, found.common.head_y].map(|shared| shared.map(|shared| shared.noise_m));
     let glass = measure_glass(recording);
     let first_segment_s = first_segment_s(&scene.linkage);
     let film = CameraObservation::new(
@@ -124,8 +119,7 @@ fn build_recording(source: &TraceSource<'_>) -> Result<TraceRecording, HeadMotio
 fn channel_noise(
     traced: &TraceData,
     recording: &Recording,
-    found: Option<ChannelNoise>,
-    shared: Option<&SharedNoise>,
+    own: Option<AutoregressiveNoise>,
 ) -> AutoregressiveNoise {
     let white = |sd_m: f64| {
         let noise = AutoregressiveNoise::white(sd_m.max(MIN_NOISE_M));
@@ -134,22 +128,13 @@ fn channel_noise(
     if let Some(noise_m) = traced.noise_m {
         return white(noise_m);
     }
-    let Some(ChannelNoise { noise, .. }) = found else {
+    let Some(noise) = own else {
         let measured = measure_quality(recording, None);
         return white(measured.head_x.noise_m.or(measured.tip_x.noise_m).unwrap_or(MIN_NOISE_M));
     };
-    // The factor for the remaining noise assumes that, apart from the common noise, tip and head have equal
-    // noise. If the common share is large, this assumption is wrong, and nothing is subtracted.
-    let left = shared
-        .filter(|shared| shared.share + 2.0 * shared.sd < MAX_SHARED_NOISE)
-        .map_or(1.0, |shared| (1.0 - shared.share * shared.share).sqrt());
-    let sd_m = (noise.sd() * left).max(MIN_NOISE_M);
+    let sd_m = noise.sd().max(MIN_NOISE_M);
     AutoregressiveNoise::new(sd_m, noise.coefficients().to_vec()).unwrap_or_else(|_| white(sd_m))
 }
-
-/// Largest share of common noise that is subtracted from the noise of tip and head. With a larger share, the
-/// remaining noise of the two points cannot be equal.
-const MAX_SHARED_NOISE: f64 = 0.9;
 
 /// Lower limit, m, of the standard deviation of the noise: the rounding error of simulated traces without
 /// noise.

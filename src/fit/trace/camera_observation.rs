@@ -4,7 +4,7 @@ use super::segmentation::equilibrium_angles;
 use crate::model::Linkage;
 use crate::recording::Recording;
 use crate::recording::channel::median_in_place;
-use crate::recording::noise_model::{AutoregressiveNoise, Whitener};
+use crate::recording::noise::{AutoregressiveNoise, Whitener};
 use crate::recording::quality::CameraTilt;
 use crate::simulate::drive::HeadSpline;
 use crate::simulate::scene::Drive;

@@ -8,7 +8,7 @@ use super::levenberg_marquardt::{outer_step, refit, start_stage};
 use super::model::{TraceModel, TraceRecording};
 use super::normal_equations::{TraceCovariance, trace_covariance};
 use super::segment_simulation::{SegmentResiduals, segment_residuals};
-use crate::recording::noise_model::AutoregressiveNoise;
+use crate::recording::noise::AutoregressiveNoise;
 use portable_math as math;
 use portable_math::StandardNormal;
 use rand::{Rng, SeedableRng};

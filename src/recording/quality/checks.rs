@@ -1,8 +1,8 @@
 //! Checks of the frame grid, the exposure and the single columns.
 
 use super::finding::{Check, QualityFinding, Severity};
+use super::gaps::FrameGaps;
 use super::measurement::{ChannelQuality, FEWEST_CYCLES, MeasuredColumn, Optics, Quality};
-use super::noise::FrameGaps;
 use crate::recording::{FrameGrid, Recording};
 use short_spectra::sampling::exposure_gain;
 
@@ -131,7 +131,7 @@ pub(crate) fn check_position_steps(measured: &Quality, optics: &Optics) -> Vec<Q
 /// Finding on positions that are written in steps larger than their noise: the step, not the tracking, then
 /// limits the accuracy.
 fn check_position_step(channel: &ChannelQuality, optics: &Optics) -> Option<QualityFinding> {
-    let step_m = channel.step_m.filter(|&step| channel.noise_m.is_some_and(|noise| noise < step))?;
+    let step_m = channel.coarse_step_m()?;
     let whole = optics.metres_per_pixel.filter(|pixel| (step_m / pixel - 1.0).abs() < PIXEL_NEARNESS);
     let kind = if whole.is_some() { " (whole pixels)" } else { "" };
     let words = format!("written in steps of {:.3} um{kind}, coarser than the noise", step_m * 1e6);

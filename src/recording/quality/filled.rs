@@ -10,8 +10,8 @@
 
 use super::finding::Check;
 use super::measurement::{MOST_POSITIONS, MeasuredColumn};
-use super::noise::{difference_at, noise_of_differences};
 use super::untracked::{UntrackedFrames, join_runs};
+use crate::recording::noise::differences::{difference_at, noise_of_differences};
 use portable_math as math;
 use std::f64::consts::TAU;
 use std::ops::Range;

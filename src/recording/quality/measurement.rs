@@ -1,6 +1,7 @@
 //! Measured properties of a recording: frames, rate, gaps, exposure, and the noise and step of each column.
 
-use super::noise::{FrameGaps, noise_floor, quantisation_step};
+use super::gaps::FrameGaps;
+use crate::recording::noise::{noise_floor, quantisation_step};
 use crate::recording::{Recording, Traces};
 use portable_math as math;
 use schemars::JsonSchema;
@@ -105,6 +106,13 @@ pub fn measure_quality(recording: &Recording, exposure_s: Option<f64>) -> Qualit
 fn measure_channel(samples: &[Option<f64>]) -> ChannelQuality {
     let missing_frames = samples.iter().filter(|v| v.is_none()).count();
     ChannelQuality { missing_frames, noise_m: noise_floor(samples), step_m: quantisation_step(samples) }
+}
+
+impl ChannelQuality {
+    /// The step, m, if it is larger than the noise: rounding is then the larger part of the errors.
+    pub(super) fn coarse_step_m(&self) -> Option<f64> {
+        self.step_m.filter(|step_m| self.noise_m.is_some_and(|noise_m| noise_m < *step_m))
+    }
 }
 
 impl Quality {

@@ -13,7 +13,7 @@
 //! quarter of this size is near and the point afterwards continues its earlier path.
 
 use super::measurement::ChannelQuality;
-use super::noise::difference_at;
+use crate::recording::noise::differences::difference_at;
 
 /// Weight of the two nearer neighbours in the cubic through four points; the two further ones have the weight
 /// -1.

@@ -8,7 +8,7 @@
 //! a different scatter. A trace whose step is coarser than its noise is not judged.
 
 use super::finding::{Check, QualityFinding, Severity};
-use super::measurement::{ChannelQuality, MeasuredColumn};
+use super::measurement::MeasuredColumn;
 use super::smoothing::find_smoothing;
 use portable_math as math;
 use std::f64::consts::TAU;
@@ -167,8 +167,7 @@ pub(super) fn goertzel_power(values: &[f64], bin: usize) -> f64 {
 
 /// Finding that a column was low-pass filtered before its export.
 pub(super) fn check_prefilter(column: &MeasuredColumn, frame_rate_hz: f64) -> Option<QualityFinding> {
-    let ChannelQuality { step_m, noise_m, .. } = column.quality;
-    if step_m.is_some_and(|step| noise_m.is_none_or(|noise| noise < step)) {
+    if column.quality.coarse_step_m().is_some() {
         return None;
     }
     let (cut_hz, words) = match find_smoothing(&collect_segments(column.samples)) {

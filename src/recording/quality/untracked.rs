@@ -4,8 +4,8 @@
 use super::filled::find_filled_frames;
 use super::finding::{Check, QualityFinding, Severity};
 use super::measurement::{ChannelQuality, Optics, Quality, measured_columns};
-use super::noise::noise_floor;
 use super::outliers::outlier_frames;
+use crate::recording::noise::noise_floor;
 use crate::recording::{Recording, Traces};
 use std::ops::Range;
 

@@ -9,7 +9,7 @@
 
 use super::Camera;
 use crate::recording::channel::ReversalInstants;
-use crate::recording::quality::noise_floor;
+use crate::recording::noise::noise_floor;
 use crate::recording::{
     FrameGrid, ON_FRAME_TOLERANCE, Recording, RecordingError, STENCIL, Traces, frame_at, lagrange_through_six,
 };

@@ -2,11 +2,13 @@
 //! of freedom of the fitted motion (Patterson and Thompson 1971, *Biometrika* 58); Schwarz's criterion
 //! selects the order.
 
+use super::ChannelNoise;
 use super::autoregressive::{AutoregressiveNoise, Whitener, raise_order};
 use super::blocks::{NoiseBlock, dot_product, project_out};
-use super::{ChannelNoise, NoiseSource};
+use crate::recording::channel::median_in_place;
 use nalgebra::{DMatrix, DVector};
 use portable_math as math;
+use std::f64::consts::PI;
 
 /// Highest order of the autoregressive process: the noise of trackers consists of vibration and sub-pixel
 /// bias, which last a few frames.
@@ -16,14 +18,19 @@ const MOST_ORDER: usize = 6;
 const ORDERS_WITHOUT_GAIN: usize = 2;
 
 /// Estimates the noise of blocks; `None` if the blocks have too few frames or no noise.
-pub(super) fn estimate_noise(blocks: &[NoiseBlock], source: NoiseSource) -> Option<ChannelNoise> {
+/// At times off the grid, the
+/// noise is white or of first order with a positive correlation.
+pub(super) fn estimate_noise(blocks: &[NoiseBlock]) -> Option<ChannelNoise> {
     let freedoms: usize = blocks.iter().map(NoiseBlock::degrees_of_freedom).sum();
     let price = math::ln(freedoms as f64);
     let mut turns: Vec<f64> = Vec::new();
     let mut best = (restricted_deviance(blocks, &turns)?, turns.clone());
-    for order in 1..=MOST_ORDER {
+    let on_grid = blocks.iter().flat_map(|block| &block.places).all(|place| place.fract() == 0.0);
+    for order in 1..=if on_grid { MOST_ORDER } else { 1 } {
         turns.push(0.0);
-        let Some(found) = minimise_deviance(blocks, &mut turns) else { break };
+        let Some(found) = minimise_deviance(blocks, &mut turns).filter(|_| on_grid || turns[0] > 0.0) else {
+            break;
+        };
         let cost = found + price * order as f64;
         if cost < best.0 {
             best = (cost, turns.clone());
@@ -32,16 +39,11 @@ pub(super) fn estimate_noise(blocks: &[NoiseBlock], source: NoiseSource) -> Opti
             break;
         }
     }
-    estimate_at_optimum(blocks, &best.1, freedoms, source)
+    estimate_at_optimum(blocks, &best.1, freedoms)
 }
 
 /// The noise at the minimum of the deviance, with standard deviations from the curvature of the deviance.
-fn estimate_at_optimum(
-    blocks: &[NoiseBlock],
-    turns: &[f64],
-    frames: usize,
-    source: NoiseSource,
-) -> Option<ChannelNoise> {
+fn estimate_at_optimum(blocks: &[NoiseBlock], turns: &[f64], frames: usize) -> Option<ChannelNoise> {
     const STEP: f64 = 1e-3;
     let at = |turns: &[f64]| {
         let coefficients = coefficients_from_turns(turns);
@@ -68,7 +70,6 @@ fn estimate_at_optimum(
         sd_of_sd_m: 0.5 * sd * (2.0 / frames as f64 + covariance[(0, 0)]).sqrt(),
         sd_of_coefficients: (1..=turns.len()).map(|i| covariance[(i, i)].sqrt()).collect(),
         frames,
-        source,
     })
 }
 
@@ -84,29 +85,51 @@ fn restricted_deviance(blocks: &[NoiseBlock], turns: &[f64]) -> Option<f64> {
     deviance.is_finite().then_some(deviance)
 }
 
-/// Deviance of the blocks and variance of their noise; neighbouring blocks with the same pattern of frames
-/// use the same whitener.
+/// Deviance of the blocks and variance of their noise.
 fn deviance_and_variance(blocks: &[NoiseBlock], noise: &AutoregressiveNoise) -> Option<(f64, f64)> {
-    let (mut left, mut logs, mut freedoms) = (0.0, 0.0, 0);
-    let mut last: Option<(Vec<usize>, Whitener)> = None;
-    for block in blocks {
-        let first = *block.frames.first()?;
-        let pattern: Vec<usize> = block.frames.iter().map(|frame| frame - first).collect();
+    let parts = whiten_blocks(blocks, noise)?;
+    let freedoms: usize = blocks.iter().map(NoiseBlock::degrees_of_freedom).sum();
+    let [squares, logs] = parts.iter().fold([0.0; 2], |sum, part| [sum[0] + part[0], sum[1] + part[1]]);
+    let variance = squares / freedoms as f64;
+    (variance > 0.0).then(|| (freedoms as f64 * math::ln(variance) + logs, variance))
+}
+
+/// For each block, the sum of the squares of its whitened residuals, and the logarithms of the determinants
+/// that enter the deviance. Neighbouring blocks with the same pattern of frames use the same whitener.
+fn whiten_blocks(blocks: &[NoiseBlock], noise: &AutoregressiveNoise) -> Option<Vec<[f64; 2]>> {
+    let mut last: Option<(Vec<f64>, Whitener)> = None;
+    let whiten = |block: &NoiseBlock| {
+        let first = *block.places.first()?;
+        let pattern: Vec<f64> = block.places.iter().map(|place| place - first).collect();
         let kept = last.take().filter(|(of, _)| *of == pattern);
         let (pattern, whitener) = kept.unwrap_or_else(|| {
-            let whitener = Whitener::new(noise, &pattern);
+            let whitener = Whitener::at_places(noise, &pattern);
             (pattern, whitener)
         });
         let (mut values, mut columns) = (block.values.clone(), block.columns.clone());
         whitener.whiten_column(&mut values);
         columns.iter_mut().for_each(|column| whitener.whiten_column(column));
-        logs += project_out(&mut columns, &mut values) + whitener.log_determinant();
-        left += dot_product(&values, &values);
-        freedoms += block.degrees_of_freedom();
+        let logs = project_out(&mut columns, &mut values) + whitener.log_determinant();
         last = Some((pattern, whitener));
-    }
-    let variance = left / freedoms as f64;
-    (variance > 0.0).then(|| (freedoms as f64 * math::ln(variance) + logs, variance))
+        Some([dot_product(&values, &values), logs])
+    };
+    blocks.iter().map(whiten).collect()
+}
+
+/// Standard deviation of noise whose correlations are those of `like`, and the standard deviation of this
+/// estimate, from the median block: blocks with fast motion hardly change it. The median of chi2 with `n`
+/// degrees of freedom is `n (1 - 2/(9 n))^3` (Wilson and Hilferty 1931).
+pub(super) fn estimate_sd_like(blocks: &[NoiseBlock], like: &AutoregressiveNoise) -> Option<[f64; 2]> {
+    let unit = AutoregressiveNoise::new(1.0, like.coefficients().to_vec()).ok()?;
+    let freedoms = || blocks.iter().map(|block| block.degrees_of_freedom() as f64);
+    let parts = whiten_blocks(blocks, &unit)?;
+    let variances = parts
+        .iter()
+        .zip(freedoms())
+        .map(|([squares, _], n)| squares / (n * math::powi(1.0 - 2.0 / (9.0 * n), 3)));
+    let sd = median_in_place(&mut variances.collect::<Vec<_>>())?.sqrt();
+    // (the variance of the median of a normal variable is pi/2 times that of the mean)
+    Some([sd, sd * (0.25 * PI / freedoms().sum::<f64>()).sqrt()])
 }
 
 /// Minimises the deviance over `turns` by Newton's method, and returns the smallest value found.

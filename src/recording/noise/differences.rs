@@ -1,4 +1,4 @@
-//! Measurements on one column: missing frames, noise, and the step of its values.
+//! Noise and step of one column, from the differences between neighbouring frames.
 
 use crate::recording::channel::median_in_place;
 
@@ -32,7 +32,7 @@ pub fn noise_floor(samples: &[Option<f64>]) -> Option<f64> {
 
 /// Standard deviation of the white noise whose absolute differences of this order have the same median as
 /// `sizes`.
-pub(super) fn noise_of_differences(sizes: impl Iterator<Item = f64>, order: usize) -> Option<f64> {
+pub(crate) fn noise_of_differences(sizes: impl Iterator<Item = f64>, order: usize) -> Option<f64> {
     let mut sizes: Vec<f64> = sizes.collect();
     if sizes.len() < FEWEST_DIFFERENCES {
         return None;
@@ -51,7 +51,7 @@ const DIFFERENCE_WEIGHTS: [&[f64]; 6] = [
 ];
 
 /// The difference of an order up to 5 that ends at `frame`.
-pub(super) fn difference_at(samples: &[Option<f64>], frame: usize, order: usize) -> Option<f64> {
+pub(crate) fn difference_at(samples: &[Option<f64>], frame: usize, order: usize) -> Option<f64> {
     let stencil = samples.get(frame.checked_sub(order)?..=frame)?;
     let weighted = stencil.iter().rev().zip(DIFFERENCE_WEIGHTS[order]);
     weighted.map(|(sample, weight)| Some((*sample)? * weight)).sum()
@@ -68,8 +68,13 @@ pub fn quantisation_step(samples: &[Option<f64>]) -> Option<f64> {
         return None;
     }
     let mut step = moves().next()?;
+    let mut farthest = step;
     for distance in moves() {
+        // (the errors of Euclid's algorithm grow with each remainder; a multiple of the step does not have
+        // them)
+        farthest = distance.max(farthest);
         step = approximate_common_divisor(distance, step, rounding);
+        step = farthest / (farthest / step).round();
         if step < largest / MOST_STEPS {
             return None;
         }
@@ -86,42 +91,6 @@ fn approximate_common_divisor(mut larger: f64, mut smaller: f64, rounding: f64) 
     larger
 }
 
-/// Numbers and lengths of the runs of consecutive missing frames.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct FrameGaps {
-    pub missing: usize,
-    pub runs: usize,
-    /// Length of the longest run, frames.
-    pub longest: usize,
-    pub longest_from: usize,
-    /// Greatest common divisor of the distances between present frames: n if every n-th frame was tracked, 0
-    /// if fewer than two frames are present.
-    pub stride: usize,
-}
-
-impl FrameGaps {
-    pub(crate) fn count_gaps(present: impl Iterator<Item = bool>) -> Self {
-        let (mut gaps, mut run, mut last) = (Self::default(), 0, None);
-        for (frame, present) in present.enumerate() {
-            if present {
-                gaps.stride = last.map_or(0, |last| greatest_common_divisor(gaps.stride, frame - last));
-                last = Some(frame);
-            }
-            run = if present { 0 } else { run + 1 };
-            gaps.missing += usize::from(!present);
-            gaps.runs += usize::from(run == 1);
-            if run > gaps.longest {
-                (gaps.longest, gaps.longest_from) = (run, frame + 1 - run);
-            }
-        }
-        gaps
-    }
-}
-
-fn greatest_common_divisor(a: usize, b: usize) -> usize {
-    if b == 0 { a } else { greatest_common_divisor(b, a % b) }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -132,14 +101,6 @@ mod tests {
         let samples: Vec<Option<f64>> = (0..40).map(|i| Some(f64::from(i % 2))).collect();
         let expected = 4.0 / (MAD_OF_NORMAL * 20.0_f64.sqrt());
         assert!((noise_floor(&samples).unwrap() - expected).abs() < 1e-12);
-    }
-
-    #[test]
-    fn the_stride_is_what_all_distances_between_frames_present_share() {
-        let stride =
-            |present: &[usize]| FrameGaps::count_gaps((0..100).map(|frame| present.contains(&frame))).stride;
-        assert_eq!([stride(&[]), stride(&[3]), stride(&[3, 4, 90])], [0, 0, 1]);
-        assert_eq!([stride(&[1, 38, 75]), stride(&[0, 6, 15, 99]), stride(&[2, 4, 8])], [37, 3, 2]);
     }
 
     #[test]
@@ -154,20 +115,15 @@ mod tests {
         let moves = [3, 5, 2, 9, 4, 4, 7, 1, 12, 6, 3, 5];
         let pixels: Vec<Option<f64>> = moves.iter().map(|&i| Some(f64::from(i) * 21.5e-6)).collect();
         assert!((quantisation_step(&pixels).unwrap() - 21.5e-6).abs() < 1e-12);
+        // pixels with decimals, in metres: the differences are multiples of the step only within rounding
+        for (decimals, scale) in [(100.0, 20e-6), (1000.0, 21.37e-6), (1000.0, 1e-3 / 47.3)] {
+            let pixels = (0..3000).map(|i| 2000.0 + 0.6 * f64::from(i) + 300.0 * (f64::from(i) / 97.0).sin());
+            let metres: Vec<_> =
+                pixels.map(|x: f64| Some((x * decimals).round() / decimals * scale)).collect();
+            let step = quantisation_step(&metres).unwrap();
+            assert!((step / scale * decimals - 1.0).abs() < 1e-6, "{step}");
+        }
         let smooth: Vec<Option<f64>> = (0..40).map(|i| Some(f64::from(i).sin())).collect();
         assert_eq!(quantisation_step(&smooth), None);
-    }
-
-    #[test]
-    fn gaps_at_both_ends_and_the_first_of_equal_ones_count() {
-        let present = [false, true, false, false, true, true, false, false];
-        assert_eq!(
-            FrameGaps::count_gaps(present.into_iter()),
-            FrameGaps { missing: 5, runs: 3, longest: 2, longest_from: 2, stride: 1 }
-        );
-        assert_eq!(
-            FrameGaps::count_gaps([true; 3].into_iter()),
-            FrameGaps { stride: 1, ..FrameGaps::default() }
-        );
     }
 }

@@ -129,8 +129,10 @@ pub(crate) struct Whitener {
 /// Step of the filter from one present frame to the next.
 #[derive(Debug, Clone, PartialEq)]
 struct WhiteningStep {
-    /// Number of frames since the previous present frame.
+    /// Number of whole frames since the previous present frame.
     ahead: usize,
+    /// Correlation of the noise over the fraction of a frame after these whole frames.
+    decay: f64,
     /// Standard deviation of the innovation.
     sd: f64,
     /// Kalman gain: change of the estimate of the last frames per unit of the innovation.
@@ -140,18 +142,28 @@ struct WhiteningStep {
 impl Whitener {
     /// The map for `frames`, the indices of the present frames in rising order.
     pub(crate) fn new(noise: &AutoregressiveNoise, frames: &[usize]) -> Self {
+        Self::at_places(noise, &frames.iter().map(|frame| *frame as f64).collect::<Vec<_>>())
+    }
+
+    /// The map for frames at true times, `places`, in mean frames and in rising order. Between whole frames,
+    /// the noise must be white or of first order: over a time `t`, its correlation is `r^t`, where `r` is its
+    /// coefficient.
+    pub(crate) fn at_places(noise: &AutoregressiveNoise, places: &[f64]) -> Self {
         let mut coefficients = [0.0; MOST_COEFFICIENTS];
         coefficients[..noise.coefficients().len()].copy_from_slice(noise.coefficients());
         let order = noise.coefficients().len().max(1);
-        let mut whitener = Self { coefficients, order, steps: Vec::with_capacity(frames.len()) };
+        let mut whitener = Self { coefficients, order, steps: Vec::with_capacity(places.len()) };
         let mut uncertain = PredictionCovariance::from_stationary(noise, order);
         let innovation = math::powi(noise.innovation_sd(), 2);
-        let mut before = frames.first().copied();
-        for &frame in frames {
-            let ahead = before.replace(frame).map_or(0, |before| frame.saturating_sub(before));
+        let mut before = places.first().copied();
+        for &place in places {
+            let step = before.replace(place).map_or(0.0, |before| place - before);
+            let (ahead, rest) = (step as usize, step.fract());
+            let decay = if rest > 0.0 { math::exp(rest * math::ln(coefficients[0].abs())) } else { 1.0 };
             (0..ahead).for_each(|_| uncertain.advance_frame(&whitener.coefficients, innovation));
+            uncertain.advance_fraction(decay, math::powi(noise.sd(), 2));
             let (sd, gain) = uncertain.observe_latest();
-            whitener.steps.push(WhiteningStep { ahead, sd, gain });
+            whitener.steps.push(WhiteningStep { ahead, decay, sd, gain });
         }
         whitener
     }
@@ -162,6 +174,7 @@ impl Whitener {
         let mut memory = [0.0; MOST_COEFFICIENTS];
         for (value, step) in column.iter_mut().zip(&self.steps) {
             (0..step.ahead).for_each(|_| self.predict_next(&mut memory));
+            memory[0] *= step.decay;
             let innovation = *value - memory[0];
             memory.iter_mut().zip(&step.gain).for_each(|(past, gain)| *past += gain * innovation);
             *value = innovation / step.sd;
@@ -214,6 +227,12 @@ impl PredictionCovariance {
             self.covariance[0][i] = with_next[i - 1];
         }
         self.covariance[0][0] = next;
+    }
+
+    /// Advances noise of first order by a part of a frame over which its correlation is `decay`.
+    fn advance_fraction(&mut self, decay: f64, variance: f64) {
+        let latest = &mut self.covariance[0][0];
+        *latest = decay * decay * *latest + (1.0 - decay * decay) * variance;
     }
 
     /// Measurement update with the latest frame: returns the standard deviation of its innovation and the
@@ -330,6 +349,29 @@ mod tests {
         };
         let expected = [0.5, innovation(-2.0, 1.0, 1), innovation(0.5, -2.0, 5)];
         assert!(column.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-15), "{column:?} {expected:?}");
+    }
+
+    /// At true times, the covariance of noise of first order is `sd^2 exp(-|t - t'|/tau)`.
+    #[test]
+    fn the_map_at_true_times_is_the_inverse_cholesky_factor_of_the_covariance() {
+        let tau = 3.7;
+        for (noise, correlated) in [(vec![(-1.0 / tau as f64).exp()], 1.0), (vec![], 0.0)] {
+            let noise = AutoregressiveNoise::new(3e-6, noise).unwrap();
+            let places: Vec<f64> =
+                (0..60).map(|i| 1.3 * f64::from(i) + 0.6 * f64::from(i * i).sin()).collect();
+            let covariance = DMatrix::from_fn(60, 60, |i, j| {
+                let apart = (places[i] - places[j]).abs();
+                9e-12 * if i == j { 1.0 } else { correlated * (-apart / tau).exp() }
+            });
+            let lower = covariance.cholesky().unwrap().l();
+            let column = DVector::from_fn(60, |i, _| 1e-6 * (1.7 * i as f64).sin());
+            let expected = lower.solve_lower_triangular(&column).unwrap();
+            let (whitener, mut found) = (Whitener::at_places(&noise, &places), column.as_slice().to_vec());
+            whitener.whiten_column(&mut found);
+            assert!(expected.iter().zip(&found).all(|(a, b)| (a - b).abs() < 1e-13), "{noise:?}");
+            let log = 2.0 * lower.diagonal().iter().map(|x| x.ln()).sum::<f64>();
+            assert!((whitener.log_determinant() - log).abs() < 1e-10, "{noise:?}");
+        }
     }
 
     #[test]

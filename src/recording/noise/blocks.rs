@@ -8,6 +8,9 @@ use portable_math as math;
 const LEAST_SHARE: f64 = 0.5;
 /// Minimum number of degrees of freedom of a block.
 const LEAST_LEFT: usize = 4;
+/// Largest end of a block, in half lengths of a block from the middle; 1 if its frames lie on a grid. It
+/// allows for a rate below the mean rate.
+const LONGEST_SPAN: f64 = 2.0;
 /// Largest scatter of the residuals in a block that is used, in units of the median scatter of all blocks. A
 /// block with a larger scatter has an outlier, or the tip is off the glass.
 const OUTLYING_SCATTER: f64 = 3.0;
@@ -21,6 +24,8 @@ pub(super) struct BlockCut<'a> {
     pub degree: usize,
     /// A channel that enters the fit as a further linear term.
     pub covariate: Option<&'a [Option<f64>]>,
+    /// Time of every frame, in mean frames; the index of the frame if the frames lie on a grid.
+    pub places: &'a [f64],
 }
 
 /// A block of frames in which the motion is a linear combination of a few columns.
@@ -28,6 +33,8 @@ pub(super) struct BlockCut<'a> {
 pub(super) struct NoiseBlock {
     /// Indices of the frames that are present.
     pub frames: Vec<usize>,
+    /// Times of these frames, in mean frames.
+    pub places: Vec<f64>,
     pub values: Vec<f64>,
     pub columns: Vec<Vec<f64>>,
 }
@@ -78,6 +85,12 @@ fn cut_block(channel: &[Option<f64>], cut: &BlockCut<'_>, first: usize) -> Optio
     let beside = |i: usize| cut.covariate.map_or(Some(0.0), |beside| beside[i]);
     let frames: Vec<usize> = (first..last).filter(|&i| channel[i].is_some() && beside(i).is_some()).collect();
     let freedoms = cut.degree + 1 + usize::from(cut.covariate.is_some());
+    let half = 0.5 * cut.length as f64;
+    let place = |i: usize| (cut.places[i] - cut.places[first] + 0.5) / half - 1.0;
+    // (a block with a gap of the times is not used)
+    if place(last - 1) > LONGEST_SPAN {
+        return None;
+    }
     if (frames.len() as f64) < LEAST_SHARE * cut.length as f64 || frames.len() < freedoms + LEAST_LEFT {
         return None;
     }
@@ -86,9 +99,7 @@ fn cut_block(channel: &[Option<f64>], cut: &BlockCut<'_>, first: usize) -> Optio
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         Some(values.into_iter().map(|x| x - mean).collect())
     };
-    let half = 0.5 * cut.length as f64;
-    let place = |i: &usize| ((i - first) as f64 + 0.5) / half - 1.0;
-    let powers = (0..=cut.degree).map(|k| frames.iter().map(|i| math::powi(place(i), k as i32)).collect());
+    let powers = (0..=cut.degree).map(|k| frames.iter().map(|i| math::powi(place(*i), k as i32)).collect());
     let mut columns: Vec<Vec<f64>> = powers.collect();
     if cut.covariate.is_some() {
         let moved = centred(&beside)?;
@@ -97,7 +108,8 @@ fn cut_block(channel: &[Option<f64>], cut: &BlockCut<'_>, first: usize) -> Optio
             columns.push(moved);
         }
     }
-    Some(NoiseBlock { values: centred(&|i| channel[i])?, columns, frames })
+    let places = frames.iter().map(|i| cut.places[*i]).collect();
+    Some(NoiseBlock { values: centred(&|i| channel[i])?, columns, frames, places })
 }
 
 /// Leaves out the blocks whose scatter is far above the median, because they contain more than noise.

@@ -4,8 +4,8 @@
 //! describes the motion. The weight of a block is the inverse of its residual variance: a block in which the
 //! blade oscillates has little weight, and a block in which it sticks has much weight.
 
-use super::block_length;
 use super::blocks::{BlockCut, NoiseBlock, cut_blocks, dot_product, keep_quiet_blocks};
+use super::{RecordingCuts, SHORTEST};
 use crate::recording::Recording;
 use portable_math as math;
 
@@ -40,13 +40,18 @@ pub(crate) struct CommonNoise {
 }
 
 /// Measures the noise that both points of a recording share.
-pub(crate) fn measure_common_noise(recording: &Recording) -> CommonNoise {
-    let (traces, length) = (recording.traces(), block_length(recording.grid().frame_rate_hz));
-    let head = channel_residuals(&traces.head_x_m, &BlockCut { length, degree: 3, covariate: None });
-    let glass =
-        channel_residuals(&traces.tip_y_m, &BlockCut { length, degree: 1, covariate: Some(&traces.tip_x_m) });
-    let short = |beside| BlockCut { length: SHORT_BLOCK, degree: 2, covariate: beside };
-    let (level, along) = (short(None), short(Some(&traces.tip_x_m)));
+pub(super) fn measure_common_noise(recording: &Recording, cuts: &RecordingCuts<'_>) -> CommonNoise {
+    let traces = recording.traces();
+    let [head, glass] = [
+        channel_residuals(&traces.head_x_m, &cuts.cut_head(SHORTEST)),
+        channel_residuals(&traces.tip_y_m, &cuts.cut_glass()),
+    ];
+    let [level, along] = [None, cuts.cut_glass().covariate].map(|covariate| BlockCut {
+        length: SHORT_BLOCK,
+        degree: 2,
+        covariate,
+        places: &cuts.places,
+    });
     CommonNoise {
         tip_x: regress_on_other_point(&traces.tip_x_m, &traces.head_x_m, head, &level),
         head_y: regress_on_other_point(&traces.head_y_m, &traces.tip_y_m, glass, &along),

@@ -1,7 +1,7 @@
 //! Synthetic recordings with known noise.
 
 use super::*;
-use crate::recording::noise_model::common_noise::CommonNoise;
+use crate::recording::noise::common_noise::CommonNoise;
 use crate::recording::{FrameGrid, Recording, Traces};
 use portable_math::StandardNormal;
 use rand::{Rng, SeedableRng};
@@ -88,7 +88,7 @@ fn white_noise_is_found_to_be_white_and_of_its_size() {
         let noise = AutoregressiveNoise::white(SD_M).unwrap();
         let found =
             measure_noise(&Sweep { rate_hz: 5000.0, noise, shared: 0.0, lost: 0.05, seed }.recording());
-        for channel in [found.along_sweep.unwrap(), found.upwards.unwrap()] {
+        for channel in [found.head_x.unwrap(), found.tip_y.unwrap()] {
             assert!((channel.noise.sd() - SD_M).abs() < 4.0 * channel.sd_of_sd_m, "{channel:?}");
             coloured += usize::from(!channel.noise.coefficients().is_empty());
         }
@@ -105,7 +105,7 @@ fn noise_that_resembles_its_neighbours_is_found() {
         for seed in 0..3 {
             let noise = AutoregressiveNoise::new(SD_M, vec![rho]).unwrap();
             let found = measure_noise(&Sweep { rate_hz, noise, shared: 0.0, lost: 0.05, seed }.recording());
-            for channel in [found.along_sweep.unwrap(), found.upwards.unwrap()] {
+            for channel in [found.head_x.unwrap(), found.tip_y.unwrap()] {
                 assert_eq!(channel.noise.coefficients().len(), 1, "{rho}: {channel:?}");
                 let off = channel.noise.coefficients()[0] - rho;
                 scores.push(off / channel.sd_of_coefficients[0]);
@@ -118,6 +118,85 @@ fn noise_that_resembles_its_neighbours_is_found() {
     assert!(scores.iter().all(|z| z.abs() < 4.0), "{scores:?}");
 }
 
+/// Noise whose correlation lasts for half of a short block is measured in longer blocks. The errors of the
+/// standard deviations, divided by their estimates, have a standard normal distribution.
+#[test]
+fn noise_that_lasts_for_many_frames_is_found_in_longer_blocks() {
+    for (rate_hz, rho, mean_error) in [(5000.0, 0.8, 0.03), (5000.0, 0.9, 0.08), (10_000.0, 0.9, 0.05)] {
+        let measured = (0..8).map(|seed| {
+            let noise = AutoregressiveNoise::new(SD_M, vec![rho]).unwrap();
+            let sweep = Sweep { rate_hz, noise, shared: 0.0, lost: 0.03, seed };
+            let found = measure_noise(&sweep.recording()).head_x.unwrap();
+            [found.noise.sd() / SD_M, (found.noise.sd() - SD_M) / found.sd_of_sd_m]
+        });
+        let measured: Vec<[f64; 2]> = measured.collect();
+        let mean = measured.iter().map(|[ratio, _]| ratio).sum::<f64>() / 8.0;
+        let square = measured.iter().map(|[_, z]| z * z).sum::<f64>() / 8.0;
+        assert!(
+            (mean - 1.0).abs() < mean_error && (0.3..2.2).contains(&square),
+            "{rate_hz} {rho}: {measured:?}"
+        );
+    }
+}
+
+/// Independent noise that only the tip has doubles the variance of its noise. Without it, tip and head have
+/// noise of the same size. A ring at a fifth of the frame rate hides the difference.
+#[test]
+fn noise_of_another_size_at_the_tip_is_found() {
+    let white = AutoregressiveNoise::white(SD_M).unwrap();
+    for (rate_hz, seed) in [(5000.0, 0), (10_000.0, 0), (10_000.0, 1), (10_000.0, 2)] {
+        let sweep = Sweep { rate_hz, noise: white.clone(), shared: 0.0, lost: 0.03, seed };
+        let alike = sweep.recording();
+        let found = measure_noise(&alike);
+        assert_eq!((&found.tip_x, &found.head_y), (&found.head_x, &found.tip_y));
+        let more = series(&white, sweep.frames(), &mut Xoshiro256PlusPlus::seed_from_u64(seed + 100));
+        let mut traces = alike.traces().clone();
+        traces.tip_x_m.iter_mut().zip(&more).for_each(|(x, more)| *x = x.map(|x| x + more));
+        let unlike = measure_noise(&alike.with_traces(traces).unwrap());
+        if rate_hz < 10_000.0 {
+            assert_eq!(unlike.tip_x, found.tip_x);
+            continue;
+        }
+        let tip = unlike.tip_x.clone().unwrap();
+        let error_m = tip.noise.sd() - 2f64.sqrt() * SD_M;
+        assert!(error_m.abs() < 3.0 * tip.sd_of_sd_m && tip.sd_of_sd_m < 0.05 * SD_M, "{error_m} {tip:?}");
+        assert_eq!(unlike.head_x, found.head_x);
+    }
+}
+
+/// The frames of a camera with an uneven clock: noise of first order whose correlation over a time `t` is
+/// `exp(-t/tau)`.
+#[test]
+fn noise_at_true_times_is_found() {
+    const TAU_FRAMES: f64 = 2.0;
+    let mut generator = Xoshiro256PlusPlus::seed_from_u64(5);
+    let (mut places, mut noise_m): (Vec<f64>, Vec<f64>) = (vec![0.0], vec![0.0]);
+    for _ in 0..8000 {
+        let step = 1.0 + 0.8 * (generator.random::<f64>() - 0.5);
+        let decay = (-step / TAU_FRAMES).exp();
+        let fresh: f64 = generator.sample(StandardNormal);
+        noise_m.push(decay * noise_m[noise_m.len() - 1] + SD_M * (1.0 - decay * decay).sqrt() * fresh);
+        places.push(places[places.len() - 1] + step);
+    }
+    let times_s: Vec<f64> = places.iter().map(|place| place / 8000.0).collect();
+    let path_m = |(t, noise): (&f64, &f64)| Some(0.05 * (TAU * t).cos() + noise);
+    let head_x_m: Vec<Option<f64>> = times_s.iter().zip(&noise_m).map(path_m).collect();
+    let missing = vec![None; times_s.len()];
+    let traces = Traces {
+        tip_x_m: missing.clone(),
+        tip_y_m: missing.clone(),
+        head_y_m: missing,
+        head_x_m,
+        ..Traces::default()
+    };
+    let found = measure_noise(&Recording::from_times("uneven", times_s, traces, true).unwrap());
+    let found = found.head_x.unwrap();
+    let [rho] = found.noise.coefficients().try_into().unwrap();
+    let expected: f64 = (-1.0 / TAU_FRAMES).exp();
+    assert!((rho - expected).abs() < 3.0 * found.sd_of_coefficients[0], "{found:?} {expected}");
+    assert!((found.noise.sd() - SD_M).abs() < 3.0 * found.sd_of_sd_m, "{found:?}");
+}
+
 /// A bias of a twentieth of a pixel that depends on the position within the pixel counts as a further part of
 /// the noise.
 #[test]
@@ -127,7 +206,7 @@ fn a_bias_within_the_pixel_counts_as_noise() {
         let noise = AutoregressiveNoise::white(SD_M).unwrap();
         let sweep = Sweep { rate_hz: 5000.0, noise, shared: 0.0, lost: 0.05, seed };
         let (recording, _) = sweep.with_bias(|x_m| 0.05 * PIXEL_M * (TAU * x_m / PIXEL_M).sin());
-        let found = measure_noise(&recording).along_sweep.unwrap().noise;
+        let found = measure_noise(&recording).head_x.unwrap().noise;
         let expected = SD_M.hypot(0.05 * PIXEL_M / 2f64.sqrt());
         assert!((found.sd() / expected - 1.0).abs() < 0.06, "{found:?} instead of {expected}");
     }
@@ -143,7 +222,7 @@ fn what_both_points_share_is_found_and_taken_out() {
         for seed in 0..3 {
             let sweep = Sweep { rate_hz, noise: noise.clone(), shared: share, lost: 0.05, seed };
             let (recording, noise) = sweep.with_bias(|_| 0.0);
-            let CommonNoise { tip_x, head_y } = measure_common_noise(&recording);
+            let CommonNoise { tip_x, head_y } = measure_noise(&recording).common;
             let shared = [tip_x.unwrap(), head_y.unwrap()];
             for found in &shared {
                 let off = found.share - share;
@@ -176,7 +255,7 @@ fn points_without_common_noise_share_nothing() {
     for seed in 0..15 {
         let noise = AutoregressiveNoise::new(SD_M, vec![0.5]).unwrap();
         let recording = Sweep { rate_hz: 5000.0, noise, shared: 0.0, lost: 0.05, seed }.recording();
-        let CommonNoise { tip_x, head_y } = measure_common_noise(&recording);
+        let CommonNoise { tip_x, head_y } = measure_noise(&recording).common;
         found += usize::from(tip_x.is_some()) + usize::from(head_y.is_some());
     }
     assert!(found <= 2, "{found} of 30");
@@ -189,6 +268,7 @@ fn a_recording_without_noise_or_without_points_has_none() {
     let still = Traces { head_x_m: vec![None; 5000], tip_y_m: vec![None; 5000], ..exact.traces().clone() };
     let blind = Recording::new("blind", exact.grid(), still, true).unwrap();
     for recording in [exact, blind] {
-        assert_eq!(measure_noise(&recording), RecordingNoise { along_sweep: None, upwards: None });
+        let found = measure_noise(&recording);
+        assert_eq!([found.tip_x, found.tip_y, found.head_x, found.head_y], [const { None }; 4]);
     }
 }
