@@ -17,7 +17,7 @@ pub mod source;
 use crate::import::source::{Import, ImportReport, ImportSource, check_file_names, hash_sources};
 use crate::recording::files::{OneOrMany, SourceEntry};
 use assemble::assemble_recording;
-pub use error::{CellProblem, ImportError, ImportProblem, TextLocation};
+pub use error::{ImportError, ImportProblem, TextLocation};
 pub use formats::format_names;
 use formats::{choose_format, find_doubtful_columns};
 pub use options::{ColumnMap, ColumnName, CoordinateScale, ImportOptions, TimeColumn};

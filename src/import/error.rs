@@ -21,26 +21,6 @@ impl Display for TextLocation {
     }
 }
 
-/// Reason why a cell cannot be used.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum CellProblem {
-    /// The cell contains text instead of a number.
-    NotANumber,
-    /// The time or the frame number of the row is missing.
-    NoTime,
-    /// The frame number is not a whole number, or is too large for any recording.
-    NotAFrame,
-    /// The time or frame number is the same as in the row above.
-    Duplicate,
-    /// The time or frame number is smaller than that of the row above.
-    Backwards,
-    /// The time is between two frames of the frame grid.
-    OffGrid,
-    /// The frame number or time is so far from that of the row above that nearly all frames would have no
-    /// row.
-    FarAway,
-}
-
 /// What is wrong with a file or an option.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ImportProblem {
@@ -92,22 +72,6 @@ pub enum ImportError {
         track: String,
         /// Line number of the first of the two rows.
         first: usize,
-    },
-    /// A cell cannot be used.
-    #[error("{place}: column {name}: found `{found}`, expected {expected}; {advice}")]
-    Cell {
-        /// Place of the cell.
-        place: TextLocation,
-        /// Reason why the cell cannot be used.
-        problem: CellProblem,
-        /// Name of the column.
-        name: String,
-        /// Text of the cell.
-        found: Box<str>,
-        /// What the cell should contain.
-        expected: &'static str,
-        /// What to do.
-        advice: &'static str,
     },
     /// Any other problem, for example with an option.
     #[error("{0}")]
@@ -190,12 +154,8 @@ impl ImportError {
     pub(crate) fn ragged_row(place: TextLocation, found: usize, expected: usize) -> Self {
         let advice = "complete the row from what the tracking program shows (a missing value is an empty cell), or \
             export again";
-        Self::format(
-            place,
-            format!("{found} cells"),
-            format!("{expected} as in the rest of the table"),
-            advice,
-        )
+        let expected = format!("{expected} as in the rest of the table");
+        Self::format(place, format!("{found} cells"), expected, advice)
     }
 
     /// Error for files or tracks whose rows do not fall on one common grid of frames.
@@ -236,12 +196,19 @@ impl ImportError {
     /// do.
     pub(crate) fn cell(
         place: TextLocation,
-        problem: CellProblem,
         (name, found): (&str, &str),
-        (expected, advice): (&'static str, &'static str),
+        (expected, advice): (&str, &str),
     ) -> Self {
-        let found = found.chars().take(LONGEST_CELL).collect::<String>().into();
-        Self::Cell { place, problem, name: name.to_owned(), found, expected, advice }
+        let found = found.chars().take(LONGEST_CELL).collect::<String>();
+        Self::format(format!("{place}: column {name}"), format!("`{found}`"), expected, advice)
+    }
+
+    /// The error, with `name` as the name of the track if it is a [`Self::DuplicateRow`].
+    pub(crate) fn with_track(mut self, name: &str) -> Self {
+        if let Self::DuplicateRow { track, .. } = &mut self {
+            name.clone_into(track);
+        }
+        self
     }
 
     pub(crate) fn point(point: &'static str, found: String, expected: &str, advice: String) -> Self {

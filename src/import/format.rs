@@ -1,9 +1,10 @@
-//! The interface of all file formats of tracking programs.
+//! The interface of all file formats of tracking programs, and the names that the files in `formats` use.
 
-use crate::import::error::ImportResult;
-use crate::import::options::ImportOptions;
-use crate::import::reader::Document;
-use crate::import::reader::track_file::TrackFile;
+pub(crate) use crate::import::error::{ImportError, ImportResult, TextLocation};
+pub(crate) use crate::import::options::ImportOptions;
+pub(crate) use crate::import::reader::*;
+pub(crate) use crate::recording::files::YAxis;
+pub(crate) use crate::recording::quality::{Check, QualityFinding, Severity};
 
 /// A file format of a tracking program. Each module in `formats` implements this trait.
 pub(crate) trait FileFormat: Sync {

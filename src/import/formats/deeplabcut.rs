@@ -1,15 +1,8 @@
 //! Reads tables of DeepLabCut and Lightning Pose: predicted positions below three header rows (four if there
 //! are several animals), and labels that were set by hand.
 
-use crate::import::error::{CellProblem, ImportError, ImportResult};
-use crate::import::format::FileFormat;
-use crate::import::options::ImportOptions;
+use crate::import::format::*;
 use crate::import::reader::findings::picked_frames_finding;
-use crate::import::reader::{
-    CellNumber, DelimitedTable, Document, Facts, InstanceFields, PointCells, RowOrder, RowPosition, RowStamp,
-    TableLayout, TextRow, TrackCollector, TrackFile, new_finding,
-};
-use crate::recording::quality::{Check, QualityFinding, Severity};
 
 /// First cells of the header rows; a table of one animal has no row `individuals`.
 const ROW_NAMES: [&str; 4] = ["scorer", "individuals", "bodyparts", "coords"];
@@ -206,95 +199,29 @@ fn header_error(table: &DelimitedTable, row: &TextRow, found: &str, expected: &s
 /// Reads labels that were set by hand. Each row names a picture of a video, and the picture's name ends in
 /// the frame number. The rows may be in any order, and most frames have no row.
 fn read_labels<'a>(
-    document: &'a Document,
+    document: &'a Document<'a>,
     table: &'a DelimitedTable,
     header: &DeepLabCutHeader,
 ) -> ImportResult<TrackFile<'a>> {
-    let picture_cell = header.index_cells - 1;
-    let points = header.points.iter().map(PointCells::fields).collect();
-    let fields = InstanceFields { has_frame: true, has_time: false, clock_cell: picture_cell, points };
-    let mut collector = TrackCollector::new(fields);
-    let mut video: Option<String> = None;
-    let mut rows = table.rows(header.start);
-    while let Some(record) = rows.next_row()? {
-        if record.is_empty() {
-            continue;
-        }
-        table.check_row_length(&record, header.cells, header.cells)?;
-        let path = (0..header.index_cells).map(|cell| record.cell(cell)).collect::<Vec<_>>().join("/");
-        let (folder, picture) = path.rsplit_once(['/', '\\']).unwrap_or(("", &path));
-        let folder = folder.rsplit(['/', '\\']).next().unwrap_or("");
-        let video = video.get_or_insert_with(|| folder.to_owned());
-        if video != folder {
-            return Err(ImportError::wrong_table(
-                table.location(record.line, 1),
-                format!("a picture of the video `{folder}` after those of `{video}`"),
-                "the labels of one video",
-                "import the CollectedData file in the folder of one video, not the merged data set",
-            ));
-        }
-        let frame = frame_number(picture).ok_or_else(|| {
-            let remedy = (
-                "a picture whose name ends in its frame number, such as img0042.png",
-                "rename the pictures by their frames in the table, or import the table of analyze_videos, which \
-                 numbers the frames",
-            );
-            let place = table.cell_location(record.line, picture_cell);
-            let picture = ("picture", record.cell(picture_cell));
-            ImportError::cell(place, CellProblem::NotAFrame, picture, remedy)
-        })?;
-        let mut positions = vec![];
-        for point in &header.points {
-            let number = |cell: Option<usize>, axis: &str| {
-                table.optional_number_at(&record, cell, &format!("{axis} of {}", point.name))
-            };
-            let [x, y] = [number(Some(point.x[0]), "x")?, number(Some(point.y[0]), "y")?];
-            positions.push(RowPosition { x, y, confidence: number(point.confidence, "likelihood")? });
-        }
-        collector.add_row("", RowStamp { line: record.line, frame: Some(frame), time: None }, &positions);
+    let video_of = |record: &RowView| {
+        let cells: Vec<&str> = (0..header.index_cells).map(|cell| record.cell(cell)).collect();
+        let path = cells.join("/");
+        let (folder, _) = path.rsplit_once(['/', '\\']).unwrap_or_default();
+        folder.rsplit(['/', '\\']).next().unwrap_or_default().to_owned()
+    };
+    let (video, other) = table.find_change(header.start, video_of)?;
+    if let Some((line, other)) = other {
+        let found = format!("a picture of the video `{other}` after those of `{video}`");
+        let advice = "import the CollectedData file in the folder of one video, not the merged data set";
+        let place = table.location(line, 1);
+        return Err(ImportError::wrong_table(place, found, "the labels of one video", advice));
     }
-    let video = video.unwrap_or_default();
-    // (the collected track has no name, so the error names the video)
-    let (clocks, tracks) = collector.finish(document.file, RowOrder::Any).map_err(|error| match error {
-        ImportError::DuplicateRow { place, what, found, first, .. } => {
-            ImportError::DuplicateRow { place, what, found, first, track: video.clone() }
-        }
-        other => other,
-    })?;
-    Ok(TrackFile {
-        table: Some(table),
-        clocks,
-        tracks,
-        facts: pixel_facts(),
-        notes: vec![format!("labels of the video `{video}`; the names of the pictures give the frames")],
-        texts: table.head.iter().take(header.start).flat_map(|row| row.cells.iter().cloned()).collect(),
-        ..TrackFile::for_document(document)
-    })
-}
-
-/// The number at the end of a picture's name, before the extension.
-fn frame_number(picture: &str) -> Option<f64> {
-    let stem = picture.rsplit_once('.').map_or(picture, |(stem, _)| stem);
-    let digits = stem.trim_end_matches(|c: char| c.is_ascii_digit()).len();
-    stem.get(digits..)?.parse::<u32>().ok().map(f64::from)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_end_of_a_pictures_name_is_its_frame() {
-        for (name, frame) in [
-            ("img0042.png", Some(42.0)),
-            ("img7.tif", Some(7.0)),
-            ("run2_000.png", Some(0.0)),
-            ("12", Some(12.0)),
-        ] {
-            assert_eq!(frame_number(name), frame, "{name}");
-        }
-        for name in ["img.png", "img12_crop.png", "", "img99999999999999999999.png", "é.png"] {
-            assert_eq!(frame_number(name), None, "{name}");
-        }
-    }
+    let layout = TableLayout::new(header.start, header.cells, header.points.clone());
+    let (frame, order) = (Some(header.index_cells - 1), RowOrder::Any);
+    let layout = TableLayout { frame, names_pictures: true, order, ..layout };
+    let read = layout.read_tracks(document, table, pixel_facts());
+    // (the tracks of the only instance have no name, so the error names the video)
+    let mut export = read.map_err(|error| error.with_track(&video))?;
+    export.notes.push(format!("labels of the video `{video}`; the names of the pictures give the frames"));
+    Ok(export)
 }

@@ -1,12 +1,7 @@
 //! Reads the solution files of DICe (Digital Image Correlation Engine) in tracking mode: one file per subset
 //! of the picture, one row per frame.
 
-use crate::import::error::{ImportError, ImportResult};
-use crate::import::format::FileFormat;
-use crate::import::options::ImportOptions;
-use crate::import::reader::{
-    DelimitedTable, Document, Facts, LostRule, PointCells, TableLayout, TextRow, TrackFile,
-};
+use crate::import::format::*;
 
 const FRAME: &str = "FRAME";
 /// Columns with the centre of the subset in the reference picture, pixels. The columns in `DISPLACEMENT`
@@ -58,12 +53,8 @@ impl FileFormat for Dice {
         };
         let (Some(frame), [Some(x), Some(y)]) = (at(FRAME), REFERENCE.map(at)) else {
             let found = format!("the columns {}", row.texts().join(", "));
-            return Err(ImportError::wrong_table(
-                table.location(row.line, 1),
-                found,
-                ONE_SUBSET,
-                TRACKING_MODE,
-            ));
+            let place = table.location(row.line, 1);
+            return Err(ImportError::wrong_table(place, found, ONE_SUBSET, TRACKING_MODE));
         };
         refuse_full_field(table, index + 1, [frame, x, y])?;
         let rule = |name: &str, is, words| at(name).map(|cell| LostRule { cell: Some(cell), is, words });
@@ -91,21 +82,21 @@ fn find_header<'t>(table: &'t DelimitedTable) -> Option<(usize, &'t TextRow)> {
 /// Refuses a field of points, in which one frame has many reference positions. In tracking mode the frame
 /// number changes and the reference position is constant.
 fn refuse_full_field(table: &DelimitedTable, start: usize, cells: [usize; 3]) -> ImportResult<()> {
-    let mut rows = table.rows(start);
     let mut first: Option<[String; 3]> = None;
-    while let Some(record) = rows.next_row()? {
+    let other = table.find_in_rows(start, |record| {
         let texts = cells.map(|cell| record.cell(cell));
         let first = first.get_or_insert_with(|| texts.map(str::to_owned));
         let again = record.line != table.head[start].line && texts[0] == first[0] && !texts[0].is_empty();
         let differs = |axis: &usize| table.parse_cell(texts[*axis]) != table.parse_cell(&first[*axis]);
-        if let Some(at) = again.then_some(0).or_else(|| (1..3).find(differs)) {
+        let at = again.then_some(0).or_else(|| (1..3).find(differs));
+        Ok(at.map(|at| {
             let name = [FRAME, REFERENCE[0], REFERENCE[1]][at];
             let found = format!("{name} {} after {}", texts[at], first[at]);
             let place = table.cell_location(record.line, cells[at]);
-            return Err(ImportError::wrong_table(place, found, ONE_SUBSET, TRACKING_MODE));
-        }
-    }
-    Ok(())
+            ImportError::wrong_table(place, found, ONE_SUBSET, TRACKING_MODE)
+        }))
+    })?;
+    other.map_or(Ok(()), Err)
 }
 
 /// Refuses a file whose displacements are relative to the previous frame, because the import needs

@@ -2,13 +2,7 @@
 //! table of points.
 
 use super::layouts::{PLAIN_ROW, PointColumns, ProgramTable};
-use crate::import::error::{ImportError, ImportResult};
-use crate::import::format::FileFormat;
-use crate::import::options::ImportOptions;
-use crate::import::reader::{
-    CoordinateUnit, DelimitedTable, Document, Facts, PointCells, RowOrder, TableLayout, TextRow, TrackFile,
-};
-use crate::recording::files::YAxis;
+use crate::import::format::*;
 
 /// The table of the plugin Manual Tracking: one row per click. Two of the column names end in a degree sign,
 /// whose encoding is unknown and which may be lost.
@@ -112,28 +106,14 @@ const FRAME: &str = "Frame";
 /// multi-point tool.
 const COUNTER: &str = "Counter";
 /// Names of measurements that show that a table is ImageJ's if its first column has no name.
-const MEASUREMENTS: [&str; 13] = [
-    "Area",
-    "Mean",
-    "StdDev",
-    "Mode",
-    "Min",
-    "Max",
-    "XM",
-    "YM",
-    "IntDen",
-    "RawIntDen",
-    "Ch",
-    COUNTER,
-    "Label",
-];
+const MEASUREMENTS: &str = "Area Mean StdDev Mode Min Max XM YM IntDen RawIntDen Ch Counter Label";
 
 /// Whether a header belongs to a Results table. It contains positions and a slice; or its first column has no
 /// name, and others have the names of ImageJ's measurements.
 fn is_results_header(names: &[&str]) -> bool {
     let has = |name: &str| names.contains(&name);
     let positions = has("X") && has("Y");
-    let measured = MEASUREMENTS.iter().any(|name| has(name)) && (positions || has(SLICE) || has("Area"));
+    let measured = MEASUREMENTS.split(' ').any(has) && (positions || has(SLICE) || has("Area"));
     (has(SLICE) && positions) || (names.first() == Some(&"") && measured)
 }
 
@@ -150,7 +130,10 @@ fn read_results<'a>(
         let advice = "tick `Centroid` and `Stack position` in Analyze > Set Measurements and measure again";
         return refuse("a Results table without X and Y", "the columns X, Y and Slice", advice);
     };
-    let varies = |cell: Option<usize>| cell.map_or(Ok(false), |cell| column_varies(table, cell));
+    let varies = |cell: Option<usize>| -> ImportResult<bool> {
+        let Some(cell) = cell else { return Ok(false) };
+        Ok(table.find_change(1, |record| record.cell(cell).to_owned())?.1.is_some())
+    };
     let frame = match (at(SLICE), at(FRAME)) {
         (Some(_), Some(_)) if varies(at(SLICE))? && varies(at(FRAME))? => {
             let advice = "the table mixes depths and times: keep the rows of one depth, or say which column \
@@ -158,13 +141,8 @@ fn read_results<'a>(
             let found = "a table in which both Slice and Frame change";
             return refuse(found, "one of them to count the frames", advice);
         }
-        (Some(slice), Some(frame)) => {
-            if varies(at(SLICE))? {
-                slice
-            } else {
-                frame
-            }
-        }
+        (Some(slice), Some(_)) if varies(at(SLICE))? => slice,
+        (Some(_), Some(frame)) => frame,
         (Some(one), None) | (None, Some(one)) => one,
         (None, None) => {
             let advice = "tick `Stack position` in Analyze > Set Measurements and measure again";
@@ -190,16 +168,4 @@ fn read_results<'a>(
     let mut export = export.map_err(|error| explain_duplicate(error, expected, advice))?;
     export.notes.extend(note);
     Ok(export)
-}
-
-/// Whether the texts in a column differ.
-fn column_varies(table: &DelimitedTable, cell: usize) -> ImportResult<bool> {
-    let mut rows = table.rows(1);
-    let mut first: Option<String> = None;
-    while let Some(record) = rows.next_row()? {
-        if first.get_or_insert_with(|| record.cell(cell).to_owned()) != record.cell(cell) {
-            return Ok(true);
-        }
-    }
-    Ok(false)
 }

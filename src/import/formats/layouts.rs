@@ -1,16 +1,9 @@
 //! Formats that are each described by a [`ProgramTable`]: how the file is recognised, what its columns mean,
 //! and what the file or the documentation of its program states. The same code reads all these formats.
 
-use crate::import::error::{ImportError, ImportResult, TextLocation};
-use crate::import::format::FileFormat;
-use crate::import::options::ImportOptions;
+use crate::import::format::*;
 use crate::import::reader::layout::read_point_pairs;
 use crate::import::reader::rate::RATE_AGREEMENT;
-use crate::import::reader::{
-    CellNumber, Clock, Column, CoordinateUnit, DelimitedTable, Document, Facts, LostRule, PointCells,
-    RowOrder, TableLayout, TextRow, TimeUnit, TrackFile, new_finding,
-};
-use crate::recording::quality::{Check, QualityFinding, Severity};
 
 /// Layout of the table of a program. If a column name in this description ends in `*`, the name in the file
 /// may continue with a unit or another sign.
@@ -442,13 +435,11 @@ impl ProgramTable {
         let (CellPlace::RightOf(name) | CellPlace::Below(name)) = setting;
         let found = find_setting(table, setting);
         let (text, place) = found.unwrap_or_else(|| ("", table.location(table.first_line(), 1)));
-        match table.parse_cell(text) {
-            CellNumber::Value(value) if value > 0.0 => Ok((value, place)),
-            _ => {
-                let found = format!("{name} `{}`", text.chars().take(40).collect::<String>());
-                Err(ImportError::wrong_table(place, found, "a number above 0", self.advice))
-            }
-        }
+        let Some(value) = table.parse_cell(text).value().filter(|value| *value > 0.0) else {
+            let found = format!("{name} `{}`", text.chars().take(40).collect::<String>());
+            return Err(ImportError::wrong_table(place, found, "a number above 0", self.advice));
+        };
+        Ok((value, place))
     }
 }
 
@@ -479,10 +470,7 @@ fn find_setting<'t>(table: &'t DelimitedTable, setting: CellPlace) -> Option<(&'
 /// The numbers of rows and points and the time from row to row, s, in the first row of a table without names.
 fn read_counts(table: &DelimitedTable) -> Option<[f64; 3]> {
     let row = table.head.first().filter(|row| row.used_width() == 3)?;
-    let value = |cell: usize| match table.parse_cell(row.cell(cell)) {
-        CellNumber::Value(value) => Some(value),
-        _ => None,
-    };
+    let value = |cell: usize| table.parse_cell(row.cell(cell)).value();
     let counts = [value(0)?, value(1)?, value(2)?];
     let is_count = |value: f64| value >= 1.0 && value.fract() == 0.0;
     (is_count(counts[0]) && is_count(counts[1]) && (0.0..=LONGEST_STEP_S).contains(&counts[2]))
@@ -499,17 +487,15 @@ fn check_repeated_frames(
     let (Some(first), Some(name)) = (first, name) else { return Ok(()) };
     let names = &table.head[header];
     for other in (first + 1..names.cells.len()).filter(|at| is_named(names.cell(*at), name)) {
-        let mut rows = table.rows(header + 1);
-        while let Some(record) = rows.next_row()? {
+        let line = table.find_in_rows(header + 1, |record| {
             let [one, two] = [first, other].map(|cell| table.parse_cell(record.cell(cell)));
-            if one != two {
-                let columns = format!("(numbers {} and {})", first + 1, other + 1);
-                let found = format!("two columns `{}` {columns} that differ", names.cell(first));
-                let advice =
-                    "export again with one of them, or give the number of the right one with --columns";
-                let place = table.location(record.line, 1);
-                return Err(ImportError::format(place, found, "the same in both", advice));
-            }
+            Ok((one != two).then_some(record.line))
+        })?;
+        if let Some(line) = line {
+            let columns = format!("(numbers {} and {})", first + 1, other + 1);
+            let found = format!("two columns `{}` {columns} that differ", names.cell(first));
+            let advice = "export again with one of them, or give the number of the right one with --columns";
+            return Err(ImportError::format(table.location(line, 1), found, "the same in both", advice));
         }
     }
     Ok(())

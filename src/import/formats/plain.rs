@@ -3,19 +3,12 @@
 
 mod columns;
 
-use crate::import::error::ImportResult;
-use crate::import::format::FileFormat;
-use crate::import::options::ImportOptions;
+use self::columns::{clock_difference_error, find_header_columns, find_mapped_columns};
+use crate::import::format::*;
 use crate::import::reader::layout::{self, ClockCell};
 use crate::import::reader::rate::EVEN_FRAMES;
-use crate::import::reader::{
-    CellNumber, ColumnMeaning, DelimitedTable, Document, Facts, PointCells, RowOrder, TableLayout, TextRow,
-    TimeUnit, TrackFile, new_finding,
-};
 use crate::recording::clock::{median_step_s, number_frames};
-use crate::recording::quality::{Check, QualityFinding, Severity};
 pub(super) use columns::unnamed_columns_error;
-use columns::{clock_difference_error, find_header_columns, find_mapped_columns};
 
 /// Format whose header names the columns.
 pub(super) static PLAIN: PlainFormat = PlainFormat { name: "plain" };
@@ -182,12 +175,11 @@ impl TableColumns {
     fn unused_clock_finding(&self, table: &DelimitedTable) -> ImportResult<Option<QualityFinding>> {
         let unused = self.unused_clocks(table).into_iter().find(|(_, kind)| *kind != ColumnMeaning::Frame);
         let Some((column, _)) = unused.filter(|_| self.clock().next().is_none()) else { return Ok(None) };
-        let (mut times, mut rows) = (vec![], table.rows(self.start));
-        while let Some(record) = rows.next_row()? {
-            if let CellNumber::Value(time) = table.parse_cell(record.cell(column)) {
-                times.push(time);
-            }
-        }
+        let mut times = vec![];
+        table.find_in_rows(self.start, |record| {
+            times.extend(table.parse_cell(record.cell(column)).value());
+            Ok(None::<()>)
+        })?;
         let fit = median_step_s(&times).and_then(|step_s| number_frames(&times, step_s));
         let Some(fit) =
             fit.filter(|fit| fit.worst_frames > EVEN_FRAMES || fit.frames.last() != Some(&(times.len() - 1)))

@@ -1,14 +1,8 @@
 //! Reads tables of SLEAP: the analysis CSV, and the tables of sleap-io with one row per point, per instance
 //! or per frame.
 
-use crate::import::error::{ImportError, ImportResult, TextLocation};
-use crate::import::format::FileFormat;
-use crate::import::options::ImportOptions;
+use crate::import::format::*;
 use crate::import::reader::findings::picked_frames_finding;
-use crate::import::reader::{
-    DelimitedTable, Document, Facts, InstanceFields, PointCells, RowOrder, RowPosition, RowStamp, RowView,
-    TextRow, Track, TrackCollector, TrackFile,
-};
 
 /// Name of the column of frame numbers; the first frame of the video is 0.
 const FRAME: &str = "frame_idx";
@@ -47,14 +41,14 @@ impl FileFormat for Sleap {
         let points = columns.instances[0].nodes.iter().map(PointCells::fields).collect();
         let fields = InstanceFields { has_frame: true, has_time: false, clock_cell: columns.frame, points };
         let mut collector = TrackCollector::new(fields);
-        let (mut video, width): (Option<String>, usize) = (None, header.used_width());
+        columns.refuse_other_video(table)?;
+        let width = header.used_width();
         let mut rows = table.rows(1);
         while let Some(record) = rows.next_row()? {
             if record.is_empty() {
                 continue;
             }
             table.check_row_length(&record, width, width)?;
-            columns.check_video(table, &record, &mut video)?;
             for instance in &columns.instances {
                 columns.read_instance(table, &record, instance, &mut collector)?;
             }
@@ -184,24 +178,14 @@ impl SleapColumns {
         Ok(Self { frame, node, video: VIDEO.iter().find_map(|name| at(name)), instances })
     }
 
-    /// Refuses a row of another video than `video`, the video of the rows before it.
-    fn check_video(
-        &self,
-        table: &DelimitedTable,
-        record: &RowView,
-        video: &mut Option<String>,
-    ) -> ImportResult<()> {
+    /// Refuses a table with rows of several videos.
+    fn refuse_other_video(&self, table: &DelimitedTable) -> ImportResult<()> {
         let Some(cell) = self.video else { return Ok(()) };
-        let (known, found) = (video.get_or_insert_with(|| record.cell(cell).to_owned()), record.cell(cell));
-        if known == found {
-            return Ok(());
-        }
-        Err(ImportError::wrong_table(
-            table.cell_location(record.line, cell),
-            format!("a row of the video `{found}` after those of `{known}`"),
-            "the rows of one video",
-            "export each video to a file of its own",
-        ))
+        let (known, other) = table.find_change(1, |record| record.cell(cell).to_owned())?;
+        let Some((line, other)) = other else { return Ok(()) };
+        let found = format!("a row of the video `{other}` after those of `{known}`");
+        let (place, advice) = (table.cell_location(line, cell), "export each video to a file of its own");
+        Err(ImportError::wrong_table(place, found, "the rows of one video", advice))
     }
 
     /// Reads one instance of a row. An instance with neither a track nor a position is skipped.

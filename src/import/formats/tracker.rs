@@ -1,12 +1,7 @@
 //! Reads tables of Tracker (Open Source Physics), from File > Export > Data or copied from its data view.
 
-use crate::import::error::{ImportError, ImportResult};
-use crate::import::format::FileFormat;
-use crate::import::options::ImportOptions;
+use crate::import::format::*;
 use crate::import::reader::layout::{ClockCell, find_clock_difference};
-use crate::import::reader::{
-    DelimitedTable, Document, Facts, PointCells, TableLayout, TextRow, TrackFile, layout,
-};
 
 /// Number of rows at the top of a table that are searched for the column names.
 const HEADER_ROWS: usize = 6;

@@ -1,12 +1,7 @@
 //! Reads this program's own `trace.csv`, in metres and seconds with y upwards. Every number is read back
 //! exactly as it was written (bit for bit).
 
-use crate::import::error::ImportResult;
-use crate::import::format::FileFormat;
-use crate::import::options::ImportOptions;
-use crate::import::reader::{
-    Clock, Column, CoordinateUnit, Document, Facts, TimeUnit, Track, TrackFile, clock_lines,
-};
+use crate::import::format::*;
 use crate::recording::files::{HEADER, YAxis, parse_trace_csv};
 
 pub(crate) struct Wiperlab;
@@ -37,7 +32,7 @@ impl FileFormat for Wiperlab {
             cell: 0,
             frame: Some((0..grid.frames).map(|frame| Some(frame as f64)).collect()),
             time: Some((0..grid.frames).map(|frame| Some(grid.time_s(frame))).collect()),
-            digit: 0.0,
+            ..Clock::default()
         };
         let why = || "a trace.csv is in metres, seconds of the recording itself, and y upwards".to_owned();
         let source = "the column time_s of a trace.csv, which holds times of the recording itself";

@@ -3,60 +3,26 @@
 
 use crate::import::options::CoordinateScale;
 
-/// Names of columns of frame numbers, in lower case and without separators; the last three are Japanese.
-const FRAMES: [&str; 16] = [
-    "frame",
-    "frames",
-    "frameno",
-    "framenr",
-    "framenumber",
-    "framenum",
-    "frameidx",
-    "frameindex",
-    "frameid",
-    "frame#",
-    "bild",
-    "bildnr",
-    "bildnummer",
-    "\u{30d5}\u{30ec}\u{30fc}\u{30e0}",                 // furemu: frame
-    "\u{30d5}\u{30ec}\u{30fc}\u{30e0}\u{756a}\u{53f7}", // furemu bango: frame number
-    "\u{30b3}\u{30de}",                                 // koma: picture of a film
-];
+/// Names of columns of frame numbers, in lower case and without separators; the last three are the Japanese
+/// words furemu (frame), furemu bango (frame number) and koma (picture of a film).
+const FRAMES: &str = "frame frames frameno framenr framenumber framenum frameidx frameindex frameid frame# bild \
+    bildnr bildnummer \u{30d5}\u{30ec}\u{30fc}\u{30e0} \u{30d5}\u{30ec}\u{30fc}\u{30e0}\u{756a}\u{53f7} \u{30b3}\u{30de}";
 /// Names of columns of times, in lower case and without separators, with the unit that a name implies (`None`
 /// if it implies none).
-const TIMES: [(&[&str], Option<TimeUnit>); 4] = [
+const TIMES: [(&str, Option<TimeUnit>); 4] = [
     // (the last name is the Japanese word jikan, time)
-    (&["t", "time", "zeit", "temps", "tempo", "tiempo", "\u{6642}\u{9593}"], None),
+    ("t time zeit temps tempo tiempo \u{6642}\u{9593}", None),
     // (a timestamp may be in seconds or milliseconds, and may count from 1970)
-    (&["timestamp"], Some(TimeUnit::Unknown)),
-    (&["seconds", "second", "sec", "timesec"], Some(TimeUnit::Seconds(1.0))),
-    (&["milliseconds", "millisecond", "msec", "ms", "timems", "timemsec"], Some(TimeUnit::Seconds(1e-3))),
+    ("timestamp", Some(TimeUnit::Unknown)),
+    ("seconds second sec timesec", Some(TimeUnit::Seconds(1.0))),
+    ("milliseconds millisecond msec ms timems timemsec", Some(TimeUnit::Seconds(1e-3))),
 ];
 /// Names of columns that name the object to which a row belongs, in lower case and without separators.
-const KEYS: [&str; 10] =
-    ["id", "track", "trackid", "objectid", "object", "particle", "marker", "point", "label", "name"];
-const CONFIDENCES: [&str; 4] = ["confidence", "likelihood", "score", "conf"];
+const KEYS: &str = "id track trackid objectid object particle marker point label name";
+const CONFIDENCES: &str = "confidence likelihood score conf";
 /// Parts of column names that mark speeds, forces and other quantities that are not positions.
-const NOT_POSITIONS: [&str; 18] = [
-    "v",
-    "vel",
-    "velocity",
-    "speed",
-    "a",
-    "acc",
-    "accel",
-    "acceleration",
-    "f",
-    "force",
-    "d",
-    "disp",
-    "displacement",
-    "delta",
-    "sigma",
-    "std",
-    "err",
-    "error",
-];
+const NOT_POSITIONS: &str =
+    "v vel velocity speed a acc accel acceleration f force d disp displacement delta sigma std err error";
 /// Characters between the parts of a column name.
 const SEPARATORS: [char; 5] = ['_', '.', '-', ' ', ':'];
 
@@ -106,14 +72,14 @@ impl ColumnMeaning {
             return clock;
         }
         let plain = squeeze_name(base);
-        if unit.is_none() && KEYS.contains(&plain.as_str()) {
+        if unit.is_none() && is_listed(KEYS, &plain) {
             return Self::Key;
         }
-        if unit.is_none() && CONFIDENCES.contains(&plain.as_str()) {
+        if unit.is_none() && is_listed(CONFIDENCES, &plain) {
             return Self::Confidence { point: String::new() };
         }
         if let Some((point, last)) = split_last_part(base)
-            && CONFIDENCES.contains(&last.to_lowercase().as_str())
+            && is_listed(CONFIDENCES, &last.to_lowercase())
         {
             return Self::Confidence { point: point.to_owned() };
         }
@@ -164,10 +130,10 @@ fn split_unit(name: &str) -> (&str, Option<&str>) {
 
 fn parse_clock(base: &str, unit: Option<&str>) -> Option<ColumnMeaning> {
     let plain = squeeze_name(base);
-    if FRAMES.contains(&plain.as_str()) {
+    if is_listed(FRAMES, &plain) {
         return unit.is_none().then_some(ColumnMeaning::Frame);
     }
-    let (_, own) = TIMES.iter().find(|(names, _)| names.contains(&plain.as_str()))?;
+    let (_, own) = TIMES.iter().find(|(names, _)| is_listed(names, &plain))?;
     Some(match (unit, own) {
         (Some(unit), _) if squeeze_name(unit).starts_with("frame") => ColumnMeaning::Frame,
         (Some(unit), _) => ColumnMeaning::Time(TimeUnit::parse(unit).unwrap_or(TimeUnit::Unknown)),
@@ -186,7 +152,7 @@ fn parse_coordinate(base: &str) -> Option<(String, usize)> {
     let before = || base.split_once(SEPARATORS).and_then(|(first, point)| Some((point.trim(), axis(first)?)));
     let (point, axis) = behind.or_else(before).or_else(|| parse_joined_coordinate(base))?;
     let position = !point.is_empty()
-        && !point.split(SEPARATORS).any(|part| NOT_POSITIONS.contains(&part.to_lowercase().as_str()));
+        && !point.split(SEPARATORS).any(|part| is_listed(NOT_POSITIONS, &part.to_lowercase()));
     position.then(|| (point.to_owned(), axis))
 }
 
@@ -207,6 +173,11 @@ fn parse_joined_coordinate(base: &str) -> Option<(&str, usize)> {
 /// Splits a column name at its last separator.
 fn split_last_part(name: &str) -> Option<(&str, &str)> {
     name.rsplit_once(SEPARATORS).map(|(point, last)| (point.trim_end_matches(SEPARATORS), last))
+}
+
+/// Whether `name` is one of the names in a list with blanks between them.
+fn is_listed(list: &str, name: &str) -> bool {
+    list.split(' ').any(|listed| listed == name)
 }
 
 /// The name in lower case, without separators.
@@ -290,10 +261,7 @@ pub(crate) enum ColumnUnit {
 
 /// Symbols of units that measure neither a length nor a time, in lower case. Units with a slash or a power,
 /// such as `mm/s`, need no entry.
-const OTHER_UNITS: [&str; 20] = [
-    "deg", "degree", "degrees", "\u{b0}", "rad", "radians", "hz", "khz", "n", "mn", "kn", "v", "mv", "pa",
-    "kpa", "mpa", "g", "kg", "%", "c",
-];
+const OTHER_UNITS: &str = "deg degree degrees \u{b0} rad radians hz khz n mn kn v mv pa kpa mpa g kg % c";
 
 impl ColumnUnit {
     /// Reads a unit; `None` for a text that is no unit.
@@ -306,7 +274,7 @@ impl ColumnUnit {
         if let Some(unit) = TimeUnit::parse(text) {
             return Some(Self::Time(unit));
         }
-        (derived || OTHER_UNITS.contains(&symbol.as_str())).then_some(Self::Other)
+        (derived || is_listed(OTHER_UNITS, &symbol)).then_some(Self::Other)
     }
 
     /// The unit in the name of a column.

@@ -2,7 +2,6 @@
 
 use crate::import::error::ImportResult;
 use crate::import::reader::findings::new_finding;
-use crate::import::reader::number::CellNumber;
 use crate::import::reader::table::DelimitedTable;
 use crate::recording::quality::{Check, QualityFinding, Severity};
 
@@ -34,18 +33,18 @@ pub(crate) fn cut_numbers_finding(
     // for each column: how many numbers are cut, line and text of the first of them, and whether other
     // numbers have all digits
     let mut found = vec![(0_usize, None, false); cells.len()];
-    let mut rows = table.rows(start);
-    while let Some(record) = rows.next_row()? {
+    table.find_in_rows(start, |record| {
         for ((count, first, plain), &cell) in found.iter_mut().zip(cells) {
             let text = record.cell(cell);
             if is_cut_number(text) {
                 *count += 1;
                 first.get_or_insert_with(|| (record.line, text.to_owned()));
             } else if !text.contains(['e', 'E']) {
-                *plain |= matches!(table.parse_cell(text), CellNumber::Value(value) if value != 0.0);
+                *plain |= table.parse_cell(text).value().is_some_and(|value| value != 0.0);
             }
         }
-    }
+        Ok(None::<()>)
+    })?;
     let cut = found.into_iter().zip(cells).find_map(|((count, first, plain), &cell)| {
         first.filter(|_| plain).map(|(line, text)| (count, line, text, cell))
     });

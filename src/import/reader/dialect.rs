@@ -153,7 +153,7 @@ fn numeric_share(cells: &[String], delimiter: Delimiter) -> f64 {
 }
 
 fn is_value(text: &str, decimal: char) -> bool {
-    matches!(parse_number(text, decimal), CellNumber::Value(_))
+    parse_number(text, decimal).value().is_some()
 }
 
 /// The decimal mark that occurs in more of the numbers, point or comma. If the delimiter is a comma, it is

@@ -9,77 +9,101 @@ type FileKind = (&'static str, &'static str);
 const PICTURE: FileKind = ("a picture", "track the points in the tracking program and export their table");
 const VIDEO: FileKind =
     ("a video", "track the points first, e.g. with Tracker or Kinovea, then export their table");
+const CINE: &str = "track the points first, e.g. with Phantom's PCC or Tracker, then export their table";
 const PICKLE: FileKind =
     ("a Python pickle (.pkl, .pickle)", "save the array as CSV (numpy.savetxt, or pandas: to_csv)");
 const SHEET: &str = "save the sheet as CSV (File > Save As) and import that";
+const MATLAB: &str = "write the points as CSV (writematrix)";
+const NUMPY: &str = "save the array as CSV (numpy.savetxt with a header)";
+const RICH_TEXT: &str = "save it as plain text, or export the tracks as CSV";
+const HDF5: FileKind = (
+    "an HDF5 file (SLEAP's .slp, DeepLabCut's .h5)",
+    "export the tracks as CSV: in SLEAP File > Export Analysis CSV, in DeepLabCut analyze_videos with save_as_csv=True",
+);
+const UNPACK: &str = "unpack it first";
+const NUMBERS: &str = "export the numbers from the tracking program";
+const TRACKER_DATA: &str = "open it in Tracker and use File > Export > Data";
+const ZIP: FileKind = (
+    "a zip archive (an .xlsx workbook or a Tracker .trz project)",
+    "save the sheet as CSV, or in Tracker use File > Export > Data",
+);
 const CAMERA_RECORD: FileKind = (
     "a Photron camera's record, not a table",
     "import the tracked points and keep this file in their folder under the same name (run7.csv, run7.cih): the \
      recording rate is read from it",
 );
+const LABVIEW: FileKind = (
+    "a measurement file of LabVIEW (.lvm)",
+    "write the channels as CSV with a column of times (in LabVIEW: Write Delimited Spreadsheet; in Python: \
+     lvm_read and numpy.savetxt)",
+);
+const MTRACKJ: FileKind = (
+    "a project of MTrackJ (.mdf)",
+    "open it in MTrackJ, press Measure with `Display point measurements` ticked, and save that table",
+);
+const UNIVERSAL_FILE: FileKind = (
+    "a universal file of vibration measurements (.uff, .unv)",
+    "write the channels as CSV with a column of times (in Python: pyuff and numpy.savetxt)",
+);
+const WEB_PAGE: FileKind = ("a web page", "save the table itself, not the page around it");
+const KINOVEA: FileKind =
+    ("a project of Kinovea (.kva)", "open it in Kinovea and use File > Export > CSV trajectories");
+const KINOVEA_JSON: FileKind = ("Kinovea's JSON", "in Kinovea use File > Export > CSV trajectories instead");
+const ISBI: FileKind = (
+    "tracks in the layout of the ISBI challenge",
+    "in TrackMate choose the action `TrackFile tracks to XML file` instead",
+);
+const TRACKMATE: FileKind = (
+    "a project of TrackMate",
+    "in TrackMate choose the action `TrackFile tracks to XML file`, or save the spots table as CSV",
+);
+const XML: FileKind = (
+    "XML (a project file)",
+    "a .trk file is Tracker's project, not its data: open it and use File > Export > Data; from other programs export the \
+     tracks as CSV",
+);
 
 /// Kinds of files that are recognised by their first bytes.
-const BY_BYTES: [(&[u8], (&str, &str)); 27] = [
-    (b"PK\x05\x06", ("an empty zip archive", "export the tracks as CSV")),
-    (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", ("an old Excel workbook (.xls)", SHEET)),
-    (b"%PDF", ("a PDF document", "export the numbers from the tracking program")),
+const BY_BYTES: [(FileKind, &[&[u8]]); 19] = [
+    (("an empty zip archive", "export the tracks as CSV"), &[b"PK\x05\x06"]),
+    (("an old Excel workbook (.xls)", SHEET), &[b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"]),
+    (("a PDF document", NUMBERS), &[b"%PDF"]),
+    (("a text document with formatting (RTF)", RICH_TEXT), &[b"{\\rtf"]),
+    (HDF5, &[b"\x89HDF"]),
+    (("a MATLAB file (.mat)", MATLAB), &[b"MATLAB 5.0"]),
+    (("a MATLAB file (.mat, version 7.3)", MATLAB), &[b"MATLAB 7.3"]),
+    (("a NumPy array (.npy)", NUMPY), &[b"\x93NUMPY"]),
+    (("a Parquet table", "save the table as CSV (pandas: to_csv)"), &[b"PAR1"]),
+    (("an SQLite database", "export the table of positions as CSV"), &[b"SQLite format 3"]),
+    (("a gzip archive", UNPACK), &[b"\x1f\x8b"]),
+    (("a 7-Zip archive", UNPACK), &[b"7z\xbc\xaf\x27\x1c"]),
+    (("a RAR archive", UNPACK), &[b"Rar!\x1a\x07"]),
+    (("an xz archive", UNPACK), &[b"\xfd7zXZ\x00"]),
+    (("a Zstandard archive", UNPACK), &[b"\x28\xb5\x2f\xfd"]),
+    (("a bzip2 archive", UNPACK), &[b"BZh91AY&SY"]),
+    (PICTURE, &[b"\x89PNG", b"\xff\xd8\xff", b"GIF8", b"II*\0", b"MM\0*"]),
+    (("a Phantom recording (.cine)", CINE), &[b"CI\x2c\x00"]),
     (
-        b"{\\rtf",
-        ("a text document with formatting (RTF)", "save it as plain text, or export the tracks as CSV"),
+        VIDEO,
+        &[
+            b"RIFF",
+            b"\x1a\x45\xdf\xa3",
+            b"\x30\x26\xb2\x75\x8e\x66\xcf\x11",
+            b"\0\0\x01\xba",
+            b"\0\0\x01\xb3",
+        ],
     ),
-    (
-        b"\x89HDF",
-        (
-            "an HDF5 file (SLEAP's .slp, DeepLabCut's .h5)",
-            "export the tracks as CSV: in SLEAP File > Export Analysis CSV, in DeepLabCut analyze_videos \
-             with save_as_csv=True",
-        ),
-    ),
-    (b"MATLAB 5.0", ("a MATLAB file (.mat)", "write the points as CSV (writematrix)")),
-    (b"MATLAB 7.3", ("a MATLAB file (.mat, version 7.3)", "write the points as CSV (writematrix)")),
-    (b"\x93NUMPY", ("a NumPy array (.npy)", "save the array as CSV (numpy.savetxt with a header)")),
-    (b"PAR1", ("a Parquet table", "save the table as CSV (pandas: to_csv)")),
-    (b"SQLite format 3", ("an SQLite database", "export the table of positions as CSV")),
-    (b"\x1f\x8b", ("a gzip archive", "unpack it first")),
-    (b"7z\xbc\xaf\x27\x1c", ("a 7-Zip archive", "unpack it first")),
-    (b"Rar!\x1a\x07", ("a RAR archive", "unpack it first")),
-    (b"\xfd7zXZ\x00", ("an xz archive", "unpack it first")),
-    (b"\x28\xb5\x2f\xfd", ("a Zstandard archive", "unpack it first")),
-    (b"BZh91AY&SY", ("a bzip2 archive", "unpack it first")),
-    (b"\x89PNG", PICTURE),
-    (b"\xff\xd8\xff", PICTURE),
-    (b"GIF8", PICTURE),
-    (b"II*\0", PICTURE),
-    (b"MM\0*", PICTURE),
-    (b"RIFF", VIDEO),
-    (
-        b"CI\x2c\x00",
-        (
-            "a Phantom recording (.cine)",
-            "track the points first, e.g. with Phantom's PCC or Tracker, then export their table",
-        ),
-    ),
-    (b"\x1a\x45\xdf\xa3", VIDEO),
-    (b"\x30\x26\xb2\x75\x8e\x66\xcf\x11", VIDEO),
-    (b"\x00\x00\x01\xba", VIDEO),
-    (b"\x00\x00\x01\xb3", VIDEO),
 ];
 
 /// Kinds of zip archives that are recognised by a name or a part of a name inside them. The first entry of
 /// this list whose name occurs decides; the empty name in the last entry always occurs.
-const IN_ZIP: [(&[u8], (&str, &str)); 6] = [
+const IN_ZIP: [(&[u8], FileKind); 6] = [
     (b"opendocument.spreadsheet", ("an OpenDocument workbook (.ods)", SHEET)),
     (b"xl/", ("an Excel workbook (.xlsx)", SHEET)),
-    (b".trk", ("a Tracker project (.trz)", "open it in Tracker and use File > Export > Data")),
-    (b".npy", ("NumPy arrays (.npz)", "save the array as CSV (numpy.savetxt with a header)")),
-    (b".csv", ("a zip archive", "unpack it first")),
-    (
-        b"",
-        (
-            "a zip archive (an .xlsx workbook or a Tracker .trz project)",
-            "save the sheet as CSV, or in Tracker use File > Export > Data",
-        ),
-    ),
+    (b".trk", ("a Tracker project (.trz)", TRACKER_DATA)),
+    (b".npy", ("NumPy arrays (.npz)", NUMPY)),
+    (b".csv", ("a zip archive", UNPACK)),
+    (b"", ZIP),
 ];
 /// Number of bytes at each end of a file that are searched for names such as those in `IN_ZIP`. A zip archive
 /// has its first entries at the start and its directory at the end.
@@ -96,72 +120,29 @@ const C3D_BLOCK: usize = 512;
 const C3D_PROCESSORS: std::ops::RangeInclusive<u8> = 84..=86;
 
 /// Kinds of files that are recognised by the beginning of their text, here in lower case.
-const BY_TEXT: [(&str, (&str, &str)); 6] = [
-    (
-        "labview measurement",
-        (
-            "a measurement file of LabVIEW (.lvm)",
-            "write the channels as CSV with a column of times (in LabVIEW: Write Delimited Spreadsheet; in Python: \
-             lvm_read and numpy.savetxt)",
-        ),
-    ),
-    ("<!doctype html", ("a web page", "save the table itself, not the page around it")),
-    ("<html", ("a web page", "save the table itself, not the page around it")),
+const BY_TEXT: [(&str, FileKind); 6] = [
+    ("labview measurement", LABVIEW),
+    ("<!doctype html", WEB_PAGE),
+    ("<html", WEB_PAGE),
     ("#camera information header", CAMERA_RECORD),
-    (
-        "mtrackj ",
-        (
-            "a project of MTrackJ (.mdf)",
-            "open it in MTrackJ, press Measure with `Display point measurements` ticked, and save that table",
-        ),
-    ),
-    ("%!ps", ("a PostScript document", "export the numbers from the tracking program")),
+    ("mtrackj ", MTRACKJ),
+    ("%!ps", ("a PostScript document", NUMBERS)),
 ];
-const UNIVERSAL_FILE: FileKind = (
-    "a universal file of vibration measurements (.uff, .unv)",
-    "write the channels as CSV with a column of times (in Python: pyuff and numpy.savetxt)",
-);
 /// Kinds of XML files that are recognised by a text near their start, here in lower case. The first entry of
 /// this list whose text occurs decides; the text of the last entry occurs in every XML file.
-const IN_MARKUP: [(&str, (&str, &str)); 6] = [
+const IN_MARKUP: [(&str, FileKind); 6] = [
     ("<cih>", CAMERA_RECORD),
-    (
-        "kinoveavideoanalysis",
-        ("a project of Kinovea (.kva)", "open it in Kinovea and use File > Export > CSV trajectories"),
-    ),
-    (
-        "org.opensourcephysics",
-        ("a project of Tracker (.trk)", "open it in Tracker and use File > Export > Data"),
-    ),
-    (
-        "trackcontestisbi",
-        (
-            "tracks in the layout of the ISBI challenge",
-            "in TrackMate choose the action `TrackFile tracks to XML file` instead",
-        ),
-    ),
-    (
-        "<trackmate",
-        (
-            "a project of TrackMate",
-            "in TrackMate choose the action `TrackFile tracks to XML file`, or save the spots table as \
-             CSV",
-        ),
-    ),
-    (
-        "<",
-        (
-            "XML (a project file)",
-            "a .trk file is Tracker's project, not its data: open it and use File > Export > Data; from \
-             other programs export the tracks as CSV",
-        ),
-    ),
+    ("kinoveavideoanalysis", KINOVEA),
+    ("org.opensourcephysics", ("a project of Tracker (.trk)", TRACKER_DATA)),
+    ("trackcontestisbi", ISBI),
+    ("<trackmate", TRACKMATE),
+    ("<", XML),
 ];
 /// Kinds of JSON files that are recognised by a text near their start, here in lower case. The first entry of
 /// this list whose text occurs decides; the empty text of the last entry always occurs.
-const IN_JSON: [(&str, (&str, &str)); 3] = [
-    ("captureframerate", ("Kinovea's JSON", "in Kinovea use File > Export > CSV trajectories instead")),
-    ("videoframerate", ("Kinovea's JSON", "in Kinovea use File > Export > CSV trajectories instead")),
+const IN_JSON: [(&str, FileKind); 3] = [
+    ("captureframerate", KINOVEA_JSON),
+    ("videoframerate", KINOVEA_JSON),
     ("", ("JSON", "export the tracks as CSV")),
 ];
 /// Number of characters at the start of a file that are searched for texts that show its kind.
@@ -169,7 +150,8 @@ const SEARCHED_CHARACTERS: usize = 4000;
 
 /// Error for a file whose bytes show that it is not a table in text form; `None` for any other file.
 pub(crate) fn refuse_bytes(file: &str, bytes: &[u8]) -> Option<ImportError> {
-    let found = BY_BYTES.iter().find(|kind| bytes.starts_with(kind.0)).map(|kind| kind.1);
+    let found = BY_BYTES.iter().find(|(_, starts)| starts.iter().any(|start| bytes.starts_with(start)));
+    let found = found.map(|kind| kind.0);
     let found = found.or_else(|| kind_of_zip(bytes)).or_else(|| kind_by_layout(bytes));
     let start = bytes.get(..SEARCHED_BYTES).unwrap_or(bytes);
     let found = found.or_else(|| contains_bytes(start, b"<cih>").then_some(CAMERA_RECORD));

@@ -86,7 +86,7 @@ impl ClockGrid {
                 .implied_hz
                 .filter(|_| !playback)
                 .and_then(|hz| findings::rounded_times_finding(export.file, &times, hz));
-            let uneven = placed.numbered && !playback && is_uneven(&times, export.clocks[*clock].digit);
+            let uneven = placed.numbered && !playback && is_uneven(&export.clocks[*clock]);
             let ignored = uneven.then(|| findings::ignored_times_finding(export.file));
             for finding in implied.into_iter().chain(rounded).chain(ignored) {
                 // (two clocks of one file often give equal findings; one is enough)

@@ -118,8 +118,7 @@ impl TrackCollector {
             cell: self.shape.clock_cell,
             frame: column(self.shape.has_frame),
             time: column(self.shape.has_time),
-            lines: vec![],
-            digit: 0.0,
+            ..Clock::default()
         };
         let points = self.shape.points.iter().map(|_| <[Column; 3]>::default()).collect();
         self.instances.push(CollectedInstance { key: key.to_owned(), clock, points });
@@ -215,6 +214,7 @@ impl CollectedInstance {
             digit: clock.digit,
             frame: clock.frame.as_ref().map(reordered),
             time: clock.time.as_ref().map(reordered),
+            ..Clock::default()
         };
         self.points.iter_mut().flatten().for_each(|column| *column = column.reorder(&order));
         Ok(())

@@ -68,6 +68,8 @@ pub(crate) struct TableLayout {
     pub most: usize,
     pub frame: Option<usize>,
     pub time: Option<usize>,
+    /// Whether the cell of the frame contains the name of a picture, which ends in the frame number.
+    pub names_pictures: bool,
     /// Frame number of the first row. It is used if the table has neither frame numbers nor times, so that
     /// every row is a frame.
     pub first_frame: f64,
@@ -92,6 +94,7 @@ impl Default for TableLayout {
             most: usize::MAX,
             frame: None,
             time: None,
+            names_pictures: false,
             first_frame: 0.0,
             key: vec![],
             skip_nameless: false,
@@ -197,6 +200,8 @@ impl TableLayout {
             }
             let frame = if self.counts_rows() {
                 Some(self.first_frame + counted)
+            } else if let (true, Some(cell)) = (self.names_pictures, self.frame) {
+                Some(picture_number(table, &record, cell)?)
             } else {
                 table.optional_number_at(&record, self.frame, "frame")?
             };
@@ -298,6 +303,27 @@ struct RowCounts {
     time_decimals: Option<i32>,
 }
 
+/// Frame number at the end of the name of a picture in a cell.
+fn picture_number(table: &DelimitedTable, record: &RowView, cell: usize) -> ImportResult<f64> {
+    let path = record.cell(cell);
+    let picture = path.rsplit(['/', '\\']).next().unwrap_or_default();
+    trailing_number(picture).ok_or_else(|| {
+        let remedy = (
+            "a picture whose name ends in its frame number, such as img0042.png",
+            "rename the pictures by their frames in the table, or import the table of analyze_videos, which numbers \
+             the frames",
+        );
+        ImportError::cell(table.cell_location(record.line, cell), ("picture", path), remedy)
+    })
+}
+
+/// The number at the end of a file name, before the extension.
+fn trailing_number(name: &str) -> Option<f64> {
+    let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
+    let digits = stem.trim_end_matches(|c: char| c.is_ascii_digit()).len();
+    stem.get(digits..)?.parse::<u32>().ok().map(f64::from)
+}
+
 fn blank_line_error(table: &DelimitedTable, line: usize) -> ImportError {
     let expected = "one row a frame: the table does not number its frames";
     let advice =
@@ -340,21 +366,14 @@ pub(crate) fn find_clock_difference(
     first: ClockCell,
     other: ClockCell,
 ) -> ImportResult<Option<ClockDifference>> {
-    let mut rows = table.rows(start);
-    while let Some(record) = rows.next_row()? {
-        let [one, two] = [first, other].map(|clock| read_clock(table, &record, clock));
-        let (one, two) = (one?, two?);
-        let differs = match (one, two) {
+    table.find_in_rows(start, |record| {
+        let differs = match (read_clock(table, record, first)?, read_clock(table, record, other)?) {
             (Some((a, a_digit)), Some((b, b_digit))) => (a - b).abs() > (a_digit + b_digit) * (1.0 + 1e-6),
-            (None, None) => false,
-            _ => true,
+            (one, two) => one.is_some() != two.is_some(),
         };
-        if differs {
-            let texts = [first, other].map(|clock| record.cell(clock.cell).to_owned());
-            return Ok(Some(ClockDifference { line: record.line, cell: other.cell, texts }));
-        }
-    }
-    Ok(None)
+        let texts = || [first, other].map(|clock| record.cell(clock.cell).to_owned());
+        Ok(differs.then(|| ClockDifference { line: record.line, cell: other.cell, texts: texts() }))
+    })
 }
 
 /// Value of a clock in a row, and the size of one unit of its last written digit, both multiplied by the unit
@@ -364,22 +383,18 @@ fn read_clock(
     record: &RowView,
     clock: ClockCell,
 ) -> ImportResult<Option<(f64, f64)>> {
-    let text = record.cell(clock.cell);
-    match table.parse_cell(text) {
-        CellNumber::Value(value) => {
-            let digit = math::powi(10.0, -count_decimals(text, table.dialect.decimal));
-            Ok(Some((value * clock.unit, digit * clock.unit)))
-        }
-        CellNumber::Missing => Ok(None),
-        CellNumber::Text => Err(table.not_a_number_error(record.line, clock.cell, text, "time")),
-    }
+    let digit = math::powi(10.0, -count_decimals(record.cell(clock.cell), table.dialect.decimal));
+    let value = table.number_at(record, clock.cell, "time")?;
+    Ok(value.map(|value| (value * clock.unit, digit * clock.unit)))
 }
 
 /// Number of decimals of a written number: 3 for `0.017`, 2 for `1.7e-1`, and -2 for `1e2`.
 fn count_decimals(text: &str, decimal: char) -> i32 {
-    let (mantissa, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
-    let decimals = mantissa.split_once(decimal).map_or(0, |(_, decimals)| decimals.len());
-    let exponent: i32 = exponent.replace('\u{2212}', "-").parse().unwrap_or(0);
+    let (mantissa, exponent) = match text.bytes().position(|byte| matches!(byte, b'e' | b'E')) {
+        Some(at) => (&text[..at], text[at + 1..].replace('\u{2212}', "-").parse().unwrap_or(0)),
+        None => (text, 0),
+    };
+    let decimals = mantissa.find(decimal).map_or(0, |at| mantissa.len() - at - 1);
     i32::try_from(decimals).unwrap_or(0).saturating_sub(exponent)
 }
 
@@ -423,5 +438,25 @@ mod tests {
         assert_eq!(line("t,u\n0,0\n0.333,0.3333\n0.667,6.667E-1\n", 1.0), None);
         assert_eq!(line("t,u\n0,0\n0.500,0.501\n0.700,0.930\n", 1.0), Some(4));
         assert_eq!(line("t,u\n0,0\n0.5,\n1,1\n", 1.0), Some(3));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_end_of_a_pictures_name_is_its_frame() {
+        for (name, frame) in [
+            ("img0042.png", Some(42.0)),
+            ("img7.tif", Some(7.0)),
+            ("run2_000.png", Some(0.0)),
+            ("12", Some(12.0)),
+        ] {
+            assert_eq!(trailing_number(name), frame, "{name}");
+        }
+        for name in ["img.png", "img12_crop.png", "", "img99999999999999999999.png", "é.png"] {
+            assert_eq!(trailing_number(name), None, "{name}");
+        }
     }
 }

@@ -16,6 +16,13 @@ pub(crate) enum CellNumber {
     Text,
 }
 
+impl CellNumber {
+    /// The number; `None` for a missing value and for other text.
+    pub(crate) fn value(self) -> Option<f64> {
+        if let Self::Value(value) = self { Some(value) } else { None }
+    }
+}
+
 /// Reads the text of a cell, which must have no blanks at its ends. `decimal` is the decimal mark, `.` or
 /// `,`.
 pub(crate) fn parse_number(text: &str, decimal: char) -> CellNumber {

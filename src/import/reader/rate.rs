@@ -26,9 +26,13 @@ const UNEVEN_ROWS: f64 = 0.05;
 /// which is the inverse of its median step.
 pub(crate) const UNEVEN_RATE: f64 = 0.2;
 
-/// Whether times lie on no grid of equal steps, whatever its rate. `digit_s` is the value of the last digit
-/// of the times, s.
-pub(crate) fn is_uneven(times: &[f64], digit_s: f64) -> bool {
+/// Whether the times of a clock lie on no grid of equal steps, whatever its rate.
+pub(crate) fn is_uneven(clock: &Clock) -> bool {
+    *clock.uneven.get_or_init(|| has_uneven_times(&clock.times(), clock.digit))
+}
+
+/// Whether times lie on no grid. `digit_s` is the value of their last digit, s.
+fn has_uneven_times(times: &[f64], digit_s: f64) -> bool {
     let Some(step_s) = clock::median_step_s(times).filter(|step_s| *step_s > 0.0) else { return false };
     let fit = clock::number_frames(times, step_s);
     fit.is_some_and(|fit| {
@@ -40,8 +44,7 @@ pub(crate) fn is_uneven(times: &[f64], digit_s: f64) -> bool {
 
 /// Whether an export has a clock without frame numbers whose times lie on no grid.
 pub(crate) fn has_uneven_clock(export: &TrackFile) -> bool {
-    let timed = export.clocks.iter().filter(|clock| clock.frame.is_none());
-    timed.into_iter().any(|clock| is_uneven(&clock.times(), clock.digit))
+    export.clocks.iter().any(|clock| clock.frame.is_none() && is_uneven(clock))
 }
 
 /// Usual frame rates of films, television and telephones, 1/s.
@@ -93,7 +96,8 @@ pub(crate) fn implied_rate(export: &TrackFile) -> Option<FrameRate> {
     let timed = export.clocks.iter().filter(|clock| clock.time.is_some());
     let longest = timed.max_by_key(|clock| clock.len())?;
     let (frames, times, hz) = number_rows(longest)?;
-    let hz = clock::simplest_rate(hz, |rate| times_fit_rate(&times, &frames, rate));
+    let quantum_s = find_quantum_s(&times);
+    let hz = clock::simplest_rate(hz, |rate| times_fit_rate(&times, &frames, rate, quantum_s));
     let source = format!("the times of {}", export.file);
     Some(FrameRate { hz, error: times_error(&times, &frames, rounding_s(&times, longest.digit)), source })
 }
@@ -157,11 +161,11 @@ fn rounding_s(times: &[f64], digit_s: f64) -> f64 {
 /// Steps to which programs round times, s.
 const QUANTA_S: [f64; 8] = [1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7];
 
-/// Whether times lie on the grid of `rate_hz` that starts at the first time, within the rounding of the
-/// times.
-fn times_fit_rate(times: &[f64], frames: &[f64], rate_hz: f64) -> bool {
+/// Whether times lie on the grid of `rate_hz` that starts at the first time, within their rounding to
+/// multiples of `quantum_s`.
+fn times_fit_rate(times: &[f64], frames: &[f64], rate_hz: f64, quantum_s: Option<f64>) -> bool {
     let (Some(start), Some(first)) = (times.first(), frames.first()) else { return false };
-    let half_quantum = find_quantum_s(times).map_or(1e-9, |q| q / 2.0 * (1.0 + 1e-6));
+    let half_quantum = quantum_s.map_or(1e-9, |q| q / 2.0 * (1.0 + 1e-6));
     // (two half steps of rounding, because the first time is rounded too)
     let fits =
         |(time, frame): (&f64, &f64)| (start + (frame - first) / rate_hz - time).abs() <= 2.0 * half_quantum;

@@ -3,6 +3,7 @@
 use super::dialect::{Delimiter, NumberedLine, is_comment};
 use crate::import::error::{ImportError, ImportResult};
 use csv::{ReaderBuilder, StringRecord};
+use std::borrow::Cow;
 
 /// A row of a table. Its cells are trimmed and have no quotation marks around them.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -44,11 +45,11 @@ impl TextRow {
     }
 }
 
-/// A row of a table whose cells are borrowed from the reader.
+/// A row of a table whose cells are borrowed from the text.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RowView<'r> {
     pub line: usize,
-    cells: &'r StringRecord,
+    cells: &'r [Cow<'r, str>],
 }
 
 impl<'r> RowView<'r> {
@@ -60,7 +61,7 @@ impl<'r> RowView<'r> {
     /// Text of the cell with this index, trimmed and without the quotation marks around it; empty if the row
     /// has no such cell.
     pub(crate) fn cell(&self, index: usize) -> &'r str {
-        self.cells.get(index).map_or("", trim_cell)
+        self.cells.get(index).map_or("", |cell| trim_cell(cell))
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -69,12 +70,12 @@ impl<'r> RowView<'r> {
 
     /// Whether all cells of the row are empty.
     pub(crate) fn is_empty(&self) -> bool {
-        self.cells.iter().all(|cell| trim_cell(cell).is_empty())
+        self.used_width() == 0
     }
 
     /// Number of cells up to the last one that is not empty.
     pub(crate) fn used_width(&self) -> usize {
-        (0..self.len()).rev().find(|&index| !self.cell(index).is_empty()).map_or(0, |last| last + 1)
+        self.cells.iter().rposition(|cell| !trim_cell(cell).is_empty()).map_or(0, |last| last + 1)
     }
 }
 
@@ -98,72 +99,22 @@ pub(crate) struct RowReader<'t> {
     file: &'t str,
     text: &'t str,
     delimiter: Delimiter,
-    source: RecordReader<'t>,
-    /// Byte offset in the text at which `source` starts.
-    base: usize,
-    /// Byte offset up to which lines have been counted; `line` is the line number there.
-    counted: usize,
-    line: usize,
     /// Byte offset at which the current row starts.
     pub start: usize,
-    record: StringRecord,
-}
-
-enum RecordReader<'t> {
-    Csv(Box<csv::Reader<&'t [u8]>>),
-    Blanks(&'t str, usize),
-}
-
-impl<'t> RecordReader<'t> {
-    fn new(text: &'t str, delimiter: Delimiter) -> Self {
-        match delimiter.byte() {
-            Some(byte) => Self::Csv(Box::new(
-                ReaderBuilder::new()
-                    .delimiter(byte)
-                    .has_headers(false)
-                    .flexible(true)
-                    .from_reader(text.as_bytes()),
-            )),
-            None => Self::Blanks(text, 0),
-        }
-    }
-
-    /// Reads the next row into `record`. Returns the range of bytes that was read, which includes the line
-    /// ends before the row; 0 is the start of this reader's text. `None` after the last row.
-    fn read_record(&mut self, record: &mut StringRecord) -> Option<(usize, usize)> {
-        match self {
-            Self::Csv(reader) => {
-                let from = reader.position().byte() as usize;
-                // (reading cannot fail: the text is UTF-8, and rows may differ in length)
-                reader.read_record(record).unwrap_or(false).then(|| (from, reader.position().byte() as usize))
-            }
-            Self::Blanks(text, at) => {
-                let from = *at;
-                let rest = text.get(from..)?;
-                let line = rest.split_inclusive('\n').next()?;
-                *at += line.len();
-                record.clear();
-                line.split_whitespace().for_each(|cell| record.push_field(cell));
-                Some((from, *at))
-            }
-        }
-    }
+    /// Byte offset of the next line, and its number.
+    next: usize,
+    next_line: usize,
+    cells: Vec<Cow<'t, str>>,
+    /// Reader for rows with quotation marks, and the byte offset at which it started. It serves as long as
+    /// such rows follow each other.
+    quoted: Option<(usize, csv::Reader<&'t [u8]>)>,
 }
 
 impl<'t> RowReader<'t> {
     /// Makes a reader of the rows of `text` from byte `start` on. Error messages name `file`.
     pub(crate) fn new(file: &'t str, text: &'t str, delimiter: Delimiter, start: usize) -> Self {
-        Self {
-            file,
-            text,
-            delimiter,
-            source: RecordReader::new(text.get(start..).unwrap_or_default(), delimiter),
-            base: start,
-            counted: start,
-            line: count_lines(&text.as_bytes()[..start.min(text.len())]) + 1,
-            start,
-            record: StringRecord::new(),
-        }
+        let next_line = count_lines(&text.as_bytes()[..start.min(text.len())]) + 1;
+        Self { file, text, delimiter, start, next: start, next_line, cells: vec![], quoted: None }
     }
 
     /// The next row; `None` after the last one. Comments and empty lines are skipped; rows whose cells are
@@ -174,60 +125,64 @@ impl<'t> RowReader<'t> {
     #[allow(clippy::should_implement_trait)] // (no `Iterator`: a row is valid until the next call)
     pub(crate) fn next_row(&mut self) -> ImportResult<Option<RowView<'_>>> {
         let text = self.text;
-        while let Some((from, to)) = self.source.read_record(&mut self.record) {
-            let span = text.get(self.base + from..self.base + to).unwrap_or_default();
-            let is_end = |byte: &&u8| matches!(**byte, b'\n' | b'\r');
-            let before = span.as_bytes().iter().take_while(is_end).count();
-            let after = span.as_bytes()[before..].iter().rev().take_while(is_end).count();
-            self.start = self.base + from + before;
-            // (line ends within a row are not counted: such a row is refused or, if it is a comment, reading
-            // restarts after its first line)
-            self.line += count_lines(&text.as_bytes()[self.counted..self.start]);
-            self.counted = self.start + span.len() - before - after;
-            let row = &span[before..span.len() - after];
-            if row.is_empty() {
+        while let Some(rest) = text.get(self.next..).filter(|rest| !rest.is_empty()) {
+            let end = rest.find('\n').unwrap_or(rest.len());
+            let (row, line) = (rest[..end].trim_end_matches('\r'), self.next_line);
+            self.start = self.next;
+            (self.next, self.next_line) = (self.next + end + 1, line + 1);
+            if row.is_empty() || is_comment(row) {
                 continue;
             }
-            if is_comment(row) {
-                if let Some(end) = row.find('\n') {
-                    self.restart_at(self.start + end); // (a quotation mark in a comment is plain text)
-                }
-                continue;
-            }
-            if row.as_bytes().contains(&b'\n') {
-                let lines = count_lines(row.as_bytes()) + 1;
+            let lines = self.split_row(row);
+            if lines > 1 {
                 return Err(ImportError::format(
-                    format!("{}:{}:1", self.file, self.line),
+                    format!("{}:{line}:1", self.file),
                     format!("a quoted cell that runs over {lines} lines"),
                     "it to end in its own",
                     "close the quotation mark, or export again",
                 ));
             }
-            return Ok(Some(RowView { line: self.line, cells: &self.record }));
+            return Ok(Some(RowView { line, cells: &self.cells }));
         }
         Ok(None)
     }
 
-    /// Continues reading at byte `at` of the text, which must be a line end.
-    fn restart_at(&mut self, at: usize) {
-        self.source = RecordReader::new(self.text.get(at..).unwrap_or_default(), self.delimiter);
-        (self.base, self.counted) = (at, at);
+    /// Splits a row into cells. Returns the number of lines over which its quoted cells run.
+    fn split_row(&mut self, row: &'t str) -> usize {
+        self.cells.clear();
+        let Some(byte) = self.delimiter.byte() else {
+            self.cells.extend(row.split_whitespace().map(Cow::Borrowed));
+            return 1;
+        };
+        if !row.contains('"') {
+            self.cells.extend(row.split(char::from(byte)).map(Cow::Borrowed));
+            return 1;
+        }
+        let (text, start) = (self.text, self.start);
+        let is_next = |(from, reader): &(usize, csv::Reader<&[u8]>)| {
+            let between = text.get(from + reader.position().byte() as usize..start);
+            between.is_some_and(|between| between.bytes().all(|byte| matches!(byte, b'\n' | b'\r')))
+        };
+        let (from, mut reader) = self.quoted.take().filter(is_next).unwrap_or_else(|| {
+            let mut builder = ReaderBuilder::new();
+            builder.delimiter(byte).has_headers(false).flexible(true);
+            (start, builder.from_reader(&text.as_bytes()[start..]))
+        });
+        let mut record = StringRecord::new();
+        // (reading cannot fail: the text is UTF-8, and rows may differ in length)
+        let _ = reader.read_record(&mut record);
+        self.cells.extend(record.iter().map(|cell| Cow::Owned(cell.to_owned())));
+        let used = text.get(start..from + reader.position().byte() as usize).unwrap_or_default();
+        self.quoted = Some((from, reader));
+        count_lines(used.trim_end_matches(['\n', '\r']).as_bytes()) + 1
     }
 }
 
-/// Splits lines into rows of cells. A row with an open quotation mark continues in the next line.
+/// Splits lines into rows of cells.
 pub(crate) fn parse_rows(lines: &[NumberedLine], delimiter: Delimiter) -> Vec<TextRow> {
-    let text: String = lines.iter().flat_map(|(_, line)| [*line, "\n"]).collect();
-    let mut source = RecordReader::new(&text, delimiter);
-    let (mut record, mut rows, mut line) = (StringRecord::new(), vec![], 0);
-    while let Some((from, to)) = source.read_record(&mut record) {
-        let number = lines.get(line).map_or(0, |line| line.0);
-        rows.push(TextRow {
-            line: number,
-            cells: RowView { line: number, cells: &record }.cells(),
-            start: from,
-        });
-        line += count_lines(text.as_bytes().get(from..to).unwrap_or_default());
-    }
-    rows
+    let parse = |(line, text): &NumberedLine| {
+        let cells = RowReader::new("", text, delimiter, 0).next_row().ok()??.cells();
+        Some(TextRow { line: *line, cells, start: 0 })
+    };
+    lines.iter().filter_map(parse).collect()
 }

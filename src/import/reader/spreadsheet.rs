@@ -11,13 +11,12 @@ const FAILED: &str = "a spreadsheet wrote the error of a formula: import the tra
     a copy with the values";
 
 /// Beginnings of month names in the languages of the supported programs, in lower case.
-const MONTHS: [&str; 36] = [
-    "jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec", // English
-    "m\u{e4}r", "mai", "okt", "dez", // German
-    "f\u{e9}v", "fev", "avr", "juin", "juil", "ao\u{fb}", "d\u{e9}c", // French
-    "ene", "abr", "ago", "dic", // Spanish
-    "gen", "mag", "giu", "lug", "set", "ott", // Italian
-    "mrt", "mei", "out", // Dutch, Portuguese
+const MONTHS: [&str; 5] = [
+    "jan feb mar apr may jun jul aug sep oct nov dec", // English
+    "m\u{e4}r mai okt dez f\u{e9}v fev avr juin juil ao\u{fb} d\u{e9}c", // German, French
+    "ene abr ago dic",                                 // Spanish
+    "gen mag giu lug set ott",                         // Italian
+    "mrt mei out",                                     // Dutch, Portuguese
 ];
 /// Maximum number of letters in an abbreviated name of a month.
 const LONGEST_MONTH: usize = 4;
@@ -52,7 +51,7 @@ fn names_month(text: &str) -> bool {
     let word = word.to_lowercase();
     text.contains(|c: char| c.is_ascii_digit())
         && word.chars().count() <= LONGEST_MONTH
-        && MONTHS.iter().any(|month| word.starts_with(month))
+        && MONTHS.iter().flat_map(|months| months.split(' ')).any(|month| word.starts_with(month))
 }
 
 /// Whether a text is a date of numbers only, such as `01/05`, `1.5.2024` or `2024-05-01`. A date with points

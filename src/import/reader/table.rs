@@ -2,7 +2,7 @@
 //! and the place of a cell for messages.
 
 use super::dialect::{declared_delimiter, is_comment};
-use crate::import::error::{CellProblem, ImportError, ImportResult, TextLocation};
+use crate::import::error::{ImportError, ImportResult, TextLocation};
 use crate::import::reader::dialect::Dialect;
 use crate::import::reader::number::{CellNumber, parse_number};
 use crate::import::reader::rows::{RowReader, RowView, TextRow, count_lines, parse_rows};
@@ -122,7 +122,48 @@ impl<'a> DelimitedTable<'a> {
     /// Whether the text contains `E+` or `E-`; only then can it contain numbers that were cut to the form
     /// `1.23E+05`.
     pub(crate) fn may_have_cut_numbers(&self) -> bool {
-        self.text.contains("E+") || self.text.contains("E-")
+        // (nearly every text has no E at all, and one character is found faster than two)
+        self.text.contains('E') && (self.text.contains("E+") || self.text.contains("E-"))
+    }
+
+    /// The first result of `find` for a row from row `from` of [`Self::head`] on.
+    ///
+    /// # Errors
+    /// The errors of `find`, and an error if a row cannot be read.
+    pub(crate) fn find_in_rows<T>(
+        &self,
+        from: usize,
+        mut find: impl FnMut(&RowView) -> ImportResult<Option<T>>,
+    ) -> ImportResult<Option<T>> {
+        let mut rows = self.rows(from);
+        while let Some(record) = rows.next_row()? {
+            if let Some(found) = find(&record)? {
+                return Ok(Some(found));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The text that `read` gives for row `from` of [`Self::head`], and the first row below it with another
+    /// text: its line number and that text.
+    ///
+    /// # Errors
+    /// An error if a row cannot be read.
+    pub(crate) fn find_change(
+        &self,
+        from: usize,
+        read: impl Fn(&RowView) -> String,
+    ) -> ImportResult<(String, Option<(usize, String)>)> {
+        let mut first: Option<String> = None;
+        let change = self.find_in_rows(from, |record| {
+            if record.is_empty() {
+                return Ok(None);
+            }
+            let text = read(record);
+            let differs = first.get_or_insert_with(|| text.clone()) != &text;
+            Ok(differs.then_some((record.line, text)))
+        })?;
+        Ok((first.unwrap_or_default(), change))
     }
 
     /// Line number in the file of the first row of the table.
@@ -147,7 +188,7 @@ impl<'a> DelimitedTable<'a> {
 
     /// Whether a cell contains a number.
     pub(crate) fn is_value(&self, cell: &str) -> bool {
-        matches!(self.parse_cell(cell), CellNumber::Value(_))
+        self.parse_cell(cell).value().is_some()
     }
 
     /// Reads the number in a cell, with the decimal mark of the table.
@@ -220,7 +261,7 @@ impl<'a> DelimitedTable<'a> {
         };
         let expected = if self.dialect.decimal == ',' { COMMA_NUMBER } else { POINT_NUMBER };
         let place = self.cell_location(line, cell);
-        ImportError::cell(place, CellProblem::NotANumber, (name, text), (expected, advice))
+        ImportError::cell(place, (name, text), (expected, advice))
     }
 
     /// Refuses a table whose first column contains names if one of its rows starts like a comment. Such a row

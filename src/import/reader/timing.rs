@@ -1,7 +1,7 @@
 //! Determines the frame number of every row: from the column of frame numbers, or else from the grid of
 //! equally spaced frames that fits the times.
 
-use crate::import::error::{CellProblem, ImportError, ImportResult};
+use crate::import::error::{ImportError, ImportResult};
 use crate::import::reader::rate::{RATE_AGREEMENT, UNEVEN_RATE, find_quantum_s, is_uneven};
 use crate::import::reader::track_file::{Clock, Column, Track, TrackFile};
 use crate::recording::clock::{self, FrameFit, MAX_FRAMES, OFF_GRID_LIMIT_FRAMES};
@@ -60,12 +60,8 @@ pub(crate) fn place_rows(rows: ClockRows, declared: DeclaredTiming) -> ImportRes
         1 if clock.frame.is_none() || rows.export.clocks.iter().all(|clock| clock.len() < 2) => {
             let place = format!("{file}:{}:1", clock.line_number(0));
             let (found, expected) = ("a single row of numbers", "one a frame and at least two");
-            return Err(ImportError::format(
-                place,
-                found,
-                expected,
-                "export again with all data rows selected",
-            ));
+            let advice = "export again with all data rows selected";
+            return Err(ImportError::format(place, found, expected, advice));
         }
         _ => {}
     }
@@ -86,7 +82,7 @@ fn refuse_sparse(rows: ClockRows, placed: &RowFrames) -> ImportResult<()> {
     let row = (1..placed.frames.len()).max_by_key(|&row| jump(row)).unwrap_or(0);
     let column = rows.clock.frame.as_ref().or(rows.clock.time.as_ref());
     let found = column.and_then(|column| column.get(row));
-    Err(cell_error(rows, row, CellProblem::FarAway, found))
+    Err(cell_error(rows, row, FAR_AWAY, found))
 }
 
 /// Refuses two clocks of one file that give different times for frame 0.
@@ -147,10 +143,10 @@ fn place_by_number(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<Ro
     let mut frames: Vec<i64> = Vec::with_capacity(clock.len());
     let numbers = clock.frame.iter().flat_map(|column| column.iter());
     for (row, number) in numbers.enumerate() {
-        let Some(number) = number else { return Err(cell_error(rows, row, CellProblem::NoTime, None)) };
+        let Some(number) = number else { return Err(cell_error(rows, row, NO_NUMBER, None)) };
         let too_far = frames.first().is_some_and(|&first| number - first as f64 > MAX_FRAMES);
         if number.fract().abs() > 0.0 || number.abs() > LARGEST_FRAME || too_far {
-            return Err(cell_error(rows, row, CellProblem::NotAFrame, Some(number)));
+            return Err(cell_error(rows, row, NOT_A_FRAME, Some(number)));
         }
         refuse_disorder(rows, row, frames.last().map(|&last| last as f64), number)?;
         frames.push(number as i64);
@@ -194,7 +190,7 @@ fn apply_frame_step(frames: &mut [i64], step: usize) -> ImportResult<()> {
 fn place_by_time(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<RowFrames> {
     let times = read_times(rows, declared)?;
     let row_s = declared.step as f64 / declared.rate_hz;
-    if !declared.playback && is_uneven(&times, rows.clock.digit) {
+    if !declared.playback && is_uneven(rows.clock) {
         return keep_times(rows, times, declared);
     }
     let fit = if declared.playback {
@@ -288,7 +284,7 @@ fn fit_shown_grid(rows: ClockRows, times: &[f64]) -> ImportResult<FrameFit> {
             (1..times.len()).max_by(|&a, &b| jump(a).total_cmp(&jump(b))).unwrap_or(0)
         }
     };
-    Err(cell_error(rows, row, CellProblem::OffGrid, Some(times[row])))
+    Err(off_grid_error(rows, row, times[row]))
 }
 
 /// Formats a number for a message; without an exponent, unless it is very large or very small.
@@ -300,16 +296,10 @@ fn read_times(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<Vec<f64
     let mut times: Vec<f64> = Vec::with_capacity(rows.clock.len());
     for row in 0..rows.clock.len() {
         let Some(time) = rows.clock.time.as_ref().and_then(|column| column.get(row)) else {
-            return Err(cell_error(rows, row, CellProblem::NoTime, None));
+            return Err(cell_error(rows, row, NO_NUMBER, None));
         };
         if times.last() == Some(&time) && !repeats_row_above(rows, row) && are_rows_frames(rows, declared) {
-            let remedy = (
-                "a value after that of the row above",
-                "export the times with more digits, or name a column that counts frames; the file has as many \
-                 rows as frames, so each row is probably one frame (--columns frame=row,...)",
-            );
-            let (place, found) = (rows.export.row_location(rows.clock, row), format_number(time));
-            return Err(ImportError::cell(place, CellProblem::Duplicate, ("time", &found), remedy));
+            return Err(cell_error(rows, row, ROUNDED_TIME, Some(time)));
         }
         refuse_disorder(rows, row, times.last().copied(), time)?;
         times.push(time);
@@ -360,7 +350,7 @@ fn refuse_stray_first_row(rows: ClockRows, times: &[f64], fit: &FrameFit) -> Imp
     let off = (ahead - ahead.round()).abs();
     let rounding = rows.clock.digit / others.frame_s;
     if off > (OFF_THE_OTHERS * others.worst_frames).max(rounding) + FEW_PARTS {
-        return Err(cell_error(rows, 0, CellProblem::OffGrid, Some(times[0])));
+        return Err(off_grid_error(rows, 0, times[0]));
     }
     Ok(())
 }
@@ -370,11 +360,14 @@ fn refuse_stray_first_row(rows: ClockRows, times: &[f64], fit: &FrameFit) -> Imp
 const FEW_PARTS: f64 = 0.02;
 
 fn refuse_disorder(rows: ClockRows, row: usize, last: Option<f64>, next: f64) -> ImportResult<()> {
-    match last {
-        Some(last) if next == last => Err(cell_error(rows, row, CellProblem::Duplicate, Some(next))),
-        Some(last) if next < last => Err(cell_error(rows, row, CellProblem::Backwards, Some(next))),
-        _ => Ok(()),
-    }
+    let remedy = match last {
+        Some(last) if next < last => BACKWARDS,
+        Some(last) if next == last && repeats_row_above(rows, row) => TWICE,
+        Some(last) if next == last && rows.clock.frame.is_some() => SAME_FRAME,
+        Some(last) if next == last => SAME_TIME,
+        _ => return Ok(()),
+    };
+    Err(cell_error(rows, row, remedy, Some(next)))
 }
 
 fn check_rate(
@@ -390,52 +383,62 @@ fn check_rate(
     Err(ImportError::rate_mismatch(rows.export.file, implied_hz, declared_hz, step))
 }
 
-fn cell_error(rows: ClockRows, row: usize, problem: CellProblem, found: Option<f64>) -> ImportError {
-    let remedy = match problem {
-        CellProblem::NotANumber | CellProblem::NoTime => (
-            "a number in every row",
-            "complete the row from what the tracking program shows, or export again; a gap needs no row",
-        ),
-        CellProblem::NotAFrame => (
-            "a whole number, at most 10 million after the first",
-            "correct the cell, name the column that counts frames, or use the time column",
-        ),
-        CellProblem::Duplicate if repeats_row_above(rows, row) => (
-            "a value after that of the row above, whose positions are the same: the row is there twice",
-            "keep one of the two lines in a copy of the file, or export again from the tracking program",
-        ),
-        CellProblem::Duplicate if rows.clock.frame.is_none() => (
-            "a value after that of the row above",
-            "export again from the tracking program, with more digits if the times are rounded more coarsely than \
-             the frames, or name a column that counts frames (--columns frame=...)",
-        ),
-        CellProblem::Duplicate => (
-            "a value after that of the row above",
-            "see in the tracking program which of the two rows is right, and export again",
-        ),
-        CellProblem::OffGrid if row == 0 => (
-            "a time on the frame grid of the other rows: the first row stands alone before them, between two frames",
-            "correct its time from what the tracking program shows (its unit may be another), or \
-             import a copy of the file without the line",
-        ),
-        CellProblem::Backwards => (
-            "a value after that of the row above",
-            "export again in the order of time; if a spreadsheet has taken numbers for dates or sorted the rows, \
-             go back to the tracking program's own export",
-        ),
-        CellProblem::FarAway => (
-            "a value near that of the row above: as it stands, fewer than one frame in a thousand has a row",
-            "correct the number from what the tracking program shows; if the rows are of several recordings, import each by itself",
-        ),
-        CellProblem::OffGrid => (
-            "a time on the frame grid of the other rows, within 0.3 of a frame",
-            "correct the time from what the tracking program shows; files with a variable frame rate need a frame column (--columns \
-             frame=...)",
-        ),
-    };
+/// What is expected in a cell of the clock, and what to do.
+type ClockRemedy = (&'static str, &'static str);
+
+const AFTER: &str = "a value after that of the row above";
+const NO_NUMBER: ClockRemedy = (
+    "a number in every row",
+    "complete the row from what the tracking program shows, or export again; a gap needs no row",
+);
+const NOT_A_FRAME: ClockRemedy = (
+    "a whole number, at most 10 million after the first",
+    "correct the cell, name the column that counts frames, or use the time column",
+);
+const FAR_AWAY: ClockRemedy = (
+    "a value near that of the row above: as it stands, fewer than one frame in a thousand has a row",
+    "correct the number from what the tracking program shows; if the rows are of several recordings, import each by itself",
+);
+const BACKWARDS: ClockRemedy = (
+    AFTER,
+    "export again in the order of time; if a spreadsheet has taken numbers for dates or sorted the rows, \
+     go back to the tracking program's own export",
+);
+const TWICE: ClockRemedy = (
+    "a value after that of the row above, whose positions are the same: the row is there twice",
+    "keep one of the two lines in a copy of the file, or export again from the tracking program",
+);
+const SAME_FRAME: ClockRemedy =
+    (AFTER, "see in the tracking program which of the two rows is right, and export again");
+const SAME_TIME: ClockRemedy = (
+    AFTER,
+    "export again from the tracking program, with more digits if the times are rounded more coarsely than \
+     the frames, or name a column that counts frames (--columns frame=...)",
+);
+const ROUNDED_TIME: ClockRemedy = (
+    AFTER,
+    "export the times with more digits, or name a column that counts frames; the file has as many rows as \
+     frames, so each row is probably one frame (--columns frame=row,...)",
+);
+const OFF_GRID: ClockRemedy = (
+    "a time on the frame grid of the other rows, within 0.3 of a frame",
+    "correct the time from what the tracking program shows; files with a variable frame rate need a frame column (--columns \
+     frame=...)",
+);
+const FIRST_OFF_GRID: ClockRemedy = (
+    "a time on the frame grid of the other rows: the first row stands alone before them, between two frames",
+    "correct its time from what the tracking program shows (its unit may be another), or import a copy of the file without the line",
+);
+
+/// Error for a row whose number does not fit the grid of the other rows.
+fn off_grid_error(rows: ClockRows, row: usize, time: f64) -> ImportError {
+    cell_error(rows, row, if row == 0 { FIRST_OFF_GRID } else { OFF_GRID }, Some(time))
+}
+
+fn cell_error(rows: ClockRows, row: usize, remedy: ClockRemedy, found: Option<f64>) -> ImportError {
     let name = if rows.clock.frame.is_some() { "frame" } else { "time" };
     let found = found.map_or_else(String::new, format_number);
-    ImportError::cell(rows.export.row_location(rows.clock, row), problem, (name, &found), remedy)
+    ImportError::cell(rows.export.row_location(rows.clock, row), (name, &found), remedy)
 }
 
 #[cfg(test)]

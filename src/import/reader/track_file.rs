@@ -8,6 +8,7 @@ use crate::import::reader::table::DelimitedTable;
 use crate::import::source::base_name;
 use crate::recording::files::YAxis;
 use crate::recording::quality::QualityFinding;
+use std::cell::OnceCell;
 
 /// Frame number and time of every row of one or more tracks.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -22,6 +23,8 @@ pub(crate) struct Clock {
     pub time: Option<Column>,
     /// Value of one unit in the last written digit of the times, in their unit; 0 if it is not known.
     pub digit: f64,
+    /// Whether the times lie on no grid; found when it is first asked for.
+    pub uneven: OnceCell<bool>,
 }
 
 /// Converts line numbers to `u32`, the type in which [`Clock`] stores them.

@@ -1,13 +1,9 @@
 //! The meaning of the columns of a plain table, from its header or from `--columns`.
 
 use super::TableColumns;
-use crate::import::error::{ImportError, ImportResult};
+use crate::import::format::*;
 use crate::import::options::{ColumnMap, ColumnName, ROW_COLUMN};
 use crate::import::reader::layout::ClockDifference;
-use crate::import::reader::{
-    CellNumber, ColumnMeaning, ColumnUnit, CoordinateUnit, DelimitedTable, Fact, PointCells, TextRow,
-    TimeUnit,
-};
 use crate::toml_file::suggest_key;
 
 /// Number of rows at the top of a table that are searched for the column names.

@@ -4,9 +4,8 @@
 //! Elements are read one by one, so deep nesting cannot overflow the stack. Only the five predefined entities
 //! and character references are resolved; a document type, which could define others, is refused.
 
-use crate::import::error::{CellProblem, ImportError, ImportResult, TextLocation};
+use crate::import::format::*;
 use crate::import::reader::rows::count_lines;
-use crate::import::reader::{CellNumber, Document, parse_number};
 use quick_xml::XmlVersion;
 use quick_xml::events::{BytesStart, Event};
 use quick_xml::reader::Reader;
@@ -131,7 +130,7 @@ impl<'a> XmlReader<'a> {
             CellNumber::Text => {
                 let remedy = ("a number with a decimal point", REMEDY);
                 let place = self.element_location(element);
-                Err(ImportError::cell(place, CellProblem::NotANumber, (name, &text), remedy))
+                Err(ImportError::cell(place, (name, &text), remedy))
             }
         }
     }
