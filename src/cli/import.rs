@@ -136,7 +136,7 @@ impl ImportOptionArgs {
         steps.show_step("reading the export");
         let sources = self.sources.iter().map(|path| read_source(path)).collect::<Outcome<Vec<_>>>()?;
         let imported = import::import(&sources, &options).map_err(Failure::input)?;
-        let writer = self.write_policy(&sources);
+        let writer = self.write_policy(&imported);
         OutputFolder::check(&self.out, &writer, &[TRACE_FILE, DESCRIPTION_FILE])?;
         if !self.dry_run {
             steps.show_step("writing the recording");
@@ -192,9 +192,9 @@ impl ImportOptionArgs {
 
     /// Files that the import may overwrite; a measured recording only if it was imported from the same
     /// exported files.
-    fn write_policy(&self, sources: &[ImportSource]) -> WritePolicy {
-        let exports = import::source::preserved_files(sources).into_iter();
-        let exports = exports.map(|(_, bytes)| crate::text::sha256(bytes)).collect();
+    fn write_policy(&self, imported: &Import) -> WritePolicy {
+        let exports =
+            imported.file.source.iter().flat_map(|source| source.sha256.as_slice().iter().cloned()).collect();
         WritePolicy { exports, ..WritePolicy::new(OutputCommand::Import, self.overwrite) }
     }
 
@@ -271,8 +271,7 @@ const LINE_SHOWN: usize = 40;
 fn read_table(path: &Path) -> Outcome<Vec<u8>> {
     let bytes = files::read_data(path)?;
     let is_markup = bytes.iter().take(16).any(|byte| *byte == b'<');
-    let mut lines = bytes.split(|byte| matches!(byte, b'\n' | b'\r'));
-    match lines.find(|line| line.len() > LONGEST_LINE).filter(|_| !is_markup) {
+    match find_long_line(&bytes).filter(|_| !is_markup) {
         Some(line) => Err(Failure::at(
             path.display(),
             format!(
@@ -283,6 +282,19 @@ fn read_table(path: &Path) -> Outcome<Vec<u8>> {
         )),
         None => Ok(bytes),
     }
+}
+
+/// The beginning of the first line that is longer than [`LONGEST_LINE`], to its end.
+fn find_long_line(bytes: &[u8]) -> Option<&[u8]> {
+    let is_end = |byte: &u8| matches!(byte, b'\n' | b'\r');
+    let mut rest = bytes;
+    while let Some(start) = rest.get(..=LONGEST_LINE) {
+        match start.iter().rposition(is_end) {
+            Some(end) => rest = &rest[end + 1..],
+            None => return rest.split(is_end).next(),
+        }
+    }
+    None
 }
 
 /// Reads an exported file with the companion files that belong to it.

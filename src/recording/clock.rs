@@ -67,8 +67,9 @@ pub(crate) fn number_frames(times_s: &[f64], seed_s: f64) -> Option<FrameFit> {
     let mut frames = follow_grid(times_s, first, seed_s);
     let mut line = fit_line(&frames, times_s);
     for _ in 0..ROUNDS {
-        let Some(again) = renumber_frames(times_s, line).filter(|again| *again != frames) else { break };
-        frames = again;
+        if !renumber_frames(&mut frames, times_s, line) {
+            break;
+        }
         line = fit_line(&frames, times_s);
     }
     Some(assess_fit(frames, times_s, line))
@@ -89,8 +90,8 @@ fn follow_grid(times_s: &[f64], first: f64, seed_s: f64) -> Vec<usize> {
 /// of two middle values is taken, because gaps only lengthen these times.
 pub(crate) fn median_step_s(times_s: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> = times_s.windows(2).map(|w| w[1] - w[0]).collect();
-    steps.sort_by(f64::total_cmp);
-    steps.get(steps.len().saturating_sub(1) / 2).copied()
+    let middle = steps.len().checked_sub(1)? / 2;
+    Some(*steps.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 /// The rate with the fewest digits near `fitted`, 1/s, for which `explains` is true; if there is none,
@@ -115,13 +116,21 @@ fn fit_line(frames: &[usize], times_s: &[f64]) -> (f64, f64) {
     (mean_time - slope * mean_frame, slope)
 }
 
-/// Nearest frame of every row on the fitted line; `None` for a line that does not rise or a grid that is too
-/// long.
-fn renumber_frames(times_s: &[f64], (intercept, slope): (f64, f64)) -> Option<Vec<usize>> {
-    let nearest: Vec<f64> = times_s.iter().map(|t| ((t - intercept) / slope).round()).collect();
-    let first = *nearest.first()?;
-    let usable = slope > 0.0 && nearest.last()? - first < MAX_FRAMES;
-    usable.then(|| nearest.iter().map(|n| (n - first) as usize).collect())
+/// Numbers every row by its nearest frame on the fitted line. Returns whether a number changed; a line that
+/// does not rise, or a grid that is too long, changes none.
+fn renumber_frames(frames: &mut [usize], times_s: &[f64], (intercept, slope): (f64, f64)) -> bool {
+    let nearest = |time: &f64| ((time - intercept) / slope).round();
+    let (Some(first), Some(last)) = (times_s.first().map(nearest), times_s.last().map(nearest)) else {
+        return false;
+    };
+    let mut changed = false;
+    if slope > 0.0 && last - first < MAX_FRAMES {
+        for (frame, time) in frames.iter_mut().zip(times_s) {
+            let again = (nearest(time) - first) as usize;
+            changed |= std::mem::replace(frame, again) != again;
+        }
+    }
+    changed
 }
 
 /// Finds the row that is furthest off the grid. A row with the same frame as the row above it counts as one
@@ -131,8 +140,9 @@ fn assess_fit(frames: Vec<usize>, times_s: &[f64], (intercept, slope): (f64, f64
         let distance = (times_s[row] - intercept - slope * frames[row] as f64).abs() / slope;
         if row > 0 && frames[row] <= frames[row - 1] { distance + 1.0 } else { distance }
     };
-    let worst_row = (0..frames.len()).max_by(|&a, &b| off(a).total_cmp(&off(b))).unwrap_or(0);
-    FrameFit { worst_frames: off(worst_row), worst_row, frame_s: slope, start_s: intercept, frames }
+    let farthest = (0..frames.len()).map(|row| (row, off(row))).max_by(|a, b| a.1.total_cmp(&b.1));
+    let (worst_row, worst_frames) = farthest.unwrap_or_default();
+    FrameFit { worst_frames, worst_row, frame_s: slope, start_s: intercept, frames }
 }
 
 #[cfg(test)]

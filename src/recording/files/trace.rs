@@ -65,12 +65,13 @@ pub fn push_trace_row(text: &mut String, time_s: f64, cells: impl IntoIterator<I
 /// Appends the shortest text that parses to the same number; it has an exponent only if plain digits would be
 /// long.
 fn push_number(text: &mut String, value: f64) {
-    // (writing to a String cannot fail)
-    let _ = if value != 0.0 && !(1e-4..1e16).contains(&value.abs()) {
-        write!(text, "{value:e}")
+    if value == 0.0 || (1e-4..1e16).contains(&value.abs()) {
+        let mut buffer = ryu::Buffer::new();
+        let digits = buffer.format_finite(value); // (plain digits in this range, with a point in each number)
+        text.push_str(digits.strip_suffix(".0").unwrap_or(digits));
     } else {
-        write!(text, "{value}")
-    };
+        let _ = write!(text, "{value:e}"); // (writing to a String cannot fail)
+    }
 }
 
 /// Reads `trace.csv` without its description. The frame rate is estimated from the times: it is the rate with
@@ -339,11 +340,42 @@ mod tests {
         );
     }
 
+    /// The standard library writes the shortest digits too, but more slowly.
+    fn number_text(value: f64) -> String {
+        if value != 0.0 && !(1e-4..1e16).contains(&value.abs()) {
+            format!("{value:e}")
+        } else {
+            value.to_string()
+        }
+    }
+
     fn column(frames: usize) -> impl Strategy<Value = Vec<Option<f64>>> {
         proptest::collection::vec(proptest::option::weighted(0.8, -1e3..1e3_f64), frames)
     }
 
+    #[test]
+    fn numbers_at_the_ends_of_plain_digits_are_those_of_the_standard_library() {
+        let powers = (-20..22).map(|power| format!("1e{power}").parse::<f64>().unwrap());
+        for value in
+            powers.flat_map(|p| [p, p.next_down(), p.next_up(), 3.0 * p, -p, 0.1 + p]).chain([0.0, -0.0])
+        {
+            let mut text = String::new();
+            push_number(&mut text, value);
+            assert_eq!(text, number_text(value));
+        }
+    }
+
     proptest! {
+        #[test]
+        fn a_number_has_the_digits_of_the_standard_library(value in proptest::num::f64::NORMAL) {
+            let mut text = String::new();
+            for value in [value, value % 1.0, value % 1e6, value % 1e17] {
+                text.clear();
+                push_number(&mut text, value);
+                prop_assert_eq!(&text, &number_text(value));
+            }
+        }
+
         #[test]
         fn writing_and_reading_is_the_identity(
             (columns, confidence) in (2_usize..40).prop_flat_map(|n| {
