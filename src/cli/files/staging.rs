@@ -253,6 +253,9 @@ pub(crate) fn check_path_free(path: &Path) -> Outcome<()> {
     }
 }
 
+/// Number of bytes of a file that are written at once.
+const COPIED_BYTES: usize = 1 << 16;
+
 /// Writes a file under a temporary name and locks it, if the file system can; returns the file with its hash.
 fn write_temporary(path: &Path, contents: impl Read) -> io::Result<(NamedTempFile, String)> {
     let within = path.parent().unwrap_or(Path::new(""));
@@ -260,9 +263,9 @@ fn write_temporary(path: &Path, contents: impl Read) -> io::Result<(NamedTempFil
     builder.prefix(TEMPORARY_NAME.0).suffix(TEMPORARY_NAME.1).permissions(readable_by_all());
     let mut file = interrupt::track_temporary_file(|| builder.tempfile_in(within))?;
     let _ = file.as_file().try_lock();
-    let mut contents = HashingReader::new(contents);
+    let mut contents = io::BufReader::with_capacity(COPIED_BYTES, HashingReader::new(contents));
     io::copy(&mut contents, file.as_file_mut())?;
-    Ok((file, contents.hash.finish()))
+    Ok((file, contents.into_inner().hash.finish()))
 }
 
 /// Like [`write_temporary`], but converts a plain table to another dialect.

@@ -206,7 +206,7 @@ impl<'a> DelimitedTable<'a> {
     /// Number in the cell of a row; `None` if it is missing. `name` is the name of the column in messages.
     ///
     /// # Errors
-    /// [`ImportError::Cell`] if the cell contains other text.
+    /// [`ImportError::Other`] if the cell contains other text.
     pub(crate) fn number_at(&self, record: &RowView, cell: usize, name: &str) -> ImportResult<Option<f64>> {
         match self.parse_cell(record.cell(cell)) {
             CellNumber::Value(value) => Ok(Some(value)),

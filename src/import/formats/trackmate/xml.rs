@@ -120,7 +120,7 @@ impl<'a> XmlReader<'a> {
     /// missing value.
     ///
     /// # Errors
-    /// [`ImportError::WrongTable`] if the attribute is missing; [`ImportError::Cell`] if it contains other
+    /// [`ImportError::WrongTable`] if the attribute is missing; [`ImportError::Other`] if it contains other
     /// text.
     pub(crate) fn number_attribute(&self, element: &XmlElement, name: &str) -> ImportResult<Option<f64>> {
         let text = self.required_attribute(element, name)?;
