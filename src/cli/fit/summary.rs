@@ -17,6 +17,13 @@ pub(crate) fn print_summary(solved: &CompletedFit) {
     } else if !result.explains_recordings() {
         print_line!("{}", to_ascii(&unexplained_headline(&far_from_priors(&result.nuisances))));
     }
+    if result.misfit.is_some() {
+        let words = match result.constants_word() {
+            "free" => "free within their priors",
+            _ => "held: their errors are not in the intervals",
+        };
+        print_line!("constants: {words}");
+    }
     print_line!("{}: {}; cost {:.4}", result.status.name(), describe_evaluations(solved), result.cost);
     print_features(result);
     print_line!("");
