@@ -41,7 +41,6 @@ impl FileFormat for Sleap {
         let points = columns.instances[0].nodes.iter().map(PointCells::fields).collect();
         let fields = InstanceFields { has_frame: true, has_time: false, clock_cell: columns.frame, points };
         let mut collector = TrackCollector::new(fields);
-        columns.refuse_other_video(table)?;
         let width = header.used_width();
         let mut rows = table.rows(1);
         while let Some(record) = rows.next_row()? {
@@ -53,6 +52,8 @@ impl FileFormat for Sleap {
                 columns.read_instance(table, &record, instance, &mut collector)?;
             }
         }
+        // (after the rows: a row that is cut short names another video too)
+        columns.refuse_other_video(table)?;
         let found = collector.finish(document.file, RowOrder::Any);
         let (clocks, mut tracks) = found.map_err(duplicate_instance_error)?;
         match (columns.node, columns.instances.as_slice(), tracks.as_mut_slice()) {
