@@ -207,7 +207,10 @@ fn blades_of_other_sizes_and_speeds_are_fitted_like_the_usual_one() {
         }
         let factor = |name: &str| unit_factor(find_parameter(name).unwrap().unit, length, time);
         let mut other = scene();
-        for (name, value) in scene().written_values() {
+        // a length is checked against the centre on it, so the larger of the two is set first
+        let mut values: Vec<(&str, f64)> = scene().written_values().collect();
+        values.sort_by_key(|(name, _)| name.ends_with("_length_m") != (length > 1.0));
+        for (name, value) in values {
             other = other.with_parameter(name, value * factor(name)).unwrap();
         }
         (other.start_s, other.run.stop_s) = (other.start_s * time, other.run.stop_s * time);
