@@ -13,7 +13,7 @@ use crate::checkpoint::{CheckpointFile, CheckpointRecord, Shard};
 use crate::fit::evaluation::EvaluationStage;
 use crate::fit::ledger::FitProgress;
 use crate::fit::result::{FitResult, FitStatus};
-use crate::fit::trace::UncertaintyRun;
+use crate::fit::trace::{MAX_STARTS, UncertaintyRun};
 use crate::fit::trace_ledger::TraceProgress;
 use crate::fit::{FitContext, FitError};
 pub(crate) use batch::{BatchJobState, check_distinct_folders};
@@ -236,6 +236,7 @@ fn describe_stage(now: &TraceProgress, stages: &[f64]) -> String {
     let (bad, all) = (now.bad_segments, now.segments);
     let length_ms = 1e3 * stages.get(now.stage).copied().unwrap_or_default();
     let chain = match UncertaintyRun::from_chain_number(now.start) {
+        None if now.start >= MAX_STARTS => format!("minimum {}", now.start - MAX_STARTS + 1),
         None => format!("start {}", now.start + 1),
         Some(UncertaintyRun::Twin(twin)) => format!("twin {}", twin + 1),
         Some(UncertaintyRun::Shorter | UncertaintyRun::Side { .. }) => "intervals".to_owned(),

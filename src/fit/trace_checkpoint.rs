@@ -35,7 +35,7 @@ impl CheckpointRecord for IterateRecord {
 
     fn to_row(&self, at: usize) -> IterateRow {
         let Self { start, step, ref iterate } = *self;
-        let Iterate { stage, number, cuts, rescues: mended, plain, settled, .. } = *iterate;
+        let Iterate { stage, number, cuts, rescues: mended, whole, plain, settled, .. } = *iterate;
         let [damping, cost] = [iterate.damping, iterate.cost].map(ExactNumber);
         let point = iterate.point.iter().copied().map(ExactNumber).collect();
         let segments = iterate.segments.iter().map(SegmentRow::from_state).collect();
@@ -48,6 +48,7 @@ impl CheckpointRecord for IterateRecord {
             number,
             cuts,
             mended,
+            whole,
             plain,
             settled,
             damping,
@@ -63,12 +64,12 @@ impl CheckpointRecord for IterateRecord {
 
     fn from_row(row: IterateRow, body: &TraceHeaderBody) -> Result<Self, String> {
         row.check_against(body)?;
-        let IterateRow { start, step, stage, number, cuts, mended: rescues, plain, settled, .. } = row;
+        let IterateRow { start, step, stage, number, cuts, mended: rescues, whole, plain, settled, .. } = row;
         let (damping, cost) = (row.damping.0, row.cost.0);
         let point = row.point.into_iter().map(|z| z.0).collect();
         let segments = row.segments.into_iter().map(SegmentRow::into_state).collect();
         let iterate =
-            Iterate { stage, number, cuts, rescues, plain, settled, damping, point, segments, cost };
+            Iterate { stage, number, cuts, rescues, whole, plain, settled, damping, point, segments, cost };
         Ok(Self { start, step, iterate })
     }
 
@@ -114,6 +115,7 @@ pub(crate) struct IterateRow {
     number: usize,
     cuts: usize,
     mended: usize,
+    whole: bool,
     plain: bool,
     settled: bool,
     damping: ExactNumber,

@@ -11,10 +11,10 @@ use super::result::{
 };
 use super::targets::measure_targets;
 use super::trace::{
-    Iterate, SearchEnd, SegmentResiduals, SegmentState, TraceAssessment, TraceDescent, TraceModel,
-    TraceRecording, TraceSearchOutcome, TraceSearchSettings, TraceUnknown, UncertaintyRun, UnknownKind,
-    chi2_per_dof, describe_start_limits, first_iterate, next_iterate, search_trace, segment_residuals,
-    start_point, undersampled_mode,
+    Iterate, MAX_STARTS, SearchEnd, SegmentResiduals, SegmentState, TraceAssessment, TraceDescent,
+    TraceModel, TraceRecording, TraceSearchOutcome, TraceSearchSettings, TraceUnknown, UncertaintyRun,
+    UnknownKind, chi2_per_dof, describe_start_limits, first_iterate, next_iterate, search_trace,
+    segment_residuals, start_point, undersampled_mode,
 };
 use super::trace_checkpoint::{
     HeaderCoordinate, IterateRecord, TraceCheckpoint, TraceHeader, TraceHeaderBody, camera_unknown_key,
@@ -57,8 +57,10 @@ impl Problem {
         let mut ledger = TraceLedger::new(&header, resume, most, journal, on_iterate)?;
         if let Some((file, found)) = resume {
             recheck_iterates(file, found, |chain, before| match before {
-                // an uncertainty run starts from the best end, which is not known yet
+                // an uncertainty run starts from the best end, and a lobe from that of a start; neither is
+                // known yet
                 _ if UncertaintyRun::from_chain_number(chain).is_some() => None,
+                None if chain >= MAX_STARTS => None,
                 None => first_iterate(&model, &settings, &start_point(&model, seed, chain)),
                 Some(before) => next_iterate(&model, &settings, before),
             })?;
@@ -68,7 +70,11 @@ impl Problem {
             let best = searched.descents.get(searched.best).and_then(TraceDescent::last_iterate);
             let end = best.and_then(|at| SearchEnd::new(&model, &settings, seed, at));
             recheck_iterates(file, found, |chain, before| {
-                end.as_ref()?.next_iterate(UncertaintyRun::from_chain_number(chain)?, before)
+                match (UncertaintyRun::from_chain_number(chain), before) {
+                    (Some(run), before) => end.as_ref()?.next_iterate(run, before),
+                    (None, None) => searched.first_lobe_iterate(&model, &settings, chain),
+                    (None, Some(_)) => None,
+                }
             })?;
         }
         if let Some(TraceStopReason::Journal(problem)) = ledger.stop_reason() {
@@ -171,8 +177,9 @@ impl TraceFindings<'_, '_> {
     }
 
     fn fit_status(&self, best: &TraceDescent) -> FitStatus {
-        let is_complete =
-            self.searched.assessment.is_some() && best.stages.len() >= self.problem.segment_s().len();
+        let is_at_end = best.stages.len() >= self.problem.segment_s().len()
+            || best.last_iterate().is_some_and(Iterate::is_junk);
+        let is_complete = self.searched.assessment.is_some() && is_at_end;
         match self.ledger.stop_reason() {
             _ if !self.searched.stopped && is_complete => FitStatus::Converged,
             _ if !self.searched.stopped => FitStatus::Failed,

@@ -8,3 +8,4 @@ mod frequencies;
 mod search;
 mod trace;
 mod twin;
+mod valleys;

@@ -1,11 +1,11 @@
 //! Intervals of the estimates at the end of a search, and reasons to doubt them.
 
-use super::checkpoint::{Iterate, chi2_per_dof};
+use super::checkpoint::Iterate;
 use super::levenberg_marquardt::MAX_STEPS;
 use super::model::TraceModel;
 use super::normal_equations::trace_covariance;
 use super::prior_conflict::prior_conflicts;
-use super::search::{TraceDescent, is_same_end, other_ends};
+use super::rivals::describe_rival;
 use super::uncertainty_run::{SearchEnd, UncertaintyRun, Z_95, profile_distances};
 use super::unknowns::UnknownKind;
 use crate::fit::bootstrap::MIN_TWINS;
@@ -84,12 +84,13 @@ impl TraceAssessment {
     }
 }
 
-/// Assesses the end of the descent with index `best`. `runs` lists the uncertainty runs that start at this
-/// end, each with its last iterate.
+/// Assesses the best end of a search. `others` are the ends to which it was preferred, and `lonely` is the
+/// doubt of a search in which no two starts agree. `runs` lists the uncertainty runs that start at this end,
+/// each with its last iterate.
 pub(super) fn assess_end(
     end: &SearchEnd<'_>,
-    descents: &[TraceDescent],
-    best: usize,
+    others: &[&Iterate],
+    lonely: Option<String>,
     runs: &[(UncertaintyRun, Option<Iterate>)],
 ) -> TraceAssessment {
     let SearchEnd { model, at, sd, .. } = end;
@@ -99,7 +100,9 @@ pub(super) fn assess_end(
     let distances = profile_distances(end, last_of);
     let rank = count_determined(model, &end.covariance.information);
     let shorter = last_of(UncertaintyRun::Shorter);
-    let mut doubts = shared_doubts(end, descents, best, rank);
+    let mut doubts = shared_doubts(end, rank);
+    doubts.extend(lonely);
+    doubts.extend(others.iter().filter_map(|other| describe_rival(end, other)));
     let lengths = shorter.and_then(|shorter| compare_segment_lengths(model, at, shorter, sd));
     let (biases, disagreement) = lengths.unwrap_or_else(|| (vec![0.0; n], None));
     doubts.extend(disagreement);
@@ -147,8 +150,9 @@ fn count_determined(model: &TraceModel, information: &DMatrix<f64>) -> usize {
     scaled.symmetric_eigenvalues().iter().filter(|value| **value > MIN_EIGENVALUE).count() + priors.len()
 }
 
-/// Reasons to doubt all parameters together. The comparison of segment lengths is not included.
-fn shared_doubts(at: &SearchEnd<'_>, descents: &[TraceDescent], best: usize, rank: usize) -> Vec<String> {
+/// Reasons to doubt all parameters together that the end alone shows. The comparison of segment lengths is
+/// not included.
+fn shared_doubts(at: &SearchEnd<'_>, rank: usize) -> Vec<String> {
     let SearchEnd { model, settings, at: end, sd, .. } = at;
     let mut doubts = Vec::new();
     let bad = end.count_bad_segments();
@@ -160,13 +164,6 @@ fn shared_doubts(at: &SearchEnd<'_>, descents: &[TraceDescent], best: usize, ran
     }
     if end.stage + 1 < settings.segment_s.len() {
         doubts.push("the search did not reach the longest segments".to_owned());
-    }
-    if !other_ends(descents, best).any(|other| is_same_end(end, other, sd)) {
-        doubts.push(format!("no two of {} starts end at the same place", descents.len()));
-    }
-    let rivals = count_rivals(end, descents, sd);
-    if rivals > 0 {
-        doubts.push(format!("{rivals} of {} starts end elsewhere and fit nearly as well", descents.len()));
     }
     let parameters = model.unknowns.parameters().count();
     if rank < parameters {
@@ -190,7 +187,7 @@ fn shared_doubts(at: &SearchEnd<'_>, descents: &[TraceDescent], best: usize, ran
     doubts
 }
 
-// Agreement of the fits with the two longest segment lengths, and of the starts that fit equally well.
+// Agreement of the fits with the two longest segment lengths.
 
 /// Largest plausible difference between the estimates with two segment lengths, in standard deviations of
 /// this difference.
@@ -222,19 +219,4 @@ fn compare_segment_lengths(
         Some(format!("segments of the two longest lengths differ by {apart:.1} deviations of {name}"))
     });
     Some((bias, disagreement))
-}
-
-/// Number of starts that end at a different point from the best end, but with nearly the same cost. Two costs
-/// are nearly the same if they differ by less than `NEARLY` standard deviations of chi2, because noise can
-/// cause such a difference.
-fn count_rivals(end: &Iterate, descents: &[TraceDescent], sd: &[f64]) -> usize {
-    /// Two costs count as nearly the same if they differ by less than this number of standard deviations of
-    /// chi2.
-    const NEARLY: f64 = 2.0;
-    let (widening, dof) = chi2_per_dof(end);
-    let limit = end.cost + NEARLY * widening.max(1.0) * (2.0 * dof as f64).sqrt();
-    let ends = descents.iter().filter_map(TraceDescent::last_iterate);
-    let rivals =
-        ends.filter(|other| (other.stage, other.plain) == (end.stage, end.plain) && other.cost < limit);
-    rivals.filter(|other| !is_same_end(end, other, sd)).count()
 }

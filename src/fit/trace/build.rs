@@ -6,7 +6,7 @@ use crate::fit::job::{FreeParameter, HeadSource, TraceChannel};
 use crate::fit::nuisance_parameters::FreedConstant;
 use crate::fit::trace::camera_observation::{CameraObservation, ObservationSettings};
 use crate::fit::trace::checkpoint::{Iterate, TraceSearchSettings};
-use crate::fit::trace::levenberg_marquardt::{first_iterate, refit_plain};
+use crate::fit::trace::levenberg_marquardt::{refit_plain, start_stage};
 use crate::fit::trace::model::{TraceModel, TraceRecording};
 use crate::fit::trace::segment_simulation::segment_residuals;
 use crate::fit::trace::segmentation::first_segment_s;
@@ -26,7 +26,7 @@ use std::sync::Arc;
 /// if a scene refuses the parameter values. The result does not depend on earlier calls.
 pub(crate) fn fit_states_at(model: &TraceModel, segment_s: &[f64], point: &[f64]) -> Option<Iterate> {
     let last = TraceSearchSettings { segment_s: segment_s.last().copied().into_iter().collect(), twins: 0 };
-    refit_plain(model, first_iterate(model, &last, point)?)
+    refit_plain(model, start_stage(model, &last, (0, true), point, &[])?)
 }
 
 /// Whitened residuals of every fitted frame, recording by recording, tip before head. An entry is `None`

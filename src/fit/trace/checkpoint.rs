@@ -80,6 +80,9 @@ pub struct Iterate {
     pub cuts: usize,
     /// Number of times that bad segments of this stage were restarted from other states.
     pub rescues: usize,
+    /// Whether a segment that is much longer than the stage's length counts to its end rather than for that
+    /// length only.
+    pub whole: bool,
     /// Whether the cost is plain chi2 rather than the robust cost.
     pub plain: bool,
     /// Whether the stage has converged.
@@ -98,6 +101,14 @@ impl Iterate {
     /// Number of measured values in all segments.
     pub(crate) fn count_data(&self) -> usize {
         self.segments.iter().map(|segment| segment.data).sum()
+    }
+
+    /// Whether the iterate explains nothing: most segments are bad, and on average the residuals are far
+    /// above the noise. Its point says nothing about the blade.
+    pub(crate) fn is_junk(&self) -> bool {
+        /// Chi2 per degree of freedom above which the residuals are far above the noise.
+        const JUNK_CHI2: f64 = 10.0;
+        2 * self.count_bad_segments() > self.segments.len() && !(chi2_per_dof(self).0 <= JUNK_CHI2)
     }
 
     /// Number of segments that fit worse than noise explains.

@@ -1,18 +1,22 @@
 //! The search as a chain of iterates. Each iterate is a pure function of the previous one, so a search that
 //! resumes from a journal continues with exactly the same numbers.
 
+use super::camera_observation::CameraObservation;
 use super::checkpoint::{Iterate, SegmentState, TraceSearchSettings};
 use super::initial_states::{RescuePolicy, fit_states, join_states, rescue_states, update_states};
 use super::model::TraceModel;
 use super::normal_equations::{NormalEquations, carry_states, damped_step, normal_equations};
 use super::normal_equations::{recording_models, segments_cost};
 use super::segment_simulation::{LinkState, RecordingModel};
-use super::segmentation::{SegmentBoundary, segment_boundaries};
+use super::segmentation::{SegmentBoundary, nominal_frames, segment_boundaries};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 /// Maximum number of outer steps (steps of the unknowns) in a phase.
 pub(super) const MAX_STEPS: usize = 40;
+/// Maximum number of outer steps in a later stage in which the iterate explains nothing. A right model brings
+/// a fit along from the stage before, so more steps would not help.
+const MAX_JUNK_STEPS: usize = 6;
 /// Maximum number of steps in the fit of a segment's starting state after each outer step.
 pub(super) const MAX_STATE_STEPS: usize = 8;
 const FIRST_DAMPING: f64 = 1e-3;
@@ -20,7 +24,7 @@ const FIRST_DAMPING: f64 = 1e-3;
 /// The first iterate of a search that starts at `point`; `None` if a scene refuses the point.
 #[must_use]
 pub fn first_iterate(model: &TraceModel, settings: &TraceSearchSettings, point: &[f64]) -> Option<Iterate> {
-    start_stage(model, settings, 0, point, &[])
+    start_stage(model, settings, (0, false), point, &[])
 }
 
 /// Cost of the segments and the priors at a point.
@@ -59,6 +63,9 @@ pub fn next_iterate(model: &TraceModel, settings: &TraceSearchSettings, before: 
     if !before.settled {
         return Some(outer_step(model, before, holds_constants(settings, before)));
     }
+    if before.is_junk() {
+        return None; // longer segments fit even worse
+    }
     let bad = before.count_bad_segments();
     let stage = before.stage + 1;
     // (if many segments are bad, the parameters are wrong rather than the starting states)
@@ -73,7 +80,7 @@ pub fn next_iterate(model: &TraceModel, settings: &TraceSearchSettings, before: 
         return refit_plain(model, next);
     }
     if stage < settings.segment_s.len() {
-        return start_stage(model, settings, stage, &before.point, &before.segments);
+        return start_stage(model, settings, (stage, before.whole), &before.point, &before.segments);
     }
     resegment(model, settings, before)
 }
@@ -98,12 +105,12 @@ fn rescue_segments(model: &TraceModel, before: &Iterate) -> Option<Iterate> {
 fn resegment(model: &TraceModel, settings: &TraceSearchSettings, before: &Iterate) -> Option<Iterate> {
     const MOST_CUTS: usize = 3;
     let points = recording_models(model, &before.point)?;
-    let cut = cut_recordings(&points, settings.segment_s[before.stage]);
+    let cut = cut_recordings(&points, settings.segment_s[before.stage], before.whole);
     let frames = |segment: &SegmentState| (segment.recording, segment.frames());
     if cut.iter().map(frames).eq(before.segments.iter().map(frames)) || before.cuts == MOST_CUTS {
         return None;
     }
-    let again = start_stage(model, settings, before.stage, &before.point, &before.segments)?;
+    let again = start_stage(model, settings, (before.stage, before.whole), &before.point, &before.segments)?;
     if before.plain && again.count_bad_segments() > 0 {
         return None;
     }
@@ -112,16 +119,17 @@ fn resegment(model: &TraceModel, settings: &TraceSearchSettings, before: &Iterat
 }
 
 /// The first iterate of a stage: new segments whose starting states lie on the fitted motion of the segments
-/// `before`. `None` if a scene refuses the point.
+/// `before`. The segments are `whole`, or a segment that is much longer than the length of the stage ends
+/// after that length. `None` if a scene refuses the point.
 pub(super) fn start_stage(
     model: &TraceModel,
     settings: &TraceSearchSettings,
-    stage: usize,
+    (stage, whole): (usize, bool),
     point: &[f64],
     before: &[SegmentState],
 ) -> Option<Iterate> {
     let points = recording_models(model, point)?;
-    let mut segments = cut_recordings(&points, settings.segment_s[stage]);
+    let mut segments = cut_recordings(&points, settings.segment_s[stage], whole);
     segments.par_iter_mut().for_each(|segment| {
         if let Some(state) = carry_state_over(&points[segment.recording], before, segment) {
             segment.start = state.into();
@@ -132,6 +140,7 @@ pub(super) fn start_stage(
         number: 0,
         cuts: 0,
         rescues: 0,
+        whole,
         plain: false,
         settled: segments.is_empty(),
         damping: FIRST_DAMPING,
@@ -143,8 +152,24 @@ pub(super) fn start_stage(
 }
 
 /// Divides all recordings into segments.
-fn cut_recordings(points: &[RecordingModel<'_>], length_s: f64) -> Vec<SegmentState> {
-    points.iter().enumerate().flat_map(|(film, at)| cut_recording(at, film, length_s)).collect()
+pub(super) fn cut_recordings(points: &[RecordingModel<'_>], length_s: f64, whole: bool) -> Vec<SegmentState> {
+    let mut segments: Vec<SegmentState> =
+        points.iter().enumerate().flat_map(|(film, at)| cut_recording(at, film, length_s)).collect();
+    for segment in segments.iter_mut().filter(|_| !whole) {
+        let film = points[segment.recording].observation;
+        if is_long(film, segment, length_s) {
+            segment.last = segment.first + nominal_frames(film, length_s);
+            segment.data = film.count_data(segment.first, segment.last);
+        }
+    }
+    segments
+}
+
+/// Whether a segment is much longer than the length `length_s` of its stage. No segment starts while the tip
+/// sticks or the blade flips over, so one segment spans the whole reversal of the head.
+pub(super) fn is_long(film: &CameraObservation, segment: &SegmentState, length_s: f64) -> bool {
+    const LONG: f64 = 1.5;
+    (segment.last - segment.first) as f64 > LONG * nominal_frames(film, length_s) as f64
 }
 
 fn cut_recording(at: &RecordingModel<'_>, film: usize, length_s: f64) -> Vec<SegmentState> {
@@ -197,15 +222,18 @@ pub(super) fn outer_step(model: &TraceModel, before: &Iterate, held: bool) -> It
     const LEAST_STATE_GAIN: f64 = 1e-2;
     const TRIALS: usize = 6;
     let number = before.number + 1;
-    let used_up = number >= MAX_STEPS;
+    let is_lost = before.stage > 0 && number >= MAX_JUNK_STEPS && before.is_junk();
+    let used_up = number >= MAX_STEPS || is_lost;
     let stay = || Iterate { number, settled: true, ..before.clone() };
     let Some(at) = normal_equations(model, &before.point, &before.segments, before.plain) else {
         return stay();
     };
     let mut damping = before.damping;
     // The plain phase (cost chi2) ends when a step is shorter than a hundredth of a standard
-    // deviation. The robust phase only prepares the plain phase and may end earlier.
-    let (least_gain, least_move) = if before.plain { (1e-4, 1e-2) } else { (1e-2, 0.3) };
+    // deviation. The robust phase only prepares the plain phase and ends with a step that lowers
+    // the cost by much less than noise does: along a direction that short segments hardly determine it
+    // would take many such steps.
+    let (least_gain, least_move) = if before.plain { (1e-4, 1e-2) } else { (0.3, f64::INFINITY) };
     // both thresholds scale with the misfit per datum, because a large remaining misfit also makes the
     // estimates less certain
     let unit = (before.cost / before.count_data().max(1) as f64).max(1.0);

@@ -1,10 +1,12 @@
 //! The search of a trace fit: it iterates from several starting points and assesses the best result.
 
 use super::assessment::{TraceAssessment, assess_end};
-use super::checkpoint::{Checkpoint, Iterate, TraceSearchSettings, chi2_per_dof};
-use super::levenberg_marquardt::{first_iterate, next_iterate};
+use super::checkpoint::{Checkpoint, Iterate, TraceSearchSettings};
+use super::levenberg_marquardt::{first_iterate, next_iterate, start_stage};
+use super::lobes::{MAX_LOBES, find_lobes};
 use super::model::TraceModel;
-use super::normal_equations::{recording_models, trace_covariance};
+use super::normal_equations::recording_models;
+use super::rivals::has_lost;
 use super::segment_simulation::RecordingModel;
 use super::uncertainty_run::{MAX_STARTS, SearchEnd, follow_runs};
 use super::unknowns::{TraceUnknown, UnknownKind};
@@ -23,10 +25,14 @@ const MIN_STARTS_SLOW: usize = 4;
 const GIVE_UP_FACTOR: f64 = 3.0;
 
 /// Outcome of a trace search.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct TraceSearchOutcome {
-    /// One descent per start, in the order of the starts.
+    /// One descent per start, in the order of the starts; then one per lobe, with whole segments at last.
     pub descents: Vec<TraceDescent>,
+    /// Points from which the lobes descend.
+    lobes: Vec<Vec<f64>>,
+    /// Index of the descent from whose end the lobes are reached.
+    rest: usize,
     /// Index of the descent with the best end.
     pub best: usize,
     /// Whether the search ended early because the checkpoint requested a stop.
@@ -34,6 +40,20 @@ pub struct TraceSearchOutcome {
     /// Intervals of the estimates at the best end, and reasons to doubt them; `None` if the search was
     /// stopped, or if the covariance at the best end does not exist.
     pub assessment: Option<TraceAssessment>,
+}
+
+impl TraceSearchOutcome {
+    /// The first iterate of the chain with number `chain`, if it is the chain of a lobe.
+    pub(crate) fn first_lobe_iterate(
+        &self,
+        model: &TraceModel,
+        settings: &TraceSearchSettings,
+        chain: usize,
+    ) -> Option<Iterate> {
+        let point = self.lobes.get(chain.checked_sub(MAX_STARTS)?)?;
+        let rest = self.descents.get(self.rest)?.last_iterate()?;
+        start_stage(model, settings, (rest.stage, true), point, &rest.segments)
+    }
 }
 
 /// Searches from the middle of the ranges, then from random points given by `seed`, until two searches end at
@@ -44,29 +64,65 @@ pub fn search_trace(
     seed: u64,
     keep: &mut dyn Checkpoint,
 ) -> TraceSearchOutcome {
-    let mut descents: Vec<TraceDescent> = Vec::new();
-    let mut stopped = false;
+    let mut found = TraceSearchOutcome::default();
     for start in 0..MAX_STARTS {
-        let first_costs = descents.iter().filter_map(|descent| Some(descent.stages.first()?.cost));
+        let first_costs = found.descents.iter().filter_map(|descent| Some(descent.stages.first()?.cost));
         let limit = GIVE_UP_FACTOR * first_costs.fold(f64::INFINITY, f64::min);
-        let point = start_point(model, seed, start);
-        let descent;
-        (descent, stopped) = descend_from_start(model, settings, &point, start, limit, keep);
-        descents.push(descent);
-        if stopped || has_enough_starts(model, &descents) {
+        let first = || first_iterate(model, settings, &start_point(model, seed, start));
+        let (stages, stopped) = descend(model, settings, start, first, limit, keep);
+        found.descents.push(TraceDescent { start, stages });
+        if stopped {
+            return TraceSearchOutcome { stopped, ..found };
+        }
+        if has_enough_starts(model, settings, seed, &found.descents) {
             break;
         }
     }
-    let best = best_descent(&descents);
-    let mut found = TraceSearchOutcome { descents, best, stopped, assessment: None };
-    let at = found.descents.get(best).and_then(TraceDescent::last_iterate).filter(|_| !stopped);
-    let Some(end) = at.and_then(|at| SearchEnd::new(model, settings, seed, at)) else { return found };
+    let starts = found.descents.len();
+    found.rest = best_descent(&found.descents);
+    found.best = found.rest;
+    let Some(rest) = SearchEnd::of_descent(model, settings, seed, &found.descents[found.rest]) else {
+        return found;
+    };
+    let confirmed = has_company(&rest, &found.descents, found.rest);
+    // a start that ends elsewhere and fits nearly as well may be better with whole segments
+    let mut lobes = if rest.at.plain { find_lobes(&rest) } else { Vec::new() };
+    if !lobes.is_empty() {
+        let rivals = other_ends(&found.descents, found.rest).filter(|other| !has_lost(&rest, other));
+        lobes.extend(rivals.map(|rival| rival.point.clone()));
+        lobes.truncate(MAX_LOBES);
+    }
+    let earlier = found.descents[found.rest].stages[..rest.at.stage].to_vec();
+    let mut ends = Vec::new();
+    for (lobe, point) in lobes.iter().enumerate() {
+        let start = MAX_STARTS + lobe;
+        let first = || start_stage(model, settings, (rest.at.stage, true), point, &rest.at.segments);
+        let (stages, stopped) = descend(model, settings, start, first, f64::INFINITY, keep);
+        ends.push(TraceDescent { start, stages: earlier.iter().cloned().chain(stages).collect() });
+        if stopped {
+            found.stopped = true;
+            break;
+        }
+    }
+    found.lobes = lobes;
+    found.descents.extend(ends);
+    let compared = if found.lobes.is_empty() { 0..starts } else { starts..found.descents.len() };
+    found.best = compared.start + best_descent(&found.descents[compared.clone()]);
+    if found.stopped {
+        return found;
+    }
+    let Some(end) = SearchEnd::of_descent(model, settings, seed, &found.descents[found.best]) else {
+        return found;
+    };
     let runs = end.uncertainty_runs();
-    let ends = follow_runs(&end, &runs, keep);
-    found.stopped = ends.is_none();
-    let assess =
-        |ends| assess_end(&end, &found.descents, best, &runs.into_iter().zip(ends).collect::<Vec<_>>());
-    found.assessment = ends.map(assess);
+    let Some(ends) = follow_runs(&end, &runs, keep) else {
+        return TraceSearchOutcome { stopped: true, ..found };
+    };
+    let others: Vec<&Iterate> =
+        compared.filter(|at| *at != found.best).filter_map(|at| found.descents[at].last_iterate()).collect();
+    let lonely = (!confirmed).then(|| format!("no two of {starts} starts end at the same place"));
+    let runs: Vec<_> = runs.into_iter().zip(ends).collect();
+    found.assessment = Some(assess_end(&end, &others, lonely, &runs));
     found
 }
 
@@ -91,18 +147,29 @@ pub fn start_point(model: &TraceModel, seed: u64, start: usize) -> Vec<f64> {
 
 /// Whether no further start is needed: the minimum number of starts is reached, and another start ends at the
 /// same point as the best start.
-fn has_enough_starts(model: &TraceModel, descents: &[TraceDescent]) -> bool {
+fn has_enough_starts(
+    model: &TraceModel,
+    settings: &TraceSearchSettings,
+    seed: u64,
+    descents: &[TraceDescent],
+) -> bool {
     let best = best_descent(descents);
     let Some(end) = descents[best].last_iterate() else { return false };
-    let fewest = if undersampled_mode(model, end).is_some() { MIN_STARTS_SLOW } else { MIN_STARTS };
-    if descents.len() < fewest {
-        return false;
+    // if short segments fit and longer ones do not, the model is wrong rather than the start
+    let grows = |descent: &&TraceDescent| {
+        descent.stages.len() > 1 && descent.last_iterate().is_some_and(Iterate::is_junk)
+    };
+    if end.is_junk() && descents.iter().filter(grows).count() >= MIN_STARTS {
+        return true;
     }
-    let Some(covariance) = trace_covariance(model, end) else { return false };
-    let widening = chi2_per_dof(end).0.max(1.0).sqrt();
-    let sd = |i: usize| widening * covariance.curvature[(i, i)].sqrt();
-    let sd: Vec<f64> = (0..end.point.len()).map(sd).collect();
-    other_ends(descents, best).any(|other| other.plain == end.plain && is_same_end(end, other, &sd))
+    let fewest = if undersampled_mode(model, end).is_some() { MIN_STARTS_SLOW } else { MIN_STARTS };
+    descents.len() >= fewest
+        && SearchEnd::new(model, settings, seed, end).is_some_and(|end| has_company(&end, descents, best))
+}
+
+/// Whether another start ends at the same point as the best start.
+fn has_company(end: &SearchEnd<'_>, descents: &[TraceDescent], best: usize) -> bool {
+    other_ends(descents, best).any(|other| other.plain == end.at.plain && is_same_end(end.at, other, &end.sd))
 }
 
 /// Frame rate and frequency of the blade's fastest mode, both in Hz, if there are fewer than two frames per
@@ -133,16 +200,18 @@ fn best_descent(descents: &[TraceDescent]) -> usize {
 }
 
 /// Last iterates of all descents except the best one.
-pub(super) fn other_ends(descents: &[TraceDescent], best: usize) -> impl Iterator<Item = &Iterate> {
+fn other_ends(descents: &[TraceDescent], best: usize) -> impl Iterator<Item = &Iterate> {
     let others = descents.iter().enumerate().filter(move |(at, _)| *at != best);
     others.filter_map(|(_, descent)| descent.last_iterate())
 }
 
 /// Whether two ends belong to the same stage and differ in every coordinate by at most [`SAME_END_SD`]
-/// standard deviations; `sd` are the standard deviations of the coordinates.
+/// standard deviations; `sd` are the standard deviations of the coordinates. Ends that explain nothing are
+/// never the same.
 pub(super) fn is_same_end(end: &Iterate, other: &Iterate, sd: &[f64]) -> bool {
     let mut pairs = end.point.iter().zip(&other.point).zip(sd);
-    other.stage == end.stage && pairs.all(|((a, b), sd)| (a - b).abs() <= SAME_END_SD * sd)
+    let comparable = other.stage == end.stage && !end.is_junk() && !other.is_junk();
+    comparable && pairs.all(|((a, b), sd)| (a - b).abs() <= SAME_END_SD * sd)
 }
 
 // Search from one start.
@@ -154,7 +223,8 @@ pub(crate) const SAME_END_SD: f64 = 1.0;
 /// Result of the search from one start.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TraceDescent {
-    /// Number of the start from which the descent began, counted from 0.
+    /// Number of the chain of the descent: the number of its start, counted from 0, or of its lobe behind
+    /// [`MAX_STARTS`].
     pub start: usize,
     /// Last iterate of each stage that was reached, in the order of the stages.
     pub stages: Vec<Iterate>,
@@ -166,18 +236,18 @@ impl TraceDescent {
     }
 }
 
-/// Computes the iterates of one start until its search ends. The returned flag is true if the checkpoint
-/// requested a stop.
+/// Computes the iterates of one chain, beginning with `first`, until its search ends. Returns the last
+/// iterate of each stage. The returned flag is true if the checkpoint requested a stop.
 ///
-/// The start is abandoned if its first stage ends with a cost above `limit`.
-fn descend_from_start(
+/// The chain is abandoned if its first stage ends with a cost above `limit`.
+fn descend(
     model: &TraceModel,
     settings: &TraceSearchSettings,
-    point: &[f64],
-    start: usize,
+    chain: usize,
+    first: impl Fn() -> Option<Iterate>,
     limit: f64,
     keep: &mut dyn Checkpoint,
-) -> (TraceDescent, bool) {
+) -> (Vec<Iterate>, bool) {
     let mut stages: Vec<Iterate> = Vec::new();
     let mut stopped = false;
     for place in 0.. {
@@ -185,16 +255,16 @@ fn descend_from_start(
         if stopped || last.is_some_and(|at| at.settled && at.stage == 0 && at.cost > limit) {
             break;
         }
-        let known = keep.find_iterate(start, place);
+        let known = keep.find_iterate(chain, place);
         let is_new = known.is_none();
         let next = known.or_else(|| match last {
-            None => first_iterate(model, settings, point),
+            None => first(),
             Some(before) => next_iterate(model, settings, before),
         });
         let Some(next) = next else { break };
-        stopped = is_new && keep.store_iterate(start, place, &next).is_break();
+        stopped = is_new && keep.store_iterate(chain, place, &next).is_break();
         stages.pop_if(|before| before.stage == next.stage);
         stages.push(next);
     }
-    (TraceDescent { start, stages }, stopped)
+    (stages, stopped)
 }

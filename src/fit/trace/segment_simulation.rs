@@ -6,6 +6,8 @@ use super::model::{TraceModel, TraceRecording};
 use super::normal_equations::recording_models;
 use super::unknowns::{CameraParameters, CameraUnknown, TraceUnknowns, UnknownKind};
 use crate::model::Pose;
+use crate::model::shoulder::Shoulder;
+use crate::simulate::mode::TipMode;
 use crate::simulate::scene::{Scene, StartKind};
 use crate::simulate::sensitivity::{
     Channel, TangentDirection, TangentObserver, TangentRunner, TangentSeeds, TangentSegment,
@@ -55,6 +57,8 @@ struct SegmentObservation {
     end: Option<LinkState>,
     /// Whether the derivatives are known up to the end of the run.
     is_known: bool,
+    /// Time during which the tip is held on the glass, s: with the neck off its shoulder, and on it.
+    held_s: [f64; 2],
 }
 
 /// Averages a run over the exposure of every frame.
@@ -63,6 +67,7 @@ struct ShutterAverage<'a> {
     clock_s: f64,
     half_s: f64,
     stop_s: f64,
+    shoulder: Option<Shoulder>,
     frame: usize,
     row: Vec<f64>,
     shot: SegmentObservation,
@@ -72,6 +77,11 @@ impl TangentObserver for ShutterAverage<'_> {
     fn observe_segment(&mut self, piece: &TangentSegment<'_>) {
         let shot = &mut self.shot;
         shot.is_known &= piece.is_known;
+        if piece.mode == TipMode::Stick {
+            let theta = piece.sample_at(0.5 * (piece.start_s + piece.end_s)).pose.theta;
+            let leans = self.shoulder.is_some_and(|shoulder| shoulder.contact_at(theta).angle_sign() != 0.0);
+            shot.held_s[usize::from(leans)] += piece.end_s - piece.start_s;
+        }
         while let Some(time) = self.times_s.get(self.frame).map(|t| t - self.clock_s) {
             let (opens, closes) = (time - self.half_s, time + self.half_s);
             if opens > piece.end_s || (self.half_s == 0.0 && time > piece.end_s) {
@@ -206,6 +216,12 @@ impl<'a> RecordingModel<'a> {
         self.simulate_segment(frames, state, &self.none)?.end
     }
 
+    /// Time during which the tip is held on the glass in a segment, s: with the neck off its shoulder, and on
+    /// it. `None` if the run ends early.
+    pub(super) fn held_times_s(&self, frames: [usize; 2], state: &LinkState) -> Option<[f64; 2]> {
+        Some(self.simulate_segment(frames, state, &self.none)?.held_s)
+    }
+
     fn simulate_segment(
         &self,
         [first, last]: [usize; 2],
@@ -230,6 +246,7 @@ impl<'a> RecordingModel<'a> {
             clock_s,
             half_s: lead,
             stop_s: scene.run.stop_s,
+            shoulder: scene.linkage.shoulder,
             frame: 0,
             row: vec![0.0; directions],
             shot: SegmentObservation {
@@ -240,6 +257,7 @@ impl<'a> RecordingModel<'a> {
                 slopes,
                 end: None,
                 is_known: true,
+                held_s: [0.0; 2],
             },
         };
         let effort = SolverOptions { most_evaluations: MOST_EVALUATIONS, ..SolverOptions::new(TOLERANCE) };

@@ -51,6 +51,11 @@ pub(super) struct SegmentBoundary {
     pub state: LinkState,
 }
 
+/// Number of frames of a segment of the length `length_s`.
+pub(super) fn nominal_frames(film: &CameraObservation, length_s: f64) -> usize {
+    ((length_s * film.rate_hz).round() as usize).max(4)
+}
+
 /// Boundaries of segments at distances of about `length_s`. Of the frames in which the tip slides and the
 /// blade is bent, the frame nearest to the nominal position is chosen. (The frame with the fastest tip would
 /// often be a frame with large noise.)
@@ -61,7 +66,7 @@ pub(super) fn segment_boundaries(
     length_s: f64,
 ) -> Vec<SegmentBoundary> {
     let [from, to] = film.settings.frames;
-    let step = ((length_s * film.rate_hz).round() as usize).max(4);
+    let step = nominal_frames(film, length_s);
     // rates from one-sided windows are inaccurate
     let inner = half_width_frames(film)..film.times_s.len().saturating_sub(half_width_frames(film));
     let least_lean_m = usual_lean_of_straight_blade(scene, film, view).map(|usual| LEAST_LEAN * usual);

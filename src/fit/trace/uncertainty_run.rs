@@ -5,8 +5,10 @@
 use super::checkpoint::{Checkpoint, Iterate, TraceSearchSettings, chi2_per_dof};
 use super::initial_states::RescuePolicy;
 use super::levenberg_marquardt::{outer_step, refit, start_stage};
+use super::lobes::MAX_LOBES;
 use super::model::{TraceModel, TraceRecording};
 use super::normal_equations::{TraceCovariance, trace_covariance};
+use super::search::TraceDescent;
 use super::segment_simulation::{SegmentResiduals, segment_residuals};
 use crate::recording::noise::AutoregressiveNoise;
 use portable_math as math;
@@ -21,6 +23,9 @@ pub(super) const Z_95: f64 = 1.959_963_984_540_054;
 
 /// Maximum number of starts. A search ends sooner if two starts end at the same point.
 pub(crate) const MAX_STARTS: usize = 6;
+
+/// Number of the first chain of an uncertainty run.
+const FIRST_RUN_CHAIN: usize = MAX_STARTS + MAX_LOBES;
 
 /// Maximum number of twins of a search.
 pub(crate) const MAX_TWINS: usize = 1000;
@@ -42,9 +47,9 @@ pub(crate) enum UncertaintyRun {
 }
 
 impl UncertaintyRun {
-    /// Number of the chain of this run; the chains of the starts have lower numbers.
+    /// Number of the chain of this run; the chains of the starts and lobes have lower numbers.
     pub(crate) fn chain_number(self) -> usize {
-        MAX_STARTS
+        FIRST_RUN_CHAIN
             + match self {
                 Self::Twin(twin) => twin,
                 Self::Shorter => MAX_TWINS,
@@ -52,9 +57,9 @@ impl UncertaintyRun {
             }
     }
 
-    /// The run whose chain has the number `chain`; `None` if it is the chain of a start.
+    /// The run whose chain has the number `chain`; `None` if it is the chain of a start or of a lobe.
     pub(crate) fn from_chain_number(chain: usize) -> Option<Self> {
-        let number = chain.checked_sub(MAX_STARTS)?;
+        let number = chain.checked_sub(FIRST_RUN_CHAIN)?;
         Some(match number.checked_sub(MAX_TWINS) {
             None => Self::Twin(number),
             Some(0) => Self::Shorter,
@@ -110,6 +115,16 @@ impl<'a> SearchEnd<'a> {
         Some(Self { model, settings, seed, at, covariance, widening, sd })
     }
 
+    /// The end of a descent; `None` if it has no iterate, or if the information matrix is singular.
+    pub(super) fn of_descent(
+        model: &'a TraceModel,
+        settings: &'a TraceSearchSettings,
+        seed: u64,
+        descent: &'a TraceDescent,
+    ) -> Option<Self> {
+        Self::new(model, settings, seed, descent.last_iterate()?)
+    }
+
     /// Lists the uncertainty runs that start at the end of this search. The list is empty if the search did
     /// not reach its plain phase, for example because of bad segments.
     pub(super) fn uncertainty_runs(&self) -> Vec<UncertaintyRun> {
@@ -155,7 +170,7 @@ impl<'a> SearchEnd<'a> {
                 let stage = at.stage.saturating_sub(1);
                 (
                     Cow::Borrowed(self.model),
-                    start_stage(self.model, self.settings, stage, &at.point, &at.segments),
+                    start_stage(self.model, self.settings, (stage, at.whole), &at.point, &at.segments),
                 )
             }
             UncertaintyRun::Side { unknown, above } => {
@@ -354,9 +369,9 @@ mod tests {
         for (place, branch) in branches.iter().enumerate() {
             assert_eq!(
                 (branch.chain_number(), UncertaintyRun::from_chain_number(branch.chain_number())),
-                (MAX_STARTS + place, Some(*branch))
+                (FIRST_RUN_CHAIN + place, Some(*branch))
             );
         }
-        assert_eq!(UncertaintyRun::from_chain_number(MAX_STARTS - 1), None);
+        assert_eq!(UncertaintyRun::from_chain_number(FIRST_RUN_CHAIN - 1), None);
     }
 }

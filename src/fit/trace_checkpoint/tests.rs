@@ -18,6 +18,7 @@ pub(in crate::fit) fn iterate(step: usize) -> Iterate {
         number: step % 3,
         cuts: step / 2,
         rescues: step % 2,
+        whole: step % 2 == 1,
         plain: step % 3 == 2,
         settled: step % 3 == 2,
         damping: 1e-3 * 0.2_f64.powi(step as i32),

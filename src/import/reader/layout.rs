@@ -439,11 +439,6 @@ mod tests {
         assert_eq!(line("t,u\n0,0\n0.500,0.501\n0.700,0.930\n", 1.0), Some(4));
         assert_eq!(line("t,u\n0,0\n0.5,\n1,1\n", 1.0), Some(3));
     }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
 
     #[test]
     fn the_end_of_a_pictures_name_is_its_frame() {

@@ -1,0 +1,75 @@
+//! Comparison of two ends of a search that lie apart: whether the recordings decide between them.
+
+use super::checkpoint::{Iterate, TraceSearchSettings};
+use super::model::TraceModel;
+use super::search::is_same_end;
+use super::segment_simulation::segment_residuals;
+use super::uncertainty_run::SearchEnd;
+use crate::model::parameters::find_parameter;
+use crate::text::format_trimmed;
+use std::collections::BTreeMap;
+
+/// Evidence from which on an end has lost against a better one, in standard deviations of the difference of
+/// their chi2.
+const LOST_SD: f64 = 4.0;
+/// Smallest number of frames in a block.
+const MIN_BLOCK_FRAMES: usize = 4;
+
+/// Whether the recordings decide against `other`, or it is the same end.
+pub(super) fn has_lost(end: &SearchEnd<'_>, other: &Iterate) -> bool {
+    let comparable = (other.stage, other.plain, other.whole) == (end.at.stage, end.at.plain, end.at.whole);
+    !comparable
+        || !other.plain
+        || is_same_end(end.at, other, &end.sd)
+        || evidence_against(end.model, end.settings, end.at, other) >= LOST_SD
+}
+
+/// A reason to doubt the end if `other` has not lost against it. It names the parameter that differs most.
+pub(super) fn describe_rival(end: &SearchEnd<'_>, other: &Iterate) -> Option<String> {
+    if has_lost(end, other) {
+        return None;
+    }
+    let unknowns = &end.model.unknowns;
+    let apart = |i: &usize| ((other.point[*i] - end.at.point[*i]) / end.sd[*i]).abs();
+    let furthest = unknowns.parameters().max_by(|a, b| apart(a).total_cmp(&apart(b)))?;
+    let name = unknowns.parameter_name(furthest)?;
+    let unit = find_parameter(name).map_or("1", |parameter| parameter.unit);
+    let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
+    let value = format_trimmed(unknowns.0[furthest].value(other.point[furthest]), 3);
+    Some(format!("another minimum, with {name} at {value}{unit}, fits nearly as well"))
+}
+
+/// Evidence of the recordings against `other`: the difference of chi2, in standard deviations that are
+/// estimated from its scatter over blocks of equal time. Blocks are independent if they are much longer than
+/// the noise is correlated. (Segments will not do: the one long segment may carry most of the difference.)
+fn evidence_against(
+    model: &TraceModel,
+    settings: &TraceSearchSettings,
+    end: &Iterate,
+    other: &Iterate,
+) -> f64 {
+    let block_s = 0.25 * settings.segment_s[end.stage];
+    let by_frame = |at: &Iterate| {
+        let mut found: BTreeMap<(usize, usize, bool), f64> = BTreeMap::new();
+        for part in segment_residuals(model, at) {
+            let squares = part.frames.iter().zip(&part.whitened).map(|(frame, r)| (*frame, r * r));
+            found.extend(squares.map(|(frame, square)| ((part.recording, frame, part.is_drop), square)));
+        }
+        found
+    };
+    let (own, others) = (by_frame(end), by_frame(other));
+    let mut blocks: BTreeMap<(usize, usize), f64> = BTreeMap::new();
+    for (place, square) in &own {
+        let (recording, frame, _) = *place;
+        let rate_hz = model.recordings[recording].observation.rate_hz;
+        let frames = ((block_s * rate_hz).round() as usize).max(MIN_BLOCK_FRAMES);
+        if let Some(other) = others.get(place) {
+            *blocks.entry((recording, frame / frames)).or_default() += other - square;
+        }
+    }
+    let (count, sum) = (blocks.len() as f64, blocks.values().sum::<f64>());
+    let scatter: f64 = blocks.values().map(|d| (d - sum / count) * (d - sum / count)).sum();
+    let sd = (scatter * count / (count - 1.0)).sqrt();
+    let sum = sum + model.unknowns.prior_cost(&other.point) - model.unknowns.prior_cost(&end.point);
+    if sd > 0.0 { sum / sd } else { 0.0 }
+}
