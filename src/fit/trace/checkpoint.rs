@@ -108,7 +108,8 @@ impl Iterate {
     pub(crate) fn is_junk(&self) -> bool {
         /// Chi2 per degree of freedom above which the residuals are far above the noise.
         const JUNK_CHI2: f64 = 10.0;
-        2 * self.count_bad_segments() > self.segments.len() && !(chi2_per_dof(self).0 <= JUNK_CHI2)
+        let chi2 = chi2_per_dof(self).0;
+        2 * self.count_bad_segments() > self.segments.len() && (chi2 > JUNK_CHI2 || chi2.is_nan())
     }
 
     /// Number of segments that fit worse than noise explains.

@@ -61,9 +61,9 @@ pub(super) fn refit_plain(model: &TraceModel, mut at: Iterate) -> Option<Iterate
 #[must_use]
 pub fn next_iterate(model: &TraceModel, settings: &TraceSearchSettings, before: &Iterate) -> Option<Iterate> {
     if !before.settled {
-        return Some(outer_step(model, before, holds_constants(settings, before)));
+        return Some(outer_step(model, before, holds_constants(model, settings, before)));
     }
-    if before.is_junk() {
+    if before.is_junk() && !holds_constants(model, settings, before) {
         return None; // longer segments fit even worse
     }
     let bad = before.count_bad_segments();
@@ -76,7 +76,7 @@ pub fn next_iterate(model: &TraceModel, settings: &TraceSearchSettings, before: 
         return Some(rescued);
     }
     if stage == settings.segment_s.len() && !before.plain && bad == 0 {
-        let next = Iterate { settled: false, number: 0, damping: FIRST_DAMPING, ..before.clone() };
+        let next = Iterate { settled: false, number: 0, ..before.clone() };
         return refit_plain(model, next);
     }
     if stage < settings.segment_s.len() {
@@ -210,19 +210,19 @@ fn carry_state_over(
 
 /// Whether the constants are held at their prior means: in all stages but the last, because far from the minimum
 /// they would take over the misfit of the parameters.
-fn holds_constants(settings: &TraceSearchSettings, at: &Iterate) -> bool {
-    at.stage + 1 < settings.segment_s.len()
+fn holds_constants(model: &TraceModel, settings: &TraceSearchSettings, at: &Iterate) -> bool {
+    at.stage + 1 < settings.segment_s.len() && (0..at.point.len()).any(|i| model.unknowns.is_constant(i))
 }
 
-/// One outer step; with `held`, constants stay where they are. If no step of the unknowns lowers the cost, only the starting states are fitted; if this
-/// does not lower the cost either, the iterate is settled.
+/// One outer step; with `held`, constants stay where they are. If no step of the unknowns lowers the cost, only
+/// the starting states are fitted; if this does not lower the cost either, the iterate is settled.
 pub(super) fn outer_step(model: &TraceModel, before: &Iterate, held: bool) -> Iterate {
     /// Smallest decrease of the cost by which fits of the starting states alone go on: a tenth of a standard
     /// deviation.
     const LEAST_STATE_GAIN: f64 = 1e-2;
     const TRIALS: usize = 6;
     let number = before.number + 1;
-    let is_lost = before.stage > 0 && number >= MAX_JUNK_STEPS && before.is_junk();
+    let is_lost = !held && before.stage > 0 && number >= MAX_JUNK_STEPS && before.is_junk();
     let used_up = number >= MAX_STEPS || is_lost;
     let stay = || Iterate { number, settled: true, ..before.clone() };
     let Some(at) = normal_equations(model, &before.point, &before.segments, before.plain) else {
@@ -233,7 +233,7 @@ pub(super) fn outer_step(model: &TraceModel, before: &Iterate, held: bool) -> It
     // deviation. The robust phase only prepares the plain phase and ends with a step that lowers
     // the cost by much less than noise does: along a direction that short segments hardly determine it
     // would take many such steps.
-    let (least_gain, least_move) = if before.plain { (1e-4, 1e-2) } else { (0.3, f64::INFINITY) };
+    let (least_gain, least_move) = if before.plain { (1e-4, 1e-2) } else { (0.1, f64::INFINITY) };
     // both thresholds scale with the misfit per datum, because a large remaining misfit also makes the
     // estimates less certain
     let unit = (before.cost / before.count_data().max(1) as f64).max(1.0);

@@ -48,7 +48,7 @@ fn evidence_against(
     end: &Iterate,
     other: &Iterate,
 ) -> f64 {
-    let block_s = 0.25 * settings.segment_s[end.stage];
+    let block_s = 0.25 * settings.segment_s[0];
     let by_frame = |at: &Iterate| {
         let mut found: BTreeMap<(usize, usize, bool), f64> = BTreeMap::new();
         for part in segment_residuals(model, at) {
