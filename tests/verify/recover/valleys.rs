@@ -57,6 +57,7 @@ const WITHOUT_REVERSAL_S: [f64; 2] = [0.73, 0.9];
 const JOB: &str = r#"format = 1
 title = "Valleys"
 scene = "scene.toml"
+nuisance = "exact"
 
 [[recording]]
 path = "twin"
