@@ -1,7 +1,6 @@
 //! Comparison of two ends of a search that lie apart: whether the recordings decide between them.
 
-use super::checkpoint::{Iterate, TraceSearchSettings};
-use super::model::TraceModel;
+use super::checkpoint::Iterate;
 use super::search::is_same_end;
 use super::segment_simulation::segment_residuals;
 use super::uncertainty_run::SearchEnd;
@@ -21,7 +20,7 @@ pub(super) fn has_lost(end: &SearchEnd<'_>, other: &Iterate) -> bool {
     !comparable
         || !other.plain
         || is_same_end(end.at, other, &end.sd)
-        || evidence_against(end.model, end.settings, end.at, other) >= LOST_SD
+        || evidence_against(end, other) >= LOST_SD
 }
 
 /// A reason to doubt the end if `other` has not lost against it. It names the parameter that differs most.
@@ -39,15 +38,13 @@ pub(super) fn describe_rival(end: &SearchEnd<'_>, other: &Iterate) -> Option<Str
     Some(format!("another minimum, with {name} at {value}{unit}, fits nearly as well"))
 }
 
-/// Evidence of the recordings against `other`: the difference of chi2, in standard deviations that are
-/// estimated from its scatter over blocks of equal time. Blocks are independent if they are much longer than
-/// the noise is correlated. (Segments will not do: the one long segment may carry most of the difference.)
-fn evidence_against(
-    model: &TraceModel,
-    settings: &TraceSearchSettings,
-    end: &Iterate,
-    other: &Iterate,
-) -> f64 {
+/// Evidence of the recordings against `other`: the difference of chi2 in its standard deviations. Two fits whose
+/// residuals differ by white noise of unit variance have twice the root of the difference as its standard
+/// deviation. Noise that is not white or not normal shows in the scatter over blocks of equal time, which also
+/// contains the concentration of the difference in a few blocks; the smaller of the two counts. (Segments will
+/// not do as blocks: the one long segment may carry most of the difference.)
+fn evidence_against(search: &SearchEnd<'_>, other: &Iterate) -> f64 {
+    let SearchEnd { model, settings, at: end, widening, .. } = search;
     let block_s = 0.25 * settings.segment_s[0];
     let by_frame = |at: &Iterate| {
         let mut found: BTreeMap<(usize, usize, bool), f64> = BTreeMap::new();
@@ -70,6 +67,7 @@ fn evidence_against(
     let (count, sum) = (blocks.len() as f64, blocks.values().sum::<f64>());
     let scatter: f64 = blocks.values().map(|d| (d - sum / count) * (d - sum / count)).sum();
     let sd = (scatter * count / (count - 1.0)).sqrt();
+    let sd = sd.min(2.0 * (widening * sum.max(0.0)).sqrt());
     let sum = sum + model.unknowns.prior_cost(&other.point) - model.unknowns.prior_cost(&end.point);
     if sd > 0.0 { sum / sd } else { 0.0 }
 }
