@@ -284,7 +284,7 @@ fn read_table(path: &Path) -> Outcome<Vec<u8>> {
     }
 }
 
-/// The beginning of the first line that is longer than [`LONGEST_LINE`], to its end.
+/// The first line that is longer than [`LONGEST_LINE`]; `None` if no line is.
 fn find_long_line(bytes: &[u8]) -> Option<&[u8]> {
     let is_end = |byte: &u8| matches!(byte, b'\n' | b'\r');
     let mut rest = bytes;

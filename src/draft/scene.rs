@@ -120,11 +120,11 @@ fn add_cosine_drive(text: CommentedToml, stroke: Stroke) -> CommentedToml {
     if stroke.delay_s == 0.0 { text } else { text.add_number("delay_s", stroke.delay_s) }
 }
 
-/// Start of the run of a scene of a recording. A blade with the user's numbers need not slide steadily at the
-/// first frame.
+/// Comment and kind of the start in a scene with a recording. It is not steady, because a blade with the
+/// user's numbers may be unable to slip steadily at the first frame.
 const RECORDED_START: [&str; 2] =
     ["The run starts with the blade upright; a fit starts from the states in the recording.", "upright"];
-/// Start of the run of a scene without a recording.
+/// Comment and kind of the start in a scene without a recording.
 const STEADY_START: [&str; 2] =
     ["The run starts where the tip slides evenly, in the equilibrium of that speed.", "steady-slide"];
 

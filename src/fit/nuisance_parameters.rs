@@ -38,7 +38,8 @@ impl FreedConstant {
 #[error("{0}")]
 pub struct NuisanceError(String);
 
-/// Constants that a job frees: in the order of the job's list, or else in the order of their names.
+/// Constants that a job frees, in the order of the job's list. Without a list, they are in the order of their
+/// names.
 ///
 /// # Errors
 /// [`NuisanceError`] for a listed constant that a scene does not have, or whose values differ between scenes.
@@ -103,26 +104,25 @@ fn free_all_constants(
     scene.written_values().filter_map(freed).collect()
 }
 
-/// Default standard deviation of the prior of a constant's natural logarithm: how well the constant of a real
-/// blade is known from a balance, a picture of the section, or a similar blade. `None` for a quantity that is
-/// no constant of the blade.
+/// Default standard deviation of the prior of the natural logarithm of a constant. It states how well the
+/// constant of a real blade is known from a balance, a picture of the section, or a similar blade. `None` for
+/// a quantity that is not a constant of the blade.
 ///
-/// The default priors apply if a job does not say what is known of the constants.
+/// The default priors apply to a job with traces and without `nuisance`.
 pub(crate) fn default_prior_sd(parameter: &ModelParameter) -> Option<f64> {
     use ParameterQuantity as Q;
-    /// Masses and forces are weighed. A balance reads to a percent, but the piece that is cut from the blade
-    /// does not end where a link ends.
+    /// Masses and forces are weighed. A balance is accurate to a percent, but a piece that is cut from the
+    /// blade does not end exactly where a link of the model ends.
     const WEIGHED: f64 = 0.05;
-    /// Inertias and centres of mass follow from the contour of the section, with its density taken as
-    /// uniform.
+    /// Inertias and centres of mass are computed from the contour of the section, with a uniform density.
     const COMPUTED: f64 = 0.1;
-    /// Lengths between hinges are read off a picture of the section: 0.1 mm of 5 mm.
+    /// Lengths between hinges are read off a picture of the section, with an error of 0.1 mm in 5 mm.
     const READ: f64 = 0.02;
     /// The natural frequency of the lip is heard or filmed on the free blade.
     const HEARD: f64 = 0.05;
     /// Natural frequencies and the angle of the shoulder are known from a blade of the same kind.
     const SIMILAR: f64 = 0.1;
-    /// The damping of rubber varies with its age and temperature: a factor of 1.5.
+    /// The damping of rubber varies with its age and temperature, by a factor of 1.5; the value is ln 1.5.
     const DAMPING: f64 = 0.405;
     let frequency_sd = match parameter.quantity {
         Q::HeadMass | Q::NeckMass | Q::LipMass | Q::Preload => return Some(WEIGHED),
@@ -139,8 +139,8 @@ pub(crate) fn default_prior_sd(parameter: &ModelParameter) -> Option<f64> {
     Some(if parameter.unit == "Hz" { frequency_sd } else { 2.0 * frequency_sd })
 }
 
-/// Whether a parameter is a constant that is known to a few percent. Lengths and centres of mass count as
-/// exact, friction is estimated as a parameter, and drive and restitution belong to the experiment.
+/// Whether a job with one percentage for all constants frees this parameter. Lengths and centres of mass then
+/// count as exact, friction is estimated as a parameter, and drive and restitution belong to the experiment.
 fn is_constant(parameter: &ModelParameter) -> bool {
     use ParameterQuantity as Q;
     let exact = [Q::NeckLength, Q::LipLength, Q::NeckCentre, Q::LipCentre, Q::Restitution];

@@ -266,7 +266,7 @@ fn check_scene(
         (HeadSource::Recording, Some(measured)) => {
             let mut driven = scene.drive_by_recording(&measured.recording);
             if driven.is_err() && !job.traces.is_empty() {
-                // segments start from recorded states
+                // a steady start is not needed: segments start from recorded states
                 let mut upright = scene.clone();
                 upright.start = StartKind::Upright;
                 driven = upright.drive_by_recording(&measured.recording);

@@ -84,7 +84,7 @@ pub struct NuisanceResult {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recording: Option<String>,
     /// Key of the constant in the scene file, or a camera error: `tilt_rad`, `scale_relative`, `offset_x_m`,
-    /// `offset_drop_m`, `clock_s` or a drift.
+    /// `offset_drop_m`, `tip_along_lip_m`, `tip_across_lip_m`, `clock_s` or a drift.
     pub name: String,
     /// Mean of the prior, in the unit that `name` states; `None` if nothing is known before the fit.
     pub prior: Option<f64>,
@@ -293,12 +293,12 @@ pub struct FitResult {
     pub version: String,
 }
 
-/// A result with what follows from it, as written to `result.json`.
+/// Contents of `result.json`: a result, and two keys that are computed from it.
 #[derive(Serialize)]
 struct ResultFile<'a> {
     /// Whether the model explains the recordings; `None` if the search did not end.
     explained: Option<bool>,
-    /// Whether constants were free.
+    /// `"free"` or `"held"`: the value of [`FitResult::constants_word`].
     constants: &'static str,
     #[serde(flatten)]
     result: &'a FitResult,
@@ -346,7 +346,7 @@ impl FitResult {
         job.parameters.iter().map(estimate).collect()
     }
 
-    /// `"free"` if constants of the scene were estimated within priors, `"held"` if all count as exact.
+    /// `"free"` if the fit estimated constants of the scene within priors, `"held"` if it took all as exact.
     pub(crate) fn constants_word(&self) -> &'static str {
         if self.nuisances.iter().any(|nuisance| nuisance.recording.is_none()) { "free" } else { "held" }
     }

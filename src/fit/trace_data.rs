@@ -8,13 +8,14 @@ use crate::simulate::drive::smooth_head_motion;
 use crate::simulate::scene::Scene;
 use std::ops::Range;
 
-/// Default segment lengths of the stages, in first segment lengths of the blade. The first is short enough for
-/// convergence from the middle of the bounds; the last is the longest for which the motion fitted with shorter
-/// segments reliably gives starting states.
+/// Default segment lengths of the stages, in units of the first segment length of the blade. The first is
+/// short enough for convergence from the middle of the bounds; the last is the longest for which the motion
+/// fitted with shorter segments reliably gives starting states.
 const DEFAULT_SEGMENTS: [f64; 3] = [1.0, 2.0, 4.0];
-/// If the shortest segments have fewer frames than this, a further stage with segments of [`EXTRA_SEGMENT`] is
-/// added, because short segments with few frames bias the estimates more strongly.
+/// If the shortest segments have fewer frames than this, a stage with longer segments is added, because short
+/// segments with few frames bias the estimates more strongly.
 const FEW_FRAMES: f64 = 16.0;
+/// Length of the segments of this stage, in units of the first segment length.
 const EXTRA_SEGMENT: f64 = 8.0;
 /// Minimum number of frames in a segment. The starting state of a segment uses up four degrees of freedom.
 pub(crate) const MIN_SEGMENT_FRAMES: usize = 8;

@@ -57,8 +57,8 @@ impl Problem {
         let mut ledger = TraceLedger::new(&header, resume, most, journal, on_iterate)?;
         if let Some((file, found)) = resume {
             recheck_iterates(file, found, |chain, before| match before {
-                // an uncertainty run starts from the best end, and a lobe from that of a start; neither is
-                // known yet
+                // an uncertainty run starts from the best end, and the chain of a lobe from the best end of a
+                // start; neither is known yet
                 _ if UncertaintyRun::from_chain_number(chain).is_some() => None,
                 None if chain >= MAX_STARTS => None,
                 None => first_iterate(&model, &settings, &start_point(&model, seed, chain)),

@@ -1,12 +1,12 @@
-//! The noise of a recording: white or correlated between neighbouring frames, alike or not in both points,
-//! partly common to both, and rounded to steps.
+//! The noise of a recording. It is white or correlated between neighbouring frames; it may differ between tip
+//! and head, and a part of it may be common to both.
 //!
-//! Two estimators of the size of the noise exist. `measure_noise` maximises the likelihood of a smooth
-//! motion and an autoregressive noise; it includes what changes slowly from frame to frame, and it needs some
-//! hundred frames. Fits and comparisons use it. [`noise_floor`] is the median third difference of a single
-//! column; it needs a dozen frames and no model of the motion, but it sees only the part of the noise that
-//! changes from one frame to the next. The checks of single columns, frames and twins use it, because they
-//! compare neighbouring frames, and so do fits and comparisons of recordings that are too short.
+//! There are two estimators of the size of the noise. `measure_noise` maximises the likelihood of a smooth
+//! motion with autoregressive noise; it includes noise that changes slowly from frame to frame, and needs
+//! some hundred frames. Fits and comparisons use it. [`noise_floor`] is the median third difference of a
+//! single column; it needs a dozen frames and no model of the motion, but it sees only the part of the noise
+//! that changes from one frame to the next. The checks of single columns, frames and twins use it, because
+//! they compare neighbouring frames, and so do fits and comparisons of recordings that are too short.
 
 mod autoregressive;
 mod blocks;
@@ -43,13 +43,14 @@ const LEAST_BLOCK: usize = 24;
 /// Degrees of the polynomials in blocks of [`LEAST_BLOCK`] frames that separate noise from the motion of the
 /// blade itself. The highest follows motions up to a fifth of the frame rate.
 const BLADE_DEGREES: [usize; 6] = [3, 5, 8, 11, 14, 16];
-/// A lower degree describes the motion if its scatter exceeds that of the highest by less than this number of
-/// standard deviations of the difference. The second highest must do so, or the motion is too fast.
+/// A lower degree describes the motion if its scatter exceeds that of the highest degree by at most this
+/// number of standard deviations of the difference. If the second highest degree does not, the motion is too
+/// fast.
 const ALIKE_DEVIATIONS: f64 = 2.0;
-/// Tip and head have noise of different size if the two differ by more than this number of standard
-/// deviations: by chance, one recording of 370.
+/// The noise of tip and head differs in size if the difference exceeds this number of standard deviations. By
+/// chance, this happens in one recording of 370.
 const CLEAR_DEVIATIONS: f64 = 3.0;
-/// Largest ratio of the noise of the two points; what exceeds it is motion of the blade.
+/// Largest ratio of the noise of the two points. A larger ratio comes from motion of the blade.
 const MOST_UNLIKE: f64 = 2.0;
 /// Maximum number of frames that are used for an estimate of the noise, spread over the recording: they
 /// determine a correlation with an error of 0.01.
@@ -58,8 +59,8 @@ const MOST_FRAMES: usize = 6_000;
 const FEWEST_FRAMES: usize = 100;
 /// Smallest standard deviation that counts as noise, m; a smaller one is rounding.
 const LEAST_SD_M: f64 = 1e-9;
-/// Largest ratio of the common noise of a channel to its whole noise at which the rest is calculated from the
-/// two: if the ratio is larger, the rest is the small difference of two uncertain numbers.
+/// Largest ratio of the common noise of a channel to its whole noise for which the common noise is
+/// subtracted. With a larger ratio, the rest would be a small difference of two uncertain numbers.
 const MOST_COMMON: f64 = 0.9;
 
 /// Estimated noise of a channel, with its uncertainty.
@@ -88,7 +89,7 @@ pub(crate) struct RecordingNoise {
 /// How a recording is cut into blocks.
 struct RecordingCuts<'a> {
     recording: &'a Recording,
-    /// Time of every frame, in mean frames.
+    /// Time of every frame, in units of the mean frame interval.
     places: Vec<f64>,
 }
 
@@ -115,8 +116,9 @@ impl RecordingCuts<'_> {
     }
 }
 
-/// Measures the noise of a recording. The noise of the head along the sweep and of the height of the tip is
-/// measured on these channels; if one measurement fails, the result of the other is used for both.
+/// Measures the noise of a recording. The position of the head along the sweep and the height of the tip are
+/// measured first; if one measurement fails, the result of the other is used for both. The other two channels
+/// take their correlations from these.
 pub(crate) fn measure_noise(recording: &Recording) -> RecordingNoise {
     let (cuts, traces) = (RecordingCuts::new(recording), recording.traces());
     let head = measure_head_noise(&traces.head_x_m, &cuts);
@@ -153,7 +155,7 @@ impl RecordingNoise {
     }
 }
 
-/// Noise of a channel minus `common`, its share of the noise of the other point.
+/// Noise of a channel without `common`, the part that it shares with the other point.
 fn subtract_common(
     whole: &ChannelNoise,
     other: &ChannelNoise,
@@ -167,7 +169,7 @@ fn subtract_common(
     AutoregressiveNoise::new(left_m, whole.coefficients().to_vec()).ok()
 }
 
-/// Measures the noise of the head along the sweep in the shortest blocks that are long against the
+/// Measures the noise of the head along the sweep, in the shortest blocks that are much longer than the
 /// correlation of the noise.
 fn measure_head_noise(values: &[Option<f64>], cuts: &RecordingCuts<'_>) -> Option<ChannelNoise> {
     let mut found = None;
@@ -205,7 +207,8 @@ fn measure_own_size(
     };
     let found: Vec<[f64; 2]> = BLADE_DEGREES.into_iter().map_while(with_degree).collect();
     let [.., second, highest] = found[..] else { return None };
-    // (the variance of the difference of an estimate and a less efficient one is that of their variances)
+    // (the variance of the difference between an estimate and a less efficient one is the difference of their
+    // variances)
     let is_alike = |[sd_m, sd_of_sd_m]: &[f64; 2]| {
         let apart_sd_m = (highest[1] * highest[1] - sd_of_sd_m * sd_of_sd_m).max(0.0).sqrt();
         sd_m - highest[0] <= ALIKE_DEVIATIONS * apart_sd_m

@@ -80,8 +80,8 @@ impl Scene {
         Ok(scene)
     }
 
-    /// Like [`Self::parse_with_recording`], for a scene whose runs start from recorded states: a start in steady
-    /// slip that does not exist is replaced by an upright blade.
+    /// Like [`Self::parse_with_recording`], for a scene whose runs start from recorded states. If the blade
+    /// cannot slip steadily at the start, the scene starts with the blade upright.
     ///
     /// # Errors
     /// As [`Self::parse_with_recording`].
@@ -93,7 +93,7 @@ impl Scene {
         Ok(Self::parse_any_start(file, text, recording)?.with_possible_start())
     }
 
-    /// The same scene, with an upright blade at the start if steady slip is impossible there.
+    /// The same scene; it starts with the blade upright if steady slip is impossible at its start.
     pub(crate) fn with_possible_start(mut self) -> Self {
         if self.check_start().is_err() {
             self.start = StartKind::Upright;

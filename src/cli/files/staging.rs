@@ -253,7 +253,7 @@ pub(crate) fn check_path_free(path: &Path) -> Outcome<()> {
     }
 }
 
-/// Number of bytes of a file that are written at once.
+/// Size of the buffer through which a file is copied, in bytes.
 const COPIED_BYTES: usize = 1 << 16;
 
 /// Writes a file under a temporary name and locks it, if the file system can; returns the file with its hash.

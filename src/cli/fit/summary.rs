@@ -20,7 +20,7 @@ pub(crate) fn print_summary(solved: &CompletedFit) {
     if result.misfit.is_some() {
         let words = match result.constants_word() {
             "free" => "free within their priors",
-            _ => "held: their errors are not in the intervals",
+            _ => "taken as exact: the intervals do not include their errors",
         };
         print_line!("constants: {words}");
     }

@@ -100,7 +100,7 @@ fn check_prior(
 // Constants of the scene that are free within a prior. They are freed because a mass or a damping is never
 // known exactly.
 
-/// Word in a job for constants that are all exact.
+/// Value of `nuisance` with which a job takes all constants as exact.
 const EXACT_WORD: &str = "exact";
 /// Smallest allowed standard deviation of the prior of a constant, in % of the constant. A more precisely
 /// known constant must be left fixed.
@@ -115,8 +115,8 @@ const MOST_PERCENT: f64 = 50.0;
 pub enum Constants {
     /// No constant is free: all constants are exact.
     Exact,
-    /// Every constant that has a default prior, except those that are zero, free parameters, or set by a
-    /// condition.
+    /// Every constant for which a default prior exists is free within it, except constants that are zero,
+    /// free parameters, or set by a condition.
     Default,
     /// All masses, inertias, stiffnesses and dampings, the preload and the shoulder angle of a scene, except
     /// those that are zero, free parameters, or set by a condition.
@@ -203,7 +203,7 @@ fn check_nuisance(
     Ok(NuisanceParameter { name: name.clone(), sd_relative })
 }
 
-/// Parses `3 %` as 0.03; `expected` is what a refusal says was expected.
+/// Parses `3 %` as 0.03. The error for other text says that `expected` was expected.
 fn parse_percentage(key: &str, text: &str, expected: &str) -> Result<f64, KeyRefusal> {
     match text.trim().strip_suffix('%').and_then(|number| number.trim().parse().ok()) {
         Some(percent) => check_percentage(key, percent),

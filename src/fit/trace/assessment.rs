@@ -84,9 +84,9 @@ impl TraceAssessment {
     }
 }
 
-/// Assesses the best end of a search. `others` are the ends to which it was preferred, and `lonely` is the
-/// doubt of a search in which no two starts agree. `runs` lists the uncertainty runs that start at this end,
-/// each with its last iterate.
+/// Assesses the best end of a search. `others` are the ends that were compared with it. `lonely` is the
+/// reason for doubt if no two starts agree. `runs` lists the uncertainty runs that start at this end, each
+/// with its last iterate.
 pub(super) fn assess_end(
     end: &SearchEnd<'_>,
     others: &[&Iterate],
@@ -150,8 +150,8 @@ fn count_determined(model: &TraceModel, information: &DMatrix<f64>) -> usize {
     scaled.symmetric_eigenvalues().iter().filter(|value| **value > MIN_EIGENVALUE).count() + priors.len()
 }
 
-/// Reasons to doubt all parameters together that the end alone shows. The comparison of segment lengths is
-/// not included.
+/// Reasons to doubt all parameters that follow from this end alone. Comparisons with other ends and with
+/// shorter segments are not included.
 fn shared_doubts(at: &SearchEnd<'_>, rank: usize) -> Vec<String> {
     let SearchEnd { model, settings, at: end, sd, .. } = at;
     let mut doubts = Vec::new();

@@ -82,7 +82,7 @@ impl TraceModel {
 fn build_recording(source: &TraceSource<'_>) -> Result<TraceRecording, HeadMotionError> {
     let TraceSource { recording, traced, exposure_s, .. } = *source;
     let mut scene = source.scene.clone();
-    // every segment has its own starting state, so none is sought at the start of the scene
+    // every segment has its own starting state, so the start of the scene is not used
     scene.start = StartKind::Upright;
     let own_head = traced.head == HeadSource::Recording;
     if own_head {
@@ -166,15 +166,17 @@ fn constant_unknown(freed: &FreedConstant) -> TraceUnknown {
     }
 }
 
-/// What is known of a camera error before the fit; `size` is its standard deviation or, without a prior, half
-/// of the range in which it is sought, and 0 for an error that is not estimated.
+/// What is known of a camera error before the fit.
 struct CameraPrior {
     what: CameraUnknown,
     /// Mean of the prior.
     mean: f64,
+    /// Standard deviation of the prior; without a prior, half of the width of the range. An error of size 0
+    /// is not estimated.
     size: f64,
-    /// Whether nothing is known but the range.
+    /// Whether the error has no prior, so that only its range is limited.
     is_flat: bool,
+    /// Value at which the search starts.
     start: f64,
 }
 
@@ -201,9 +203,9 @@ impl CameraPrior {
 
 /// Unknowns of the camera of a recording. A quantity whose prior has zero width is not estimated.
 ///
-/// Nothing is known of the picture's zero: the drop is counted from an arbitrary height, and without a tracked
-/// head the positions along the sweep are counted from an arbitrary place. The tilt is known from the path of
-/// the tip on the glass, where this path shows it.
+/// The zero of the picture is arbitrary. Drops are counted from an arbitrary height and, if the head is not
+/// tracked, positions along the sweep from an arbitrary place, so these offsets have no prior. If the path of
+/// the tip on the glass shows the tilt, this tilt is the mean of the prior.
 fn camera_unknowns(film: usize, source: &TraceSource<'_>, data: &CameraObservation) -> Vec<TraceUnknown> {
     let TraceData { camera: doubt, head, .. } = source.traced;
     let linkage = &source.scene.linkage;
@@ -218,7 +220,7 @@ fn camera_unknowns(film: usize, source: &TraceSource<'_>, data: &CameraObservati
     };
     let normal = CameraPrior::normal;
     let with_drop = |sd: f64| if data.settings.head_drop { sd } else { 0.0 };
-    // with one channel alone, the lip's length and the marker's place on it cannot be told apart
+    // one channel alone cannot distinguish the place of the marker on the lip from the length of the lip
     let with_tip = |sd: f64| if data.settings.tip_x { with_drop(sd) } else { 0.0 };
     let along = match head {
         HeadSource::Scene => zero(CameraUnknown::OffsetX, along_m),
@@ -243,7 +245,8 @@ fn camera_unknowns(film: usize, source: &TraceSource<'_>, data: &CameraObservati
     rows.iter().filter(|row| row.size > 0.0).map(|row| row.unknown(film)).collect()
 }
 
-/// The glass in the picture, from the path of the tip; `None` if the path does not show it.
+/// Angle and curvature of the glass in the picture, from the path of the tip; `None` if they cannot be
+/// measured.
 fn measure_glass(recording: &Recording) -> Option<CameraTilt> {
     let instants = ReversalInstants::find_instants(recording);
     measure_tilt(recording, &instants, &measure_quality(recording, None)).ok()

@@ -47,8 +47,8 @@ pub struct CameraObservation {
     /// Mean of `head_m` over the fitted frames, m. A tilt of the camera rotates the picture about this
     /// position.
     pub centre_m: f64,
-    /// Angle from the picture's x axis to the glass and its standard deviation, rad, from the path of the tip;
-    /// both are 0 if the path shows no clear angle.
+    /// Angle from the x axis of the picture to the glass, and its standard deviation, rad, measured on the
+    /// path of the tip. Both are 0 if the path shows no clear angle.
     pub tilt_rad: [f64; 2],
     /// Greatest speed of the head in the fitted frames, m/s.
     pub head_speed_m_per_s: f64,
@@ -64,14 +64,16 @@ const FEWEST_POINTS: usize = 20;
 /// The leans (tip position minus head position) are sorted, and this fraction of them is ignored at each end.
 const LEAN_TAIL: f64 = 0.1;
 
-/// Lean and drop, m, at which a blade is upright that leans to both sides; `points` are its leans and drops,
-/// and `ends` the usual leans to either side. `None` if the drops are no function of the lean.
+/// Measured lean and drop, m, of the upright blade, for a blade that leans to both sides. `points` are its
+/// measured leans and drops; `ends` are its usual leans to the two sides. `None` if no cubic can be fitted to
+/// the drops.
 fn upright_point(points: &[[f64; 2]], ends: [f64; 2]) -> Option<[f64; 2]> {
-    /// The offset is sought within this fraction of the distance between `ends`, around the middle.
+    /// Width of the range in which the offset is sought, as a fraction of the distance between `ends`. The
+    /// range is centred between them.
     const SOUGHT: f64 = 0.5;
     /// Number of offsets that are tried in each round.
     const TRIED: usize = 21;
-    /// Factor by which the distance between two offsets shrinks from round to round.
+    /// Ratio of the distance between neighbouring offsets in a round to that in the round before.
     const FINER: f64 = 0.1;
     /// Number of rounds; in the last one, neighbouring offsets differ by 2e-5 of the distance between `ends`.
     const ROUNDS: usize = 4;
@@ -91,8 +93,8 @@ fn upright_point(points: &[[f64; 2]], ends: [f64; 2]) -> Option<[f64; 2]> {
     best.map(|(_, point)| point)
 }
 
-/// Sum of the squared residuals, m^2, of a cubic in the squared lean that is fitted to the drops, and the drop
-/// of the upright blade, m. The leans are counted from `offset_m`.
+/// Fits a cubic in the squared lean to the drops; leans are counted from `offset_m`. Returns the sum of the
+/// squared residuals, m^2, and the drop of the upright blade, m.
 fn fit_drops(points: &[[f64; 2]], offset_m: f64, reach_m: f64) -> Option<(f64, f64)> {
     const TERMS: usize = 4;
     let mut normal = SMatrix::<f64, TERMS, TERMS>::zeros();
@@ -109,10 +111,10 @@ fn fit_drops(points: &[[f64; 2]], offset_m: f64, reach_m: f64) -> Option<(f64, f
     Some((squares - coefficients.dot(&right), coefficients[0]))
 }
 
-/// Offset of the drop, m, with which the drops are, in the median, those of the blade at rest with the same
-/// lean; 0 without such a drop.
+/// Median difference, m, between the measured drop and the drop of the blade at rest with the same lean; 0 if
+/// no blade at rest has such a lean.
 fn drop_offset_at_rest(points: &[[f64; 2]], linkage: &Linkage) -> f64 {
-    /// Number of points that are compared.
+    /// Maximum number of points that are compared.
     const COMPARED: usize = 200;
     let apart = points.len().div_ceil(COMPARED).max(1);
     let above = |[lean, drop]: &[f64; 2]| {
@@ -127,8 +129,8 @@ fn drop_offset_at_rest(points: &[[f64; 2]], linkage: &Linkage) -> f64 {
 impl CameraObservation {
     /// Data of a recording. `drive` moves the head in the model of the recording. `shared` is the noise in
     /// each frame, m, that tip and head have in common, along the sweep and in height; it is subtracted from
-    /// the tip's position and from the head's height. `glass` is the glass in the picture: heights of the head
-    /// are counted from a curved glass below it.
+    /// the tip's position and from the head's height. `glass` is the glass in the picture. If it is curved,
+    /// heights of the head are counted from the glass at the tip.
     pub(crate) fn new(
         recording: &Recording,
         drive: &Drive,
@@ -180,10 +182,11 @@ impl CameraObservation {
 
     /// Initial guesses, m, of the offsets of the tip's position and of the head's drop.
     ///
-    /// A blade that leans to both sides has its least drop where it is upright, and the drop is a function of
-    /// the square of the lean: the offset along the sweep is the one with which a cubic in this square fits
-    /// the drops best. A blade that leans to one side does not show where it is upright; its lean is taken as
-    /// measured, and its drop as that of the blade at rest with this lean.
+    /// The drop of a blade is smallest where the blade is upright, and it is a function of the square of the
+    /// lean. If the blade leans to both sides, the offset along the sweep is the one with which a cubic in
+    /// this square fits the drops best. If it leans to one side only, nothing shows where it is upright. Then
+    /// the offset along the sweep is 0 or, if the head is not tracked, the median lean; the drop is that of
+    /// the blade at rest with the remaining lean.
     pub(super) fn guess_offsets_m(&self, tilt_rad: f64, linkage: &Linkage) -> [f64; 2] {
         let [first, last] = self.settings.frames;
         let apart = (last - first).div_ceil(GUESS_FRAMES).max(1);
@@ -348,8 +351,8 @@ mod tests {
         crate::simulate::scene::Scene::parse("actual-blade.toml", text).unwrap().linkage
     }
 
-    /// A blade leans further to one side than to the other, as friction depends on speed; its drop is a
-    /// function of the square of its lean alone.
+    /// A blade leans farther to one side than to the other, because friction depends on speed. Its drop
+    /// depends only on the square of its lean.
     #[test]
     fn a_blade_that_leans_unequally_far_to_both_sides_shows_where_it_is_upright() {
         let ends = [-1.1e-3, 1.7e-3];

@@ -80,8 +80,8 @@ pub struct Iterate {
     pub cuts: usize,
     /// Number of times that bad segments of this stage were restarted from other states.
     pub rescues: usize,
-    /// Whether a segment that is much longer than the stage's length counts to its end rather than for that
-    /// length only.
+    /// Whether segments count to their end. If false, a segment that is much longer than the length of the
+    /// stage counts for this length only.
     pub whole: bool,
     /// Whether the cost is plain chi2 rather than the robust cost.
     pub plain: bool,
@@ -104,7 +104,7 @@ impl Iterate {
     }
 
     /// Whether the iterate explains nothing: most segments are bad, and on average the residuals are far
-    /// above the noise. Its point says nothing about the blade.
+    /// above the noise. Its parameter values mean nothing.
     pub(crate) fn is_junk(&self) -> bool {
         /// Chi2 per degree of freedom above which the residuals are far above the noise.
         const JUNK_CHI2: f64 = 10.0;

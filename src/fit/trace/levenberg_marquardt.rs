@@ -14,8 +14,8 @@ use rayon::prelude::*;
 
 /// Maximum number of outer steps (steps of the unknowns) in a phase.
 pub(super) const MAX_STEPS: usize = 40;
-/// Maximum number of outer steps in a later stage in which the iterate explains nothing. A right model brings
-/// a fit along from the stage before, so more steps would not help.
+/// Maximum number of outer steps of a stage, after the first, whose iterates explain nothing. With a right
+/// model, the end of the stage before already fits well, so more steps would not help.
 const MAX_JUNK_STEPS: usize = 6;
 /// Maximum number of steps in the fit of a segment's starting state after each outer step.
 pub(super) const MAX_STATE_STEPS: usize = 8;
@@ -64,7 +64,7 @@ pub fn next_iterate(model: &TraceModel, settings: &TraceSearchSettings, before: 
         return Some(outer_step(model, before, holds_constants(model, settings, before)));
     }
     if before.is_junk() && !holds_constants(model, settings, before) {
-        return None; // longer segments fit even worse
+        return None; // neither other starting states nor longer segments help
     }
     let bad = before.count_bad_segments();
     let stage = before.stage + 1;
@@ -119,8 +119,8 @@ fn resegment(model: &TraceModel, settings: &TraceSearchSettings, before: &Iterat
 }
 
 /// The first iterate of a stage: new segments whose starting states lie on the fitted motion of the segments
-/// `before`. The segments are `whole`, or a segment that is much longer than the length of the stage ends
-/// after that length. `None` if a scene refuses the point.
+/// `before`. With `whole`, segments keep all their frames; otherwise a segment that is much longer than the
+/// length of the stage ends after that length. `None` if a scene refuses the point.
 pub(super) fn start_stage(
     model: &TraceModel,
     settings: &TraceSearchSettings,
@@ -151,7 +151,8 @@ pub(super) fn start_stage(
     refit(model, first, MAX_STATE_STEPS, RescuePolicy::Beyond(3.0))
 }
 
-/// Divides all recordings into segments.
+/// Divides all recordings into segments. Without `whole`, a segment that is much longer than `length_s` ends
+/// after `length_s`.
 pub(super) fn cut_recordings(points: &[RecordingModel<'_>], length_s: f64, whole: bool) -> Vec<SegmentState> {
     let mut segments: Vec<SegmentState> =
         points.iter().enumerate().flat_map(|(film, at)| cut_recording(at, film, length_s)).collect();
@@ -208,17 +209,17 @@ fn carry_state_over(
     point.end_state([old.first, segment.first], &old.start_state())
 }
 
-/// Whether the constants are held at their prior means: in all stages but the last, because far from the minimum
-/// they would take over the misfit of the parameters.
+/// Whether the constants are held at their prior means. They are held in all stages but the last, because far
+/// from the minimum they would absorb the misfit of wrong parameters.
 fn holds_constants(model: &TraceModel, settings: &TraceSearchSettings, at: &Iterate) -> bool {
     at.stage + 1 < settings.segment_s.len() && (0..at.point.len()).any(|i| model.unknowns.is_constant(i))
 }
 
-/// One outer step; with `held`, constants stay where they are. If no step of the unknowns lowers the cost, only
-/// the starting states are fitted; if this does not lower the cost either, the iterate is settled.
+/// One outer step; with `held`, the constants keep their values. If no step of the unknowns lowers the cost,
+/// only the starting states are fitted; if this does not lower the cost either, the iterate is settled.
 pub(super) fn outer_step(model: &TraceModel, before: &Iterate, held: bool) -> Iterate {
-    /// Smallest decrease of the cost by which fits of the starting states alone go on: a tenth of a standard
-    /// deviation.
+    /// Smallest decrease of the cost after which another step is made if only the starting states were
+    /// fitted: that of a step of a tenth of a standard deviation.
     const LEAST_STATE_GAIN: f64 = 1e-2;
     const TRIALS: usize = 6;
     let number = before.number + 1;
@@ -229,10 +230,10 @@ pub(super) fn outer_step(model: &TraceModel, before: &Iterate, held: bool) -> It
         return stay();
     };
     let mut damping = before.damping;
-    // The plain phase (cost chi2) ends when a step is shorter than a hundredth of a standard
-    // deviation. The robust phase only prepares the plain phase and ends with a step that lowers
-    // the cost by much less than noise does: along a direction that short segments hardly determine it
-    // would take many such steps.
+    // The plain phase (cost chi2) ends when a step is shorter than a hundredth of a standard deviation. The
+    // robust phase only prepares the plain phase. It ends with a step that lowers the cost by much less than
+    // noise changes it, because many such steps would follow along a direction that short segments hardly
+    // determine.
     let (least_gain, least_move) = if before.plain { (1e-4, 1e-2) } else { (0.1, f64::INFINITY) };
     // both thresholds scale with the misfit per datum, because a large remaining misfit also makes the
     // estimates less certain

@@ -1,10 +1,10 @@
-//! Lobes of the cost along the frequency at which the blade rings while its tip is held.
+//! Minima (lobes) of the cost as a function of the frequency at which the blade rings while its tip sticks.
 //!
 //! No segment starts while the tip sticks, so the blade may ring freely through most of one long segment. A
-//! frequency with half a cycle more or less in this time then fits nearly as well, as with every frequency
-//! that is estimated from two pieces of a record with a gap between them. Such minima (lobes) are evenly
-//! spaced in frequency, so they can be listed: the segments of normal length limit the frequency, and the
-//! long segments decide between the lobes within these limits.
+//! frequency with half a cycle more or less in this time then fits nearly as well. The same ambiguity exists
+//! for any frequency that is estimated from two parts of a record with a gap between them. The lobes are
+//! evenly spaced in frequency, so all of them can be tried: the segments of normal length limit the
+//! frequency, and the long segments decide between the lobes within these limits.
 
 use super::checkpoint::SegmentState;
 use super::initial_states::{RescuePolicy, fit_states, update_states};
@@ -16,31 +16,31 @@ use nalgebra::DVector;
 
 /// Maximum number of lobes from which a search descends.
 pub(crate) const MAX_LOBES: usize = 8;
-/// Distance from the end of a search within which lobes are looked for, in standard deviations of the held
-/// blade's frequency. Beyond it, the segments of normal length exclude them.
+/// Lobes are sought within this distance from the end of a search, in standard deviations of the frequency of
+/// the blade with a held tip. The segments of normal length exclude lobes at larger distances.
 const SPAN_SD: f64 = 5.0;
 /// Smallest number of half cycles within [`SPAN_SD`] that leaves room for another lobe.
 const LEAST_LOBES: f64 = 0.5;
 /// Smallest and largest number of points at which the cost of the long segments is computed, on either side
 /// of the end.
 const POINTS: [usize; 2] = [10, 20];
-/// Number of points in each lobe, as far as [`POINTS`] allows.
+/// Number of points per lobe, within the limits of [`POINTS`].
 const POINTS_PER_LOBE: f64 = 8.0;
 
-/// The direction of the unknowns in which lobes follow one another.
+/// Direction in the space of the unknowns along which the lobes follow one another.
 struct LobeDirection {
-    /// Derivative of the held blade's frequency with respect to each coordinate, per standard deviation of
-    /// this frequency.
+    /// Derivative of the frequency of the blade with a held tip with respect to each coordinate, in standard
+    /// deviations of this frequency.
     gradient: DVector<f64>,
-    /// Change of each coordinate that changes the frequency by one standard deviation and the cost of the
-    /// segments of normal length least.
+    /// Change of each coordinate. Of all changes that raise the frequency by one standard deviation, it
+    /// raises the cost of the segments of normal length least.
     step: DVector<f64>,
-    /// Number of half cycles in a long segment by which this step changes the ringing.
+    /// Number of half cycles that this step adds to the ringing in a long segment.
     half_cycles: f64,
 }
 
-/// Points from which the search descends with whole segments, the best first; empty if no segment is longer
-/// than intended. `end` is the best end of the search without the long segments.
+/// Points from which the search descends with whole segments, the best first; empty if no segment is much
+/// longer than its stage. `end` is the best end of the search without the long segments.
 pub(super) fn find_lobes(end: &SearchEnd<'_>) -> Vec<Vec<f64>> {
     let long = long_segments(end);
     if long.is_empty() {
@@ -50,7 +50,7 @@ pub(super) fn find_lobes(end: &SearchEnd<'_>) -> Vec<Vec<f64>> {
     lobes.filter(|lobes| !lobes.is_empty()).unwrap_or_else(|| vec![end.at.point.clone()])
 }
 
-/// Segments that are longer than intended, whole, with fitted starting states.
+/// Segments that are much longer than their stage, with all their frames and with fitted starting states.
 fn long_segments(end: &SearchEnd<'_>) -> Vec<SegmentState> {
     let Some(points) = recording_models(end.model, &end.at.point) else { return Vec::new() };
     let length_s = end.settings.segment_s[end.at.stage];
@@ -66,8 +66,8 @@ fn long_segments(end: &SearchEnd<'_>) -> Vec<SegmentState> {
     long
 }
 
-/// The direction in which the frequency of the held blade is known worst, in half cycles of the ringing in a
-/// long segment; `None` if it is known to less than half a lobe.
+/// The direction in which the number of half cycles in a long segment is least certain; `None` if it is so
+/// certain that there is no room for another lobe.
 fn lobe_direction(end: &SearchEnd<'_>, long: &[SegmentState]) -> Option<LobeDirection> {
     /// Change of a coordinate in the finite difference of the frequency.
     const CHANGE: f64 = 1e-4;
@@ -112,7 +112,7 @@ struct ScanPoint {
     cost: f64,
 }
 
-/// Minima of the cost over the frequency, the lowest first.
+/// Points of the minima of the cost as a function of the frequency, the lowest first.
 fn scan_lobes(end: &SearchEnd<'_>, direction: &LobeDirection, long: &[SegmentState]) -> Vec<Vec<f64>> {
     let wanted = POINTS_PER_LOBE * direction.half_cycles * SPAN_SD;
     let count = (wanted as usize).clamp(POINTS[0], POINTS[1]);
@@ -137,7 +137,8 @@ fn scan_lobes(end: &SearchEnd<'_>, direction: &LobeDirection, long: &[SegmentSta
 }
 
 /// Moves a point of the scan by `sd` standard deviations of the frequency, and fits everything else again at
-/// the new frequency. `None` if a scene refuses the point or it is beyond a range.
+/// the new frequency. `None` if a scene refuses the point, or if the range of an unknown stops it less than
+/// half of the way.
 fn refit_scan_point(
     end: &SearchEnd<'_>,
     direction: &LobeDirection,
@@ -161,7 +162,8 @@ fn refit_scan_point(
 }
 
 /// Moves a point of the scan by `step` or, without one, by the Gauss-Newton step that keeps the frequency.
-/// The cost is that of the long segments, plus the rise that the covariance predicts for all others.
+/// The cost is chi2 of the long segments, plus the rise of the cost of the search, as its information matrix
+/// predicts it.
 fn move_scan_point(
     end: &SearchEnd<'_>,
     direction: &LobeDirection,

@@ -74,8 +74,8 @@ pub(super) fn normal_equations(
     Some(NormalEquations { matrix: total, slope, parts })
 }
 
-/// The point after a damped step of the unknowns, within their ranges; with `held`, constants stay where they
-/// are.
+/// The point after a damped step of the unknowns, within their ranges; with `held`, the constants keep their
+/// values.
 pub(super) fn damped_step(
     model: &TraceModel,
     z: &[f64],
@@ -114,8 +114,8 @@ pub(super) fn carry_states(
 ) -> Vec<SegmentState> {
     /// Largest allowed change, rad, of an angle of a starting state in one step.
     const ANGLE: f64 = 0.05;
-    /// Largest allowed change, rad per first segment length, of an angular velocity of a starting state in one
-    /// step.
+    /// Largest allowed change of an angular velocity of a starting state in one step, rad per first segment
+    /// length.
     const RATE: f64 = 0.8;
     let mut segments = segments.to_vec();
     for (segment, part) in segments.iter_mut().zip(&at.parts) {

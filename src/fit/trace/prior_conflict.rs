@@ -1,6 +1,6 @@
-//! Whether the estimates of the constants contradict what was known of them.
+//! Tests whether the estimates of the constants contradict their priors.
 //!
-//! With a right model and honest priors, the distance of the estimates from the prior means has the covariance
+//! With a right model and right priors, the distance of the estimates from the prior means has the covariance
 //! `P - C` (prior less posterior). Constants that are jointly too far from their priors, and parameters that
 //! move when the priors are made wider, show that a prior or the model is wrong.
 
@@ -10,15 +10,16 @@ use portable_math as math;
 
 /// Standard normal quantile of the test of all constants together: one right fit in a hundred fails it.
 const Z_99: f64 = 2.326_347_874_040_841;
-/// Smallest fraction of the prior variance of a direction that the recordings must remove; in other directions
-/// the estimates stay at the prior means whatever the recordings show.
+/// Directions count only if the recordings reduce the prior variance by at least this fraction. In other
+/// directions the estimates stay near the prior means, whatever the recordings show.
 const LEAST_REMOVED: f64 = 0.05;
-/// Largest shift of an estimate by priors of twice the width, in its standard deviations with these priors.
+/// Largest allowed shift of an estimate if all priors become twice as wide, in standard deviations of the
+/// shifted estimate.
 const MAX_SHIFT_SD: f64 = 1.0;
-/// Number of constants that a doubt names.
+/// Maximum number of constants that a reason names.
 const NAMED: usize = 3;
 
-/// Reasons to doubt all parameters because the constants, or the priors of parameters, are contradicted.
+/// Reasons to doubt all parameters because the estimates contradict the priors of constants or parameters.
 pub(super) fn prior_conflicts(end: &SearchEnd<'_>) -> Vec<String> {
     let known: Vec<(usize, f64, f64)> = (0..end.at.point.len())
         .filter(|&i| end.model.unknowns.is_parameter(i))
@@ -43,9 +44,9 @@ pub(super) fn prior_conflicts(end: &SearchEnd<'_>) -> Vec<String> {
         furthest.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
         let named = furthest.iter().take(NAMED);
         let named: Vec<String> =
-            named.map(|(i, pull, _)| format!("{} by {pull:+.1} deviations", name(*i))).collect();
+            named.map(|(i, pull, _)| format!("{} by {pull:+.1} prior deviations", name(*i))).collect();
         doubts.push(format!(
-            "the {} constants contradict what was known of them, foremost {}",
+            "{} constants together contradict their priors, most of all {}",
             known.len(),
             named.join(", ")
         ));
@@ -55,15 +56,16 @@ pub(super) fn prior_conflicts(end: &SearchEnd<'_>) -> Vec<String> {
     let furthest = free.map(|i| (i, moved[i])).max_by(|a, b| a.1.total_cmp(&b.1));
     if let Some((i, shift)) = furthest.filter(|(_, shift)| *shift > MAX_SHIFT_SD) {
         doubts.push(format!(
-            "{} moves by {shift:.1} deviations if the priors of the constants are twice as wide",
+            "{} would move by {shift:.1} standard deviations with priors twice as wide",
             name(i)
         ));
     }
     doubts
 }
 
-/// Whether constants with these pulls, which are their distances from the prior means in prior standard
-/// deviations, lie further out than one fit in a hundred does. `removed` is the covariance of the pulls.
+/// Whether the pulls are jointly so large that only one right fit in a hundred exceeds them. A pull is the
+/// distance of an estimate from its prior mean, in standard deviations of the prior; `removed` is the
+/// covariance of the pulls.
 fn are_jointly_improbable(removed: &DMatrix<f64>, pulls: &[f64]) -> bool {
     let eigen = removed.clone().symmetric_eigen();
     let pulls = DVector::from_column_slice(pulls);
@@ -80,8 +82,8 @@ fn chi_squared_99(freedoms: usize) -> f64 {
     freedoms as f64 * math::powi(1.0 - spread + Z_99 * spread.sqrt(), 3)
 }
 
-/// Sizes of the shifts of all unknowns if the priors `known` are twice as wide, in standard deviations with these
-/// priors; zeros if the recordings alone do not determine the unknowns.
+/// Absolute shifts of all unknowns if the priors `known` become twice as wide, in standard deviations of the
+/// shifted estimates; zeros if the unknowns are then not determined.
 fn shifts_by_wider_priors(information: &DMatrix<f64>, known: &[(usize, f64, f64)]) -> Vec<f64> {
     /// Fraction of the information of a prior that is lost if its standard deviation doubles.
     const LOST: f64 = 0.75;
@@ -115,13 +117,14 @@ mod tests {
         assert!(!are_jointly_improbable(&removed, &[2.0, 0.0]));
         assert!(are_jointly_improbable(&removed, &[3.0, 0.0]));
         assert!(!are_jointly_improbable(&DMatrix::zeros(2, 2), &[0.0, 0.0]));
-        // the second constant is known half from the recordings, and its pull is as improbable as twice the first
+        // the recordings remove a quarter of the prior variance of the second constant, so its pull of 1.6 is
+        // as improbable as a pull of 3.2 of the first
         let half = DMatrix::from_diagonal(&DVector::from_vec(vec![1.0, 0.25]));
         assert!(are_jointly_improbable(&half, &[0.0, 1.6]));
     }
 
-    /// Two unknowns whose sum is measured exactly, the second known beforehand as 0 with deviation 1 and found
-    /// at 0.8: with a prior of twice the width it is found at 0.94.
+    /// An unknown has the prior 0 with standard deviation 1, and is measured as 1 with standard deviation
+    /// 0.5. Its estimate is 0.8; with a prior that is twice as wide, it is 0.94.
     #[test]
     fn a_wider_prior_moves_an_estimate_as_a_new_fit_would() {
         let (data, prior) = (4.0, 1.0);

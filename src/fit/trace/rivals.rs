@@ -1,4 +1,4 @@
-//! Comparison of two ends of a search that lie apart: whether the recordings decide between them.
+//! Compares different ends of a search, and tests whether the recordings decide between them.
 
 use super::checkpoint::Iterate;
 use super::search::is_same_end;
@@ -8,13 +8,14 @@ use crate::model::parameters::find_parameter;
 use crate::text::format_trimmed;
 use std::collections::BTreeMap;
 
-/// Evidence from which on an end has lost against a better one, in standard deviations of the difference of
-/// their chi2.
+/// Smallest difference of the chi2 of two ends that decides against the worse one, in standard deviations of
+/// this difference.
 const LOST_SD: f64 = 4.0;
 /// Smallest number of frames in a block.
 const MIN_BLOCK_FRAMES: usize = 4;
 
-/// Whether the recordings decide against `other`, or it is the same end.
+/// Whether `other` is no rival: the recordings decide against it, it is the same end, or its cost is not
+/// comparable.
 pub(super) fn has_lost(end: &SearchEnd<'_>, other: &Iterate) -> bool {
     let comparable = (other.stage, other.plain, other.whole) == (end.at.stage, end.at.plain, end.at.whole);
     !comparable
@@ -23,7 +24,8 @@ pub(super) fn has_lost(end: &SearchEnd<'_>, other: &Iterate) -> bool {
         || evidence_against(end, other) >= LOST_SD
 }
 
-/// A reason to doubt the end if `other` has not lost against it. It names the parameter that differs most.
+/// A reason to doubt the end if the recordings do not decide against `other`. It names the parameter that
+/// differs most.
 pub(super) fn describe_rival(end: &SearchEnd<'_>, other: &Iterate) -> Option<String> {
     if has_lost(end, other) {
         return None;
@@ -38,11 +40,11 @@ pub(super) fn describe_rival(end: &SearchEnd<'_>, other: &Iterate) -> Option<Str
     Some(format!("another minimum, with {name} at {value}{unit}, fits nearly as well"))
 }
 
-/// Evidence of the recordings against `other`: the difference of chi2 in its standard deviations. Two fits whose
-/// residuals differ by white noise of unit variance have twice the root of the difference as its standard
-/// deviation. Noise that is not white or not normal shows in the scatter over blocks of equal time, which also
-/// contains the concentration of the difference in a few blocks; the smaller of the two counts. (Segments will
-/// not do as blocks: the one long segment may carry most of the difference.)
+/// Evidence against `other`: the difference of chi2, with the cost of the priors, in standard deviations. If the
+/// noise is white, the standard deviation of a difference of chi2 is twice its root. Otherwise it shows in the
+/// scatter of the difference over blocks of equal time. This scatter is larger where most of the difference lies
+/// in a few blocks, so the smaller of the two standard deviations counts. (Segments are not suitable as blocks,
+/// because most of the difference may lie in the one long segment.)
 fn evidence_against(search: &SearchEnd<'_>, other: &Iterate) -> f64 {
     let SearchEnd { model, settings, at: end, widening, .. } = search;
     let block_s = 0.25 * settings.segment_s[0];

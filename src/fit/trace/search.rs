@@ -27,11 +27,12 @@ const GIVE_UP_FACTOR: f64 = 3.0;
 /// Outcome of a trace search.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TraceSearchOutcome {
-    /// One descent per start, in the order of the starts; then one per lobe, with whole segments at last.
+    /// One descent per start, in the order of the starts; then one per lobe, whose last stage has whole
+    /// segments.
     pub descents: Vec<TraceDescent>,
-    /// Points from which the lobes descend.
+    /// Points at which the descents of the lobes begin.
     lobes: Vec<Vec<f64>>,
-    /// Index of the descent from whose end the lobes are reached.
+    /// Index of the best descent from a start. The lobes are sought around its end.
     rest: usize,
     /// Index of the descent with the best end.
     pub best: usize,
@@ -57,7 +58,8 @@ impl TraceSearchOutcome {
 }
 
 /// Searches from the middle of the ranges, then from random points given by `seed`, until two searches end at
-/// the same point. Then assesses the best end point.
+/// the same point. If a segment is much longer than its stage, searches on with whole segments from each
+/// lobe. Then assesses the best end point.
 pub fn search_trace(
     model: &TraceModel,
     settings: &TraceSearchSettings,
@@ -85,7 +87,7 @@ pub fn search_trace(
         return found;
     };
     let confirmed = has_company(&rest, &found.descents, found.rest);
-    // a start that ends elsewhere and fits nearly as well may be better with whole segments
+    // another end that fits nearly as well may fit better with whole segments
     let mut lobes = if rest.at.plain { find_lobes(&rest) } else { Vec::new() };
     if !lobes.is_empty() {
         let rivals = other_ends(&found.descents, found.rest).filter(|other| !has_lost(&rest, other));
@@ -127,8 +129,8 @@ pub fn search_trace(
 }
 
 /// Point at which a start begins, in the coordinates of the unknowns. Start 0 is in the middle of every
-/// range, the others are at random points given by `seed`. A camera error and an unknown with a prior always begin at
-/// their own `start`.
+/// range, the others are at random points given by `seed`. Camera errors and unknowns with a prior always
+/// begin at their own `start`.
 #[must_use]
 pub fn start_point(model: &TraceModel, seed: u64, start: usize) -> Vec<f64> {
     /// Fraction of each range, at either end, in which no search starts; one entry per start. Later starts
@@ -145,8 +147,9 @@ pub fn start_point(model: &TraceModel, seed: u64, start: usize) -> Vec<f64> {
     model.unknowns.0.iter().map(place).collect()
 }
 
-/// Whether no further start is needed: the minimum number of starts is reached, and another start ends at the
-/// same point as the best start.
+/// Whether no further start is needed. This is so if the minimum number of starts is reached, and another
+/// start ends at the same point as the best start; or if the best end explains nothing, and at least two
+/// starts explain nothing with segments longer than the first.
 fn has_enough_starts(
     model: &TraceModel,
     settings: &TraceSearchSettings,
@@ -155,7 +158,7 @@ fn has_enough_starts(
 ) -> bool {
     let best = best_descent(descents);
     let Some(end) = descents[best].last_iterate() else { return false };
-    // if short segments fit and longer ones do not, the model is wrong rather than the start
+    // if short segments fit and longer ones do not, the model is wrong, not the start
     let grows = |descent: &&TraceDescent| {
         descent.stages.len() > 1 && descent.last_iterate().is_some_and(Iterate::is_junk)
     };
@@ -223,8 +226,8 @@ pub(crate) const SAME_END_SD: f64 = 1.0;
 /// Result of the search from one start.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TraceDescent {
-    /// Number of the chain of the descent: the number of its start, counted from 0, or of its lobe behind
-    /// [`MAX_STARTS`].
+    /// Number of the chain of the descent: the number of its start, counted from 0, or [`MAX_STARTS`] plus
+    /// the number of its lobe.
     pub start: usize,
     /// Last iterate of each stage that was reached, in the order of the stages.
     pub stages: Vec<Iterate>,
@@ -236,8 +239,8 @@ impl TraceDescent {
     }
 }
 
-/// Computes the iterates of one chain, beginning with `first`, until its search ends. Returns the last
-/// iterate of each stage. The returned flag is true if the checkpoint requested a stop.
+/// Computes the iterates of one chain, from `first` to the end of its search. Returns the last iterate of
+/// each stage, and a flag that is true if the checkpoint requested a stop.
 ///
 /// The chain is abandoned if its first stage ends with a cost above `limit`.
 fn descend(

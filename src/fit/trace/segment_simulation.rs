@@ -20,8 +20,8 @@ use std::cell::RefCell;
 /// Angles, rad, and rates, rad/s, of neck and lip.
 pub(super) type LinkState = Vector4<f64>;
 
-/// Scales of the four numbers of a starting state: rad for the two angles, and rad per first segment length for
-/// the two angular velocities.
+/// Scales of the four numbers of a starting state: two angles, rad, and two angular velocities, rad per first
+/// segment length.
 const STATE_STEPS: [f64; 4] = [3e-5, 3e-5, 4e-4, 4e-4];
 /// Number of values in a starting state.
 const STATES: usize = 4;
@@ -31,8 +31,8 @@ const TOLERANCE: f64 = 1e-8;
 const ACCURACY: f64 = 1e-5;
 /// Maximum number of evaluations of the right-hand side in the run of a segment.
 const MOST_EVALUATIONS: u64 = 400_000;
-/// Channels that are averaged over the exposure of every frame. The last one counts only if the place of the
-/// tip's marker on the lip is estimated.
+/// Channels that are averaged over the exposure of every frame. The last one is computed only if the place of
+/// the tip's marker on the lip is estimated.
 const CHANNELS: [Channel; 4] = [Channel::TipX, Channel::HeadX, Channel::HeadDrop, Channel::LipAngle];
 
 thread_local! {
@@ -46,10 +46,10 @@ struct SegmentObservation {
     first: usize,
     /// Number of directions along which the run is differentiated.
     directions: usize,
-    /// Number of channels that are known.
+    /// Number of channels that are computed.
     channels: usize,
-    /// Means over the exposure of each frame, one row per frame: positions of tip and head along the sweep and
-    /// drop of the head, m, and angle of the lip, rad.
+    /// Means over the exposure, one row per frame: positions of tip and head along the sweep and drop of the
+    /// head, m, and angle of the lip, rad.
     means: Vec<[f64; 4]>,
     /// Derivatives of the means, ordered by frame, then channel, then direction.
     slopes: Vec<f64>,
@@ -57,7 +57,7 @@ struct SegmentObservation {
     end: Option<LinkState>,
     /// Whether the derivatives are known up to the end of the run.
     is_known: bool,
-    /// Time during which the tip is held on the glass, s: with the neck off its shoulder, and on it.
+    /// Times during which the tip sticks, s: with the neck off the shoulder, and with the neck on it.
     held_s: [f64; 2],
 }
 
@@ -216,8 +216,8 @@ impl<'a> RecordingModel<'a> {
         self.simulate_segment(frames, state, &self.none)?.end
     }
 
-    /// Time during which the tip is held on the glass in a segment, s: with the neck off its shoulder, and on
-    /// it. `None` if the run ends early.
+    /// Times during which the tip sticks in a segment, s: with the neck off the shoulder, and with the neck
+    /// on it. `None` if the run ends early.
     pub(super) fn held_times_s(&self, frames: [usize; 2], state: &LinkState) -> Option<[f64; 2]> {
         Some(self.simulate_segment(frames, state, &self.none)?.held_s)
     }
@@ -335,7 +335,7 @@ impl<'a> RecordingModel<'a> {
         finite.then_some(LinearizedSegment { residuals, by_state, by_unknown })
     }
 
-    /// Distance, m, from the edge of the lip to its marker along the sweep, at an angle of the lip.
+    /// Distance along the sweep, m, from the edge of the lip to its marker, at the lip angle `lip`, rad.
     fn marker_shift(&self, lip: f64) -> f64 {
         let [along_m, across_m] = self.camera.tip_marker_m;
         if self.has_tip_marker { along_m * math::sin(lip) + across_m * math::cos(lip) } else { 0.0 }

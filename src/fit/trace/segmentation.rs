@@ -11,16 +11,16 @@ use crate::text::format_trimmed;
 use nalgebra::{DMatrix, DVector};
 use portable_math as math;
 
-/// Smallest angle between neck and lip, rad, at which the two coordinates of the tip determine both angles. In
-/// a nearly straight blade they do not.
+/// Smallest angle between neck and lip, rad, at which the two coordinates of the tip determine both angles.
+/// In a nearly straight blade they do not.
 const MIN_BEND_RAD: f64 = 0.15;
 /// A blade counts as straight if it is bent in less than this fraction of the frames in which the tip slides.
 const LEAST_BENT: f64 = 0.5;
-/// A straight blade starts only where its lean is at least this fraction of its usual lean: it passes a smaller
-/// one while it flips.
+/// A segment of a straight blade starts only where the lean is at least this fraction of its usual size. The
+/// lean is smaller while the blade flips over.
 const LEAST_LEAN: f64 = 0.5;
-/// Smallest speed of the tip over the glass that counts as sliding, as a fraction of the greatest speed of the
-/// head. While the tip sticks, the state has only three degrees of freedom.
+/// Smallest speed of the tip over the glass that counts as sliding, as a fraction of the greatest head speed.
+/// While the tip sticks, the state has only three degrees of freedom.
 const MIN_SPEED: f64 = 0.1;
 /// A speed of the tip over the glass counts as sliding only if it exceeds this number of its standard
 /// deviations.
@@ -29,14 +29,15 @@ const SPEED_DEVIATIONS: f64 = 5.0;
 /// third of a stick-slip cycle.
 const HALF_WIDTH: f64 = 0.0875;
 
-/// First segment length, s, for a blade whose lip oscillates at `USUAL_LIP_HZ` by itself: a few stick-slip
-/// cycles.
+/// First segment length, s, of a blade whose lip alone has the natural frequency `USUAL_LIP_HZ`: a few
+/// stick-slip cycles.
 const USUAL_SEGMENT_S: f64 = 0.004;
+/// Natural frequency, Hz, of the lip alone of a blade of the usual size.
 const USUAL_LIP_HZ: f64 = 608.0;
 
-/// Length of the shortest segments, s, for a blade: [`USUAL_SEGMENT_S`] for blades of the usual size. For
-/// others it is longer or shorter by a power of 4, because rounded lengths do not depend on a small error of
-/// the lip's frequency.
+/// Length of the shortest segments of a blade, s: [`USUAL_SEGMENT_S`] times a power of 4 that follows from
+/// the natural frequency of the lip alone. A power of 4, so that a small error of this frequency hardly ever
+/// changes the length.
 pub(crate) fn first_segment_s(linkage: &Linkage) -> f64 {
     let lip_hz = body_frequencies(linkage).lip_hz;
     let quarters = math::ln(USUAL_LIP_HZ / lip_hz) / math::ln(4.0);
@@ -51,14 +52,14 @@ pub(super) struct SegmentBoundary {
     pub state: LinkState,
 }
 
-/// Number of frames of a segment of the length `length_s`.
+/// Number of frames in `length_s`, at least 4.
 pub(super) fn nominal_frames(film: &CameraObservation, length_s: f64) -> usize {
     ((length_s * film.rate_hz).round() as usize).max(4)
 }
 
 /// Boundaries of segments at distances of about `length_s`. Of the frames in which the tip slides and the
-/// blade is bent, the frame nearest to the nominal position is chosen. (The frame with the fastest tip would
-/// often be a frame with large noise.)
+/// blade is bent (or, if it is nearly straight, leans enough), the frame nearest to the nominal position is
+/// chosen. (The frame with the fastest tip would often be a frame with large noise.)
 pub(super) fn segment_boundaries(
     scene: &Scene,
     film: &CameraObservation,
@@ -102,12 +103,12 @@ pub(super) fn segment_boundaries(
     found
 }
 
-/// Says which frames of a recording can start a segment, with the numbers.
+/// Describes in which frames of a recording a segment can start, with the limits.
 pub(crate) fn describe_start_limits(film: &CameraObservation) -> String {
     let mm = |speed: f64| format_trimmed(1e3 * speed, 3);
     format!(
-        "a segment starts where the tip moves over the glass at more than {} mm/s: a tenth of the head's greatest \
-         speed of {} mm/s, and {SPEED_DEVIATIONS} deviations of a measured speed of the tip, which is known to {} mm/s",
+        "no segment was started: the tip must move over the glass faster than {} mm/s, the larger of a tenth of the \
+         greatest head speed ({} mm/s) and {SPEED_DEVIATIONS} standard deviations of a measured tip speed ({} mm/s)",
         mm(least_sliding_speed(film)),
         mm(film.head_speed_m_per_s),
         mm(speed_sd(film))
@@ -126,14 +127,14 @@ fn speed_sd(film: &CameraObservation) -> f64 {
     film.settings.noise[0].sd() * film.rate_hz / squares.sqrt()
 }
 
-/// Usual size of the lean, m, of a blade that is nearly straight while the tip slides; `None` for a blade that
-/// bends, or whose drop is not tracked.
+/// Median size of the lean, m, while the tip slides, for a blade that is nearly straight; `None` for a blade
+/// that bends, or if the drop is not tracked.
 fn usual_lean_of_straight_blade(
     scene: &Scene,
     film: &CameraObservation,
     view: &CameraParameters,
 ) -> Option<f64> {
-    /// Number of frames that are looked at.
+    /// Maximum number of frames that are used.
     const FRAMES: usize = 400;
     let [from, to] = film.settings.frames;
     let apart = (to - from).div_ceil(FRAMES).max(1);
@@ -149,8 +150,7 @@ fn usual_lean_of_straight_blade(
     median_in_place(&mut sliding.iter().map(|seen| seen.lean[0].abs()).collect::<Vec<_>>())
 }
 
-/// Motion of the blade at the instant when the shutter opens for a frame, from parabolas that are fitted to the
-/// neighbouring frames.
+/// Motion of the blade when the shutter opens for a frame, from parabolas fitted to the neighbouring frames.
 struct RecordedMotion {
     /// Distance of the tip from the head along the sweep, m, and its rate, m/s.
     lean: [f64; 2],
@@ -161,8 +161,8 @@ struct RecordedMotion {
 }
 
 impl RecordedMotion {
-    /// State of a bent blade; without a drop, that of [`Self::state_at_rest`]. `None` if the blade is nearly
-    /// straight or the tip is out of reach.
+    /// State of a bent blade, from lean and drop; without a drop, from [`Self::state_at_rest`]. `None` if the
+    /// blade is nearly straight, or if no angles give this lean and drop.
     fn bent_state(&self, scene: &Scene) -> Option<LinkState> {
         let state = match self.drop {
             None => self.state_at_rest(scene)?,
@@ -176,7 +176,8 @@ impl RecordedMotion {
         ((state[1] - state[0]).abs() > MIN_BEND_RAD).then_some(state)
     }
 
-    /// State of a blade whose angles are those at rest with the same lean.
+    /// State of a blade that passes through its equilibrium poses: its angles are those at rest with the same
+    /// lean.
     fn state_at_rest(&self, scene: &Scene) -> Option<LinkState> {
         /// Relative change of the lean in the finite difference that gives the derivative of the static pose
         /// with respect to the lean.

@@ -7,15 +7,18 @@ use portable_math as math;
 /// Kind of error of the camera that took a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CameraUnknown {
-    /// Part of the distance between the markers of tip and head along the sweep, m, that neither the lean of the
-    /// blade nor the place of the tip's marker on the lip explains: the head's marker, or the picture's zero.
+    /// Part of the distance between the markers of tip and head along the sweep, m, that neither the lean of
+    /// the blade nor the place of the tip's marker on the lip explains. It comes from the marker of the head
+    /// or, without one, from the zero of the picture.
     OffsetX,
     /// Offset of the drop, m: the measured drop of an upright blade.
     OffsetDrop,
-    /// Distance of the tip's marker beyond the edge of the lip, along the lip, m. The marker turns with the lip.
+    /// Distance along the lip, m, by which the tip's marker is beyond the edge of the lip. The marker turns
+    /// with the lip.
     TipAlong,
-    /// Distance of the tip's marker from the middle of the lip, across the lip, m; positive where an upright
-    /// lip has it at larger positions along the sweep. The marker turns with the lip.
+    /// Distance of the tip's marker from the middle of the lip, across the lip, m; positive if, on an upright
+    /// lip, the marker is at a larger position along the sweep than the middle. The marker turns with the
+    /// lip.
     TipAcross,
     /// Rate of change of [`Self::OffsetX`], m/s; `OffsetX` itself is the offset at the middle of the fitted
     /// frames.
@@ -116,7 +119,7 @@ pub struct TraceUnknowns(pub Vec<TraceUnknown>);
 pub(crate) struct CameraParameters {
     pub offset_x_m: f64,
     pub offset_drop_m: f64,
-    /// Distances of the tip's marker from the edge of the lip, along and across the lip, m.
+    /// [`CameraUnknown::TipAlong`] and [`CameraUnknown::TipAcross`], m.
     pub tip_marker_m: [f64; 2],
     pub drift_x_m_per_s: f64,
     pub drift_drop_m_per_s: f64,

@@ -52,7 +52,7 @@ impl FileFormat for Sleap {
                 columns.read_instance(table, &record, instance, &mut collector)?;
             }
         }
-        // (after the rows: a row that is cut short names another video too)
+        // (this follows the rows, because a row that is cut short also seems to name another video)
         columns.refuse_other_video(table)?;
         let found = collector.finish(document.file, RowOrder::Any);
         let (clocks, mut tracks) = found.map_err(duplicate_instance_error)?;

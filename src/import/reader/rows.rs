@@ -105,8 +105,8 @@ pub(crate) struct RowReader<'t> {
     next: usize,
     next_line: usize,
     cells: Vec<Cow<'t, str>>,
-    /// Reader for rows with quotation marks, and the byte offset at which it started. It serves as long as
-    /// such rows follow each other.
+    /// Reader for rows with quotation marks, and the byte offset at which it started. It is used again as
+    /// long as such rows follow one another.
     quoted: Option<(usize, csv::Reader<&'t [u8]>)>,
 }
 
@@ -147,7 +147,8 @@ impl<'t> RowReader<'t> {
         Ok(None)
     }
 
-    /// Splits a row into cells. Returns the number of lines over which its quoted cells run.
+    /// Splits a row into cells. Returns the number of lines that the row occupies; a quoted cell may contain
+    /// line ends.
     fn split_row(&mut self, row: &'t str) -> usize {
         self.cells.clear();
         let Some(byte) = self.delimiter.byte() else {

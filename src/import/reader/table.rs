@@ -122,11 +122,11 @@ impl<'a> DelimitedTable<'a> {
     /// Whether the text contains `E+` or `E-`; only then can it contain numbers that were cut to the form
     /// `1.23E+05`.
     pub(crate) fn may_have_cut_numbers(&self) -> bool {
-        // (nearly every text has no E at all, and one character is found faster than two)
+        // (a single character is found faster than two, and most texts do not contain E)
         self.text.contains('E') && (self.text.contains("E+") || self.text.contains("E-"))
     }
 
-    /// The first result of `find` for a row from row `from` of [`Self::head`] on.
+    /// Calls `find` for every row, from row `from` of [`Self::head`] on, and returns its first result.
     ///
     /// # Errors
     /// The errors of `find`, and an error if a row cannot be read.

@@ -23,7 +23,7 @@ pub(crate) struct Clock {
     pub time: Option<Column>,
     /// Value of one unit in the last written digit of the times, in their unit; 0 if it is not known.
     pub digit: f64,
-    /// Whether the times lie on no grid; found when it is first asked for.
+    /// Whether the times lie on no grid; computed on first use.
     pub uneven: OnceCell<bool>,
 }
 

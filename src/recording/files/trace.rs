@@ -67,7 +67,7 @@ pub fn push_trace_row(text: &mut String, time_s: f64, cells: impl IntoIterator<I
 fn push_number(text: &mut String, value: f64) {
     if value == 0.0 || (1e-4..1e16).contains(&value.abs()) {
         let mut buffer = ryu::Buffer::new();
-        let digits = buffer.format_finite(value); // (plain digits in this range, with a point in each number)
+        let digits = buffer.format_finite(value); // (in this range: plain digits, always with a point)
         text.push_str(digits.strip_suffix(".0").unwrap_or(digits));
     } else {
         let _ = write!(text, "{value:e}"); // (writing to a String cannot fail)

@@ -145,9 +145,9 @@ impl Whitener {
         Self::at_places(noise, &frames.iter().map(|frame| *frame as f64).collect::<Vec<_>>())
     }
 
-    /// The map for frames at true times, `places`, in mean frames and in rising order. Between whole frames,
-    /// the noise must be white or of first order: over a time `t`, its correlation is `r^t`, where `r` is its
-    /// coefficient.
+    /// The map for frames at their true times `places`, in units of the mean frame interval and in rising
+    /// order. If times are not whole numbers, the noise must be white or of first order: over a time `t`, its
+    /// correlation is `r^t`, where `r` is its coefficient.
     pub(crate) fn at_places(noise: &AutoregressiveNoise, places: &[f64]) -> Self {
         let mut coefficients = [0.0; MOST_COEFFICIENTS];
         coefficients[..noise.coefficients().len()].copy_from_slice(noise.coefficients());

@@ -8,8 +8,8 @@ use portable_math as math;
 const LEAST_SHARE: f64 = 0.5;
 /// Minimum number of degrees of freedom of a block.
 const LEAST_LEFT: usize = 4;
-/// Largest end of a block, in half lengths of a block from the middle; 1 if its frames lie on a grid. It
-/// allows for a rate below the mean rate.
+/// Largest allowed distance of the end of a block from its middle, in units of half its nominal length. This
+/// distance is about 1 if the frames lie on a grid, and larger where the frame rate is below the mean rate.
 const LONGEST_SPAN: f64 = 2.0;
 /// Largest scatter of the residuals in a block that is used, in units of the median scatter of all blocks. A
 /// block with a larger scatter has an outlier, or the tip is off the glass.
@@ -24,7 +24,8 @@ pub(super) struct BlockCut<'a> {
     pub degree: usize,
     /// A channel that enters the fit as a further linear term.
     pub covariate: Option<&'a [Option<f64>]>,
-    /// Time of every frame, in mean frames; the index of the frame if the frames lie on a grid.
+    /// Time of every frame, in units of the mean frame interval; the index of the frame if the frames lie on
+    /// a grid.
     pub places: &'a [f64],
 }
 
@@ -33,7 +34,7 @@ pub(super) struct BlockCut<'a> {
 pub(super) struct NoiseBlock {
     /// Indices of the frames that are present.
     pub frames: Vec<usize>,
-    /// Times of these frames, in mean frames.
+    /// Times of these frames, in units of the mean frame interval.
     pub places: Vec<f64>,
     pub values: Vec<f64>,
     pub columns: Vec<Vec<f64>>,
@@ -87,7 +88,7 @@ fn cut_block(channel: &[Option<f64>], cut: &BlockCut<'_>, first: usize) -> Optio
     let freedoms = cut.degree + 1 + usize::from(cut.covariate.is_some());
     let half = 0.5 * cut.length as f64;
     let place = |i: usize| (cut.places[i] - cut.places[first] + 0.5) / half - 1.0;
-    // (a block with a gap of the times is not used)
+    // (a block with a long gap between its times is not used)
     if place(last - 1) > LONGEST_SPAN {
         return None;
     }

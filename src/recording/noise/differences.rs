@@ -70,8 +70,8 @@ pub fn quantisation_step(samples: &[Option<f64>]) -> Option<f64> {
     let mut step = moves().next()?;
     let mut farthest = step;
     for distance in moves() {
-        // (the errors of Euclid's algorithm grow with each remainder; a multiple of the step does not have
-        // them)
+        // (rounding errors grow with each remainder of Euclid's algorithm; the largest distance, which is a
+        // whole number of steps, corrects the step)
         farthest = distance.max(farthest);
         step = approximate_common_divisor(distance, step, rounding);
         step = farthest / (farthest / step).round();

@@ -17,9 +17,8 @@ const MOST_ORDER: usize = 6;
 /// criterion.
 const ORDERS_WITHOUT_GAIN: usize = 2;
 
-/// Estimates the noise of blocks; `None` if the blocks have too few frames or no noise.
-/// At times off the grid, the
-/// noise is white or of first order with a positive correlation.
+/// Estimates the noise of blocks; `None` if the blocks have too few frames or no noise. If the times are not
+/// on a grid, the noise is white, or of first order with a positive correlation.
 pub(super) fn estimate_noise(blocks: &[NoiseBlock]) -> Option<ChannelNoise> {
     let freedoms: usize = blocks.iter().map(NoiseBlock::degrees_of_freedom).sum();
     let price = math::ln(freedoms as f64);
@@ -117,8 +116,8 @@ fn whiten_blocks(blocks: &[NoiseBlock], noise: &AutoregressiveNoise) -> Option<V
 }
 
 /// Standard deviation of noise whose correlations are those of `like`, and the standard deviation of this
-/// estimate, from the median block: blocks with fast motion hardly change it. The median of chi2 with `n`
-/// degrees of freedom is `n (1 - 2/(9 n))^3` (Wilson and Hilferty 1931).
+/// estimate, from the median over the blocks, which blocks with fast motion hardly change. The median of chi2
+/// with `n` degrees of freedom is `n (1 - 2/(9 n))^3` (Wilson and Hilferty 1931).
 pub(super) fn estimate_sd_like(blocks: &[NoiseBlock], like: &AutoregressiveNoise) -> Option<[f64; 2]> {
     let unit = AutoregressiveNoise::new(1.0, like.coefficients().to_vec()).ok()?;
     let freedoms = || blocks.iter().map(|block| block.degrees_of_freedom() as f64);

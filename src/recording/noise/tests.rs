@@ -139,8 +139,8 @@ fn noise_that_lasts_for_many_frames_is_found_in_longer_blocks() {
     }
 }
 
-/// Independent noise that only the tip has doubles the variance of its noise. Without it, tip and head have
-/// noise of the same size. A ring at a fifth of the frame rate hides the difference.
+/// Additional noise doubles the variance of the tip. Without it, tip and head have noise of the same size. At
+/// the lower frame rate, the blade rings at a fifth of the rate, which hides the difference.
 #[test]
 fn noise_of_another_size_at_the_tip_is_found() {
     let white = AutoregressiveNoise::white(SD_M).unwrap();

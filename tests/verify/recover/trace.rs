@@ -120,7 +120,7 @@ fn a_marker_that_drifts_is_found_where_that_is_asked_for() {
     assert!(fitted("", recording()).nuisances.iter().all(|nuisance| !nuisance.name.starts_with("drift")));
 }
 
-/// A real picture has its zero anywhere: at the bottom of the frame, far below the glass.
+/// The zero of a real picture may be anywhere, for example at the bottom of the frame, far below the glass.
 #[test]
 fn the_zero_of_the_picture_does_not_matter() {
     let whole = recording();
@@ -137,7 +137,7 @@ fn the_zero_of_the_picture_does_not_matter() {
     }
 }
 
-/// Angles of the lip at the instants of a run that are listed in rising order.
+/// Angles of the lip at given instants of a run, which are in rising order.
 struct LipAngles {
     times_s: Vec<f64>,
     angles: Vec<f64>,
@@ -173,7 +173,7 @@ fn a_marker_that_is_beside_the_edge_of_the_lip_turns_with_the_lip() {
     }
 }
 
-/// Factor of a quantity of this unit if lengths are `length` times as large and times `time` times as long;
+/// Factor by which a quantity with this unit changes if lengths grow by `length` and times by `time`, and
 /// densities stay the same.
 fn unit_factor(unit: &str, length: f64, time: f64) -> f64 {
     let (mass, force) = (length.powi(3), length.powi(4) / time.powi(2));
@@ -207,7 +207,8 @@ fn blades_of_other_sizes_and_speeds_are_fitted_like_the_usual_one() {
         }
         let factor = |name: &str| unit_factor(find_parameter(name).unwrap().unit, length, time);
         let mut other = scene();
-        // a length is checked against the centre on it, so the larger of the two is set first
+        // a centre of mass must lie on its link, so lengths are set first if they grow, and last if they
+        // shrink
         let mut values: Vec<(&str, f64)> = scene().written_values().collect();
         values.sort_by_key(|(name, _)| name.ends_with("_length_m") != (length > 1.0));
         for (name, value) in values {

@@ -1,6 +1,6 @@
-//! The tip of a blade sticks through the reversal while its neck leaves the shoulder and rings. A neck with a
-//! cycle less in that time fits nearly as well: the fit finds the right one from every start, and nothing is
-//! spent on such minima where the head does not reverse.
+//! The tip of a blade sticks through the reversal while its neck leaves the shoulder and rings. A neck with
+//! one cycle less in this time fits nearly as well. The fit finds the right neck from every start. It does
+//! not search for such minima if the head does not reverse.
 
 use wiperlab::fit::job::Job;
 use wiperlab::fit::result::{FitResult, FitStatus};
@@ -50,7 +50,7 @@ const CAMERA: Camera = Camera { frame_rate_hz: 5_000.0, exposure_s: 5e-5 };
 /// A tenth of a pixel of 20 um.
 const TRACKING: TrackingModel =
     TrackingModel { metres_per_pixel: 2e-5, noise_px: 0.1, dropout_fraction: 0.01, seed: 7 };
-/// The head turns at .625 s, and the tip sticks from .628 to .708 s.
+/// The head turns at 0.625 s, and the tip sticks from 0.628 to 0.708 s.
 const WITH_REVERSAL_S: [f64; 2] = [0.54, 0.84];
 const WITHOUT_REVERSAL_S: [f64; 2] = [0.73, 0.9];
 
@@ -116,7 +116,8 @@ fn every_start_finds_the_neck_among_the_cycles_of_its_ringing() {
         assert_eq!(result.status, FitStatus::Converged);
         let neck = &result.parameters["blade.neck_natural_frequency_hz"];
         assert!((neck.estimate / 160.0 - 1.0).abs() < 0.02, "{}", neck.estimate);
-        // a neck of another number of cycles that has not lost clearly is the only doubt
+        // the only allowed doubt is a neck with another number of cycles that the recording does not clearly
+        // exclude
         assert!(neck.reasons.iter().all(|reason| reason.starts_with("another minimum, with ")), "{neck:?}");
         assert!(result.waterfall.len() > 2, "two starts, and minima of the long segment");
     }
