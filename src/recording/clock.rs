@@ -11,6 +11,38 @@ pub(crate) const MAX_FRAMES: f64 = 10_000_000.0;
 /// with a jump in its times from filling the memory.
 pub(crate) const FRAMES_WITHOUT_ROWS: (usize, usize) = (250_000, 4);
 
+/// Usual frame rates of films, television, telephones and high-speed cameras, 1/s.
+pub(crate) const COMMON_RATES_HZ: [f64; 16] = [
+    24_000.0 / 1001.0,
+    24.0,
+    25.0,
+    30_000.0 / 1001.0,
+    30.0,
+    48.0,
+    50.0,
+    60_000.0 / 1001.0,
+    60.0,
+    100.0,
+    120_000.0 / 1001.0,
+    120.0,
+    240_000.0 / 1001.0,
+    240.0,
+    480.0,
+    960.0,
+];
+/// Highest of the common rates at which video is played back, 1/s.
+const MOST_PLAYBACK_HZ: f64 = 60.0;
+/// Largest relative difference at which a rate counts as a playback rate: it allows for rounded times and
+/// still separates 29.97 from 30.
+const PLAYBACK_NEARNESS: f64 = 1e-3;
+
+/// Whether `rate_hz` is a playback rate. The time column of a video file often has this rate instead of the
+/// recording rate.
+pub(crate) fn is_playback_rate(rate_hz: f64) -> bool {
+    let playback = COMMON_RATES_HZ.iter().filter(|rate| **rate <= MOST_PLAYBACK_HZ);
+    playback.into_iter().any(|playback| (rate_hz / playback - 1.0).abs() <= PLAYBACK_NEARNESS)
+}
+
 /// After each row, the phase of the grid is corrected by this fraction of the row's distance from the grid.
 /// If the first guess of the time per frame is wrong by 1 %, the phase lags by a tenth of a frame.
 const PHASE_GAIN: f64 = 0.1;

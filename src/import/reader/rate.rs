@@ -47,12 +47,6 @@ pub(crate) fn has_uneven_clock(export: &TrackFile) -> bool {
     export.clocks.iter().any(|clock| clock.frame.is_none() && is_uneven(clock))
 }
 
-/// Usual frame rates of films, television and telephones, 1/s.
-const COMMON_RATES_HZ: [f64; 16] = [
-    23.976, 24.0, 25.0, 29.97, 30.0, 48.0, 50.0, 59.94, 60.0, 100.0, 119.88, 120.0, 239.76, 240.0, 480.0,
-    960.0,
-];
-
 /// A frame rate with its uncertainty and its source.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FrameRate {
@@ -140,7 +134,7 @@ fn times_error(times: &[f64], frames: &[f64], digit_s: f64) -> f64 {
         _ => return of_ends,
     }
     let same_step = |hz: &&f64| (1.0 / (**hz * digit_s)).round() == digits;
-    COMMON_RATES_HZ
+    clock::COMMON_RATES_HZ
         .iter()
         .filter(same_step)
         .map(|hz| (hz * frame_s - 1.0).abs())

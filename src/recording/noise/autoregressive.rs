@@ -355,7 +355,7 @@ mod tests {
     #[test]
     fn the_map_at_true_times_is_the_inverse_cholesky_factor_of_the_covariance() {
         let tau = 3.7;
-        for (noise, correlated) in [(vec![(-1.0 / tau as f64).exp()], 1.0), (vec![], 0.0)] {
+        for (noise, correlated) in [(vec![math::exp(-1.0 / tau)], 1.0), (vec![], 0.0)] {
             let noise = AutoregressiveNoise::new(3e-6, noise).unwrap();
             let places: Vec<f64> =
                 (0..60).map(|i| 1.3 * f64::from(i) + 0.6 * f64::from(i * i).sin()).collect();

@@ -3,6 +3,7 @@
 use super::finding::{Check, QualityFinding, Severity};
 use super::gaps::FrameGaps;
 use super::measurement::{ChannelQuality, FEWEST_CYCLES, MeasuredColumn, Optics, Quality};
+use crate::recording::clock::is_playback_rate;
 use crate::recording::{FrameGrid, Recording};
 use short_spectra::sampling::exposure_gain;
 
@@ -18,19 +19,6 @@ const EXPOSURE_PASSES: f64 = 0.9;
 /// Largest relative difference between a step and a pixel at which the step counts as a whole pixel: scales
 /// are given to three digits.
 const PIXEL_NEARNESS: f64 = 0.01;
-
-/// Rates at which video is played back, 1/s (film, PAL, NTSC and their doubles).
-const PLAYBACK_RATES_HZ: [f64; 8] =
-    [24_000.0 / 1001.0, 24.0, 25.0, 30_000.0 / 1001.0, 30.0, 50.0, 60_000.0 / 1001.0, 60.0];
-/// Largest relative difference at which a rate counts as a playback rate: it allows for rounded times and
-/// still separates 29.97 from 30.
-const PLAYBACK_NEARNESS: f64 = 1e-3;
-
-/// Whether `rate_hz` is a playback rate. The time column of a video file often has this rate instead of the
-/// recording rate.
-pub(crate) fn is_playback_rate(rate_hz: f64) -> bool {
-    PLAYBACK_RATES_HZ.iter().any(|playback| (rate_hz / playback - 1.0).abs() <= PLAYBACK_NEARNESS)
-}
 
 /// Finding on a recording whose tracks were interpolated from true frame times to a grid.
 pub(super) fn check_clock(recording: &Recording) -> Option<QualityFinding> {

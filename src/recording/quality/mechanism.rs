@@ -8,6 +8,7 @@ use super::motion::{LARGEST_VIEW_M, head_height_m, largest_travel_m};
 use super::regression::fit_rows;
 use crate::recording::Recording;
 use crate::recording::channel::{Channel, ReversalInstants, median_in_place};
+use crate::recording::clock::is_playback_rate;
 use crate::text::format_rate;
 use portable_math as math;
 use serde::Serialize;
@@ -179,7 +180,7 @@ pub fn check_scene_height(motion: &MotionSummary, scene_height_m: f64) -> Option
 fn check_rate(motion: &MotionSummary, measured: &Quality) -> Option<QualityFinding> {
     let rate_hz = measured.frame_rate_hz;
     let kind = (Check::FrameRate, Severity::Caution);
-    if rate_hz < LEAST_RATE_HZ && !super::checks::is_playback_rate(rate_hz) {
+    if rate_hz < LEAST_RATE_HZ && !is_playback_rate(rate_hz) {
         let found = format!(
             "{} frames/s over {:.1} s show no vibration of a blade, which has 9 Hz or more",
             format_rate(rate_hz),
