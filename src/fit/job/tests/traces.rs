@@ -113,7 +113,7 @@ fn constants_are_checked() {
     for (to, words) in [
         ("\"3\"", "nuisance: found \"3\", expected \"exact\", or a percentage such as \"3 %\""),
         ("\"90 %\"", "nuisance: found 90 %, expected 0.0001 % to 50 %"),
-        ("3", "expected a percentage such as \"3 %\", or a list"),
+        ("3", "expected \"exact\", a percentage such as \"3 %\", or a list"),
         ("[]", "nuisance: found an empty list"),
         ("[{ name = \"friction.d\", sd = \"3 %\" }]", "nuisance `friction.d`: not a parameter of a scene"),
         ("[{ name = \"friction.a\", sd = \"3 %\" }]", "the [[parameter]] `friction.a` is free already"),
