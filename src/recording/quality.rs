@@ -9,7 +9,6 @@ mod checks;
 mod columns;
 mod filled;
 mod finding;
-mod gaps;
 mod lag;
 mod measurement;
 mod mechanism;

@@ -147,10 +147,10 @@ const MISTAKES: [(&str, &str, &str, &[&str]); 48] = [
     // words and texts
     (SCENE, "title = \"My blade\"", "title = My blade", &["`title`", "found My blade", "write \"My blade\""]),
     (SCENE, "title = \"My blade\"", "title = 5", &["`title`", "found 5", "a text in quotes"]),
-    (SCENE, "kind = \"steady-slide\"", "kind = steady-slide", &["`kind`", "write \"steady-slide\""]),
+    (SCENE, "kind = \"upright\"", "kind = upright", &["`kind`", "write \"upright\""]),
     (
         SCENE,
-        "kind = \"steady-slide\"",
+        "kind = \"upright\"",
         "kind = \"steady slide\"",
         &["`start.kind`", "\"steady slide\"", "\"upright\", \"steady-slide\", \"state\""],
     ),
@@ -278,7 +278,7 @@ fn several_mistakes_of_a_file_are_named_at_once() {
     let text = text.replace("head_mass_kg = 0.001409", "head_mas_kg = 0.001409");
     let text = text.replace("lip_length_m = 0.001623", "lip_length_m = \"1,6\"");
     let text = text.replace("preload_force_n = 0.126", "preload_force_n = -0.126");
-    let text = text.replace("kind = \"steady-slide\"", "kind = \"slide\"");
+    let text = text.replace("kind = \"upright\"", "kind = \"slide\"");
     project.write(SCENE, &text.replace("stop_s", "stop"));
     let said = said(&project, SCENE);
     let expected = [
@@ -298,7 +298,7 @@ fn what_a_file_says_stays_on_its_line() {
     let project = project();
     let text =
         project.read(SCENE).replace("title = \"My blade\"", "title = \"t\"\n\"a\\nerror: b\\u001b[31m\" = 1");
-    let text = text.replace("kind = \"steady-slide\"", "kind = \"x\\ny\\u0007\"");
+    let text = text.replace("kind = \"upright\"", "kind = \"x\\ny\\u0007\"");
     project.write(SCENE, &text);
     let said = said(&project, SCENE);
     assert_eq!(said.lines().count(), 2, "{said}");

@@ -186,7 +186,7 @@ impl CameraPrior {
         Self { what, mean, size, is_flat: false, start: mean }
     }
 
-    fn unknown(&self, film: usize) -> TraceUnknown {
+    fn build_unknown(&self, film: usize) -> TraceUnknown {
         let unit = self.what.coordinate_unit();
         let (mean, size, start) = (self.mean / unit, self.size / unit, self.start / unit);
         let reach = if self.is_flat { size } else { CAMERA_RANGE_SD * size };
@@ -242,7 +242,7 @@ fn camera_unknowns(film: usize, source: &TraceSource<'_>, data: &CameraObservati
         normal(CameraUnknown::Tilt, angle_rad, with_drop(tilt_sd_rad)),
         normal(CameraUnknown::Clock, 0.0, doubt.clock_sd_s(*head)),
     ];
-    rows.iter().filter(|row| row.size > 0.0).map(|row| row.unknown(film)).collect()
+    rows.iter().filter(|row| row.size > 0.0).map(|row| row.build_unknown(film)).collect()
 }
 
 /// Angle and curvature of the glass in the picture, from the path of the tip; `None` if they cannot be

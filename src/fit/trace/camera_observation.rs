@@ -1,12 +1,12 @@
 //! A recording in the form in which a trace fit uses it.
 
-use super::segmentation::equilibrium_angles;
 use crate::model::Linkage;
 use crate::recording::Recording;
 use crate::recording::channel::median_in_place;
 use crate::recording::noise::{AutoregressiveNoise, Whitener};
 use crate::recording::quality::CameraTilt;
 use crate::simulate::drive::HeadSpline;
+use crate::simulate::equilibrium::equilibrium_angles;
 use crate::simulate::scene::Drive;
 use nalgebra::{DMatrix, SMatrix, SVector};
 use portable_math as math;

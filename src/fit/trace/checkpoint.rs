@@ -125,3 +125,32 @@ pub fn chi2_per_dof(at: &Iterate) -> (f64, usize) {
     let dof = at.count_data().saturating_sub(4 * at.segments.len() + at.point.len()).max(1);
     (chi2 / dof as f64, dof)
 }
+
+/// Two end points count as the same point if every unknown differs between them by at most this number of
+/// standard deviations of that unknown.
+const SAME_END_SD: f64 = 1.0;
+
+/// Whether two ends belong to the same stage and differ in every coordinate by at most [`SAME_END_SD`]
+/// standard deviations; `sd` are the standard deviations of the coordinates. Ends that explain nothing are
+/// never the same.
+pub(super) fn is_same_end(end: &Iterate, other: &Iterate, sd: &[f64]) -> bool {
+    let mut pairs = end.point.iter().zip(&other.point).zip(sd);
+    let comparable = other.stage == end.stage && !end.is_junk() && !other.is_junk();
+    comparable && pairs.all(|((a, b), sd)| (a - b).abs() <= SAME_END_SD * sd)
+}
+
+/// Result of the search from one start.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TraceDescent {
+    /// Number of the chain of the descent: the number of its start, counted from 0, or [`MAX_STARTS`](super::MAX_STARTS) plus
+    /// the number of its lobe.
+    pub start: usize,
+    /// Last iterate of each stage that was reached, in the order of the stages.
+    pub stages: Vec<Iterate>,
+}
+
+impl TraceDescent {
+    pub(crate) fn last_iterate(&self) -> Option<&Iterate> {
+        self.stages.last()
+    }
+}

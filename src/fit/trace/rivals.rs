@@ -1,7 +1,6 @@
 //! Compares different ends of a search, and tests whether the recordings decide between them.
 
-use super::checkpoint::Iterate;
-use super::search::is_same_end;
+use super::checkpoint::{Iterate, is_same_end};
 use super::segment_simulation::segment_residuals;
 use super::uncertainty_run::SearchEnd;
 use crate::model::parameters::find_parameter;
@@ -40,11 +39,11 @@ pub(super) fn describe_rival(end: &SearchEnd<'_>, other: &Iterate) -> Option<Str
     Some(format!("another minimum, with {name} at {value}{unit}, fits nearly as well"))
 }
 
-/// Evidence against `other`: the difference of chi2, with the cost of the priors, in standard deviations. If the
-/// noise is white, the standard deviation of a difference of chi2 is twice its root. Otherwise it shows in the
-/// scatter of the difference over blocks of equal time. This scatter is larger where most of the difference lies
-/// in a few blocks, so the smaller of the two standard deviations counts. (Segments are not suitable as blocks,
-/// because most of the difference may lie in the one long segment.)
+/// Evidence against `other`: the difference of chi2, with the cost of the priors, in standard deviations.
+/// If the noise is white, the standard deviation of a difference of chi2 is twice its root. Otherwise it
+/// shows in the scatter of the difference over blocks of equal time. This scatter is larger where most of
+/// the difference lies in a few blocks, so the smaller of the two standard deviations counts. (Segments
+/// are not suitable as blocks, because most of the difference may lie in the one long segment.)
 fn evidence_against(search: &SearchEnd<'_>, other: &Iterate) -> f64 {
     let SearchEnd { model, settings, at: end, widening, .. } = search;
     let block_s = 0.25 * settings.segment_s[0];

@@ -1,7 +1,7 @@
 //! The search of a trace fit: it iterates from several starting points and assesses the best result.
 
 use super::assessment::{TraceAssessment, assess_end};
-use super::checkpoint::{Checkpoint, Iterate, TraceSearchSettings};
+use super::checkpoint::{Checkpoint, Iterate, TraceDescent, TraceSearchSettings, is_same_end};
 use super::levenberg_marquardt::{first_iterate, next_iterate, start_stage};
 use super::lobes::{MAX_LOBES, find_lobes};
 use super::model::TraceModel;
@@ -208,36 +208,7 @@ fn other_ends(descents: &[TraceDescent], best: usize) -> impl Iterator<Item = &I
     others.filter_map(|(_, descent)| descent.last_iterate())
 }
 
-/// Whether two ends belong to the same stage and differ in every coordinate by at most [`SAME_END_SD`]
-/// standard deviations; `sd` are the standard deviations of the coordinates. Ends that explain nothing are
-/// never the same.
-pub(super) fn is_same_end(end: &Iterate, other: &Iterate, sd: &[f64]) -> bool {
-    let mut pairs = end.point.iter().zip(&other.point).zip(sd);
-    let comparable = other.stage == end.stage && !end.is_junk() && !other.is_junk();
-    comparable && pairs.all(|((a, b), sd)| (a - b).abs() <= SAME_END_SD * sd)
-}
-
 // Search from one start.
-
-/// Two end points count as the same point if every unknown differs between them by at most this number of
-/// standard deviations of that unknown.
-pub(crate) const SAME_END_SD: f64 = 1.0;
-
-/// Result of the search from one start.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TraceDescent {
-    /// Number of the chain of the descent: the number of its start, counted from 0, or [`MAX_STARTS`] plus
-    /// the number of its lobe.
-    pub start: usize,
-    /// Last iterate of each stage that was reached, in the order of the stages.
-    pub stages: Vec<Iterate>,
-}
-
-impl TraceDescent {
-    pub(crate) fn last_iterate(&self) -> Option<&Iterate> {
-        self.stages.last()
-    }
-}
 
 /// Computes the iterates of one chain, from `first` to the end of its search. Returns the last iterate of
 /// each stage, and a flag that is true if the checkpoint requested a stop.

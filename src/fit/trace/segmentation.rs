@@ -6,6 +6,7 @@ use super::unknowns::CameraParameters;
 use crate::model::Linkage;
 use crate::model::modes::body_frequencies;
 use crate::recording::channel::median_in_place;
+use crate::simulate::equilibrium::equilibrium_angles;
 use crate::simulate::scene::Scene;
 use crate::text::format_trimmed;
 use nalgebra::{DMatrix, DVector};
@@ -267,51 +268,4 @@ fn link_rates(linkage: &Linkage, [theta, phi]: [f64; 2], lean_rate: f64, drop_ra
         l2 * (math::sin(phi) * lean_rate - math::cos(phi) * drop_rate) / determinant,
         l1 * (math::cos(theta) * drop_rate - math::sin(theta) * lean_rate) / determinant,
     ]
-}
-
-/// Angles of neck and lip of a blade at rest, with whatever friction force equilibrium requires, for which
-/// the tip is at the distance `lean` from the head along the sweep. They are used if the drop is not tracked.
-pub(super) fn equilibrium_angles(linkage: &Linkage, lean: f64) -> Option<[f64; 2]> {
-    /// Largest neck angle, rad, that is tried.
-    const LARGEST_RAD: f64 = 0.7;
-    /// Number of neck angles that are tried.
-    const POINTS: usize = 140;
-    let side = 1f64.copysign(lean);
-    let phi_of = |theta: f64| {
-        let sine = (lean - linkage.l1_m * math::sin(theta)) / linkage.l2_m;
-        (sine.abs() < 0.98).then(|| math::asin(sine))
-    };
-    let moment = |theta: f64| Some(neck_moment(linkage, theta, phi_of(theta)?));
-    let grid = |k: usize| side * LARGEST_RAD * k as f64 / POINTS as f64;
-    let bracket = (0..POINTS).find(
-        |&k| matches!((moment(grid(k)), moment(grid(k + 1))), (Some(a), Some(b)) if (a > 0.0) != (b > 0.0)),
-    )?;
-    let (mut low, mut high) = (grid(bracket), grid(bracket + 1));
-    let positive = moment(low)? > 0.0;
-    for _ in 0..40 {
-        let middle = 0.5 * (low + high);
-        if (moment(middle)? > 0.0) == positive {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    Some([low, phi_of(low)?])
-}
-
-/// Unbalanced moment on the neck of a blade at rest, if the friction at the tip balances the lip.
-fn neck_moment(linkage: &Linkage, theta: f64, phi: f64) -> f64 {
-    let (l1, l2) = (linkage.l1_m, linkage.l2_m);
-    let drop = l1 * (1.0 - math::cos(theta)) + l2 * (1.0 - math::cos(phi));
-    let normal = linkage.head.stiffness * (linkage.preload_displacement_m - drop);
-    let lip = linkage.lip.stiffness * (phi - theta);
-    let friction = (lip - normal * l2 * math::sin(phi)) / (l2 * math::cos(phi));
-    let shoulder = linkage.shoulder.map_or(0.0, |s| match s.contact_at(theta).angle_sign() {
-        0.0 => 0.0,
-        sign => s.moment(theta, 0.0, sign),
-    });
-    linkage.neck.stiffness * theta + shoulder
-        - lip
-        - normal * l1 * math::sin(theta)
-        - friction * l1 * math::cos(theta)
 }

@@ -2,13 +2,12 @@
 //! fits with each parameter shifted to either side (profile), and fits to simulated recordings (twins;
 //! parametric bootstrap).
 
-use super::checkpoint::{Checkpoint, Iterate, TraceSearchSettings, chi2_per_dof};
+use super::checkpoint::{Checkpoint, Iterate, TraceDescent, TraceSearchSettings, chi2_per_dof};
 use super::initial_states::RescuePolicy;
 use super::levenberg_marquardt::{outer_step, refit, start_stage};
 use super::lobes::MAX_LOBES;
 use super::model::{TraceModel, TraceRecording};
 use super::normal_equations::{TraceCovariance, trace_covariance};
-use super::search::TraceDescent;
 use super::segment_simulation::{SegmentResiduals, segment_residuals};
 use crate::recording::noise::AutoregressiveNoise;
 use portable_math as math;

@@ -1,8 +1,7 @@
 //! Checks of the frame grid, the exposure and the single columns.
 
 use super::finding::{Check, QualityFinding, Severity};
-use super::gaps::FrameGaps;
-use super::measurement::{ChannelQuality, FEWEST_CYCLES, MeasuredColumn, Optics, Quality};
+use super::measurement::{ChannelQuality, FEWEST_CYCLES, FrameGaps, MeasuredColumn, Optics, Quality};
 use crate::recording::clock::is_playback_rate;
 use crate::recording::{FrameGrid, Recording};
 use short_spectra::sampling::exposure_gain;
