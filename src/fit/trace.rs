@@ -28,7 +28,7 @@ mod variable_projection;
 pub use assessment::{TraceAssessment, UnknownEstimate};
 pub(crate) use build::{TraceSource, fit_states_at, frame_residuals};
 pub(crate) use checkpoint::Checkpoint;
-pub use checkpoint::TraceDescent;
+pub(crate) use checkpoint::TraceDescent;
 pub use checkpoint::{Iterate, SegmentState, TraceSearchSettings, chi2_per_dof};
 pub use levenberg_marquardt::{first_iterate, next_iterate};
 pub(crate) use model::{TraceModel, TraceRecording};

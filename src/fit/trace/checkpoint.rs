@@ -142,8 +142,8 @@ pub(super) fn is_same_end(end: &Iterate, other: &Iterate, sd: &[f64]) -> bool {
 /// Result of the search from one start.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TraceDescent {
-    /// Number of the chain of the descent: the number of its start, counted from 0, or [`MAX_STARTS`](super::MAX_STARTS) plus
-    /// the number of its lobe.
+    /// Number of the chain of the descent: the number of its start, counted from 0, or the maximum number of
+    /// starts plus the number of its lobe.
     pub start: usize,
     /// Last iterate of each stage that was reached, in the order of the stages.
     pub stages: Vec<Iterate>,
