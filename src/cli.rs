@@ -119,7 +119,7 @@ pub(crate) enum Command {
     /// result.json at the end. A fit that was killed, or whose budgets in [search] have been raised since,
     /// continues with --resume and ends with the result that it would have had in one run. A fit that cannot
     /// determine anything is refused before the search. Exit code 3: the allowed evaluations were used up
-    /// before the search had converged.
+    /// before the search had converged, or the model does not explain the recordings.
     Fit(fit::FitArgs),
     /// Figures and page of a fit
     Report(report::ReportArgs),

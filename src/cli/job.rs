@@ -1,8 +1,8 @@
 //! A job with the scenes and recordings that it names, read from the disk.
 
-use super::load::{LoadedRecording, load_recording, read_driven_scene, read_scene_for_segments};
+use super::load::{LoadedRecording, load_recording, read_driven_scene, read_scene_of_any_start};
 use super::prelude::*;
-use crate::fit::job::Job;
+use crate::fit::job::{HeadSource, Job};
 use crate::fit::{MeasuredRecording, Problem};
 use crate::model::plausibility::PlausibilityFinding;
 use std::collections::BTreeMap;
@@ -51,8 +51,11 @@ impl LoadedJob {
         };
         let scene_files = job.conditions.iter().map(|condition| found("scene", &condition.scene));
         let scene_files = scene_files.collect::<Result<Vec<_>, _>>()?;
-        let read = if job.traces.is_empty() { read_driven_scene } else { read_scene_for_segments };
-        let scenes = scene_files.iter().map(|file| read(file));
+        let scenes = scene_files.iter().zip(&job.conditions).map(|(file, condition)| {
+            // traces start from recorded states, and a recorded head has another start
+            let own_start = job.traces.is_empty() && condition.head == HeadSource::Scene;
+            if own_start { read_driven_scene(file) } else { read_scene_of_any_start(file) }
+        });
         let (scenes, drivers): (Vec<_>, Vec<_>) = scenes.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
         let doubts = scene_files.iter().zip(&scenes);
         let doubts = doubts.map(|(file, scene)| (file.clone(), scene.find_implausible())).collect();

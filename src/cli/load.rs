@@ -21,9 +21,9 @@ pub(crate) fn read_driven_scene(path: &Path) -> Outcome<(Scene, Option<PathBuf>)
     read_scene_with(path, |file, text, recording| Scene::parse_with_recording(file, text, recording))
 }
 
-/// Like [`read_driven_scene`], for a fit to traces, whose runs start from recorded states.
-pub(crate) fn read_scene_for_segments(path: &Path) -> Outcome<(Scene, Option<PathBuf>)> {
-    read_scene_with(path, |file, text, recording| Scene::parse_for_segments(file, text, recording))
+/// Like [`read_driven_scene`], for a scene whose own start is not used.
+pub(crate) fn read_scene_of_any_start(path: &Path) -> Outcome<(Scene, Option<PathBuf>)> {
+    read_scene_with(path, |file, text, recording| Scene::parse_any_start(file, text, recording))
 }
 
 /// Loads the recording with a given path, or says why it cannot be loaded.

@@ -118,7 +118,8 @@ impl TraceMisfit {
     ) -> Self {
         let tests = [
             no_segment_compared(&stages),
-            unseen_channel(&channels),
+            unseen_channel(&channels, &stages),
+            mostly_left_out(&channels),
             bad_segments(&stages),
             misfit_above_noise(&stages),
             misfit_growth(&stages),
@@ -128,9 +129,16 @@ impl TraceMisfit {
         Self { explained: reasons.is_empty(), reasons, channels, stages }
     }
 
-    /// The first sentence of a report on the fit.
-    pub(crate) fn headline(&self) -> String {
+    /// The first sentence of a report on a fit; `ended` says whether its search came to its end.
+    pub(crate) fn headline(&self, ended: bool) -> String {
         let chi2 = self.stages.last().map_or(f64::NAN, |stage| stage.chi2_per_dof);
+        if !ended {
+            let chi2 = format_trimmed(chi2, DIGITS);
+            return format!(
+                "The search has not ended (chi2 per degree of freedom {chi2} so far), so nothing is said about the \
+                 model; go on with --resume"
+            );
+        }
         if self.explained {
             let chi2 = format_trimmed(chi2, DIGITS);
             return format!(
@@ -157,11 +165,24 @@ fn no_segment_compared(stages: &[StageMisfit]) -> Option<String> {
     (!compared).then(|| "no segment of it could be started".to_owned())
 }
 
-/// Evidence against the model: a channel has no compared frames.
-fn unseen_channel(channels: &[ChannelMisfit]) -> Option<String> {
+/// Evidence against the model: a channel has no compared frames, although there are segments that run.
+fn unseen_channel(channels: &[ChannelMisfit], stages: &[StageMisfit]) -> Option<String> {
+    stages.last().filter(|stage| stage.bad_segments < stage.segments)?;
     let unseen = channels.iter().find(|channel| channel.frames == 0)?;
     let (recording, channel) = (&unseen.recording, &unseen.channel);
     Some(format!("no segment of {channel} in `{recording}` could be started"))
+}
+
+/// A reason not to call the recording explained: most of its frames were not compared.
+fn mostly_left_out(channels: &[ChannelMisfit]) -> Option<String> {
+    let is_left_out = |c: &&ChannelMisfit| c.frames > 0 && c.frames_left_out > c.frames;
+    let ChannelMisfit { recording, channel, frames, frames_left_out, .. } =
+        channels.iter().find(is_left_out)?;
+    Some(format!(
+        "only {frames} of {} tracked frames of {channel} in `{recording}` are compared, because segments start \
+         only where the tip slides",
+        frames + frames_left_out
+    ))
 }
 
 /// Evidence against the model: segments with a wrong starting state, or with a motion that the model cannot
@@ -178,8 +199,10 @@ fn misfit_above_noise(stages: &[StageMisfit]) -> Option<String> {
     let last = stages.last()?;
     let most = 1.0 + Z_95 * math::hypot(2.0 * NOISE_SD_RELATIVE, last.chi2_sd());
     let (found, most_words) = (format_trimmed(last.chi2_per_dof, DIGITS), format_trimmed(most, DIGITS));
-    let is_above = last.chi2_per_dof > most || last.chi2_per_dof.is_nan();
-    is_above.then(|| {
+    if !last.chi2_per_dof.is_finite() {
+        return (last.segments > 0).then(|| "the model cannot run through some segments".to_owned());
+    }
+    (last.chi2_per_dof > most).then(|| {
         format!("chi2 per degree of freedom is {found}, and the noise's own uncertainty allows {most_words}")
     })
 }
@@ -189,7 +212,8 @@ fn misfit_above_noise(stages: &[StageMisfit]) -> Option<String> {
 fn misfit_growth(stages: &[StageMisfit]) -> Option<String> {
     let [first, .., last] = stages else { return None };
     let most = first.chi2_per_dof * (1.0 + MAX_GROWTH + Z_95 * math::hypot(first.chi2_sd(), last.chi2_sd()));
-    (last.chi2_per_dof > most).then(|| {
+    let grows = last.chi2_per_dof.is_finite() && last.chi2_per_dof > most;
+    grows.then(|| {
         format!(
             "chi2 per degree of freedom grows with the segments, from {} at {} ms to {} at {} ms",
             format_trimmed(first.chi2_per_dof, DIGITS),
@@ -253,11 +277,31 @@ mod tests {
 
     #[test]
     fn a_recording_that_was_not_compared_and_a_run_that_fails_are_said() {
-        let channels = vec![ChannelMisfit { recording: "b".to_owned(), ..ChannelMisfit::default() }];
+        let (recording, channel) = ("b".to_owned(), "tip-x".to_owned());
+        let channels = vec![ChannelMisfit { recording, channel, ..ChannelMisfit::default() }];
         let found = TraceMisfit::judge(channels, stages([1.0, 1.0, f64::INFINITY], 1, 5000), &[]);
-        assert_eq!(found.reasons.len(), 4, "{:?}", found.reasons);
+        assert_eq!(
+            found.reasons,
+            [
+                "no segment of tip-x in `b` could be started",
+                "1 of 40 segments fit worse than noise ever does",
+                "the model cannot run through some segments",
+            ]
+        );
         let text = serde_json::to_string(&found).unwrap();
         assert_eq!(serde_json::from_str::<TraceMisfit>(&text).unwrap(), found);
+    }
+
+    #[test]
+    fn a_recording_of_which_most_was_left_out_is_not_explained() {
+        let reasons = |frames_left_out| {
+            let (recording, channel) = ("a".to_owned(), "tip-x".to_owned());
+            let channel =
+                ChannelMisfit { recording, channel, frames: 100, frames_left_out, ..Default::default() };
+            TraceMisfit::judge(vec![channel], stages([1.0; 3], 0, 5000), &[]).reasons
+        };
+        assert!(reasons(99).is_empty());
+        assert!(reasons(101)[0].starts_with("only 100 of 201 tracked frames of tip-x in `a` are compared"));
     }
 
     #[test]
@@ -284,7 +328,7 @@ mod tests {
 
     #[test]
     fn the_first_sentence_says_it() {
-        let said = |chi2, bad| TraceMisfit::judge(Vec::new(), stages(chi2, bad, 5000), &[]).headline();
+        let said = |chi2, bad| TraceMisfit::judge(Vec::new(), stages(chi2, bad, 5000), &[]).headline(true);
         assert_eq!(
             said([1.0, 1.0, 0.98], 0),
             "The model explains the recording to within its noise (chi2 per degree of freedom 0.98)"

@@ -262,19 +262,19 @@ fn check_scene(
     let condition = &job.conditions[at];
     let refused =
         |place: String| |problem: SceneError| ProblemError::Scene { place, problem: problem.to_string() };
-    let mut scene = match (condition.head, measured) {
-        (HeadSource::Recording, Some(measured)) => {
-            let mut driven = scene.drive_by_recording(&measured.recording);
-            if driven.is_err() && !job.traces.is_empty() {
-                // a steady start is not needed: segments start from recorded states
-                let mut upright = scene.clone();
-                upright.start = StartKind::Upright;
-                driven = upright.drive_by_recording(&measured.recording);
-            }
-            driven.map_err(refused(format!("`{}`, `drive`", condition.name)))?
-        }
-        _ => scene.clone(),
-    };
+    // a fit to traces needs no steady start: segments start from recorded states
+    let any_start = !job.traces.is_empty();
+    let mut scene = scene.clone();
+    if let (HeadSource::Recording, Some(measured)) = (condition.head, measured) {
+        let driven = scene.drive_by_recording(&measured.recording).or_else(|error| {
+            let mut upright = scene.clone();
+            upright.start = StartKind::Upright;
+            if any_start { upright.drive_by_recording(&measured.recording) } else { Err(error) }
+        });
+        scene = driven.map_err(refused(format!("`{}`, `drive`", condition.name)))?;
+    } else if any_start {
+        scene = scene.with_possible_start();
+    }
     for (name, value) in &condition.set {
         let set = scene.with_parameter(name, *value);
         scene = set.map_err(refused(format!("`{}`, `set`, `{name}`", condition.name)))?;

@@ -38,6 +38,11 @@ impl FitStatus {
             Self::Failed => "failed",
         }
     }
+
+    /// Whether the search came to its end, so that it can say whether the model explains the recordings.
+    pub(crate) fn has_ended(self) -> bool {
+        !matches!(self, Self::Interrupted | Self::BudgetExhausted)
+    }
 }
 
 /// Result for one parameter, in its own SI unit.
@@ -320,9 +325,8 @@ impl FitResult {
     #[must_use]
     pub fn to_json(&self) -> String {
         // serialisation cannot fail: keys are strings, and numbers that are not finite become `null`
-        let ended = !matches!(self.status, FitStatus::Interrupted | FitStatus::BudgetExhausted);
         let file = ResultFile {
-            explained: ended.then(|| self.explains_recordings()),
+            explained: self.status.has_ended().then(|| self.explains_recordings()),
             constants: self.constants_word(),
             result: self,
         };

@@ -146,11 +146,11 @@ fn head_source(aim: &TraceTarget, recording: &Recording) -> Result<HeadSource, T
 
 /// Refuses a job that frees a parameter of the drive although the recorded head drives the model.
 fn check_drive(job: &Job, head: HeadSource) -> Result<(), TraceRefusal> {
-    let free = job.parameters.iter().find(|free| free.name.starts_with("drive."));
-    let Some(free) = free.filter(|_| head == HeadSource::Recording) else { return Ok(()) };
+    let free = job.parameters.iter().map(|free| free.name.as_str()).chain(job.constants.listed_names());
+    let mut free = free.filter(|name| head == HeadSource::Recording && name.starts_with("drive."));
+    let Some(name) = free.next() else { return Ok(()) };
     let problem = format!(
-        "the recording's own head drives the model, and the parameter `{}` is free; remove it, or write drive = \"scene\"",
-        free.name
+        "the recording's own head drives the model, and `{name}` is free; remove it, or write drive = \"scene\""
     );
     Err(("drive", problem))
 }
@@ -164,7 +164,7 @@ fn check_span(scene: &Scene, one: &TraceData, recording: &Recording) -> Result<(
         return Ok(());
     }
     let problem = format!(
-        "found \"scene\", whose head runs from {start_s} to {stop_s} s, and frames from {first_s} to {last_s} s in `{}`, expected times in common; shift the scene's times, or track the head and leave `drive` out",
+        "found \"scene\", whose head runs from {start_s} to {stop_s} s, and frames from {first_s} to {last_s} s in `{}`, expected times in common; shift the scene's times and `drive.delay_s` by the same, or track the head and leave `drive` out",
         recording.name()
     );
     Err(("drive", problem))

@@ -222,12 +222,17 @@ impl TraceFindings<'_, '_> {
             reasons: misfit.reasons.clone(),
         };
         let Some(known) = &self.searched.assessment else {
-            found.reasons = vec!["the search had not come to its end".to_owned()];
+            if self.searched.stopped {
+                found.reasons = vec!["the search had not come to its end".to_owned()];
+            }
+            found.verdict = trace_verdict(free, &found);
             return found;
         };
         let own = &known.estimates[at];
-        found.linear_95 = Some(own.ends_95);
-        found.bootstrap_95 = own.twins_95;
+        // an infinite end is no number of a file
+        let finite = |ends: &[f64; 2]| ends.iter().all(|end| end.is_finite());
+        found.linear_95 = Some(own.ends_95).filter(finite);
+        found.bootstrap_95 = own.twins_95.filter(finite);
         let [lower, upper] = own.widest_95();
         found.lower_95 = Some(lower).filter(|end| *end > free.bounds.lower());
         found.upper_95 = Some(upper).filter(|end| *end < free.bounds.upper());
@@ -259,8 +264,8 @@ impl TraceFindings<'_, '_> {
                 prior: unknown.prior.map(|[mean, _]| unknown.value(mean)),
                 prior_sd: unknown.prior.map(|[mean, sd]| sd * unknown.slope(mean)),
                 estimate: unknown.value(*z),
-                lower_95: ends.map(|ends| ends[0]),
-                upper_95: ends.map(|ends| ends[1]),
+                lower_95: ends.map(|ends| ends[0]).filter(|end| end.is_finite()),
+                upper_95: ends.map(|ends| ends[1]).filter(|end| end.is_finite()),
             }
         };
         all.map(nuisance).collect()

@@ -28,7 +28,7 @@ use portable_math as math;
 // that of the other point too, unless the fastest part of the channel's own scatter clearly differs.
 
 /// Blocks in which a polynomial is fitted to the motion of the head: length, s, and degree. For a motion at
-/// 50 Hz, the residual of each is a hundredth of the amplitude. The shorter blocks leave less of a faster
+/// 50 Hz, the residual is at most a hundredth of the amplitude. The shorter blocks leave less of a faster
 /// motion.
 const HEAD_BLOCKS: [(f64, usize); 4] = [(8e-3, 3), (16e-3, 5), (32e-3, 9), (64e-3, 16)];
 /// Index of the shortest of [`HEAD_BLOCKS`].

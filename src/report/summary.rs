@@ -123,6 +123,9 @@ fn worst_channel(misfit: &TraceMisfit) -> Option<&ChannelMisfit> {
 }
 
 fn trace_headline(report: &Report, misfit: &TraceMisfit) -> Statement {
+    if !report.search.has_ended() {
+        return Statement::new(format!("{}.", misfit.headline(false)));
+    }
     let shown = if misfit.explained { misfit.channels.first() } else { worst_channel(misfit) };
     let left = shown.map_or_else(String::new, |c| {
         let (point, ratio) = (channel_point_name(&c.channel), format_digits(c.residual_rms_m / c.noise_m, 2));
@@ -264,6 +267,9 @@ fn certainty_sentence(report: &Report) -> Sentence {
     let open_names = join_with_and(&open.iter().map(name).collect::<Vec<_>>());
     if all == 0 {
         return Sentence::new("No parameter was fitted.");
+    }
+    if !report.search.has_ended() {
+        return Sentence::new("No parameter counts as determined before the search has ended.");
     }
     if report.misfit.as_ref().is_some_and(|misfit| !misfit.explained) {
         return Sentence::new(

@@ -47,7 +47,7 @@ impl ReportVerdict {
         let met = |list: &[TargetComparison]| list.iter().all(|c| c.pass);
         Self {
             model_explains_recording: match &report.misfit {
-                Some(misfit) => misfit.explained,
+                Some(misfit) => misfit.explained && report.search.has_ended(),
                 None => far_from_priors(&report.nuisances).is_empty(),
             },
             all_components_met: met(&report.components),
@@ -74,7 +74,8 @@ impl ReportVerdict {
 }
 
 fn verdict_statements(report: &Report) -> Vec<Statement> {
-    let mut found: Vec<Statement> = report.misfit.iter().map(misfit_statement).collect();
+    let mut found: Vec<Statement> =
+        report.misfit.iter().map(|misfit| misfit_statement(report, misfit)).collect();
     found.extend(far_camera_statement(report));
     if report.misfit.is_none() && !report.recordings.is_empty() {
         found.push(Statement { details: Vec::new(), ..summary::report_headline(report) });
@@ -125,9 +126,10 @@ fn far_camera_statement(report: &Report) -> Option<Statement> {
 }
 
 /// Statement on whether the model explains the traces, with the residuals of every channel.
-fn misfit_statement(misfit: &TraceMisfit) -> Statement {
+fn misfit_statement(report: &Report, misfit: &TraceMisfit) -> Statement {
     let details = misfit.channels.iter().map(residual_sentence).collect();
-    Statement::with_details(misfit.headline(), details, Some(misfit.explained))
+    let ended = report.search.has_ended();
+    Statement::with_details(misfit.headline(ended), details, ended.then_some(misfit.explained))
 }
 
 /// Sentence on the residual of a channel compared with its noise, and on the segment with the worst fit.

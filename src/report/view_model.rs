@@ -71,6 +71,13 @@ pub struct SearchLine {
     pub condition: Option<f64>,
 }
 
+impl SearchLine {
+    /// Whether the search came to its end; also if there was none.
+    pub(crate) fn has_ended(&self) -> bool {
+        self.status.is_none_or(fit::result::FitStatus::has_ended)
+    }
+}
+
 /// Number of evaluations that failed for one reason.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct FailureCount {

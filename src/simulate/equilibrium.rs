@@ -192,6 +192,26 @@ mod tests {
     use super::*;
     use crate::simulate::scene::Scene;
 
+    /// A blade in steady slip is at rest relative to its head, so the pose that its lean alone gives, without
+    /// the law of friction, is the same.
+    #[test]
+    fn the_lean_of_a_steady_slip_gives_its_pose() {
+        let scenes = [
+            include_str!("../../data/scenes/actual-blade.toml"),
+            include_str!("../../data/scenes/another-blade.toml"),
+        ];
+        for text in scenes {
+            let linkage = Scene::parse("scene.toml", text).unwrap().linkage;
+            for speed in [-0.4, -0.1, 0.05, 0.2, 0.5] {
+                let pose = steady_slip_pose(&linkage, speed).unwrap();
+                let lean = linkage.l1_m * math::sin(pose.theta) + linkage.l2_m * math::sin(pose.phi);
+                let [theta, phi] = equilibrium_angles(&linkage, lean).unwrap();
+                let error = (theta - pose.theta).abs().max((phi - pose.phi).abs());
+                assert!(error < 1e-9, "{speed} m/s: {theta} {phi}, expected {pose:?}");
+            }
+        }
+    }
+
     /// These values make Newton's steps cycle across the shoulder's corner.
     #[test]
     fn an_equilibrium_next_to_the_shoulders_corner_is_found() {

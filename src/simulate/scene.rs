@@ -80,20 +80,11 @@ impl Scene {
         Ok(scene)
     }
 
-    /// Like [`Self::parse_with_recording`], for a scene whose runs start from recorded states. If the blade
-    /// cannot slip steadily at the start, the scene starts with the blade upright.
-    ///
-    /// # Errors
-    /// As [`Self::parse_with_recording`].
-    pub(crate) fn parse_for_segments(
-        file: &str,
-        text: &str,
-        recording: impl FnOnce(&str) -> Result<Recording, String>,
-    ) -> Result<Self, SceneError> {
-        Ok(Self::parse_any_start(file, text, recording)?.with_possible_start())
+    fn check_start(&self) -> Result<(), SceneError> {
+        run::check_steady_start(&self.file, self.start_s, self.start, &self.linkage, &self.drive)
     }
 
-    /// The same scene; it starts with the blade upright if steady slip is impossible at its start.
+    /// The same scene. If it starts in steady slip that does not exist, its blade starts upright.
     pub(crate) fn with_possible_start(mut self) -> Self {
         if self.check_start().is_err() {
             self.start = StartKind::Upright;
@@ -101,11 +92,11 @@ impl Scene {
         self
     }
 
-    fn check_start(&self) -> Result<(), SceneError> {
-        run::check_steady_start(&self.file, self.start_s, self.start, &self.linkage, &self.drive)
-    }
-
-    fn parse_any_start(
+    /// Like [`Self::parse_with_recording`], but accepts a start in steady slip that does not exist.
+    ///
+    /// # Errors
+    /// As [`Self::parse_with_recording`].
+    pub(crate) fn parse_any_start(
         file: &str,
         text: &str,
         recording: impl FnOnce(&str) -> Result<Recording, String>,

@@ -13,7 +13,7 @@ const DIGITS: usize = 5;
 pub(crate) fn print_summary(solved: &CompletedFit) {
     let result = &solved.result;
     if let Some(misfit) = &result.misfit {
-        print_misfit(misfit);
+        print_misfit(misfit, result.status.has_ended());
     } else if !result.explains_recordings() {
         print_line!("{}", to_ascii(&unexplained_headline(&far_from_priors(&result.nuisances))));
     }
@@ -113,9 +113,9 @@ pub(super) fn format_value(value: f64) -> String {
 const MOST_SEGMENTS: usize = 3;
 
 /// Prints the headline, the residuals compared with the noise, and the misfit for each length of the
-/// segments.
-pub(crate) fn print_misfit(misfit: &TraceMisfit) {
-    print_line!("{}", text::to_ascii(&misfit.headline()));
+/// segments. `ended` says whether the search came to its end.
+pub(crate) fn print_misfit(misfit: &TraceMisfit, ended: bool) {
+    print_line!("{}", text::to_ascii(&misfit.headline(ended)));
     print_line!("recording                channel     residual, um  noise, um  chi2/dof   neighbours");
     misfit.channels.iter().for_each(print_channel_misfit);
     print_line!("");

@@ -102,6 +102,8 @@ fn check_prior(
 
 /// Value of `nuisance` with which a job takes all constants as exact.
 const EXACT_WORD: &str = "exact";
+/// The forms of `nuisance`, for refusals.
+const NUISANCE_FORMS: &str = "\"exact\", a percentage such as \"3 %\", or a list of constants";
 /// Smallest allowed standard deviation of the prior of a constant, in % of the constant. A more precisely
 /// known constant must be left fixed.
 const LEAST_PERCENT: f64 = 1e-4;
@@ -145,7 +147,7 @@ impl Constants {
     }
 
     /// Names of the listed constants.
-    pub(super) fn listed_names(&self) -> impl Iterator<Item = &str> {
+    pub(in crate::fit) fn listed_names(&self) -> impl Iterator<Item = &str> {
         let listed = if let Self::Listed(listed) = self { &listed[..] } else { &[] };
         listed.iter().map(|nuisance| nuisance.name.as_str())
     }
@@ -168,13 +170,12 @@ pub(super) fn check_constants(
     let list = match nuisance {
         JobNuisanceEntry::All(text) if text == EXACT_WORD => return Ok(Constants::Exact),
         JobNuisanceEntry::All(text) => {
-            let words = "\"exact\", or a percentage such as \"3 %\"";
-            return Ok(Constants::All { sd_relative: parse_percentage("nuisance", text, words)? });
+            return Ok(Constants::All { sd_relative: parse_percentage("nuisance", text, NUISANCE_FORMS)? });
         }
         JobNuisanceEntry::Listed(list) => list,
     };
     if list.is_empty() {
-        refuse!("nuisance", "found an empty list, expected names, or a percentage such as \"3 %\"");
+        refuse!("nuisance", "found an empty list, expected {NUISANCE_FORMS}");
     }
     let names: Vec<&str> = list.iter().map(|one| one.name.as_str()).collect();
     check_distinct("nuisance", &names, "")?;
@@ -218,6 +219,6 @@ fn check_percentage(key: &str, percent: f64) -> Result<f64, KeyRefusal> {
     }
     refuse!(
         key,
-        "found {percent} %, expected {LEAST_PERCENT} % to {MOST_PERCENT} %: what is known no better is a [[parameter]]"
+        "found {percent} %, expected {LEAST_PERCENT} % to {MOST_PERCENT} %: what is known no better is a [[parameter]], and nuisance = \"exact\" takes all constants as exact"
     )
 }

@@ -65,8 +65,8 @@ const FEWEST_POINTS: usize = 20;
 const LEAN_TAIL: f64 = 0.1;
 
 /// Measured lean and drop, m, of the upright blade, for a blade that leans to both sides. `points` are its
-/// measured leans and drops; `ends` are its usual leans to the two sides. `None` if no cubic can be fitted to
-/// the drops.
+/// measured leans and drops; `ends` are its usual leans to the two sides. `None` if there are too few
+/// points, or if no cubic can be fitted to the drops.
 fn upright_point(points: &[[f64; 2]], ends: [f64; 2]) -> Option<[f64; 2]> {
     /// Width of the range in which the offset is sought, as a fraction of the distance between `ends`. The
     /// range is centred between them.
@@ -77,6 +77,9 @@ fn upright_point(points: &[[f64; 2]], ends: [f64; 2]) -> Option<[f64; 2]> {
     const FINER: f64 = 0.1;
     /// Number of rounds; in the last one, neighbouring offsets differ by 2e-5 of the distance between `ends`.
     const ROUNDS: usize = 4;
+    if points.len() < FEWEST_POINTS {
+        return None;
+    }
     let reach = ends[1] - ends[0];
     let (mut middle, mut width) = (0.5 * (ends[0] + ends[1]), SOUGHT * reach);
     let mut best: Option<(f64, [f64; 2])> = None;
@@ -111,8 +114,8 @@ fn fit_drops(points: &[[f64; 2]], offset_m: f64, reach_m: f64) -> Option<(f64, f
     Some((squares - coefficients.dot(&right), coefficients[0]))
 }
 
-/// Median difference, m, between the measured drop and the drop of the blade at rest with the same lean; 0 if
-/// no blade at rest has such a lean.
+/// Median difference, m, between the measured drop and the drop of the blade at rest with the same lean. If no
+/// blade at rest has such a lean, it is the median drop.
 fn drop_offset_at_rest(points: &[[f64; 2]], linkage: &Linkage) -> f64 {
     /// Maximum number of points that are compared.
     const COMPARED: usize = 200;
@@ -123,7 +126,8 @@ fn drop_offset_at_rest(points: &[[f64; 2]], linkage: &Linkage) -> f64 {
         Some(drop - upright(linkage.l1_m, theta) - upright(linkage.l2_m, phi))
     };
     let mut offsets: Vec<f64> = points.iter().step_by(apart).filter_map(above).collect();
-    median_in_place(&mut offsets).unwrap_or(0.0)
+    let mut drops: Vec<f64> = points.iter().map(|[_, drop]| *drop).collect();
+    median_in_place(&mut offsets).or_else(|| median_in_place(&mut drops)).unwrap_or(0.0)
 }
 
 impl CameraObservation {
@@ -201,16 +205,16 @@ impl CameraObservation {
         // leans to both sides)
         let both_sides = (low < 0.0 && high > 0.0) || self.reverses();
         let points: Vec<[f64; 2]> = frames().filter_map(|i| Some([lean(i)?, level(i)?])).collect();
-        if !both_sides {
-            let along = if self.own_head { 0.0 } else { at(0.5) };
-            let leans = points.iter().map(|[lean, drop]| [lean - along, *drop]).collect::<Vec<_>>();
-            return [along, drop_offset_at_rest(&leans, linkage)];
-        }
-        let middle = 0.5 * (low + high);
-        if points.len() < FEWEST_POINTS {
-            return [middle, 0.0];
-        }
-        upright_point(&points, [low, high]).unwrap_or([middle, 0.0])
+        let along = match both_sides {
+            true => 0.5 * (low + high),
+            false if self.own_head => 0.0,
+            false => at(0.5),
+        };
+        let upright = if both_sides { upright_point(&points, [low, high]) } else { None };
+        upright.unwrap_or_else(|| {
+            let leans: Vec<[f64; 2]> = points.iter().map(|[lean, drop]| [lean - along, *drop]).collect();
+            [along, drop_offset_at_rest(&leans, linkage)]
+        })
     }
 
     /// Whether the head reverses its motion within the fitted frames, so that the blade leans to both sides.

@@ -137,6 +137,22 @@ fn the_zero_of_the_picture_does_not_matter() {
     }
 }
 
+/// A preload that is five prior deviations off: either the model does not explain the recording, or nothing is
+/// identified.
+#[test]
+fn a_constant_far_outside_its_prior_takes_the_verdict_away() {
+    let preload = "blade.preload_force_n";
+    let wrong = scene().with_parameter(preload, 1.3 * scene().value(preload).unwrap()).unwrap();
+    let job = Job::parse("job.toml", &JOB.replace("nuisance = \"exact\"\n", "")).unwrap();
+    let measured = MeasuredRecording { recording: recording(), exposure_s: Some(CAMERA.exposure_s) };
+    let result = Problem::new(job, vec![wrong], vec![measured]).unwrap().fit().unwrap();
+    assert!(result.nuisances.iter().any(|nuisance| nuisance.name == preload));
+    for (name, found) in &result.parameters {
+        assert_ne!(found.verdict, ParameterVerdict::Identified, "{name}: {found:?}");
+        assert!(!found.reasons.is_empty(), "{name}");
+    }
+}
+
 /// Angles of the lip at given instants of a run, which are in rising order.
 struct LipAngles {
     times_s: Vec<f64>,
