@@ -114,8 +114,8 @@ fn fit_drops(points: &[[f64; 2]], offset_m: f64, reach_m: f64) -> Option<(f64, f
     Some((squares - coefficients.dot(&right), coefficients[0]))
 }
 
-/// Median difference, m, between the measured drop and the drop of the blade at rest with the same lean. If no
-/// blade at rest has such a lean, it is the median drop.
+/// Median difference, m, between the measured drop and the drop of the blade at rest with the same lean. It
+/// is the median drop if no blade at rest has such a lean.
 fn drop_offset_at_rest(points: &[[f64; 2]], linkage: &Linkage) -> f64 {
     /// Maximum number of points that are compared.
     const COMPARED: usize = 200;

@@ -111,7 +111,7 @@ fn traces_are_checked() {
 #[test]
 fn constants_are_checked() {
     for (to, words) in [
-        ("\"3\"", "nuisance: found \"3\", expected \"exact\", or a percentage such as \"3 %\""),
+        ("\"3\"", "nuisance: found \"3\", expected \"exact\", a percentage such as \"3 %\""),
         ("\"90 %\"", "nuisance: found 90 %, expected 0.0001 % to 50 %"),
         ("3", "expected \"exact\", a percentage such as \"3 %\", or a list"),
         ("[]", "nuisance: found an empty list"),
