@@ -2,8 +2,10 @@
 //! transitions and runs. Each distinct scene is simulated only once.
 
 pub mod condition;
+mod drift;
 pub mod friction;
 pub mod model_run;
+mod overlay;
 pub mod ridge;
 pub mod rows;
 pub mod summary;

@@ -16,6 +16,7 @@ pub mod camera_calibration;
 pub(crate) mod context;
 pub mod evaluation;
 pub mod feature_checkpoint;
+mod fitted_model;
 pub mod identifiability;
 pub mod job;
 pub mod ledger;

@@ -1,6 +1,7 @@
 //! Compares, for one condition of a job, the recording with the model. The model runs with the estimated
 //! parameters and is recorded by a simulated camera like that of the recording.
 
+use super::drift::drift_cycles;
 use super::model_run::{ModelRun, RunSummary, summarize_run};
 use super::ridge::RidgePair;
 use crate::feature::{FeatureBand, FeatureUnit};
@@ -19,7 +20,7 @@ use std::ops::Range;
 
 /// Channels on which the model is judged, in order of preference; the first one that is tracked is used. The
 /// deflection shows stick and slip best, but it can be computed only if the head is tracked.
-const JUDGED: [Channel; 3] = [Channel::Deflection, Channel::TipX, Channel::HeadX];
+const JUDGED: [Channel; 4] = [Channel::Deflection, Channel::TipX, Channel::HeadX, Channel::HeadDrop];
 
 /// A fitted recording with its description and its video.
 #[derive(Debug, Clone, Copy)]
@@ -49,8 +50,12 @@ pub struct ConditionComparison<'a> {
     /// Indices of the later conditions in which the model runs the same scene; `None` if an earlier condition
     /// already has this scene.
     pub same_run: Option<Vec<usize>>,
-    /// Measured minus aligned model, in every frame of the recording.
+    /// Motion of the recording as it is compared with the model; `None` without a recording.
+    pub(crate) measured_motion: Option<MotionTraces>,
+    /// Measured minus one run of the aligned model, in every frame of the recording.
     pub residual: Option<MotionTraces>,
+    /// Measured minus the model that restarts at every segment of the fit; `None` without fitted traces.
+    pub(crate) restarted: Option<MotionTraces>,
     /// Ridges of recording and model: the frequency of the strongest component against time.
     pub ridges: RidgePair,
     noise: Option<RecordingNoise>,
@@ -89,7 +94,11 @@ impl<'a> ConditionComparison<'a> {
             let view = &model.view.recording;
             let measured = measured.get(condition).copied();
             let recording = measured.map(|m| m.recording);
-            let alignment = recording.map_or_else(Alignment::default, |seen| Alignment::estimate(seen, view));
+            let alignment = recording.map_or_else(Alignment::default, |seen| model.alignment(seen));
+            let measured_motion = recording.map(|seen| model.measured_motion(seen));
+            let residual = recording.zip(measured_motion.as_ref()).map(|(seen, motion)| {
+                motion.subtract(&MotionTraces::from_model_at_frames(seen, view, &alignment))
+            });
             let mut case = Self {
                 job,
                 result,
@@ -98,7 +107,9 @@ impl<'a> ConditionComparison<'a> {
                 model,
                 alignment,
                 same_run: later_same_runs(models, condition),
-                residual: recording.map(|seen| MotionTraces::residual(seen, view, &alignment)),
+                residual,
+                restarted: recording.and_then(|seen| model.restarted_residual(seen)),
+                measured_motion,
                 ridges: RidgePair::default(),
                 noise: recording.map(measure_noise),
                 measured_instants: recording.map(ReversalInstants::find_instants),
@@ -139,6 +150,9 @@ impl<'a> ConditionComparison<'a> {
     /// Standard deviation of the noise of a recorded channel, m, as in a fit to traces. If its measurement
     /// fails, the scatter from frame to frame is used. `None` without a recording or without noise.
     pub(crate) fn noise_m(&self, channel: Channel) -> Option<f64> {
+        if let Some(noise_m) = self.fitted_noise_m(channel) {
+            return Some(noise_m);
+        }
         let noise = self.noise.as_ref()?;
         let sd_m = |found: &Option<ChannelNoise>| found.as_ref().map(|found| found.noise.sd());
         let known_m = match channel {
@@ -150,14 +164,45 @@ impl<'a> ConditionComparison<'a> {
         known_m.or_else(|| noise_floor(&channel.samples(self.recording()?))).filter(|noise_m| *noise_m > 0.0)
     }
 
+    /// Standard deviation of the noise with which the fit compares a channel, m; `None` for a channel that
+    /// the fit does not compare.
+    fn fitted_noise_m(&self, channel: Channel) -> Option<f64> {
+        let traces = self.model.traces.as_ref()?;
+        let column = match channel {
+            Channel::TipX => 0,
+            Channel::Deflection if traces.own_head => 0,
+            Channel::HeadDrop => 1,
+            Channel::Deflection | Channel::HeadX => return None,
+        };
+        traces.measured[column].iter().any(Option::is_some).then_some(traces.noise_m[column])
+    }
+
+    /// Measured minus model as the verdict of the fit compares them: the model restarts at every segment if
+    /// traces were fitted, and runs once otherwise.
+    pub(crate) fn judged_residual(&self) -> Option<&MotionTraces> {
+        self.restarted.as_ref().or(self.residual.as_ref())
+    }
+
     /// The channel on which the model is judged, and the standard deviation of its noise, m. `None` without a
     /// recording, if the heads of recording and model turn in opposite directions, or if the noise is
     /// unknown.
     pub(crate) fn judged_channel(&self) -> Option<(Channel, f64)> {
-        let residual = self.residual.as_ref().filter(|_| !self.alignment.opposite_turn)?;
+        let residual = self.judged_residual().filter(|_| !self.alignment.opposite_turn)?;
         let is_known = |channel: &Channel| residual.column(*channel).iter().any(Option::is_some);
         let channel = JUDGED.into_iter().find(is_known)?;
         Some((channel, self.noise_m(channel)?))
+    }
+
+    /// Cycles of stick and slip by which one run of the model gets ahead of the recording; `None` if they
+    /// show no common cycle.
+    pub(crate) fn drift_cycles(&self) -> Option<f64> {
+        let measured = self.measured_motion.as_ref().filter(|_| !self.alignment.opposite_turn)?;
+        let (low_hz, high_hz) = self.ridges.measured.as_ref()?.frequency_range_hz()?;
+        let recording = self.recording()?;
+        let view = &self.model.view.recording;
+        let model = MotionTraces::from_model_at_frames(recording, view, &self.alignment);
+        let deflections = [measured, &model].map(|motion| &motion.deflection_m[..]);
+        drift_cycles(deflections, recording.grid().frame_rate_hz, 0.5 * (low_hz + high_hz))
     }
 
     /// Exposure time of a frame, s; `None` if unknown.

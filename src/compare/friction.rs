@@ -59,7 +59,8 @@ impl MeasuredFriction {
     /// tracked.
     pub(crate) fn measure(case: &ConditionComparison) -> Self {
         let Some(side) = case.measured_side() else { return Self::default() };
-        let deflections = static_deflections(&case.model.scene.linkage);
+        let mut deflections = static_deflections(&case.model.scene.linkage);
+        deflections.iter_mut().for_each(|(_, deflection_m)| *deflection_m += case.alignment.tip_m);
         let slowest_hz =
             case.frequency_comparisons().map(|sought| sought.target.frequency_hz).reduce(f64::min);
         let cycles_s = slowest_hz.map_or(CYCLE_BLOCK_S, |hz| (SLOW_CYCLES / hz).max(CYCLE_BLOCK_S));
@@ -67,7 +68,10 @@ impl MeasuredFriction {
         let evenly = one_way_blocks(&side, STEADY_BLOCK_S, noise_m);
         let cycles = one_way_blocks(&side, cycles_s, noise_m);
         let mut model = one_way_blocks(&case.model_side(), cycles_s, noise_m);
-        model.iter_mut().for_each(|block| block.start_s += case.alignment.shift_s);
+        for block in &mut model {
+            block.start_s += case.alignment.shift_s;
+            block.deflection_m += case.alignment.tip_m;
+        }
         let grid = side.recording.grid();
         let shown = grid.start_s..=grid.time_s(grid.frames);
         let points = |blocks: &[FrictionBlock], even: bool| {

@@ -1,9 +1,11 @@
 //! Runs of the model at the estimates, one per condition.
 
+use super::overlay::view_through_camera;
 use crate::fit::evaluation::RunFailure;
 use crate::fit::job::Job;
 use crate::fit::result::FitResult;
 use crate::fit::scene_model::SceneModel;
+use crate::fit::trace::FittedTraces;
 use crate::simulate::mode::TipMode;
 use crate::simulate::motion::{MotionRecorder, RunMotion};
 use crate::simulate::scene::Scene;
@@ -17,8 +19,11 @@ use serde::{Serialize, Serializer};
 pub struct ModelRun {
     /// The scene with the estimates as its values.
     pub scene: Scene,
-    /// The motion of the model as the camera of the condition records it.
+    /// The motion of the model as the camera of the condition records it; after a fit to traces, through the
+    /// fitted camera and in the frames of the recording.
     pub view: TwinView,
+    /// The fitted traces beside the model, if traces were fitted.
+    pub(crate) traces: Option<FittedTraces>,
     /// States of the run.
     pub motion: RunMotion,
 }
@@ -38,8 +43,12 @@ pub fn run_conditions(
     let at = |condition| {
         let scene = model.scene_at(&values, condition)?;
         let mut recorder = MotionRecorder::new(&scene);
-        let view = model.record_scene(&scene, condition, &mut recorder)?;
-        Ok(ModelRun { motion: recorder.into_motion(&scene, view.run), scene, view })
+        let mut view = model.record_scene(&scene, condition, &mut recorder)?;
+        let traces = model.fitted_traces(condition).cloned();
+        if let Some(shown) = traces.as_ref().and_then(|traces| view_through_camera(&view, traces)) {
+            view.recording = shown;
+        }
+        Ok(ModelRun { motion: recorder.into_motion(&scene, view.run), scene, view, traces })
     };
     (0..job.conditions.len()).into_par_iter().map(at).collect()
 }

@@ -4,8 +4,10 @@ use super::condition::{ConditionComparison, FitWindow, TimedRecording, group_fit
 use super::ridge::TrackedRidge;
 use crate::recording::alignment::AlignmentPoint;
 use crate::recording::channel::Channel;
-use crate::recording::motion_traces::MOTION_CHANNELS;
+use crate::recording::motion_traces::{MOTION_CHANNELS, MotionTraces};
+use crate::text::format_digits;
 use serde::Serialize;
+use serde_json::{Map, Value, json};
 
 /// A recording compared with the model at the estimates; without a recording, the model alone.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -27,8 +29,14 @@ pub struct ComparisonSummary {
     pub followed: Option<AlignmentPoint>,
     /// Whether the head in the recording turns in the opposite direction to the head of the model.
     pub opposite_turn: bool,
-    /// Residuals, one for each channel.
+    /// Residuals of one run of the model, one for each channel.
     pub residuals: Vec<ResidualSummary>,
+    /// Residuals of the model that restarts at every segment of the fit, one for each fitted channel; empty
+    /// without a fit to traces.
+    pub restarted: Vec<ResidualSummary>,
+    /// Cycles of stick and slip by which one run of the model gets ahead of the recording; `None` if they
+    /// show no common cycle.
+    pub drift_cycles: Option<f64>,
     /// The channel on which the model is judged; `None` if the heads of recording and model turn in opposite
     /// directions or the noise is unknown.
     pub judged: Option<&'static str>,
@@ -94,9 +102,25 @@ pub struct RidgeSummary {
 }
 
 impl ComparisonSummary {
-    /// Residual of the channel on which the model is judged.
+    /// Residual of the channel on which the model is judged, in one run of the model.
     pub(crate) fn judged_residual(&self) -> Option<&ResidualSummary> {
         self.residuals.iter().find(|line| Some(line.channel) == self.judged)
+    }
+
+    /// The part of `comparison.json` on this condition.
+    fn to_json(&self) -> Value {
+        let ratios = |lines: &[ResidualSummary]| -> Map<String, Value> {
+            let line = |r: &ResidualSummary| {
+                (
+                    r.channel.to_owned(),
+                    json!({ "residual_over_noise": r.rms_over_noise, "residual_rms_m": r.rms_m, "noise_m": r.noise_m }),
+                )
+            };
+            lines.iter().map(line).collect()
+        };
+        let mut single_run = ratios(&self.residuals);
+        single_run.insert("drift_cycles".to_owned(), json!(self.drift_cycles));
+        json!({ "condition": self.condition, "restarted": ratios(&self.restarted), "single_run": single_run })
     }
 
     /// The numbers of a condition.
@@ -114,7 +138,9 @@ impl ComparisonSummary {
             drop_m: alignment.map(|a| a.drop_m),
             followed: alignment.map(|a| a.followed),
             opposite_turn: case.alignment.opposite_turn,
-            residuals: summarize_residuals(case),
+            residuals: summarize_residuals(case, case.residual.as_ref()),
+            restarted: summarize_residuals(case, case.restarted.as_ref()),
+            drift_cycles: case.drift_cycles(),
             judged: case.judged_channel().map(|(channel, _)| channel.name()),
             windows: windows.iter().map(|window| summarize_window(case, window)).collect(),
             ridge: RidgeSummaries { measured, model },
@@ -123,8 +149,22 @@ impl ComparisonSummary {
     }
 }
 
-fn summarize_residuals(case: &ConditionComparison) -> Vec<ResidualSummary> {
-    let Some(residual) = case.residual.as_ref() else { return Vec::new() };
+/// Clause on the drift of a run, such as "0.3 cycles ahead at its end".
+pub(crate) fn describe_drift(cycles: f64) -> String {
+    let where_to = if cycles < 0.0 { "behind" } else { "ahead" };
+    format!("{} cycles {where_to} at its end", format_digits(cycles.abs(), 2))
+}
+
+/// Contents of `comparison.json`: the numbers of the condition `farthest`, and those of all conditions.
+pub(crate) fn format_comparison_json(conditions: &[ComparisonSummary], farthest: usize) -> String {
+    let mut whole = conditions.get(farthest).map_or_else(|| json!({}), ComparisonSummary::to_json);
+    whole["conditions"] = conditions.iter().map(ComparisonSummary::to_json).collect();
+    // serialisation cannot fail: keys are strings, and numbers that are not finite become `null`
+    serde_json::to_string_pretty(&whole).unwrap_or_default() + "\n"
+}
+
+fn summarize_residuals(case: &ConditionComparison, residual: Option<&MotionTraces>) -> Vec<ResidualSummary> {
+    let Some(residual) = residual else { return Vec::new() };
     let line = |channel: Channel| {
         let rms_m = residual.rms_m(channel, None)?;
         let noise_m = case.noise_m(channel);

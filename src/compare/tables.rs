@@ -5,7 +5,6 @@ use super::model_run::ModelRun;
 use super::ridge::TrackedRidge;
 use crate::fit::job::Job;
 use crate::recording::Recording;
-use crate::recording::alignment::Alignment;
 use crate::recording::channel::Channel;
 use crate::recording::motion_traces::{MOTION_CHANNELS, MotionTraces};
 use crate::simulate::Transition;
@@ -56,8 +55,8 @@ pub(crate) fn comparison_table(
     let mut rows = vec![header.collect::<Vec<_>>()];
     for ((condition, measured), model) in job.conditions.iter().zip(measured).zip(models) {
         let (recording, view) = (measured.recording, &model.view.recording);
-        let alignment = Alignment::estimate(recording, view);
-        let seen = MotionTraces::from_recording(recording);
+        let alignment = model.alignment(recording);
+        let seen = model.measured_motion(recording);
         let model = MotionTraces::from_model_at_frames(recording, view, &alignment);
         for (i, time_s) in seen.time_s.iter().enumerate() {
             let pair = |&channel: &Channel| [&seen, &model].map(|traces| trace_cell(traces, channel, i));

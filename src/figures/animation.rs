@@ -180,7 +180,7 @@ fn tracked_motion(recording: &Recording, alignment: &Alignment, [from_s, to_s]: 
     };
     TrackedMotion {
         time_s: frames.clone().map(|i| grid.time_s(i)).collect(),
-        tip_x_m: of(Channel::TipX, alignment.along_m),
+        tip_x_m: of(Channel::TipX, alignment.offset_m(Channel::TipX)),
         head_x_m: of(Channel::HeadX, alignment.along_m),
         head_drop_m: of(Channel::HeadDrop, alignment.drop_m),
     }

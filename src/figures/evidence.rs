@@ -4,8 +4,8 @@
 use super::history::{length_unit, symmetric_axis, thin_points};
 use super::{FigureBlock, FigureText, history};
 use crate::compare::ConditionComparison;
+use crate::compare::summary::describe_drift;
 use crate::figures::full_figure;
-use crate::fit::misfit::ChannelMisfit;
 use crate::recording::channel::{Channel, InstantKind};
 use crate::recording::motion_traces::MotionTraces;
 use crate::simulate::ModelSample;
@@ -32,6 +32,8 @@ pub struct EvidencePart {
     pub rms: f64,
     /// Shaded spans in which the model's tip sticks.
     pub sticks: Vec<ShadedSpan>,
+    /// Further text after the heading of the part; empty for none.
+    pub remark: String,
 }
 
 /// Data of the figure.
@@ -49,6 +51,8 @@ pub struct EvidencePlot {
     pub parts: Vec<EvidencePart>,
 }
 
+/// Name of the part with one run of the model over the whole recording.
+const SINGLE_RUN: &str = "one run";
 /// Largest ratio of the root mean square of a residual to that of the noise at which the residual still
 /// counts as noise. It exceeds 1 since the noise is known only to a few per cent.
 pub(crate) const NOTHING_LEFT: f64 = 1.1;
@@ -76,10 +80,11 @@ pub fn draw_figure(shown: &EvidencePlot) -> Figure {
     )
 }
 
-fn draw_panels(shown: &EvidencePlot, index: usize, part: &EvidencePart) -> [Panel; 2] {
+fn draw_panels(shown: &EvidencePlot, index: usize, part: &EvidencePart) -> Vec<Panel> {
     let values = || part.model.iter().chain(&part.measured).flatten().map(|(_, x)| *x);
     let (unit, factor) = length_unit(values());
-    let (whole, (from, to)) = (index == 0, part.span_s);
+    let (single_run, (from, to)) = (part.name == SINGLE_RUN, part.span_s);
+    let whole = index == 0 || single_run;
     let series = |label: &str, colour, mark, course: &TimeCurve, factor: f64| {
         let scaled: TimeCurve = course.iter().map(|p| p.map(|(t, x)| (t, x * factor))).collect();
         Series::new(label, colour, mark, thin_points(&scaled, part.span_s))
@@ -94,15 +99,17 @@ fn draw_panels(shown: &EvidencePlot, index: usize, part: &EvidencePart) -> [Pane
     let enlarged = |part: &EvidencePart| {
         ShadedSpan::outline("enlarged below", Colour::Black, part.span_s.0, part.span_s.1)
     };
-    let enlarged: Vec<ShadedSpan> = shown.parts.iter().skip(1).filter(|_| whole).map(enlarged).collect();
+    let enlarged: Vec<ShadedSpan> =
+        shown.parts.iter().skip(1).filter(|part| whole && part.name != SINGLE_RUN).map(enlarged).collect();
     let time = ChartAxis::time().with_range(from, to);
     let quantity = ChartAxis::linear(format!("{}, {unit}", shown.quantity));
     let curves = [
         series("model", Colour::Vermilion, Mark::Line, &part.model, factor),
         series(measured, Colour::Black, frames, &part.measured, factor),
     ];
+    let title = format!("{}: {} times the noise{}", part.name, format_digits(part.rms, 2), part.remark);
     let upper = Panel {
-        title: format!("{}: {} times the noise", part.name, format_digits(part.rms, 2)),
+        title: title.clone(),
         sampled_series: details(&[(&part.model, factor), (&part.measured, factor)]),
         shaded_spans: if whole { enlarged.clone() } else { part.sticks.clone() },
         ..Panel::new(time.clone(), quantity, HEIGHT_MM, curves)
@@ -114,12 +121,14 @@ fn draw_panels(shown: &EvidencePlot, index: usize, part: &EvidencePart) -> [Pane
     let noise = [from, to].map(|t| (t, -NOISE_95, NOISE_95));
     let y = symmetric_axis(ChartAxis::linear("residual / noise"), &all);
     let lower = Panel {
+        title: if single_run { title } else { String::new() },
         sampled_series: details(&[(&part.residual, 1.0)]),
         shaded_spans: enlarged,
         ribbons: vec![Ribbon::new("95 % of the noise", Colour::SkyBlue, noise)],
         ..Panel::new(time, y, RESIDUAL_HEIGHT_MM, [residual])
     };
-    [upper, lower]
+    // at the scale of the whole recording, the curves of a run that drifts look the same
+    if single_run { vec![lower] } else { vec![upper, lower] }
 }
 
 /// A page contains all frames of a curve if there are at most this many; longer curves would exceed the size
@@ -153,24 +162,32 @@ const LEAST_PRESENT: f64 = 0.5;
 /// The figure of a condition; `None` without a recording, or if recording and model move in opposite
 /// directions.
 pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
-    let residual = case.residual.as_ref()?;
+    let residual = case.judged_residual()?;
     let (channel, noise_m) = case.judged_channel()?;
-    let measured = MotionTraces::from_recording(case.recording()?);
-    let model = MotionTraces::from_model(&case.model.view.recording, &case.alignment);
+    let measured = case.measured_motion.as_ref()?;
+    let restarted = case.restarted.as_ref().map(|restarted| measured.subtract(restarted));
+    let single = MotionTraces::from_model(&case.model.view.recording, &case.alignment);
     let whole_s = (*residual.time_s.first()?, *residual.time_s.last()?);
+    let drift = case.drift_cycles().map(|cycles| format!(", {}", describe_drift(cycles)));
     let part = |name: String, span_s: (f64, f64)| {
+        let is_single = restarted.is_none() || name == SINGLE_RUN;
+        let (residual, model) = match &restarted {
+            Some(model) if !is_single => (residual, model),
+            _ => (case.residual.as_ref()?, &single),
+        };
         let rms = residual.rms_m(channel, Some(span_s))? / noise_m;
-        let fine = Some(span_s).filter(|span_s| *span_s != whole_s);
+        let fine = Some(span_s).filter(|span_s| is_single && *span_s != whole_s);
         let fine = fine.and_then(|span_s| model_states_curve(case, channel, span_s));
         let left = channel_between(residual, channel, span_s).into_iter();
         Some(EvidencePart {
             name,
             span_s,
-            measured: channel_between(&measured, channel, span_s),
-            model: fine.unwrap_or_else(|| channel_between(&model, channel, span_s)),
+            measured: channel_between(measured, channel, span_s),
+            model: fine.unwrap_or_else(|| channel_between(model, channel, span_s)),
             residual: left.map(|p| p.map(|(t, x)| (t, x / noise_m))).collect(),
             rms,
             sticks: history::stick_spans(&case.sticks_on_clock(), span_s),
+            remark: drift.clone().filter(|_| restarted.is_some() && is_single).unwrap_or_default(),
         })
     };
     let release_s = case.measured_or_model().instant_s(InstantKind::Release);
@@ -179,13 +196,15 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     let later_s = (around_s.map_or(whole_s.0, |(_, to)| to), whole_s.1);
     let worst_s = worst_s(residual, channel, later_s).filter(|(from, to)| from < to);
     let later = if around_s.is_some() { "worst later" } else { "worst part" };
-    let spans = [("recording", Some(whole_s)), ("release", around_s), (later, worst_s)];
+    let single_s = restarted.is_some().then_some(whole_s);
+    let spans =
+        [("recording", Some(whole_s)), ("release", around_s), (later, worst_s), (SINGLE_RUN, single_s)];
     let parts: Vec<EvidencePart> =
         spans.into_iter().filter_map(|(name, span_s)| part(name.to_owned(), span_s?)).collect();
     let whole = parts.first()?.rms;
     let shown = EvidencePlot {
-        title: figure_title(channel, whole, noise_m),
-        note: describe_segments(case).map_or_else(String::new, |said| said.trim_end_matches('.').to_owned()),
+        title: figure_title(case, channel, whole, noise_m),
+        note: restart_clause(case).unwrap_or_default(),
         synthetic: case.is_synthetic(),
         quantity: channel.label(),
         parts,
@@ -250,12 +269,13 @@ fn model_states_curve(
 }
 
 /// The main result in one sentence, with its number.
-fn figure_title(channel: Channel, rms: f64, noise_m: f64) -> String {
+fn figure_title(case: &ConditionComparison, channel: Channel, rms: f64, noise_m: f64) -> String {
     let (label, left, noise) = (channel.label(), format_length(rms * noise_m), format_length(noise_m));
+    let model = if case.restarted.is_some() { "The model" } else { "One run of the model" };
     if rms <= NOTHING_LEFT {
-        return format!("One run of the model explains the {label} to within its noise of {noise}");
+        return format!("{model} explains the {label} to within its noise of {noise}");
     }
-    format!("One run of the model misses the {label} by {left}, {} times the noise", format_digits(rms, 2))
+    format!("{model} misses the {label} by {left}, {} times the noise", format_digits(rms, 2))
 }
 
 fn figure_text(
@@ -264,6 +284,9 @@ fn figure_text(
     channel: Channel,
     noise_m: f64,
 ) -> FigureText {
+    let [whole, parts @ ..] = shown.parts.as_slice() else { return FigureText::default() };
+    let restarted = restart_clause(case);
+    let enlarged = parts.iter().filter(|part| part.name != SINGLE_RUN);
     let rms = |part: &EvidencePart| {
         let at = match part.name.as_str() {
             "worst later" => "where it fits worst later",
@@ -272,14 +295,16 @@ fn figure_text(
         };
         format!("{} {at}", format_digits(part.rms, 2))
     };
-    let [whole, parts @ ..] = shown.parts.as_slice() else { return FigureText::default() };
-    let enlarged: Vec<String> = parts.iter().map(rms).collect();
+    let enlarged: Vec<String> = enlarged.map(rms).collect();
     let enlarged = if enlarged.is_empty() { String::new() } else { format!(": {}", enlarged.join(", ")) };
     let caption = format!(
-        "The {} of {} and of one run of the fitted model lie {} apart (root mean square), {} times the \
-         noise{enlarged}.",
+        "The {} of {} and of {} lie {} apart (root mean square), {} times the noise{enlarged}.",
         channel.label(),
         case.source_kind(),
+        match &restarted {
+            Some(how) => format!("the fitted model, {how},"),
+            None => "one run of the fitted model".to_owned(),
+        },
         format_length(whole.rms * noise_m),
         format_digits(whole.rms, 2),
     );
@@ -290,31 +315,30 @@ fn figure_text(
     let spans: Vec<String> = shown.parts.iter().map(span).collect();
     let details = format!(
         "Shown: {}. The noise of the {} is {}, measured on the recording where nothing but noise moves it \
-         from frame to frame; the shaded strip holds 95 % of such noise. The model runs once from its start \
-         state through the same camera, so that small errors of its frequency add up; enlarged, its line is \
-         its own motion, and every dot is a frame.",
+         from frame to frame; the shaded strip holds 95 % of such noise. {}",
         spans.join("; "),
         channel.label(),
         format_length(noise_m),
+        match &restarted {
+            Some(how) => format!(
+                "The model is seen through the fitted camera, {how} as in the fit; every dot is a frame. One run \
+                 from the start has its own panel: its phase may drift, because small errors of its frequency \
+                 add up."
+            ),
+            None =>
+                "The model runs once from its start state through the same camera, so that small errors of \
+                     its frequency add up; enlarged, its line is its own motion, and every dot is a frame."
+                    .to_owned(),
+        },
     );
-    let segments = describe_segments(case).map_or_else(String::new, |said| format!(" {}", capitalise(&said)));
-    let details = details + &segments;
     FigureText { caption, details }
 }
 
-/// Sentence on the misfit of a fit to traces in its longest segments; the model restarts at each segment.
-fn describe_segments(case: &ConditionComparison) -> Option<String> {
-    let misfit = case.result.misfit.as_ref()?;
-    let own = |found: &&ChannelMisfit| found.recording == case.name();
-    let tip = misfit.channels.iter().find(own)?;
-    let longest = misfit.stages.last()?;
-    Some(format!(
-        "restarted every {} ms, as it is fitted, the model misses the {} by {}, {} times the noise.",
-        format_trimmed(1e3 * longest.segment_s, 3),
-        tip.channel.replace("tip-x", "tip").replace("head-drop", "head drop"),
-        format_length(tip.residual_rms_m),
-        format_digits(tip.residual_rms_m / tip.noise_m, 2),
-    ))
+/// Clause on the segments of a fit to traces, at whose starts the model restarts; `None` for other fits.
+fn restart_clause(case: &ConditionComparison) -> Option<String> {
+    case.restarted.as_ref()?;
+    let longest = case.result.misfit.as_ref()?.stages.last()?;
+    Some(format!("restarted every {} ms", format_trimmed(1e3 * longest.segment_s, 3)))
 }
 
 #[cfg(test)]
@@ -332,6 +356,7 @@ mod tests {
             residual: course(1.0),
             rms: 3.46,
             sticks: Vec::new(),
+            remark: String::new(),
         };
         EvidencePlot {
             title: "t".to_owned(),

@@ -141,7 +141,7 @@ const WHITE_NOISE_TOLERANCE: f64 = 0.1;
 /// The figure of a condition; `None` without a recording, with too few frames, or if recording and model move
 /// in opposite directions.
 pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
-    let residual = case.residual.as_ref()?;
+    let residual = case.judged_residual()?;
     let (channel, noise_m) = case.judged_channel()?;
     let left: Vec<Option<f64>> = residual.column(channel).iter().map(|x| x.map(|x| x / noise_m)).collect();
     let values: Vec<f64> = left.iter().flatten().copied().collect();
@@ -152,11 +152,15 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     let rms = (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt();
     let correlation = autocorrelation(&left, rate_hz);
     let neighbours = correlation.first()?.1;
+    let run = match case.restarted {
+        Some(_) => "the segments of the fit",
+        None => "one run of the model",
+    };
     let stages = case.result.misfit.iter().flat_map(|misfit| &misfit.stages);
     let growth = stages.map(|stage| (stage.segment_s, stage.chi2_per_dof));
     let shown = ResidualDiagnostics {
         title: claim_sentence(rms, neighbours),
-        note: format!("residual of the {} in one run of the model", channel.label()),
+        note: format!("residual of the {} in {run}", channel.label()),
         synthetic: case.is_synthetic(),
         histogram: histogram_bins(&values),
         correlation,
@@ -168,8 +172,8 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     let caption = format!("{}; that of white noise lies within \u{b1}{white_95}.", shown.title);
     let growth = match (shown.growth.first(), shown.growth.last()) {
         (Some(first), Some(last)) => format!(
-            " Restarted in segments, as it is fitted, the model has a chi2 per degree of freedom of {} at {} ms \
-             and {} at {} ms; one that does not grow speaks for the model.",
+            " Chi2 per degree of freedom is {} in segments of {} ms and {} in segments of {} ms; one that does not \
+             grow speaks for the model.",
             format_digits(first.1, 3),
             format_digits(1e3 * first.0, 2),
             format_digits(last.1, 3),
@@ -178,9 +182,9 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
         _ => String::new(),
     };
     let details = format!(
-        "Measured minus model of the {} over the whole recording, in deviations of the noise: density of its \
-         values with that of the noise, correlation with itself some frames later, and its power density over \
-         that of the noise ({TAPERS} tapers).{growth}",
+        "Measured minus model of the {} in {run}, in deviations of the noise: density of its values with that \
+         of the noise, correlation with itself some frames later, and its power density over that of the noise \
+         ({TAPERS} tapers).{growth}",
         channel.label()
     );
     Some(case.figure_block("residuals", FigureText { caption, details }, draw_figure(&shown)))

@@ -3,29 +3,23 @@
 use super::context::FitContext;
 use super::job::{FreeParameter, HeadSource, Job};
 use super::ledger::{FitProgress, OnProgress};
-use super::model::ModelFeatures;
 use super::nuisance_parameters::{FreedConstant, NuisanceError, check_scaling, free_constants};
-use super::objective::Objective;
-use super::result::{FeatureResult, FitResult, ModelledTargets};
-use super::run::{fit_features, predict_held_out, read_best_model};
+use super::result::FitResult;
+use super::run::fit_features;
 use super::scene_model::{Instrument, ModelCondition, PlausibilityLimits, SceneModel};
-use super::target_value::TargetValue;
-use super::targets::split_held_out;
 use super::trace::{TraceModel, TraceSource};
 use super::trace_data::{TraceData, TraceError, prepare_traces};
 use super::trace_ledger::TraceProgress;
 use super::{FitError, job};
 use crate::checkpoint::{CheckpointSink, NullSink, fingerprint};
-use crate::model::Pose;
 use crate::recording::quality::measure_quality;
 use crate::recording::{FrameGrid, Recording, Traces};
-use crate::simulate::drive::{Drive, HeadMotionError, smooth_head_motion};
+use crate::simulate::drive::HeadMotionError;
 use crate::simulate::scene::error::SceneError;
 use crate::simulate::scene::{Scene, StartKind};
 use crate::simulate::twin::Camera;
 use serde::Serialize;
 use std::ops::ControlFlow;
-use std::sync::Arc;
 
 /// Maximum number of frames of a model run. The limit keeps a mistyped frame rate from filling the memory:
 /// each thread stores one run, and a million frames take 0.1 GB.
@@ -339,76 +333,6 @@ struct RecordingIdentity<'a> {
     synthetic: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     frame_rate_sd_hz: Option<f64>,
-}
-
-// Runs over a whole recording with the fitted constants. If the recorded head drives the model, a run starts
-// in the fitted state of the first good segment.
-
-impl Problem {
-    /// The model with the fitted constants and starting states of a result. In a fit of features this is the
-    /// model of the problem.
-    ///
-    /// # Errors
-    /// [`FitError::CannotBeFitted`] if a scene refuses a fitted value.
-    pub fn fitted_model(&self, result: &FitResult) -> Result<SceneModel, FitError> {
-        let conditions = self.model().conditions().iter().enumerate();
-        let whole = conditions.map(|(at, condition)| {
-            let scene = self.whole_scene(at, &condition.scene, result)?;
-            Ok(ModelCondition { scene, instrument: condition.instrument })
-        });
-        Ok(self.model().with_conditions(whole.collect::<Result<_, FitError>>()?))
-    }
-
-    /// The scene of condition `at` for a run over the whole recording, with the fitted constants, drive and
-    /// starting state.
-    fn whole_scene(&self, at: usize, scene: &Scene, result: &FitResult) -> Result<Scene, FitError> {
-        let refused = |why: String| FitError::CannotBeFitted { why };
-        let mut scene = scene.clone();
-        for constant in result.nuisances.iter().filter(|nuisance| nuisance.recording.is_none()) {
-            let set = scene.with_parameter(&constant.name, constant.estimate);
-            scene = set.map_err(|error| refused(error.to_string()))?;
-        }
-        let trace = self.traces().iter().find(|trace| trace.condition == at);
-        let name = self.job().conditions.get(at).map(|condition| &condition.name);
-        let start = result.starts.iter().find(|start| Some(&start.recording) == name);
-        let recording = self.recordings().get(at).and_then(Option::as_ref);
-        if let (Some(HeadSource::Recording), Some(start), Some(recording)) =
-            (trace.map(|trace| trace.head), start, recording)
-        {
-            let motion = smooth_head_motion(recording).map_err(|error| refused(error.to_string()))?;
-            scene.run.stop_s = motion.span_s()[1];
-            scene.drive = Drive::Recorded(Arc::new(motion));
-            scene.start_s = start.time_s;
-            scene.start = StartKind::State(Pose {
-                theta: start.neck_angle_rad,
-                phi: start.lip_angle_rad,
-                theta_rate: start.neck_rate_rad_per_s,
-                phi_rate: start.lip_rate_rad_per_s,
-            });
-        }
-        Ok(scene)
-    }
-
-    /// Compares runs of the fitted model over whole recordings with the components and features of the job.
-    pub(super) fn compare_with_targets(
-        &self,
-        result: &FitResult,
-        targets: Vec<TargetValue>,
-    ) -> Result<(ModelledTargets, Vec<FeatureResult>), FitError> {
-        let (job, model) = (self.job(), self.fitted_model(result)?);
-        let (aims, targets, held) = split_held_out(job, targets);
-        let values = result.parameter_estimates(job);
-        let held_out = predict_held_out(&held, &model, &values);
-        if aims.is_empty() {
-            return Ok((ModelledTargets { components: Vec::new(), features: Vec::new() }, held_out));
-        }
-        let seen = ModelFeatures::for_targets(&model, &aims, &targets, job.ensemble.members);
-        let objective = Objective::new(job.search_axes(), targets, &seen);
-        let best = objective.evaluate_values(values.clone());
-        let reads = read_best_model(&seen, &values);
-        let shown = ModelledTargets::compare(&aims, objective.targets(), &[], &best, &reads);
-        Ok((shown, held_out))
-    }
 }
 
 #[cfg(test)]

@@ -103,11 +103,17 @@ pub struct NuisanceResult {
     pub upper_95: Option<f64>,
 }
 
-/// Fitted starting state of the blade for a run of the model over a whole recording.
+/// A segment of a recording over which the fitted model was run, with its fitted starting state.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct StartState {
+pub struct FittedSegment {
     /// Name of the recording in the job.
     pub recording: String,
+    /// Index of the first frame of the segment.
+    pub first_frame: usize,
+    /// Index of the frame after the last frame of the segment.
+    pub end_frame: usize,
+    /// Whether the segment fits as well as noise allows.
+    pub fits: bool,
     /// Time of the start on the clock of the drive, s.
     pub time_s: f64,
     /// Angle of the neck, rad.
@@ -255,7 +261,7 @@ pub struct FitResult {
     pub nuisances: Vec<NuisanceResult>,
     /// Fitted starting states for runs of the model over whole recordings, in a trace fit.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub starts: Vec<StartState>,
+    pub segments: Vec<FittedSegment>,
     /// Components in job order.
     pub components: Vec<ComponentResult>,
     /// Other features in job order.
@@ -435,7 +441,7 @@ mod tests {
             status: FitStatus::BudgetExhausted,
             misfit: None,
             nuisances: vec![],
-            starts: vec![],
+            segments: vec![],
             parameters: parameters.into_iter().map(|(name, p)| (name.to_owned(), p)).collect(),
             components: vec![ComponentResult {
                 name: "low".to_owned(),

@@ -2,6 +2,7 @@
 
 use super::evaluation::{FailureReason, RunFailure};
 use super::model::{Draw, Model, Restart};
+use super::trace::FittedTraces;
 use crate::model::Pose;
 use crate::model::modes::{TipConstraint, natural_modes, time_scales_rad_per_s};
 use crate::recording::Recording;
@@ -68,18 +69,29 @@ pub struct SceneModel {
     conditions: Vec<ModelCondition>,
     names: Vec<String>,
     plausible: PlausibilityLimits,
+    /// Recordings whose traces were fitted, by condition; empty before a fit to traces.
+    traces: Vec<Option<FittedTraces>>,
 }
 
 impl SceneModel {
     /// A model of `conditions`; `names` are the free parameters in job order.
     #[must_use]
     pub fn new(conditions: Vec<ModelCondition>, names: Vec<String>, plausible: PlausibilityLimits) -> Self {
-        Self { conditions, names, plausible }
+        Self { conditions, names, plausible, traces: Vec::new() }
     }
 
-    /// The same model with other conditions.
-    pub(super) fn with_conditions(&self, conditions: Vec<ModelCondition>) -> Self {
-        Self { conditions, names: self.names.clone(), plausible: self.plausible }
+    /// The same model with other conditions and with fitted traces.
+    pub(super) fn with_conditions(
+        &self,
+        conditions: Vec<ModelCondition>,
+        traces: Vec<Option<FittedTraces>>,
+    ) -> Self {
+        Self { conditions, names: self.names.clone(), plausible: self.plausible, traces }
+    }
+
+    /// The recording of a condition beside the fitted model, if its traces were fitted.
+    pub(crate) fn fitted_traces(&self, condition: usize) -> Option<&FittedTraces> {
+        self.traces.get(condition)?.as_ref()
     }
 
     pub(crate) fn conditions(&self) -> &[ModelCondition] {

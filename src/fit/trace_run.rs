@@ -7,14 +7,14 @@ use super::linear_model::CHI_SQUARED_95;
 use super::misfit::{ChannelMisfit, StageMisfit, TraceMisfit, WorstSegment};
 use super::problem::Problem;
 use super::result::{
-    EvaluationCounts, FitResult, FitStatus, LocalOptimum, NuisanceResult, ParameterResult, StartState,
+    EvaluationCounts, FitResult, FitStatus, FittedSegment, LocalOptimum, NuisanceResult, ParameterResult,
 };
 use super::targets::measure_targets;
 use super::trace::{
     Iterate, MAX_STARTS, SearchEnd, SegmentResiduals, SegmentState, TraceAssessment, TraceDescent,
-    TraceModel, TraceRecording, TraceSearchOutcome, TraceSearchSettings, TraceUnknown, UncertaintyRun,
-    UnknownKind, chi2_per_dof, describe_start_limits, first_iterate, next_iterate, search_trace,
-    segment_residuals, start_point, undersampled_mode,
+    TraceModel, TraceSearchOutcome, TraceSearchSettings, TraceUnknown, UncertaintyRun, UnknownKind,
+    chi2_per_dof, describe_start_limits, first_iterate, next_iterate, search_trace, segment_residuals,
+    start_point, undersampled_mode,
 };
 use super::trace_checkpoint::{
     HeaderCoordinate, IterateRecord, TraceCheckpoint, TraceHeader, TraceHeaderBody, camera_unknown_key,
@@ -149,7 +149,7 @@ impl TraceFindings<'_, '_> {
             status: self.fit_status(best),
             parameters: parameters.collect(),
             nuisances,
-            starts: self.start_states(end),
+            segments: self.fitted_segments(end),
             misfit: Some(misfit),
             components: Vec::new(),
             features: Vec::new(),
@@ -271,25 +271,25 @@ impl TraceFindings<'_, '_> {
         all.map(nuisance).collect()
     }
 
-    /// The fitted starting state of the first well-fitted segment of each recording.
-    fn start_states(&self, end: &Iterate) -> Vec<StartState> {
-        let start = |(film, shoot): (usize, &TraceRecording)| {
-            let fits = |s: &&SegmentState| s.recording == film && s.chi2.is_finite() && !s.is_bad();
-            let first = end.segments.iter().find(fits)?;
+    fn fitted_segments(&self, end: &Iterate) -> Vec<FittedSegment> {
+        let fitted = |segment: &SegmentState| {
+            let film = segment.recording;
+            let seen = &self.model.recordings[film].observation;
             let clock_s = self.model.unknowns.camera_at(film, &end.point).clock_s;
-            let [neck_angle_rad, lip_angle_rad, neck_rate_rad_per_s, lip_rate_rad_per_s] = first.start;
-            let (recording, seen) = (self.recording_name(film), &shoot.observation);
-            let time_s = seen.times_s[first.first] - seen.lead_s() - clock_s;
-            Some(StartState {
-                recording,
-                time_s,
+            let [neck_angle_rad, lip_angle_rad, neck_rate_rad_per_s, lip_rate_rad_per_s] = segment.start;
+            FittedSegment {
+                recording: self.recording_name(film),
+                first_frame: segment.first,
+                end_frame: segment.last,
+                fits: segment.chi2.is_finite() && !segment.is_bad(),
+                time_s: seen.times_s[segment.first] - seen.lead_s() - clock_s,
                 neck_angle_rad,
                 lip_angle_rad,
                 neck_rate_rad_per_s,
                 lip_rate_rad_per_s,
-            })
+            }
         };
-        self.model.recordings.iter().enumerate().filter_map(start).collect()
+        end.segments.iter().map(fitted).collect()
     }
 
     fn trace_misfit(&self, best: &TraceDescent, end: &Iterate, nuisances: &[NuisanceResult]) -> TraceMisfit {

@@ -12,6 +12,8 @@ pub struct Alignment {
     pub shift_s: f64,
     /// Offset of the model's head and tip along the sweep, m.
     pub along_m: f64,
+    /// Offset of the model's tip relative to its head along the sweep, m.
+    pub tip_m: f64,
     /// Offset of the model's head drop, m.
     pub drop_m: f64,
     /// Point whose path in the model is aligned with its recorded path.
@@ -93,14 +95,16 @@ impl Alignment {
             }
         }
         let drop_m = mean_drop_offset_m(measured, model, shift_s);
-        Self { shift_s, along_m, drop_m, followed: by, shift_sd_s, opposite_turn: opposite.is_some() }
+        let opposite_turn = opposite.is_some();
+        Self { shift_s, along_m, tip_m: 0.0, drop_m, followed: by, shift_sd_s, opposite_turn }
     }
 
     /// Offset that is added to a channel of the model, m.
     pub(crate) fn offset_m(&self, channel: Channel) -> f64 {
         match channel {
-            Channel::TipX | Channel::HeadX => self.along_m,
-            Channel::Deflection => 0.0,
+            Channel::TipX => self.along_m + self.tip_m,
+            Channel::HeadX => self.along_m,
+            Channel::Deflection => self.tip_m,
             Channel::HeadDrop => self.drop_m,
         }
     }

@@ -114,7 +114,7 @@ pub(crate) fn mean_speed_m_per_s(
 }
 
 /// Means of x and y, then the sum of `(x - mean x)^2` and the sum of `(x - mean x) (y - mean y)`.
-pub(super) fn central_moments(points: &[(f64, f64)]) -> ([f64; 2], [f64; 2]) {
+pub(crate) fn central_moments(points: &[(f64, f64)]) -> ([f64; 2], [f64; 2]) {
     let count = points.len() as f64;
     let [x, y] = points.iter().fold([0.0; 2], |sum, p| [sum[0] + p.0 / count, sum[1] + p.1 / count]);
     let sums = points

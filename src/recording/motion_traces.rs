@@ -55,17 +55,19 @@ impl MotionTraces {
         })
     }
 
-    /// Recording minus model at the frames of the recording; missing if either is missing.
-    pub(crate) fn residual(recording: &Recording, model: &Recording, alignment: &Alignment) -> Self {
-        let grid = recording.grid();
-        Self::from_columns(recording, |channel| {
-            let (of_model, by_m) = (channel.samples(model), alignment.offset_m(channel));
-            let time_s = |i| grid.time_s(i) - alignment.shift_s;
-            let left = |(i, measured): (usize, Option<f64>)| {
-                Some(measured? - model.interpolate_column(&of_model, time_s(i))? - by_m)
-            };
-            channel.samples(recording).into_iter().enumerate().map(left).collect()
-        })
+    /// This motion minus another one in the same frames; missing if either is missing.
+    pub(crate) fn subtract(&self, other: &Self) -> Self {
+        let less = |channel: Channel| {
+            let pairs = self.column(channel).iter().zip(other.column(channel));
+            pairs.map(|(a, b)| Some((*a)? - (*b)?)).collect()
+        };
+        Self {
+            time_s: self.time_s.clone(),
+            tip_x_m: less(Channel::TipX),
+            head_x_m: less(Channel::HeadX),
+            deflection_m: less(Channel::Deflection),
+            head_drop_m: less(Channel::HeadDrop),
+        }
     }
 
     fn from_columns(recording: &Recording, column: impl Fn(Channel) -> Vec<Option<f64>>) -> Self {

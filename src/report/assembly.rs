@@ -5,8 +5,11 @@ mod tables;
 use super::{
     CombinationLine, FailureCount, FigureGroup, FigureSubject, ProbeLine, Report, SearchLine, summary,
 };
+use crate::compare::summary::format_comparison_json;
 use crate::compare::tables::comparison_tables;
-use crate::compare::{ComparisonSummary, ConditionComparison, FittedRecording, ModelRun, run_conditions};
+use crate::compare::{
+    ComparisonSummary, ComparisonTable, ConditionComparison, FittedRecording, ModelRun, run_conditions,
+};
 use crate::figures::corner::CornerPlot;
 use crate::figures::figure_text::make_file_names_unique;
 use crate::figures::profiles::ProfilePlot;
@@ -63,7 +66,10 @@ pub fn build_report(
     ];
     let groups = groups.into_iter().filter(|(_, figures)| !figures.is_empty());
     let figures = groups.map(|(subject, figures)| FigureGroup { subject, figures }).collect();
-    Report { tables: comparison_tables(&cases), figures, ..report }
+    let mut tables = comparison_tables(&cases);
+    let text = format_comparison_json(&report.comparison, telling);
+    tables.push(ComparisonTable { file: "comparison.json", text });
+    Report { tables, figures, ..report }
 }
 
 /// The report of a fit without its figures, which take most of the time.

@@ -4,7 +4,7 @@
 use super::Report;
 use super::rich_text::{Sentence, Statement};
 use super::verdict::comparison_sentence;
-use crate::compare::summary::ResidualSummary;
+use crate::compare::summary::{ResidualSummary, describe_drift};
 use crate::compare::{ComparisonSummary, ParameterLine, TargetComparison};
 use crate::figures::evidence::NOTHING_LEFT;
 use crate::figures::friction::FrictionLine;
@@ -17,6 +17,8 @@ use serde::Serialize;
 
 /// Ratio of the residual of a run to the noise above which the run deviates visibly from the recording.
 const SEEN: f64 = 3.0;
+/// Drift of a run, in cycles, above which it is mentioned.
+const SEEN_DRIFT: f64 = 0.01;
 /// The deviation of the model from a met target is mentioned if it exceeds this number of standard deviations
 /// of the target.
 const FAR_SD: f64 = 1.96;
@@ -157,8 +159,9 @@ fn single_run_sentence(report: &Report) -> Option<Sentence> {
     } else {
         Sentence::new("Run")
     };
-    let drift = report.misfit.as_ref().is_some_and(|misfit| misfit.explained);
-    let why = if drift { ": small errors of its frequency add up." } else { "." };
+    let drift = report.comparison.iter().find(|line| line.condition == condition);
+    let drift = drift.and_then(|line| line.drift_cycles).filter(|cycles| cycles.abs() > SEEN_DRIFT);
+    let why = drift.map_or_else(|| ".".to_owned(), |cycles| format!(", {}.", describe_drift(cycles)));
     let (rms, channel, ratio) = (format_length(r.rms_m), r.channel, format_digits(ratio, 2));
     Some(of.with_words(format!(
         " once from its start, the model lies {rms} rms off the {channel}, {ratio} times the noise{why}"

@@ -40,7 +40,7 @@ fn build_history(case: &ConditionComparison) -> TimeHistory {
     let zoom_s = release_s(&shown);
     let light = |traces: MotionTraces| thin_frames(traces, whole_s, zoom_s);
     // the motions are thinned one after the other, so that only one full motion is in memory
-    let measured = case.recording().map(MotionTraces::from_recording).map(light);
+    let measured = case.measured_motion.clone().map(light);
     let model = light(MotionTraces::from_model(&case.model.view.recording, &case.alignment));
     let windows = fit_window_spans(case).into_iter().enumerate();
     let windows = windows.map(|(i, (_, from, to))| ((i + 1).to_string(), from, to));

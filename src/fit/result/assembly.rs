@@ -48,7 +48,7 @@ impl FitFindings<'_> {
             status: self.status,
             misfit: None,
             nuisances: camera_nuisance_results(self.job, &found.cameras),
-            starts: Vec::new(),
+            segments: Vec::new(),
             parameters: map_names(&names, found.intervals.iter().cloned()),
             components: shown.components,
             features: shown.features,

@@ -2,6 +2,7 @@
 
 use super::camera_observation::CameraObservation;
 use super::checkpoint::Iterate;
+use super::fitted_traces::ShownFrame;
 use super::model::{TraceModel, TraceRecording};
 use super::normal_equations::recording_models;
 use super::unknowns::{CameraParameters, CameraUnknown, TraceUnknowns, UnknownKind};
@@ -222,12 +223,34 @@ impl<'a> RecordingModel<'a> {
         Some(self.simulate_segment(frames, state, &self.none)?.held_s)
     }
 
+    /// The frames `frames` of a run that starts in `state`, up to the frame in which the run ends.
+    pub(super) fn show_frames(&self, frames: [usize; 2], state: &LinkState) -> Vec<ShownFrame> {
+        let (shot, complete) = self.run_segment(frames, state, &self.none);
+        let show = |(at, means): (usize, &[f64; 4])| ShownFrame {
+            picture: self.project_to_picture(frames[0] + at, *means),
+            truth: [means[0], means[1], means[2]],
+        };
+        shot.means[..complete].iter().enumerate().map(show).collect()
+    }
+
     fn simulate_segment(
+        &self,
+        frames: [usize; 2],
+        state: &LinkState,
+        seeds: &TangentSeeds,
+    ) -> Option<SegmentObservation> {
+        let (shot, complete) = self.run_segment(frames, state, seeds);
+        let is_whole = complete == frames[1] - frames[0] && shot.end.is_some();
+        (is_whole && (shot.is_known || seeds.is_empty())).then_some(shot)
+    }
+
+    /// Runs the model over a segment; also returns the number of frames before the run ends.
+    fn run_segment(
         &self,
         [first, last]: [usize; 2],
         state: &LinkState,
         seeds: &TangentSeeds,
-    ) -> Option<SegmentObservation> {
+    ) -> (SegmentObservation, usize) {
         let (film, clock_s) = (self.observation, self.camera.clock_s);
         let (lead, count, directions) = (film.lead_s(), last - first, seeds.len());
         let mut scene = self.scene.clone();
@@ -262,9 +285,9 @@ impl<'a> RecordingModel<'a> {
         };
         let effort = SolverOptions { most_evaluations: MOST_EVALUATIONS, ..SolverOptions::new(TOLERANCE) };
         let run = RUNNER.with_borrow_mut(|runner| runner.run_scene(&scene, effort, seeds, &mut average));
-        let whole = run.status == RunStatus::Completed && average.frame == count;
-        let shot = average.shot;
-        (whole && shot.end.is_some() && (shot.is_known || seeds.is_empty())).then_some(shot)
+        let mut shot = average.shot;
+        shot.end = shot.end.filter(|_| run.status == RunStatus::Completed);
+        (shot, average.frame.min(count))
     }
 
     /// Residuals whitened to unit variance: first those of the tip, frame by frame, then those of the drop.
@@ -352,7 +375,7 @@ impl<'a> RecordingModel<'a> {
     fn project_to_picture(&self, frame: usize, [tip, head, drop, lip]: [f64; 4]) -> [f64; 2] {
         let (film, view) = (self.observation, &self.camera);
         let scale = 1.0 + view.scale;
-        let shown = if film.own_head { film.head_m[frame] } else { scale * head };
+        let shown = self.scaled_head_m(frame, head);
         let along = film.head_m[frame] - film.centre_m;
         let [offset_x_m, offset_drop_m] = view.offsets_m(film.after_middle_s(frame));
         let tip = tip + self.marker_shift(lip);
@@ -360,6 +383,20 @@ impl<'a> RecordingModel<'a> {
             shown + scale * (tip - head - view.tilt_rad * drop) + offset_x_m,
             scale * drop - view.tilt_rad * along + offset_drop_m,
         ]
+    }
+
+    /// Position of the head along the sweep on the scale of the picture, m, from its true position.
+    fn scaled_head_m(&self, frame: usize, head: f64) -> f64 {
+        if self.observation.own_head {
+            self.observation.head_m[frame]
+        } else {
+            (1.0 + self.camera.scale) * head
+        }
+    }
+
+    /// Position of the head along the sweep in the picture, m, from its true position.
+    pub(super) fn head_in_picture(&self, frame: usize, head: f64) -> f64 {
+        self.scaled_head_m(frame, head) + if self.observation.own_head { 0.0 } else { self.camera.offset_x_m }
     }
 
     /// Model minus measurement, m: first for the tip, frame by frame, then for the drop.
