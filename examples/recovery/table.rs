@@ -1,163 +1,213 @@
 //! Lines of the study and the table of them.
 
-use crate::case::Case;
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// What was found of one parameter in one fit.
+#[derive(Default)]
 pub struct Line {
     pub case: String,
     pub blade: u64,
-    pub run: u64,
+    pub maker: String,
+    pub fault: String,
     pub parameter: String,
     pub truth: f64,
     pub estimate: f64,
     pub ends: [Option<f64>; 2],
     pub verdict: String,
     pub explained: bool,
+    pub seconds: f64,
+    /// Cramér-Rao deviation of the logarithm, with the priors.
+    pub bound: Option<f64>,
+    /// Cost of the fit above that of a descent from the truth.
+    pub above_truth: Option<f64>,
+    /// What the cost would fall by, were the fault known.
+    pub visible: Option<f64>,
+    pub reasons: String,
 }
 
-impl Line {
-    pub const HEAD: &str = "case,blade,run,parameter,truth,estimate,lower_95,upper_95,verdict,explained\n";
+/// Fall of the cost at which a wrong belief in a constant is visible in the recording: chi2 with one degree of
+/// freedom exceeds it once in a thousand times.
+const VISIBLE: f64 = 10.8;
 
-    pub fn is(&self, case: &str, blade: u64, run: u64) -> bool {
-        (self.case.as_str(), self.blade, self.run) == (case, blade, run)
-    }
+impl Line {
+    pub const HEAD: &str = "case,blade,maker,fault,parameter,truth,estimate,lower_95,upper_95,verdict,explained,\
+                            seconds,cramer_rao,cost_above_truth,cost_of_fault,reasons\n";
 
     pub fn csv(&self) -> String {
-        let [lower, upper] = self.ends.map(|end| end.map_or_else(String::new, |end| end.to_string()));
-        let Self { case, blade, run, parameter, truth, estimate, verdict, explained, .. } = self;
-        format!("{case},{blade},{run},{parameter},{truth},{estimate},{lower},{upper},{verdict},{explained}\n")
+        let Self { case, blade, maker, fault, parameter, truth, estimate, verdict, explained, .. } = self;
+        let Self { seconds, reasons, .. } = self;
+        let written = |number: Option<f64>| number.map_or_else(String::new, |number| number.to_string());
+        let [lower, upper] = self.ends.map(written);
+        let [bound, above, visible] = [self.bound, self.above_truth, self.visible].map(written);
+        format!(
+            "{case},{blade},{maker},{fault},{parameter},{truth},{estimate},{lower},{upper},{verdict},{explained},\
+             {seconds:.1},{bound},{above},{visible},{reasons}\n"
+        )
     }
 
     /// Lines of a file, whole ones alone.
-    pub fn read(text: &str) -> Vec<Self> {
+    pub fn read_all(text: &str) -> Vec<Self> {
         text.lines().skip(1).filter_map(Self::parse).collect()
     }
 
     fn parse(line: &str) -> Option<Self> {
-        let cells: Vec<&str> = line.split(',').collect();
-        let [case, blade, run, parameter, truth, estimate, lower, upper, verdict, explained] =
-            cells.as_slice()
-        else {
-            return None;
-        };
+        let cells: [&str; 16] = line.split(',').collect::<Vec<_>>().try_into().ok()?;
+        let word = |at: usize| cells[at].to_owned();
+        let number = |at: usize| cells[at].parse::<f64>().ok();
         Some(Self {
-            case: (*case).to_owned(),
-            blade: blade.parse().ok()?,
-            run: run.parse().ok()?,
-            parameter: (*parameter).to_owned(),
-            truth: truth.parse().ok()?,
-            estimate: estimate.parse().ok()?,
-            ends: [lower.parse().ok(), upper.parse().ok()],
-            verdict: (*verdict).to_owned(),
-            explained: explained.parse().ok()?,
+            case: word(0),
+            blade: cells[1].parse().ok()?,
+            maker: word(2),
+            fault: word(3),
+            parameter: word(4),
+            truth: number(5)?,
+            estimate: number(6)?,
+            ends: [number(7), number(8)],
+            verdict: word(9),
+            explained: cells[10].parse().ok()?,
+            seconds: number(11)?,
+            bound: number(12),
+            above_truth: number(13),
+            visible: number(14),
+            reasons: word(15),
         })
     }
 
-    fn error(&self) -> f64 {
-        100.0 * (self.estimate / self.truth).ln().abs()
-    }
-
-    fn inside(&self) -> bool {
+    fn is_inside(&self) -> bool {
         self.ends[0].is_none_or(|lower| lower <= self.truth)
             && self.ends[1].is_none_or(|upper| self.truth <= upper)
     }
 
-    /// Standard deviation of the logarithm by the interval, where that is closed.
-    fn sd(&self) -> Option<f64> {
-        Some((self.ends[1]? / self.ends[0]?).ln() / 3.92)
+    fn is_identified(&self) -> bool {
+        self.verdict == "identified"
+    }
+
+    /// Half width of the interval of the logarithm, where that is closed.
+    fn half_width(&self) -> Option<f64> {
+        Some(0.5 * (self.ends[1]? / self.ends[0]?).ln())
+    }
+
+    /// Whether it is called identified, but the truth is over four of its deviations off.
+    fn is_wrong(&self) -> bool {
+        let off = (self.estimate / self.truth).ln().abs();
+        self.is_identified() && self.half_width().is_none_or(|half| off > 4.0 * half / 1.96)
+    }
+
+    /// Half width against 1.96 Cramér-Rao deviations.
+    fn width_ratio(&self) -> Option<f64> {
+        Some(self.half_width()? / (1.96 * self.bound?))
     }
 }
 
-impl std::fmt::Display for Line {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { case, blade, run, parameter, truth, estimate, verdict, .. } = self;
-        let error = 100.0 * (estimate / truth).ln();
-        let said = if self.inside() { "" } else { " MISSED" };
-        let misfit = if self.explained { "" } else { " (misfit)" };
-        write!(
-            f,
-            "{case} {blade} {run} {parameter:<32} {estimate:>10.5} ({error:+7.3} %) {verdict}{misfit}{said}"
-        )
-    }
-}
-
-/// The study as a table in Markdown.
-pub fn table(cases: &[Case], lines: &[Line]) -> String {
-    let mut text = String::from(
-        "Synthetic recordings: no camera took any of them.\n\n\
-         | case | fits | all identified | misfit said | median (largest) error of A, % | B, % | C, % | neck, % | \
-         shoulder, % | truth inside 95 %, of all | of those identified |\n\
-         |---|---|---|---|---|---|---|---|---|---|---|\n",
-    );
-    for case in cases {
-        let of: Vec<&Line> = lines.iter().filter(|line| line.case == case.name).collect();
-        if !of.is_empty() {
-            text += &row(case, &of);
+/// The study as tables in Markdown.
+pub fn write_table(lines: &[Line]) -> String {
+    let mut text = String::from("Synthetic recordings: no camera took any of them.\n");
+    for case in ["right", "faults"] {
+        let of_case: Vec<&Line> = lines.iter().filter(|line| line.case == case).collect();
+        if of_case.is_empty() {
+            continue;
         }
-    }
-    text
-}
-
-fn row(case: &Case, lines: &[&Line]) -> String {
-    let fits: Vec<&[&Line]> = lines.chunks(5).collect();
-    let whole = fits.iter().filter(|fit| fit.iter().all(|line| line.verdict == "identified")).count();
-    let misfit = fits.iter().filter(|fit| !fit[0].explained).count();
-    let mut text = format!("| {} | {} | {whole} | {misfit} |", case.words, fits.len());
-    for at in 0..5 {
-        let errors: Vec<f64> = fits.iter().filter_map(|fit| Some(fit.get(at)?.error())).collect();
-        let largest = errors.iter().copied().fold(0.0, f64::max);
-        let _ = write!(text, " {:.2} ({largest:.2}) |", median(&errors));
-    }
-    let known: Vec<&Line> = lines.iter().copied().filter(|line| line.verdict == "identified").collect();
-    for of in [lines, &known] {
-        let _ = write!(text, " {} |", coverage(of));
-    }
-    text.push('\n');
-    if case.seeds > 1 || case.corners > 0 {
-        let _ = writeln!(
-            text,
-            "| ... largest distance of two answers of a blade | | | | {:.3} deviations | | | | | | |",
-            farthest(lines)
-        );
-    }
-    text
-}
-
-/// How many intervals hold their truth, with the binomial 95 % interval of the share.
-fn coverage(lines: &[&Line]) -> String {
-    let (n, k) = (lines.len(), lines.iter().filter(|line| line.inside()).count());
-    if n == 0 {
-        return "none".to_owned();
-    }
-    // Wilson's interval of a share
-    let (n_, share, z) = (n as f64, k as f64 / n as f64, 1.96_f64);
-    let middle = (share + z * z / (2.0 * n_)) / (1.0 + z * z / n_);
-    let half = z / (1.0 + z * z / n_) * (share * (1.0 - share) / n_ + z * z / (4.0 * n_ * n_)).sqrt();
-    format!(
-        "{k} of {n} ({:.1} %; {:.0} to {:.0})",
-        100.0 * share,
-        100.0 * (middle - half),
-        100.0 * (middle + half)
-    )
-}
-
-/// Largest distance of two answers for one parameter of one blade, in standard deviations.
-fn farthest(lines: &[&Line]) -> f64 {
-    let mut largest = 0.0_f64;
-    for a in lines {
-        for b in lines.iter().filter(|b| b.blade == a.blade && b.parameter == a.parameter) {
-            if let Some(sd) = a.sd().filter(|_| a.verdict == "identified" && b.verdict == "identified") {
-                largest = largest.max((a.estimate / b.estimate).ln().abs() / sd);
+        let mut groups = vec![("all".to_owned(), of_case.clone())];
+        for group in of_case.iter().flat_map(|line| [&line.maker, &line.fault]) {
+            if group != "none" && !groups.iter().any(|(name, _)| name == group) {
+                let has = |line: &&&Line| [&line.maker, &line.fault].contains(&group);
+                groups.push((group.clone(), of_case.iter().filter(has).copied().collect()));
             }
         }
+        let rows = if case == "right" { right_rows } else { fault_rows };
+        let columns: Vec<_> = groups.iter().map(|(_, lines)| rows(lines)).collect();
+        let names: String = groups.iter().map(|(name, _)| format!(" {name} |")).collect();
+        let _ = write!(text, "\n| {case} |{names}\n|---|{}\n", "---|".repeat(groups.len()));
+        for (i, (words, _)) in columns[0].iter().enumerate() {
+            let cells: String = columns.iter().map(|column| format!(" {} |", column[i].1)).collect();
+            let _ = writeln!(text, "| {words} |{cells}");
+        }
     }
-    largest
+    text
 }
 
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let middle = |from_end: usize| sorted.get(from_end / 2).copied().unwrap_or(f64::NAN);
-    0.5 * (middle(sorted.len().saturating_sub(1)) + middle(sorted.len()))
+type Rows = Vec<(&'static str, String)>;
+
+fn right_rows(lines: &[&Line]) -> Rows {
+    let fits = split_fits(lines);
+    let answered = fits.iter().filter(|fit| fit[0].verdict != "error").count();
+    let sharp: Vec<&&Line> = lines.iter().filter(|line| line.bound.is_some_and(|bound| bound < 0.05)).collect();
+    let known: Vec<&&&Line> = sharp.iter().filter(|line| line.is_identified()).collect();
+    let mut ratios: Vec<f64> = known.iter().filter_map(|line| line.width_ratio()).collect();
+    ratios.sort_by(f64::total_cmp);
+    let narrow = ratios.iter().filter(|ratio| **ratio <= 1.5).count();
+    let unexplained = fits.iter().filter(|fit| !fit[0].explained).count();
+    let mut rows = vec![
+        ("blades", fits.len().to_string()),
+        ("fits that end with an answer", count_of(answered, fits.len())),
+        ("intervals that hold the truth; 95 % interval with blades as units", find_coverage(&fits)),
+        ("identified, but over four deviations off", lines.iter().filter(|l| l.is_wrong()).count().to_string()),
+        ("identified, of parameters with a Cramér-Rao deviation below 5 %", count_of(known.len(), sharp.len())),
+        ("half width against 1.96 such deviations: median", format!("{:.2}", middle(&ratios))),
+        ("at most 1.5", count_of(narrow, ratios.len())),
+        ("called unexplained", count_of(unexplained, fits.len())),
+    ];
+    rows.extend(time_rows(&fits));
+    rows
+}
+
+fn fault_rows(lines: &[&Line]) -> Rows {
+    let fits = split_fits(lines);
+    // a marker that is 5 mm off and a lost contact are visible by their size
+    let visible: Vec<&Vec<&Line>> =
+        fits.iter().filter(|fit| fit[0].visible.is_none_or(|fall| fall > VISIBLE)).collect();
+    let said = visible.iter().filter(|fit| !fit[0].explained).count();
+    let silent = fits.iter().filter(|fit| !fit.iter().any(|line| line.is_identified())).count();
+    let mut rows = vec![
+        ("blades", fits.len().to_string()),
+        ("faults that the recording shows", count_of(visible.len(), fits.len())),
+        ("called unexplained, of these", count_of(said, visible.len())),
+        ("nothing identified", count_of(silent, fits.len())),
+        ("identified, but over four deviations off", lines.iter().filter(|l| l.is_wrong()).count().to_string()),
+    ];
+    rows.extend(time_rows(&fits));
+    rows
+}
+
+fn time_rows(fits: &[Vec<&Line>]) -> Rows {
+    let mut seconds: Vec<f64> = fits.iter().map(|fit| fit[0].seconds).collect();
+    seconds.sort_by(f64::total_cmp);
+    let longest = seconds.last().copied().unwrap_or(f64::NAN);
+    vec![("seconds a fit: median, longest", format!("{:.0}, {longest:.0}", middle(&seconds)))]
+}
+
+fn split_fits<'a>(lines: &[&'a Line]) -> Vec<Vec<&'a Line>> {
+    let mut fits = BTreeMap::<u64, Vec<&Line>>::new();
+    lines.iter().for_each(|line| fits.entry(line.blade).or_default().push(line));
+    fits.into_values().collect()
+}
+
+/// Share of the intervals that hold their truth, and Wilson's 95 % interval of it for as many independent
+/// intervals as have the scatter between blades.
+fn find_coverage(fits: &[Vec<&Line>]) -> String {
+    let shares: Vec<f64> = fits
+        .iter()
+        .filter(|fit| fit[0].verdict != "error")
+        .map(|fit| fit.iter().filter(|line| line.is_inside()).count() as f64 / fit.len() as f64)
+        .collect();
+    let blades = shares.len() as f64;
+    let share = shares.iter().sum::<f64>() / blades;
+    let scatter = shares.iter().map(|one| (one - share).powi(2)).sum::<f64>() / (blades - 1.0);
+    let units = if scatter > 0.0 { share * (1.0 - share) * blades / scatter } else { blades };
+    let z = 1.96_f64;
+    let centre = (share + z * z / (2.0 * units)) / (1.0 + z * z / units);
+    let half = z / (1.0 + z * z / units) * (share * (1.0 - share) / units + z * z / (4.0 * units * units)).sqrt();
+    let [share, low, high] = [share, centre - half, centre + half].map(|share| 100.0 * share);
+    format!("{share:.1} %; {low:.1} to {high:.1} %")
+}
+
+fn count_of(part: usize, all: usize) -> String {
+    format!("{part} of {all}")
+}
+
+/// The median of sorted values.
+fn middle(sorted: &[f64]) -> f64 {
+    let at = |from_end: usize| sorted.get(from_end / 2).copied().unwrap_or(f64::NAN);
+    0.5 * (at(sorted.len().saturating_sub(1)) + at(sorted.len()))
 }

@@ -1,75 +1,220 @@
-//! Blades whose values are known, and what a camera and a tracking program make of them.
+//! Blades whose values are known: what is believed of them, what they are, and their films.
 
+use crate::camera::Filming;
+use crate::linkage_run::{Place, run_linkage};
+use portable_math::StandardNormal;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use wiperlab::fit::job::Job;
-use wiperlab::fit::measure_targets;
-use wiperlab::fit::model::{Draw, Model};
-use wiperlab::fit::scene_model::{Instrument, ModelCondition, PlausibilityLimits, SceneModel};
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use wiperlab::model::Pose;
 use wiperlab::recording::Recording;
-use wiperlab::simulate::scene::Scene;
-use wiperlab::simulate::twin::Camera;
+use wiperlab::simulate::equilibrium::steady_slip_pose;
+use wiperlab::simulate::outputs::SampleObserver;
+use wiperlab::simulate::scene::contact::ContactLossRule;
+use wiperlab::simulate::scene::{Scene, StartKind};
+use wiperlab::simulate::{RunStatus, SolverOptions, run_scene_with};
 
-/// Ranges of the truths, in the order of the job's parameters; drawn evenly in the logarithm.
-const RANGES: [(f64, f64); 5] = [(0.07, 0.2), (2.5, 9.0), (0.2, 0.4), (0.0013, 0.0027), (0.018, 0.055)];
-/// Length of a pixel, m, and noise of a tracked coordinate, pixels.
-pub const PIXEL_M: f64 = 20e-6;
-const NOISE_PX: f64 = 0.1;
-pub const EXPOSURE_S: f64 = 5e-5;
-/// Relative spread of the state in which a blade starts: the fit does not know it.
-pub const SPREAD: f64 = 0.1;
-/// Blades that are drawn for a twin, at most.
-const TRIES: u64 = 200;
+/// Parameters that a fit seeks. For a blade of size 1: the range from which the truth is drawn, evenly in the
+/// logarithm, and the bounds of the fit.
+pub const SOUGHT: [(&str, [f64; 2], [f64; 2]); 5] = [
+    ("friction.a", [0.07, 0.2], [0.03, 0.4]),
+    ("friction.b_s_per_m", [2.5, 9.0], [1.0, 20.0]),
+    ("friction.c", [0.2, 0.4], [0.1, 0.6]),
+    ("blade.neck_stiffness_n_m_per_rad", [0.0013, 0.0027], [0.0009, 0.0038]),
+    ("shoulder.stiffness_n_m_per_rad", [0.018, 0.055], [0.008, 0.12]),
+];
+/// Time from the start of a run to the reversal, and from there to its end, s, at time scale 1.
+const BEFORE_S: f64 = 0.108;
+const AFTER_S: f64 = 0.482;
+/// Blades that are drawn for one that runs, at most.
+const TRIES: u64 = 400;
 
-/// A blade: its values, and the start that nobody knows.
-pub struct Blade {
-    pub truth: Vec<f64>,
-    start: u64,
-    /// Frames a second and share of lost points of its usual film.
-    usual: (f64, f64),
+/// What is wrong with a blade beyond what the fit allows for.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Fault {
+    /// A constant is 5 to 6 deviations of its prior off.
+    Constant(&'static str),
+    /// The tip's marker is 5 to 6 deviations of its prior, 1 mm, off the edge of the lip.
+    Marker,
+    /// The tip leaves the glass; a run without flight has a tracker that sits 10 noises off for 30 ms.
+    Contact,
 }
 
-/// How a blade is filmed, where that is not as usual.
-#[derive(Clone, Copy, Default)]
-pub struct Filming {
-    pub frame_rate_hz: Option<f64>,
-    pub dropout_fraction: Option<f64>,
-    /// Which noise is drawn.
-    pub draw: u64,
-}
+const FAULTS: [Fault; 6] = [
+    Fault::Constant("blade.preload_force_n"),
+    Fault::Constant("blade.head_mass_kg"),
+    Fault::Constant("blade.neck_length_m"),
+    Fault::Constant("blade.lip_inertia_kg_m2"),
+    Fault::Marker,
+    Fault::Contact,
+];
 
-/// Blade number `number`: the first that stays in contact, flips, and shows every feature of the job to the
-/// usual camera.
-pub fn blade(scene: &Scene, job: &Job, number: u64) -> Blade {
-    const SEED: u64 = 1;
-    let mut generator = Xoshiro256PlusPlus::seed_from_u64(SEED ^ (number << 20));
-    let frame_rate_hz = if number.is_multiple_of(2) { 5_000.0 } else { 10_000.0 };
-    let usual = (frame_rate_hz, 0.05 * generator.random::<f64>());
-    for start in 1..=TRIES {
-        let mut drawn = |(low, high): (f64, f64)| low * (high / low).powf(generator.random::<f64>());
-        let blade = Blade { truth: RANGES.map(&mut drawn).to_vec(), start, usual };
-        let shown = blade.film(scene, job, number, Filming::default());
-        if shown.is_some_and(|recording| measure_targets(job, &[Some(recording)]).is_ok()) {
-            return blade;
+impl Fault {
+    /// The fault of a number: each comes to both makers.
+    pub fn of_number(number: u64) -> Self {
+        FAULTS[(number / 2) as usize % FAULTS.len()]
+    }
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Constant(name) => name.trim_start_matches("blade."),
+            Self::Marker => "tip marker",
+            Self::Contact => "contact",
         }
     }
-    panic!("none of {TRIES} blades does");
 }
 
-impl Blade {
-    /// A film of it in a scene; `None` where the model cannot run there.
-    pub fn film(&self, scene: &Scene, job: &Job, number: u64, filming: Filming) -> Option<Recording> {
-        let Filming { frame_rate_hz, dropout_fraction, draw } = filming;
-        let camera = Camera { frame_rate_hz: frame_rate_hz.unwrap_or(self.usual.0), exposure_s: EXPOSURE_S };
-        let instrument = Instrument {
-            camera,
-            noise_m: NOISE_PX * PIXEL_M,
-            dropout_fraction: dropout_fraction.unwrap_or(self.usual.1),
-        };
-        let plausible = PlausibilityLimits { spread: SPREAD, largest_tilt_rad: job.largest_tilt_rad };
-        let condition = ModelCondition { scene: scene.clone(), instrument };
-        let model = SceneModel::new(vec![condition], job.parameter_names(), plausible);
-        let draw = Draw { member: 1_000 + self.start, noise: 2 + number + 1_000 * draw, dropouts: true };
-        model.record_condition(&self.truth, 0, draw).ok()
+/// A blade with its film.
+pub struct Blade {
+    /// Factors of its lengths, times and masses, against the scene.
+    pub size: f64,
+    pub time: f64,
+    mass: f64,
+    /// What the fit believes, and what was filmed.
+    pub believed: Scene,
+    pub filmed: Scene,
+    pub filming: Filming,
+    pub recording: Recording,
+    /// Largest distance, m, of the tip from that of the library's run in the first 50 ms, at time scale 1.
+    pub apart_m: f64,
+}
+
+/// Blade `number`: the first that runs to its end, flips, and stays in contact unless that is its fault.
+/// `prior_sd` are the deviations of the fit's priors. Odd blades are run by Lagrange's equations.
+pub fn draw_blade(
+    scene: &Scene,
+    prior_sd: &BTreeMap<String, f64>,
+    number: u64,
+    fault: Option<Fault>,
+) -> Option<Blade> {
+    let seed = number << 20 | if fault.is_some() { 1 << 60 } else { 0 };
+    (0..TRIES).find_map(|try_| {
+        let mut generator = Xoshiro256PlusPlus::seed_from_u64(seed + try_);
+        draw_once(scene, prior_sd, &mut generator, number % 2 == 1, fault)
+    })
+}
+
+fn draw_once(
+    scene: &Scene,
+    prior_sd: &BTreeMap<String, f64>,
+    generator: &mut Xoshiro256PlusPlus,
+    by_lagrange: bool,
+    fault: Option<Fault>,
+) -> Option<Blade> {
+    let mut log = |[low, high]: [f64; 2]| low * (high / low).powf(generator.random::<f64>());
+    let (size, time) = (log([0.3, 3.0]), log([0.5, 3.0]));
+    let mass = size * size * log([0.5, 2.0]);
+    let [amplitude, rate] = [log([0.7, 1.4]), log([0.7, 1.4])];
+    let truths = SOUGHT.map(|(name, range, _)| (name, log(range)));
+    let unit = |name: &str| unit_of(name, size, time, mass);
+    let mut believed = scene.clone();
+    for (name, value) in scene.written_values() {
+        believed = believed.with_parameter(name, value * unit(name)).ok()?;
     }
+    for (name, factor) in [("drive.amplitude_m", amplitude), ("drive.frequency_hz", rate)] {
+        believed = believed.with_parameter(name, factor * believed.value(name)?).ok()?;
+    }
+    let reversal_s = 0.5 / believed.value("drive.frequency_hz")?;
+    (believed.start_s, believed.run.stop_s) = (reversal_s - BEFORE_S * time, reversal_s + AFTER_S * time);
+    let mut filmed = believed.clone();
+    for (name, sd) in prior_sd {
+        let z: f64 = match fault {
+            Some(Fault::Constant(wrong)) if wrong == name => beyond(generator),
+            _ => generator.sample(StandardNormal),
+        };
+        filmed = filmed.with_parameter(name, believed.value(name)? * (sd * z).exp()).ok()?;
+    }
+    for (name, value) in truths {
+        filmed = filmed.with_parameter(name, value * unit(name)).ok()?;
+    }
+    let speed = filmed.drive.motion_at(filmed.start_s).velocity_m_per_s;
+    let pose = steady_slip_pose(&filmed.linkage, speed)?;
+    let mut near = |angle: f64| angle * (1.0 + 0.1 * generator.sample::<f64, _>(StandardNormal));
+    filmed.start =
+        StartKind::State(Pose { theta: near(pose.theta), phi: near(pose.phi), theta_rate: 0.0, phi_rate: 0.0 });
+    let stroke_m = 2.0 * filmed.value("drive.amplitude_m")?;
+    let mut filming =
+        Filming::draw(generator, size, time, stroke_m, filmed.value("blade.lip_natural_frequency_hz")?);
+    if fault == Some(Fault::Marker) {
+        filming.tip_marker_m[generator.random_range(0..2)] = 1e-3 * beyond(generator);
+    }
+    let flies = fault == Some(Fault::Contact) && !by_lagrange;
+    if fault == Some(Fault::Contact) && by_lagrange {
+        let frames = |time_s: f64| (time_s * time * filming.frame_rate_hz) as usize;
+        filming.glued = Some([frames(generator.random_range(0.2..0.4)), frames(0.03)]);
+    }
+    let step_s = 1.0 / (filming.frame_rate_hz * filming.steps[0] as f64);
+    let count = ((filmed.run.stop_s - filmed.start_s) / step_s) as usize;
+    let of_library = run_library(&filmed, flies, step_s, count)?;
+    let height_m = filmed.linkage.l1_m + filmed.linkage.l2_m;
+    let lean = |place: &Place| (place.tip_x_m - place.head_x_m) / height_m;
+    let flips = lean(&of_library[0]) * lean(&of_library[count - 1]) < 0.0;
+    let flown = of_library.iter().filter(|place| place.tip_height_m > filming.noise_m).count();
+    if !flips || flies && (flown as f64 * step_s) < 5e-4 * time {
+        return None;
+    }
+    let places =
+        if by_lagrange { run_linkage(&filmed, step_s, count).ok()? } else { of_library.clone() };
+    let early = places.iter().zip(&of_library).take((0.05 * time / step_s) as usize);
+    let apart_m = early.map(|(a, b)| (a.tip_x_m - b.tip_x_m).abs()).fold(0.0, f64::max);
+    let recording = filming.film(&places, height_m, generator);
+    Some(Blade { size, time, mass, believed, filmed, filming, recording, apart_m })
+}
+
+/// A distance of 5 to 6 deviations, to either side.
+fn beyond(generator: &mut Xoshiro256PlusPlus) -> f64 {
+    let far = generator.random_range(5.0..6.0);
+    if generator.random::<bool>() { far } else { -far }
+}
+
+/// Places of a run of the library; `None` if it does not reach its end.
+fn run_library(scene: &Scene, flies: bool, step_s: f64, count: usize) -> Option<Vec<Place>> {
+    let mut scene = scene.clone();
+    scene.loss = if flies { ContactLossRule::Fly } else { ContactLossRule::Stop };
+    let mut places = Vec::with_capacity(count);
+    let start_s = scene.start_s;
+    let times = (0..count).map(|i| start_s + i as f64 * step_s);
+    let mut observer = SampleObserver::new(times, |sample| {
+        places.push(Place {
+            head_x_m: sample.head_x_m,
+            drop_m: sample.head_drop_m,
+            tip_x_m: sample.tip_x_m,
+            tip_height_m: sample.tip_height_m,
+            lip_rad: sample.pose.phi,
+        });
+    });
+    let run = run_scene_with(&scene, SolverOptions::from_scene(&scene), &mut observer);
+    (run.status == RunStatus::Completed && places.len() == count).then_some(places)
+}
+
+/// Factor of a quantity of a blade whose lengths, times and masses are multiplied.
+fn unit_of(name: &str, size: f64, time: f64, mass: f64) -> f64 {
+    match name.rsplit_once('.').map_or(name, |(_, key)| key) {
+        key if key.ends_with("_kg") => mass,
+        key if key.ends_with("_kg_m2") => mass * size * size,
+        key if key.ends_with("_s_per_m") => time / size,
+        key if key.ends_with("_n_m_per_rad") => mass * size * size / (time * time),
+        key if key.ends_with("_hz") => 1.0 / time,
+        key if key.ends_with("_force_n") => mass * size / (time * time),
+        key if key.ends_with("_m") => size,
+        _ => 1.0,
+    }
+}
+
+/// The job of a blade: bounds several times wider than the ranges of the truths, constants within the default
+/// priors.
+pub fn write_job(blade: &Blade, number: u64) -> String {
+    let mut text = format!(
+        "format = 1\ntitle = \"Recovery\"\nscene = \"scene\"\nseed = {}\n[[recording]]\npath = \"film\"\n",
+        number + 1
+    );
+    for (name, _, bounds) in SOUGHT {
+        let [lower, upper] = bounds.map(|bound| bound * unit_of(name, blade.size, blade.time, blade.mass));
+        let _ = write!(
+            text,
+            "[[parameter]]\nname = \"{name}\"\nlower = {lower}\nupper = {upper}\nscale = \"log\"\n"
+        );
+    }
+    text + "[[trace]]\n"
 }

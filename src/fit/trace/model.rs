@@ -15,6 +15,7 @@ pub struct TraceRecording {
 /// Recordings, scenes and unknowns of a trace fit.
 #[derive(Clone)]
 pub struct TraceModel {
+    /// The recordings, each with its scene.
     pub recordings: Vec<TraceRecording>,
     /// All unknowns except the starting states.
     pub unknowns: TraceUnknowns,

@@ -63,6 +63,7 @@ pub enum UnknownKind {
     Camera {
         /// Index of the recording.
         film: usize,
+        /// The error.
         what: CameraUnknown,
     },
 }
@@ -70,6 +71,7 @@ pub enum UnknownKind {
 /// An unknown with its range and its prior; both refer to the coordinate of the unknown, not to its value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TraceUnknown {
+    /// What is unknown.
     pub kind: UnknownKind,
     /// Lower and upper end of the range, in the coordinate.
     pub range: [f64; 2],

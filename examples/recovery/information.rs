@@ -1,0 +1,123 @@
+//! Descents from the truth, and the Cramér-Rao deviations at their ends, by finite differences.
+
+use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
+use std::collections::BTreeMap;
+use wiperlab::fit::Problem;
+use wiperlab::fit::trace::{
+    Iterate, TraceModel, TraceSearchSettings, TraceUnknown, UnknownKind, first_iterate, next_iterate,
+    segment_residuals, start_point,
+};
+use wiperlab::simulate::scene::Scene;
+
+/// Name of an unknown that is a parameter of the scene.
+fn parameter_name(unknown: &TraceUnknown) -> Option<&str> {
+    match &unknown.kind {
+        UnknownKind::Parameter { name, .. } => Some(name),
+        UnknownKind::Camera { .. } => None,
+    }
+}
+
+/// Deviations of the priors that a model has for constants, by name.
+pub fn read_priors(model: &TraceModel) -> BTreeMap<String, f64> {
+    let unknowns = model.unknowns.0.iter();
+    unknowns.filter_map(|unknown| Some((parameter_name(unknown)?.to_owned(), unknown.prior?[1]))).collect()
+}
+
+/// The end of a descent that starts at the values of a scene; errors of the camera start where a search
+/// starts.
+pub fn descend_from(problem: &Problem, truth: &Scene) -> Option<(TraceModel, Iterate)> {
+    let model = problem.trace_model()?.ok()?;
+    let mut point = start_point(&model, 1, 0);
+    for (coordinate, unknown) in point.iter_mut().zip(&model.unknowns.0) {
+        if let Some(value) = parameter_name(unknown).and_then(|name| truth.value(name)) {
+            *coordinate = value.ln().clamp(unknown.range[0], unknown.range[1]);
+        }
+    }
+    let settings = TraceSearchSettings { segment_s: problem.segment_s().to_vec(), twins: 0 };
+    let mut at = first_iterate(&model, &settings, &point)?;
+    while let Some(next) = next_iterate(&model, &settings, &at) {
+        at = next;
+    }
+    (at.stage + 1 == settings.segment_s.len()).then_some((model, at))
+}
+
+/// Whitened residuals by segment and channel.
+type Residuals = BTreeMap<(usize, bool), Vec<f64>>;
+
+fn whitened(model: &TraceModel, at: &Iterate) -> Residuals {
+    segment_residuals(model, at).into_iter().map(|part| ((part.segment, part.is_drop), part.whitened)).collect()
+}
+
+/// Half of the difference of two sets of residuals per `step`; a part that one of them lacks says nothing.
+fn slopes(above: &Residuals, below: &Residuals, step: f64) -> Residuals {
+    let slope = |(key, above): (&(usize, bool), &Vec<f64>)| {
+        let below = below.get(key)?;
+        Some((*key, above.iter().zip(below).map(|(a, b)| (a - b) / (2.0 * step)).collect()))
+    };
+    above.iter().filter_map(slope).collect()
+}
+
+/// Deviations of the logarithms of the parameters: the inverse of the information of the residuals and the
+/// priors, the starting states of the segments unknown. `lip_rad_per_s` sets the steps of their rates.
+pub fn find_deviations(model: &TraceModel, at: &Iterate, lip_rad_per_s: f64) -> Option<BTreeMap<String, f64>> {
+    const STEP_SD: f64 = 0.02;
+    const STEP: f64 = 1e-3;
+    const STATE_RAD: f64 = 1e-4;
+    let difference = |moved: &dyn Fn(&mut Iterate, f64), step: f64| {
+        let [above, below] = [step, -step].map(|by| {
+            let mut iterate = at.clone();
+            moved(&mut iterate, by);
+            whitened(model, &iterate)
+        });
+        slopes(&above, &below, step)
+    };
+    let n = at.point.len();
+    let by_unknown: Vec<Residuals> = (0..n)
+        .map(|i| {
+            let step = model.unknowns.0[i].prior.map_or(STEP, |[_, sd]| STEP_SD * sd);
+            difference(&|iterate, by| iterate.point[i] += by, step)
+        })
+        .collect();
+    let by_state: Vec<Residuals> = (0..4)
+        .map(|i| {
+            let step = if i < 2 { STATE_RAD } else { STATE_RAD * lip_rad_per_s };
+            let move_all = |iterate: &mut Iterate, by: f64| {
+                iterate.segments.iter_mut().for_each(|segment| segment.start[i] += by);
+            };
+            // in units of the step, so that the four are of one size
+            let mut slopes = difference(&move_all, step);
+            slopes.values_mut().flatten().for_each(|slope| *slope *= step);
+            slopes
+        })
+        .collect();
+    let mut information = DMatrix::<f64>::zeros(n, n);
+    for segment in 0..at.segments.len() {
+        let column = |of: &Residuals| {
+            let parts = [false, true].map(|drop| of.get(&(segment, drop)).cloned().unwrap_or_default());
+            DVector::from_vec(parts.concat())
+        };
+        let own: Vec<DVector<f64>> = by_unknown.iter().map(column).collect();
+        let states: Vec<DVector<f64>> = by_state.iter().map(column).collect();
+        if own.iter().chain(&states).any(|one| one.len() != own[0].len()) {
+            continue;
+        }
+        let mut of_states = Matrix4::from_fn(|i, j| states[i].dot(&states[j]));
+        of_states += Matrix4::identity() * (1e-10 * of_states.trace());
+        let Some(inverse) = of_states.try_inverse() else { continue };
+        let crossed: Vec<Vector4<f64>> =
+            own.iter().map(|one| Vector4::from_fn(|i, _| states[i].dot(one))).collect();
+        for i in 0..n {
+            for j in 0..n {
+                information[(i, j)] += own[i].dot(&own[j]) - crossed[i].dot(&(inverse * crossed[j]));
+            }
+        }
+    }
+    for (i, unknown) in model.unknowns.0.iter().enumerate() {
+        information[(i, i)] += unknown.prior.map_or(0.0, |[_, sd]| 1.0 / (sd * sd));
+    }
+    let covariance = information.cholesky()?.inverse();
+    let named = |(i, unknown): (usize, &TraceUnknown)| {
+        Some((parameter_name(unknown)?.to_owned(), covariance[(i, i)].sqrt()))
+    };
+    Some(model.unknowns.0.iter().enumerate().filter_map(named).collect())
+}
