@@ -35,9 +35,15 @@ pub struct Filming {
 
 impl Filming {
     /// Draws a camera for a blade of a size and time scale relative to the usual blade.
-    pub fn draw(generator: &mut Xoshiro256PlusPlus, size: f64, time: f64, stroke_m: f64, lip_hz: f64) -> Self {
+    pub fn draw(
+        generator: &mut Xoshiro256PlusPlus,
+        size: f64,
+        time: f64,
+        stroke_m: f64,
+        lip_hz: f64,
+    ) -> Self {
         /// Steps of the run in a period of the lip.
-        const STEPS_A_PERIOD: f64 = 160.0;
+        const STEPS_A_PERIOD: f64 = 100.0;
         let mut within = |low: f64, high: f64| low + (high - low) * generator.random::<f64>();
         let frame_rate_hz = 2_000.0 * within(0.0, 5.0_f64.ln()).exp() / time;
         let steps = 2 * (0.5 * STEPS_A_PERIOD * lip_hz / frame_rate_hz).ceil() as usize;
@@ -108,10 +114,8 @@ impl Filming {
     /// Both markers in the picture at one instant.
     fn show(&self, place: &Place, upright_m: f64) -> [f64; 4] {
         let ([along, across], (sin, cos)) = (self.tip_marker_m, place.lip_rad.sin_cos());
-        let tip = [
-            place.tip_x_m + along * sin + across * cos,
-            place.tip_height_m - along * cos + across * sin,
-        ];
+        let tip =
+            [place.tip_x_m + along * sin + across * cos, place.tip_height_m - along * cos + across * sin];
         let [aside, above] = self.head_marker_m;
         let head = [place.head_x_m + aside, upright_m - place.drop_m + above];
         let [[tip_x, tip_y], [head_x, head_y]] = [tip, head].map(|[along_m, height_m]| {

@@ -45,7 +45,10 @@ pub fn descend_from(problem: &Problem, truth: &Scene) -> Option<(TraceModel, Ite
 type Residuals = BTreeMap<(usize, bool), Vec<f64>>;
 
 fn whitened(model: &TraceModel, at: &Iterate) -> Residuals {
-    segment_residuals(model, at).into_iter().map(|part| ((part.segment, part.is_drop), part.whitened)).collect()
+    segment_residuals(model, at)
+        .into_iter()
+        .map(|part| ((part.segment, part.is_drop), part.whitened))
+        .collect()
 }
 
 /// Half of the difference of two sets of residuals per `step`; a part that one of them lacks says nothing.
@@ -59,7 +62,11 @@ fn slopes(above: &Residuals, below: &Residuals, step: f64) -> Residuals {
 
 /// Deviations of the logarithms of the parameters: the inverse of the information of the residuals and the
 /// priors, the starting states of the segments unknown. `lip_rad_per_s` sets the steps of their rates.
-pub fn find_deviations(model: &TraceModel, at: &Iterate, lip_rad_per_s: f64) -> Option<BTreeMap<String, f64>> {
+pub fn find_deviations(
+    model: &TraceModel,
+    at: &Iterate,
+    lip_rad_per_s: f64,
+) -> Option<BTreeMap<String, f64>> {
     const STEP_SD: f64 = 0.02;
     const STEP: f64 = 1e-3;
     const STATE_RAD: f64 = 1e-4;

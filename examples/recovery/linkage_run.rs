@@ -128,8 +128,7 @@ impl Sweep {
         let ([x, v, a], [l1, l2]) = (self.head(t), self.parts.l);
         let drop = l1 * (1.0 - y[0].cos()) + l2 * (1.0 - y[1].cos());
         let drop_rate = l1 * y[0].sin() * y[2] + l2 * y[1].sin() * y[3];
-        let linkage =
-            Linkage::at(&self.parts, [x, drop, y[0], y[1]], [v, drop_rate, y[2], y[3]], self.side);
+        let linkage = Linkage::at(&self.parts, [x, drop, y[0], y[1]], [v, drop_rate, y[2], y[3]], self.side);
         let [free, pulled] = [0.0, 1.0].map(|force| {
             let answer = linkage.answer(a, force);
             let [_, _, theta, phi] = answer.accelerations;

@@ -27,6 +27,7 @@ use table::{Line, write_table};
 use truth::{Blade, Fault, SOUGHT, draw_blade, write_job};
 use wiperlab::fit::job::Job;
 use wiperlab::fit::result::FitResult;
+use wiperlab::fit::trace::{Iterate, chi2_per_dof};
 use wiperlab::fit::{MeasuredRecording, Problem};
 use wiperlab::simulate::scene::Scene;
 
@@ -44,7 +45,11 @@ fn main() {
     });
     std::fs::create_dir_all(&folder).expect("a folder that can be made");
     let kept = format!("{folder}/recovery.csv");
-    let mut lines = Line::read_all(&std::fs::read_to_string(&kept).unwrap_or_default());
+    let old = std::fs::read_to_string(&kept).unwrap_or_default();
+    if !old.starts_with(Line::HEAD) {
+        std::fs::write(&kept, Line::HEAD).expect("a file that can be written");
+    }
+    let mut lines = Line::read_all(&old);
     let scene = Scene::parse("actual-blade.toml", SCENE).expect("the bundled scene");
     let prior_sd = default_priors(&scene);
     for case in ["right", "faults"].into_iter().filter(|case| wanted.as_deref().is_none_or(|w| w == *case)) {
@@ -56,7 +61,11 @@ fn main() {
             let blade = draw_blade(&scene, &prior_sd, number, fault).expect("a blade that runs");
             println!(
                 "{case} {number}: size {:.2}, time {:.2}, {} frames/s, curvature {:.3} 1/m, tip {:.1e} m from the library's in the first 50 ms",
-                blade.size, blade.time, blade.filming.frame_rate_hz.round(), blade.filming.curvature_per_m, blade.apart_m
+                blade.size,
+                blade.time,
+                blade.filming.frame_rate_hz.round(),
+                blade.filming.curvature_per_m,
+                blade.apart_m
             );
             let found = fit_blade(&blade, number, fault);
             found.iter().for_each(|line| print!("{}", line.csv()));
@@ -71,18 +80,18 @@ fn main() {
 
 /// Adds what a fit found to the file.
 fn keep_lines(path: &str, found: &[Line]) {
-    let mut file = std::fs::OpenOptions::new().create(true).append(true).open(path).expect("a file to write");
-    let is_empty = file.metadata().is_ok_and(|data| data.len() == 0);
+    let mut file = std::fs::OpenOptions::new().append(true).open(path).expect("a file to write");
     let text: String = found.iter().map(Line::csv).collect();
-    let head = if is_empty { Line::HEAD } else { "" };
-    file.write_all(format!("{head}{text}").as_bytes()).expect("a file that can be written");
+    file.write_all(text.as_bytes()).expect("a file that can be written");
 }
 
 /// Deviations of the default priors of the constants of a scene, as the fit has them.
 fn default_priors(scene: &Scene) -> BTreeMap<String, f64> {
     let none = BTreeMap::new();
     let blade = draw_blade(scene, &none, 0, None).expect("a blade that runs");
-    read_priors(&make_problem(&blade, &blade.believed, 0).trace_model().expect("a trace").expect("a tracked head"))
+    read_priors(
+        &make_problem(&blade, &blade.believed, 0).trace_model().expect("a trace").expect("a tracked head"),
+    )
 }
 
 /// The problem of a blade for a fit that believes a scene.
@@ -105,13 +114,17 @@ fn fit_blade(blade: &Blade, number: u64, fault: Option<Fault>) -> Vec<Line> {
     let truth = descend_from(&problem, &blade.filmed);
     let lip_rad_per_s = TAU * blade.believed.value("blade.lip_natural_frequency_hz").unwrap_or(f64::NAN);
     let deviations = truth.as_ref().and_then(|(model, at)| find_deviations(model, at, lip_rad_per_s));
-    let above_truth = |result: &FitResult| Some(result.cost - truth.as_ref()?.1.cost);
+    let excess = |at: &Iterate| at.cost - chi2_per_dof(at).1 as f64;
+    let above_truth = |result: &FitResult| {
+        let dof = result.misfit.as_ref()?.stages.last()?.dof as f64;
+        Some(result.cost - dof - excess(&truth.as_ref()?.1))
+    };
     let visible = fault.and_then(|fault| match fault {
         Fault::Constant(name) => {
             // what the right belief in this constant would save
             let right = blade.believed.with_parameter(name, blade.filmed.value(name)?).ok()?;
             let (_, at) = descend_from(&make_problem(blade, &right, number), &blade.filmed)?;
-            Some(truth.as_ref()?.1.cost - at.cost)
+            Some(excess(&truth.as_ref()?.1) - excess(&at))
         }
         Fault::Marker | Fault::Contact => None,
     });

@@ -19,7 +19,7 @@ pub struct Line {
     pub seconds: f64,
     /// Cramér-Rao deviation of the logarithm, with the priors.
     pub bound: Option<f64>,
-    /// Cost of the fit above that of a descent from the truth.
+    /// Cost of the fit above that of a descent from the truth, each less its degrees of freedom.
     pub above_truth: Option<f64>,
     /// What the cost would fall by, were the fault known.
     pub visible: Option<f64>,
@@ -132,7 +132,8 @@ type Rows = Vec<(&'static str, String)>;
 fn right_rows(lines: &[&Line]) -> Rows {
     let fits = split_fits(lines);
     let answered = fits.iter().filter(|fit| fit[0].verdict != "error").count();
-    let sharp: Vec<&&Line> = lines.iter().filter(|line| line.bound.is_some_and(|bound| bound < 0.05)).collect();
+    let sharp: Vec<&&Line> =
+        lines.iter().filter(|line| line.bound.is_some_and(|bound| bound < 0.05)).collect();
     let known: Vec<&&&Line> = sharp.iter().filter(|line| line.is_identified()).collect();
     let mut ratios: Vec<f64> = known.iter().filter_map(|line| line.width_ratio()).collect();
     ratios.sort_by(f64::total_cmp);
@@ -142,8 +143,14 @@ fn right_rows(lines: &[&Line]) -> Rows {
         ("blades", fits.len().to_string()),
         ("fits that end with an answer", count_of(answered, fits.len())),
         ("intervals that hold the truth; 95 % interval with blades as units", find_coverage(&fits)),
-        ("identified, but over four deviations off", lines.iter().filter(|l| l.is_wrong()).count().to_string()),
-        ("identified, of parameters with a Cramér-Rao deviation below 5 %", count_of(known.len(), sharp.len())),
+        (
+            "identified, but over four deviations off",
+            lines.iter().filter(|l| l.is_wrong()).count().to_string(),
+        ),
+        (
+            "identified, of parameters with a Cramér-Rao deviation below 5 %",
+            count_of(known.len(), sharp.len()),
+        ),
         ("half width against 1.96 such deviations: median", format!("{:.2}", middle(&ratios))),
         ("at most 1.5", count_of(narrow, ratios.len())),
         ("called unexplained", count_of(unexplained, fits.len())),
@@ -164,7 +171,10 @@ fn fault_rows(lines: &[&Line]) -> Rows {
         ("faults that the recording shows", count_of(visible.len(), fits.len())),
         ("called unexplained, of these", count_of(said, visible.len())),
         ("nothing identified", count_of(silent, fits.len())),
-        ("identified, but over four deviations off", lines.iter().filter(|l| l.is_wrong()).count().to_string()),
+        (
+            "identified, but over four deviations off",
+            lines.iter().filter(|l| l.is_wrong()).count().to_string(),
+        ),
     ];
     rows.extend(time_rows(&fits));
     rows
@@ -197,7 +207,8 @@ fn find_coverage(fits: &[Vec<&Line>]) -> String {
     let units = if scatter > 0.0 { share * (1.0 - share) * blades / scatter } else { blades };
     let z = 1.96_f64;
     let centre = (share + z * z / (2.0 * units)) / (1.0 + z * z / units);
-    let half = z / (1.0 + z * z / units) * (share * (1.0 - share) / units + z * z / (4.0 * units * units)).sqrt();
+    let half =
+        z / (1.0 + z * z / units) * (share * (1.0 - share) / units + z * z / (4.0 * units * units)).sqrt();
     let [share, low, high] = [share, centre - half, centre + half].map(|share| 100.0 * share);
     format!("{share:.1} %; {low:.1} to {high:.1} %")
 }

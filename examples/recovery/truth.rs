@@ -131,8 +131,12 @@ fn draw_once(
     let speed = filmed.drive.motion_at(filmed.start_s).velocity_m_per_s;
     let pose = steady_slip_pose(&filmed.linkage, speed)?;
     let mut near = |angle: f64| angle * (1.0 + 0.1 * generator.sample::<f64, _>(StandardNormal));
-    filmed.start =
-        StartKind::State(Pose { theta: near(pose.theta), phi: near(pose.phi), theta_rate: 0.0, phi_rate: 0.0 });
+    filmed.start = StartKind::State(Pose {
+        theta: near(pose.theta),
+        phi: near(pose.phi),
+        theta_rate: 0.0,
+        phi_rate: 0.0,
+    });
     let stroke_m = 2.0 * filmed.value("drive.amplitude_m")?;
     let mut filming =
         Filming::draw(generator, size, time, stroke_m, filmed.value("blade.lip_natural_frequency_hz")?);
@@ -154,8 +158,7 @@ fn draw_once(
     if !flips || flies && (flown as f64 * step_s) < 5e-4 * time {
         return None;
     }
-    let places =
-        if by_lagrange { run_linkage(&filmed, step_s, count).ok()? } else { of_library.clone() };
+    let places = if by_lagrange { run_linkage(&filmed, step_s, count).ok()? } else { of_library.clone() };
     let early = places.iter().zip(&of_library).take((0.05 * time / step_s) as usize);
     let apart_m = early.map(|(a, b)| (a.tip_x_m - b.tip_x_m).abs()).fold(0.0, f64::max);
     let recording = filming.film(&places, height_m, generator);

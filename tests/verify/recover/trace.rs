@@ -264,12 +264,3 @@ fn a_scene_of_another_time_does_not_drive_a_trace() {
     let said = Problem::new(job, vec![early], vec![measured]).map(|_| ()).unwrap_err().to_string();
     assert!(said.contains("`drive`: found \"scene\", whose head runs from -2 to -1 s"), "{said}");
 }
-
-/// `cargo run --release --example recovery` fits traces with the parameters of this job.
-#[test]
-fn the_job_of_the_recovery_study_fits_traces() {
-    let job = include_str!("../../../examples/recovery/job.toml");
-    let (parameters, _) = job.split_once("[[component]]").unwrap();
-    let job = Job::parse("job.toml", &format!("{parameters}\n[[trace]]\n")).unwrap();
-    assert_eq!((job.traces.len(), job.parameters.len()), (1, 5));
-}
