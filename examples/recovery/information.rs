@@ -4,8 +4,8 @@ use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 use std::collections::BTreeMap;
 use wiperlab::fit::Problem;
 use wiperlab::fit::trace::{
-    Iterate, TraceModel, TraceSearchSettings, TraceUnknown, UnknownKind, first_iterate, next_iterate,
-    segment_residuals, start_point,
+    Iterate, TraceModel, TraceSearchSettings, TraceUnknown, UnknownKind, chi2_per_dof, first_iterate,
+    next_iterate, segment_residuals, start_point,
 };
 use wiperlab::simulate::scene::Scene;
 
@@ -23,7 +23,7 @@ pub fn read_priors(model: &TraceModel) -> BTreeMap<String, f64> {
     unknowns.filter_map(|unknown| Some((parameter_name(unknown)?.to_owned(), unknown.prior?[1]))).collect()
 }
 
-/// The end of a descent that starts at the values of a scene; errors of the camera start where a search
+/// The end of a descent that starts at the values of a scene, if the model runs through every segment; errors of the camera start where a search
 /// starts.
 pub fn descend_from(problem: &Problem, truth: &Scene) -> Option<(TraceModel, Iterate)> {
     let model = problem.trace_model()?.ok()?;
@@ -38,7 +38,8 @@ pub fn descend_from(problem: &Problem, truth: &Scene) -> Option<(TraceModel, Ite
     while let Some(next) = next_iterate(&model, &settings, &at) {
         at = next;
     }
-    (at.stage + 1 == settings.segment_s.len()).then_some((model, at))
+    // elsewhere the cost is not chi2, or the model cannot run through a segment
+    (at.plain && chi2_per_dof(&at).0.is_finite()).then_some((model, at))
 }
 
 /// Whitened residuals by segment and channel.

@@ -132,7 +132,7 @@ fn fit_blade(blade: &Blade, number: u64, fault: Option<Fault>) -> Vec<Line> {
         let mut line = Line {
             case: if fault.is_some() { "faults" } else { "right" }.to_owned(),
             blade: number,
-            maker: if number % 2 == 0 { "library" } else { "Lagrange" }.to_owned(),
+            maker: if number.is_multiple_of(2) { "library" } else { "Lagrange" }.to_owned(),
             fault: fault.map_or("none", Fault::name).to_owned(),
             parameter: name.to_owned(),
             truth: blade.filmed.value(name).unwrap_or(f64::NAN),

@@ -138,11 +138,13 @@ fn right_rows(lines: &[&Line]) -> Rows {
     let mut ratios: Vec<f64> = known.iter().filter_map(|line| line.width_ratio()).collect();
     ratios.sort_by(f64::total_cmp);
     let narrow = ratios.iter().filter(|ratio| **ratio <= 1.5).count();
+    let identified: Vec<&Line> = lines.iter().copied().filter(|line| line.is_identified()).collect();
     let unexplained = fits.iter().filter(|fit| !fit[0].explained).count();
     let mut rows = vec![
         ("blades", fits.len().to_string()),
         ("fits that end with an answer", count_of(answered, fits.len())),
         ("intervals that hold the truth; 95 % interval with blades as units", find_coverage(&fits)),
+        ("of those identified", find_coverage(&split_fits(&identified))),
         (
             "identified, but over four deviations off",
             lines.iter().filter(|l| l.is_wrong()).count().to_string(),

@@ -91,7 +91,7 @@ pub fn draw_blade(
     let seed = number << 20 | if fault.is_some() { 1 << 60 } else { 0 };
     (0..TRIES).find_map(|try_| {
         let mut generator = Xoshiro256PlusPlus::seed_from_u64(seed + try_);
-        draw_once(scene, prior_sd, &mut generator, number % 2 == 1, fault)
+        draw_once(scene, prior_sd, &mut generator, !number.is_multiple_of(2), fault)
     })
 }
 
