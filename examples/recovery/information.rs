@@ -23,8 +23,8 @@ pub fn read_priors(model: &TraceModel) -> BTreeMap<String, f64> {
     unknowns.filter_map(|unknown| Some((parameter_name(unknown)?.to_owned(), unknown.prior?[1]))).collect()
 }
 
-/// The end of a descent that starts at the values of a scene, if the model runs through every segment; errors of the camera start where a search
-/// starts.
+/// The end of a descent that starts at the values of a scene, if the model runs through every segment. Errors
+/// of the camera start where a search starts.
 pub fn descend_from(problem: &Problem, truth: &Scene) -> Option<(TraceModel, Iterate)> {
     let model = problem.trace_model()?.ok()?;
     let mut point = start_point(&model, 1, 0);
