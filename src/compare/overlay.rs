@@ -25,6 +25,7 @@ impl ModelRun {
     pub(crate) fn measured_motion(&self, recording: &Recording) -> MotionTraces {
         let mut motion = MotionTraces::from_recording(recording);
         let Some(traces) = &self.traces else { return motion };
+        motion.head_x_m.clone_from(&traces.measured_head_x_m);
         let [tip, drop] = &traces.measured;
         if tip.iter().any(Option::is_some) {
             motion.tip_x_m.clone_from(tip);

@@ -110,6 +110,7 @@ pub fn evidence(name: &str) -> Figure {
             residual: inside(course(5.0)),
             rms: 3.5,
             sticks: Vec::new(),
+            remark: String::new(),
         }
     };
     evidence::draw_figure(&evidence::EvidencePlot {

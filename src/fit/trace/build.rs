@@ -81,6 +81,9 @@ impl TraceModel {
 
 fn build_recording(source: &TraceSource<'_>) -> Result<TraceRecording, HeadMotionError> {
     let TraceSource { recording, traced, exposure_s, .. } = *source;
+    let glass = measure_glass(recording);
+    let flat = glass.as_ref().and_then(|glass| glass.flatten(recording));
+    let recording = flat.as_ref().unwrap_or(recording);
     let mut scene = source.scene.clone();
     // every segment has its own starting state, so the start of the scene is not used
     scene.start = StartKind::Upright;
@@ -99,7 +102,6 @@ fn build_recording(source: &TraceSource<'_>) -> Result<TraceRecording, HeadMotio
         frames: [traced.frames.start, traced.frames.end],
     };
     let shared = [found.common.tip_x, found.common.head_y].map(|shared| shared.map(|shared| shared.noise_m));
-    let glass = measure_glass(recording);
     let first_segment_s = first_segment_s(&scene.linkage);
     let film = CameraObservation::new(
         recording,

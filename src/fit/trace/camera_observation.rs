@@ -39,6 +39,8 @@ pub struct CameraObservation {
     pub drop_m: Vec<Option<f64>>,
     /// Position of the head along the sweep in every frame, as given by the drive, m.
     pub head_m: Vec<f64>,
+    /// Position of the head along the sweep as it was tracked, m.
+    pub seen_head_m: Vec<Option<f64>>,
     /// Whether the recorded head drives the model. If so, `head_m` is in lengths as measured in the picture,
     /// which include its scale error; otherwise it is in true lengths.
     pub own_head: bool,
@@ -133,8 +135,7 @@ fn drop_offset_at_rest(points: &[[f64; 2]], linkage: &Linkage) -> f64 {
 impl CameraObservation {
     /// Data of a recording. `drive` moves the head in the model of the recording. `shared` is the noise in
     /// each frame, m, that tip and head have in common, along the sweep and in height; it is subtracted from
-    /// the tip's position and from the head's height. `glass` is the glass in the picture. If it is curved,
-    /// heights of the head are counted from the glass at the tip.
+    /// the tip's position and from the head's height. `glass` is the glass in the picture.
     pub(crate) fn new(
         recording: &Recording,
         drive: &Drive,
@@ -158,19 +159,13 @@ impl CameraObservation {
             Drive::Recorded(spline) if own_head => Some(Arc::clone(spline)),
             _ => None,
         };
-        let mut drop_m = data(settings.head_drop, &traces.head_y_m, &shared[1], -1.0);
-        if let Some((tilt, curvature)) = glass.and_then(|tilt| Some((tilt, tilt.curvature?))) {
-            for (i, drop) in drop_m.iter_mut().enumerate() {
-                let along = traces.tip_x_m[i].unwrap_or(head_m[i]) - tilt.centre_m[0];
-                *drop = drop.map(|drop| drop + 0.5 * curvature.per_m * along * along);
-            }
-        }
         let tilt = glass.filter(|tilt| tilt.is_clear());
         let moves = head_m[first..last].windows(2).map(|pair| (pair[1] - pair[0]).abs());
         let head_speed_m_per_s = grid.frame_rate_hz * moves.fold(0.0, f64::max);
         Self {
             tip_x_m: data(settings.tip_x, &traces.tip_x_m, &shared[0], 1.0),
-            drop_m,
+            drop_m: data(settings.head_drop, &traces.head_y_m, &shared[1], -1.0),
+            seen_head_m: traces.head_x_m.clone(),
             tilt_rad: tilt.map_or([0.0; 2], |tilt| [tilt.angle_rad, tilt.sd_rad]),
             times_s,
             rate_hz: grid.frame_rate_hz,

@@ -20,6 +20,8 @@ pub(crate) type PictureColumns = [Vec<Option<f64>>; 2];
 pub(crate) struct FittedTraces {
     /// The recording as the fit compares it.
     pub measured: PictureColumns,
+    /// Position of the recorded head along the sweep, m.
+    pub measured_head_x_m: Vec<Option<f64>>,
     /// The model, which restarts at every segment in its fitted state.
     pub restarted: PictureColumns,
     /// One run of the model, from the first segment that fits to its end or that of the recording.
@@ -93,6 +95,7 @@ impl FittedTraces {
         let [tip_m, drop_m] = shifts.map(|mut shifts| median_in_place(&mut shifts).unwrap_or(0.0));
         Self {
             measured: compared_columns(film),
+            measured_head_x_m: film.seen_head_m.clone(),
             restarted,
             single_run,
             grid: FrameGrid { start_s: film.times_s[0], frame_rate_hz: film.rate_hz, frames },
