@@ -242,6 +242,7 @@ pub(super) fn camera_unknown_key(what: CameraUnknown) -> [&'static str; 2] {
         CameraUnknown::OffsetDrop => ["offset_drop_m", "m"],
         CameraUnknown::TipAlong => ["tip_along_lip_m", "m"],
         CameraUnknown::TipAcross => ["tip_across_lip_m", "m"],
+        CameraUnknown::Curvature => ["curvature_per_m", "1/m"],
         CameraUnknown::DriftX => ["drift_x_m_per_s", "m/s"],
         CameraUnknown::DriftDrop => ["drift_drop_m_per_s", "m/s"],
         CameraUnknown::Scale => ["scale_relative", "1"],

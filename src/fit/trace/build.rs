@@ -209,6 +209,10 @@ impl CameraPrior {
 /// tracked, positions along the sweep from an arbitrary place, so these offsets have no prior. If the path of
 /// the tip on the glass shows the tilt, this tilt is the mean of the prior.
 fn camera_unknowns(film: usize, source: &TraceSource<'_>, data: &CameraObservation) -> Vec<TraceUnknown> {
+    /// Change of the slope of the glass over the travel of the head, rad, by which the measured curvature may
+    /// be wrong: that of a windshield with a radius of one metre over a stroke of 0.1 m. The path of the tip
+    /// shows the curvature only roughly, since its marker moves up and down as the lip turns.
+    const CHANGE_OF_SLOPE_RAD: f64 = 0.1;
     let TraceData { camera: doubt, head, .. } = source.traced;
     let linkage = &source.scene.linkage;
     let [angle_rad, angle_sd_rad] = data.tilt_rad;
@@ -233,6 +237,8 @@ fn camera_unknowns(film: usize, source: &TraceSource<'_>, data: &CameraObservati
     let drop = zero(CameraUnknown::OffsetDrop, drop_m);
     let tilt_sd_rad =
         if doubt.tilt_sd_rad > 0.0 { math::hypot(doubt.tilt_sd_rad, angle_sd_rad) } else { 0.0 };
+    let bends = doubt.tilt_sd_rad > 0.0 && data.head_travel_m > 0.0;
+    let curvature_sd_per_m = if bends { CHANGE_OF_SLOPE_RAD / data.head_travel_m } else { 0.0 };
     let rows = [
         along,
         CameraPrior { size: with_drop(drop.size), ..drop },
@@ -242,6 +248,7 @@ fn camera_unknowns(film: usize, source: &TraceSource<'_>, data: &CameraObservati
         normal(CameraUnknown::DriftDrop, 0.0, with_drop(doubt.drift_sd_m_per_s)),
         normal(CameraUnknown::Scale, 0.0, doubt.scale_sd),
         normal(CameraUnknown::Tilt, angle_rad, with_drop(tilt_sd_rad)),
+        normal(CameraUnknown::Curvature, 0.0, with_drop(curvature_sd_per_m)),
         normal(CameraUnknown::Clock, 0.0, doubt.clock_sd_s(*head)),
     ];
     rows.iter().filter(|row| row.size > 0.0).map(|row| row.build_unknown(film)).collect()

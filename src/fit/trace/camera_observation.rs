@@ -54,6 +54,8 @@ pub struct CameraObservation {
     pub tilt_rad: [f64; 2],
     /// Greatest speed of the head in the fitted frames, m/s.
     pub head_speed_m_per_s: f64,
+    /// Distance between the extreme positions of the head in the fitted frames, m.
+    pub head_travel_m: f64,
     /// Length of the shortest segments, s: the time scale of the blade.
     pub first_segment_s: f64,
     pub settings: ObservationSettings,
@@ -132,6 +134,11 @@ fn drop_offset_at_rest(points: &[[f64; 2]], linkage: &Linkage) -> f64 {
     median_in_place(&mut offsets).or_else(|| median_in_place(&mut drops)).unwrap_or(0.0)
 }
 
+/// The lowest and the highest value.
+fn find_range(values: &[f64]) -> (f64, f64) {
+    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)))
+}
+
 impl CameraObservation {
     /// Data of a recording. `drive` moves the head in the model of the recording. `shared` is the noise in
     /// each frame, m, that tip and head have in common, along the sweep and in height; it is subtracted from
@@ -162,6 +169,7 @@ impl CameraObservation {
         let tilt = glass.filter(|tilt| tilt.is_clear());
         let moves = head_m[first..last].windows(2).map(|pair| (pair[1] - pair[0]).abs());
         let head_speed_m_per_s = grid.frame_rate_hz * moves.fold(0.0, f64::max);
+        let (low_m, high_m) = find_range(&head_m[first..last]);
         Self {
             tip_x_m: data(settings.tip_x, &traces.tip_x_m, &shared[0], 1.0),
             drop_m: data(settings.head_drop, &traces.head_y_m, &shared[1], -1.0),
@@ -174,6 +182,7 @@ impl CameraObservation {
             own_curve,
             centre_m,
             head_speed_m_per_s,
+            head_travel_m: high_m - low_m,
             first_segment_s,
             settings,
         }
@@ -219,8 +228,7 @@ impl CameraObservation {
         const LEAST: f64 = 0.05;
         let [first, last] = self.settings.frames;
         let heads = &self.head_m[first..last];
-        let (low, high) =
-            heads.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+        let (low, high) = find_range(heads);
         let [Some(start), Some(end)] = [heads.first(), heads.last()] else { return false };
         // distance by which the head moves outside the range between its first and last position
         let beyond = (high - start.max(*end)).max(start.min(*end) - low);

@@ -379,10 +379,22 @@ impl<'a> RecordingModel<'a> {
         let along = film.head_m[frame] - film.centre_m;
         let [offset_x_m, offset_drop_m] = view.offsets_m(film.after_middle_s(frame));
         let tip = tip + self.marker_shift(lip);
+        let [bent_x_m, bent_drop_m] = self.bend_by_curvature(along, drop);
         [
-            shown + scale * (tip - head - view.tilt_rad * drop) + offset_x_m,
-            scale * drop - view.tilt_rad * along + offset_drop_m,
+            shown
+                + scale * (tip - head - view.tilt_rad * drop)
+                + offset_x_m
+                + view.curvature_per_m * bent_x_m,
+            scale * drop - view.tilt_rad * along + offset_drop_m + view.curvature_per_m * bent_drop_m,
         ]
+    }
+
+    /// Effect of a curvature of the glass of 1/m on tip and drop in the picture, m^2, at a distance `along`
+    /// along the glass from the middle. The head, which is above the glass, appears displaced towards the
+    /// centre of the arc; if the recorded head drives the model, the tip is farther from it by as much.
+    fn bend_by_curvature(&self, along: f64, drop: f64) -> [f64; 2] {
+        let height = self.scene.linkage.l1_m + self.scene.linkage.l2_m - drop;
+        [if self.observation.own_head { height * along } else { 0.0 }, -0.5 * along * along]
     }
 
     /// Position of the head along the sweep on the scale of the picture, m, from its true position.
@@ -479,6 +491,7 @@ impl<'a> RecordingModel<'a> {
                 CameraUnknown::DriftDrop => [0.0, film.after_middle_s(frame)],
                 CameraUnknown::Scale => [shown + tip - head - view.tilt_rad * drop, drop],
                 CameraUnknown::Tilt => [-scale * drop, film.centre_m - film.head_m[frame]],
+                CameraUnknown::Curvature => self.bend_by_curvature(film.head_m[frame] - film.centre_m, drop),
                 CameraUnknown::Clock => [0.0; 2],
             };
             by_value.map(|by_value| slope * by_value)

@@ -199,14 +199,17 @@ fn recorded_motion(
 ) -> Option<RecordedMotion> {
     let start_s = film.times_s[frame] - film.lead_s();
     let head = scene.drive.motion_at(start_s - view.clock_s);
-    let scale = 1.0 + view.scale;
+    let (scale, upright_m) = (1.0 + view.scale, scene.linkage.l1_m + scene.linkage.l2_m);
     let (lean, lean_rate) = fit_parabola(film, frame, |k| {
         let head = film.head_m[k] * if film.own_head { 1.0 } else { scale };
-        Some((film.tip_x_m[k]? - head - view.offsets_m(film.after_middle_s(k))[0]) / scale)
+        let bent = film.own_head.then(|| view.curvature_per_m * upright_m * (film.head_m[k] - film.centre_m));
+        let offset = view.offsets_m(film.after_middle_s(k))[0] + bent.unwrap_or(0.0);
+        Some((film.tip_x_m[k]? - head - offset) / scale)
     })?;
     let fall = fit_parabola(film, frame, |k| {
         let along = film.head_m[k] - film.centre_m;
-        Some((film.drop_m[k]? + view.tilt_rad * along - view.offsets_m(film.after_middle_s(k))[1]) / scale)
+        let level = film.drop_m[k]? + view.tilt_rad * along + 0.5 * view.curvature_per_m * along * along;
+        Some((level - view.offsets_m(film.after_middle_s(k))[1]) / scale)
     });
     film.tip_x_m[frame].or(film.drop_m[frame])?;
     Some(RecordedMotion {

@@ -30,6 +30,9 @@ pub enum CameraUnknown {
     Scale,
     /// Angle from the picture's x axis to the glass, rad.
     Tilt,
+    /// Curvature, 1/m, that the glass has in addition to the one that was measured on the path of the tip;
+    /// positive if the middle lies lower than the ends.
+    Curvature,
     /// Clock of the camera minus clock of the drive, s.
     Clock,
 }
@@ -42,6 +45,7 @@ impl CameraUnknown {
             Self::OffsetX | Self::OffsetDrop | Self::DriftX | Self::DriftDrop => 1e-4,
             Self::TipAlong | Self::TipAcross => 1e-4,
             Self::Scale | Self::Tilt => 1e-2,
+            Self::Curvature => 0.1,
             Self::Clock => 1e-4,
         }
     }
@@ -127,6 +131,7 @@ pub(crate) struct CameraParameters {
     pub drift_drop_m_per_s: f64,
     pub scale: f64,
     pub tilt_rad: f64,
+    pub curvature_per_m: f64,
     pub clock_s: f64,
 }
 
@@ -180,6 +185,7 @@ impl TraceUnknowns {
             drift_drop_m_per_s: value(CameraUnknown::DriftDrop),
             scale: value(CameraUnknown::Scale),
             tilt_rad: value(CameraUnknown::Tilt),
+            curvature_per_m: value(CameraUnknown::Curvature),
             clock_s: value(CameraUnknown::Clock),
         }
     }
