@@ -404,7 +404,7 @@ impl TraceFindings<'_, '_> {
                 notes.push(format!(
                     "{}: {}",
                     self.recording_name(film),
-                    describe_start_limits(&shoot.observation)
+                    describe_start_limits(shoot, &self.model.unknowns.camera_at(film, &end.point))
                 ));
             }
         }

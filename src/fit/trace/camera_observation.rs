@@ -52,8 +52,6 @@ pub struct CameraObservation {
     /// Angle from the x axis of the picture to the glass, and its standard deviation, rad, measured on the
     /// path of the tip. Both are 0 if the path shows no clear angle.
     pub tilt_rad: [f64; 2],
-    /// Greatest speed of the head in the fitted frames, m/s.
-    pub head_speed_m_per_s: f64,
     /// Distance between the extreme positions of the head in the fitted frames, m.
     pub head_travel_m: f64,
     /// Length of the shortest segments, s: the time scale of the blade.
@@ -167,8 +165,6 @@ impl CameraObservation {
             _ => None,
         };
         let tilt = glass.filter(|tilt| tilt.is_clear());
-        let moves = head_m[first..last].windows(2).map(|pair| (pair[1] - pair[0]).abs());
-        let head_speed_m_per_s = grid.frame_rate_hz * moves.fold(0.0, f64::max);
         let (low_m, high_m) = find_range(&head_m[first..last]);
         Self {
             tip_x_m: data(settings.tip_x, &traces.tip_x_m, &shared[0], 1.0),
@@ -181,7 +177,6 @@ impl CameraObservation {
             own_head,
             own_curve,
             centre_m,
-            head_speed_m_per_s,
             head_travel_m: high_m - low_m,
             first_segment_s,
             settings,

@@ -120,18 +120,35 @@ fn lower_cost_step(
 }
 
 /// Computes chi2 of the segments after a step of the unknowns, and refits the starting states of the segments
-/// whose chi2 has risen.
-pub(super) fn update_states(points: &[RecordingModel<'_>], segments: &mut [SegmentState], most: usize) {
+/// whose chi2 has risen. `before` are the segments before the step.
+pub(super) fn update_states(
+    points: &[RecordingModel<'_>],
+    before: &[SegmentState],
+    segments: &mut [SegmentState],
+    most: usize,
+) {
     /// Rise of a segment's chi2 above which its starting state is refitted, in standard deviations of chi2.
     const RISE_SD: f64 = 0.05;
-    segments.par_iter_mut().for_each(|segment| {
+    segments.par_iter_mut().zip(before).for_each(|(segment, before)| {
         let point = &points[segment.recording];
         let found = point.whitened_residuals(segment.frames(), &segment.start_state());
         let chi2 = found.map_or(f64::INFINITY, |residuals| residuals.norm_squared());
-        let allowed = segment.chi2 + RISE_SD * (2.0 * segment.data as f64).sqrt();
+        let allowed = before.chi2 + RISE_SD * (2.0 * before.data as f64).sqrt();
         segment.chi2 = chi2;
-        if chi2 > allowed {
-            refine_state(point, segment, most);
+        if chi2 <= allowed && chi2.is_finite() {
+            return;
+        }
+        refine_state(point, segment, most);
+        // after a short step, the state before it is nearly right
+        if segment.chi2 > allowed {
+            try_state(point, segment, &before.start_state(), most);
+        }
+        // one segment without a run costs more than all others gain
+        for state in rescue_candidates(point, segment, None, RescuePolicy::Never) {
+            if segment.chi2.is_finite() {
+                return;
+            }
+            try_state(point, segment, &state, most);
         }
     });
 }

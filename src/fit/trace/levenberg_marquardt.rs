@@ -274,7 +274,7 @@ fn accept_if_lower(
     let moved = DVector::from_iterator(point.len(), point.iter().zip(&before.point).map(|(a, b)| a - b));
     let mut segments = carry_states(model, &before.segments, at, &moved);
     let points = recording_models(model, &point)?;
-    update_states(&points, &mut segments, MAX_STATE_STEPS);
+    update_states(&points, &before.segments, &mut segments, MAX_STATE_STEPS);
     rescue_states(&points, &mut segments, MAX_STATE_STEPS, RescuePolicy::Beyond(4.0));
     let cost = total_cost(model, &point, &segments, before.plain);
     (cost < before.cost).then(|| Iterate { point, segments, cost, ..before.clone() })

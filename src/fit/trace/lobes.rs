@@ -189,7 +189,7 @@ fn move_scan_point(
     };
     let point = DVector::from_vec(model.unknowns.clamp_to_ranges((&at.point + step).as_slice()));
     let mut long = carry_states(model, &at.long, &found, &(&point - &at.point));
-    update_states(&recording_models(model, point.as_slice())?, &mut long, MAX_STATE_STEPS);
+    update_states(&recording_models(model, point.as_slice())?, &at.long, &mut long, MAX_STATE_STEPS);
     let rise = away(&point).dot(&(information * away(&point)));
     let cost = rise + long.iter().map(|segment| segment.chi2).sum::<f64>();
     Some(ScanPoint { point, long, cost })

@@ -1,6 +1,7 @@
 //! Boundaries of segments, and the states of the blade there, estimated from the recording.
 
 use super::camera_observation::CameraObservation;
+use super::model::TraceRecording;
 use super::segment_simulation::LinkState;
 use super::unknowns::CameraParameters;
 use crate::model::Linkage;
@@ -12,17 +13,12 @@ use crate::text::format_trimmed;
 use nalgebra::{DMatrix, DVector};
 use portable_math as math;
 
-/// Smallest angle between neck and lip, rad, at which the two coordinates of the tip determine both angles.
-/// In a nearly straight blade they do not.
-const MIN_BEND_RAD: f64 = 0.15;
-/// A blade counts as straight if it is bent in less than this fraction of the frames in which the tip slides.
-const LEAST_BENT: f64 = 0.5;
-/// A segment of a straight blade starts only where the lean is at least this fraction of its usual size. The
-/// lean is smaller while the blade flips over.
+/// A segment starts only where the lean is at least this fraction of its usual size. The lean is smaller
+/// while the blade flips over, and the blade is then far from its poses at rest.
 const LEAST_LEAN: f64 = 0.5;
-/// Smallest speed of the tip over the glass that counts as sliding, as a fraction of the greatest head speed.
-/// While the tip sticks, the state has only three degrees of freedom.
-const MIN_SPEED: f64 = 0.1;
+/// Smallest speed of the tip over the glass that counts as sliding, as a fraction of its usual speed. While
+/// the tip sticks, the state has only three degrees of freedom.
+const MIN_SPEED: f64 = 0.125;
 /// A speed of the tip over the glass counts as sliding only if it exceeds this number of its standard
 /// deviations.
 const SPEED_DEVIATIONS: f64 = 5.0;
@@ -36,14 +32,14 @@ const USUAL_SEGMENT_S: f64 = 0.004;
 /// Natural frequency, Hz, of the lip alone of a blade of the usual size.
 const USUAL_LIP_HZ: f64 = 608.0;
 
-/// Length of the shortest segments of a blade, s: [`USUAL_SEGMENT_S`] times a power of 4 that follows from
-/// the natural frequency of the lip alone. A power of 4, so that a small error of this frequency hardly ever
+/// Length of the shortest segments of a blade, s: [`USUAL_SEGMENT_S`] times a power of 2 that follows from
+/// the natural frequency of the lip alone. A power of 2, so that a small error of this frequency hardly ever
 /// changes the length.
 pub(crate) fn first_segment_s(linkage: &Linkage) -> f64 {
     let lip_hz = body_frequencies(linkage).lip_hz;
-    let quarters = math::ln(USUAL_LIP_HZ / lip_hz) / math::ln(4.0);
-    let steps = if quarters.is_finite() { quarters.round().clamp(-6.0, 6.0) } else { 0.0 };
-    USUAL_SEGMENT_S * math::powi(4.0, steps as i32)
+    let halves = math::ln(USUAL_LIP_HZ / lip_hz) / math::ln(2.0);
+    let steps = if halves.is_finite() { halves.round().clamp(-12.0, 12.0) } else { 0.0 };
+    USUAL_SEGMENT_S * math::powi(2.0, steps as i32)
 }
 
 /// A frame at which a segment may begin, with the state of the blade there.
@@ -59,8 +55,9 @@ pub(super) fn nominal_frames(film: &CameraObservation, length_s: f64) -> usize {
 }
 
 /// Boundaries of segments at distances of about `length_s`. Of the frames in which the tip slides and the
-/// blade is bent (or, if it is nearly straight, leans enough), the frame nearest to the nominal position is
-/// chosen. (The frame with the fastest tip would often be a frame with large noise.)
+/// blade leans enough, the frame nearest to the nominal position is chosen. (The frame with the fastest tip
+/// would often be a frame with large noise.) The blade starts there as if it passed through its poses at
+/// rest: lean and drop alone do not determine the state of a nearly straight blade.
 pub(super) fn segment_boundaries(
     scene: &Scene,
     film: &CameraObservation,
@@ -71,16 +68,13 @@ pub(super) fn segment_boundaries(
     let step = nominal_frames(film, length_s);
     // rates from one-sided windows are inaccurate
     let inner = half_width_frames(film)..film.times_s.len().saturating_sub(half_width_frames(film));
-    let least_lean_m = usual_lean_of_straight_blade(scene, film, view).map(|usual| LEAST_LEAN * usual);
+    let least_lean_m = LEAST_LEAN * usual_lean_m(scene, film, view);
     let least_speed = least_sliding_speed(film);
     let usable = |frame: usize| -> Option<SegmentBoundary> {
         inner.contains(&frame).then_some(())?;
         let seen = recorded_motion(scene, film, view, frame)?;
-        (seen.speed_m_per_s.abs() > least_speed).then_some(())?;
-        let state = match least_lean_m {
-            Some(least) => seen.lean[0].abs().ge(&least).then(|| seen.state_at_rest(scene))??,
-            None => seen.bent_state(scene)?,
-        };
+        let starts = seen.speed_m_per_s.abs() > least_speed && seen.lean[0].abs() >= least_lean_m;
+        let state = starts.then(|| seen.state_at_rest(scene))??;
         Some(SegmentBoundary { frame, state })
     };
     let mut found: Vec<SegmentBoundary> = Vec::new();
@@ -104,21 +98,38 @@ pub(super) fn segment_boundaries(
     found
 }
 
-/// Describes in which frames of a recording a segment can start, with the limits.
-pub(crate) fn describe_start_limits(film: &CameraObservation) -> String {
-    let mm = |speed: f64| format_trimmed(1e3 * speed, 3);
+/// Describes in which frames of a recording a segment can start: the limits, and what was measured.
+pub(crate) fn describe_start_limits(shoot: &TraceRecording, view: &CameraParameters) -> String {
+    let film = &shoot.observation;
+    let milli = |metres: f64| format_trimmed(1e3 * metres, 3);
+    let lean_m = usual_lean_m(&shoot.scene, film, view);
     format!(
-        "no segment was started: the tip must move over the glass faster than {} mm/s, the larger of a tenth of the \
-         greatest head speed ({} mm/s) and {SPEED_DEVIATIONS} standard deviations of a measured tip speed ({} mm/s)",
-        mm(least_sliding_speed(film)),
-        mm(film.head_speed_m_per_s),
-        mm(speed_sd(film))
+        "no segment was started: the tip must move over the glass faster than {} mm/s, the larger of an eighth of \
+         its usual speed ({} mm/s) and {SPEED_DEVIATIONS} standard deviations of a measured tip speed ({} mm/s), where the \
+         blade leans by {} mm at least, half of its usual lean ({} mm), and can rest with this lean",
+        milli(least_sliding_speed(film)),
+        milli(usual_tip_speed(film)),
+        milli(speed_sd(film)),
+        milli(LEAST_LEAN * lean_m),
+        milli(lean_m),
     )
 }
 
 /// Smallest speed of the tip over the glass, m/s, that counts as sliding.
 fn least_sliding_speed(film: &CameraObservation) -> f64 {
-    (MIN_SPEED * film.head_speed_m_per_s).max(SPEED_DEVIATIONS * speed_sd(film))
+    (MIN_SPEED * usual_tip_speed(film)).max(SPEED_DEVIATIONS * speed_sd(film))
+}
+
+/// Speed of the tip over the glass, m/s, averaged over the distance that the tip covers while it slides; 0 if
+/// it never does. Times of rest do not count, however long they are.
+fn usual_tip_speed(film: &CameraObservation) -> f64 {
+    let ([from, to], width) = (film.settings.frames, 2 * half_width_frames(film));
+    let per_s = film.rate_hz / width as f64;
+    let least = SPEED_DEVIATIONS * std::f64::consts::SQRT_2 * film.settings.noise[0].sd() * per_s;
+    let speed = |k: usize| Some((film.tip_x_m[k]? - film.tip_x_m[k - width]?).abs() * per_s);
+    let sliding = (from + width..to).filter_map(speed).filter(|speed| *speed > least);
+    let (sum, squares) = sliding.fold((0.0, 0.0), |(sum, squares), v| (sum + v, squares + v * v));
+    if sum > 0.0 { squares / sum } else { 0.0 }
 }
 
 /// Standard deviation, m/s, of the tip's speed from the noise of the frames to which it is fitted.
@@ -128,55 +139,27 @@ fn speed_sd(film: &CameraObservation) -> f64 {
     film.settings.noise[0].sd() * film.rate_hz / squares.sqrt()
 }
 
-/// Median size of the lean, m, while the tip slides, for a blade that is nearly straight; `None` for a blade
-/// that bends, or if the drop is not tracked.
-fn usual_lean_of_straight_blade(
-    scene: &Scene,
-    film: &CameraObservation,
-    view: &CameraParameters,
-) -> Option<f64> {
+/// Median size of the lean, m, while the tip slides; 0 if it never does.
+fn usual_lean_m(scene: &Scene, film: &CameraObservation, view: &CameraParameters) -> f64 {
     /// Maximum number of frames that are used.
-    const FRAMES: usize = 400;
+    const FRAMES: usize = 2000;
     let [from, to] = film.settings.frames;
     let apart = (to - from).div_ceil(FRAMES).max(1);
-    let frames = (from..to).step_by(apart);
     let least_speed = least_sliding_speed(film);
-    let seen = frames.filter_map(|frame| recorded_motion(scene, film, view, frame));
-    let sliding: Vec<RecordedMotion> =
-        seen.filter(|seen| seen.drop.is_some() && seen.speed_m_per_s.abs() > least_speed).collect();
-    let bent = sliding.iter().filter(|seen| seen.bent_state(scene).is_some()).count();
-    if sliding.is_empty() || bent as f64 >= LEAST_BENT * sliding.len() as f64 {
-        return None;
-    }
-    median_in_place(&mut sliding.iter().map(|seen| seen.lean[0].abs()).collect::<Vec<_>>())
+    let seen = (from..to).step_by(apart).filter_map(|frame| recorded_motion(scene, film, view, frame));
+    let sliding = seen.filter(|seen| seen.speed_m_per_s.abs() > least_speed);
+    median_in_place(&mut sliding.map(|seen| seen.lean[0].abs()).collect::<Vec<_>>()).unwrap_or(0.0)
 }
 
 /// Motion of the blade when the shutter opens for a frame, from parabolas fitted to the neighbouring frames.
 struct RecordedMotion {
     /// Distance of the tip from the head along the sweep, m, and its rate, m/s.
     lean: [f64; 2],
-    /// Drop of the head, m, and its rate, m/s; `None` if it is not tracked.
-    drop: Option<[f64; 2]>,
     /// Speed of the tip over the glass, m/s.
     speed_m_per_s: f64,
 }
 
 impl RecordedMotion {
-    /// State of a bent blade, from lean and drop; without a drop, from [`Self::state_at_rest`]. `None` if the
-    /// blade is nearly straight, or if no angles give this lean and drop.
-    fn bent_state(&self, scene: &Scene) -> Option<LinkState> {
-        let state = match self.drop {
-            None => self.state_at_rest(scene)?,
-            Some([drop, drop_rate]) => {
-                let [theta, phi] = link_angles(&scene.linkage, self.lean[0], drop)?;
-                let [theta_rate, phi_rate] =
-                    link_rates(&scene.linkage, [theta, phi], self.lean[1], drop_rate);
-                LinkState::new(theta, phi, theta_rate, phi_rate)
-            }
-        };
-        ((state[1] - state[0]).abs() > MIN_BEND_RAD).then_some(state)
-    }
-
     /// State of a blade that passes through its equilibrium poses: its angles are those at rest with the same
     /// lean.
     fn state_at_rest(&self, scene: &Scene) -> Option<LinkState> {
@@ -214,7 +197,6 @@ fn recorded_motion(
     film.tip_x_m[frame].or(film.drop_m[frame])?;
     Some(RecordedMotion {
         lean: [lean + fall.map_or(0.0, |(drop, _)| view.tilt_rad * drop), lean_rate],
-        drop: fall.map(|(drop, rate)| [drop, rate]),
         speed_m_per_s: lean_rate + head.velocity_m_per_s,
     })
 }
@@ -244,31 +226,4 @@ fn fit_parabola(
     let values = DVector::from_fn(points.len(), |row, _| points[row][1]);
     let found = powers.svd(true, true).solve(&values, 1e-12).ok()?;
     Some((found[0], found[1] * film.rate_hz))
-}
-
-/// Angles of neck and lip, with the lip trailing, for which the tip is at the distance `lean` from the head
-/// along the sweep and the head has dropped by `drop`; `None` if the tip is out of reach.
-fn link_angles(linkage: &Linkage, lean: f64, drop: f64) -> Option<[f64; 2]> {
-    /// Largest accepted value of the cosine of an angle. It exceeds 1 because noise may make a straight blade
-    /// appear too long.
-    const REACH: f64 = 1.02;
-    let (l1, l2) = (linkage.l1_m, linkage.l2_m);
-    let height = l1 + l2 - drop;
-    let cosine = (lean * lean + height * height - l1 * l1 - l2 * l2) / (2.0 * l1 * l2);
-    if cosine.abs() > REACH {
-        return None;
-    }
-    let bend = math::acos(cosine.clamp(-1.0, 1.0)).copysign(lean);
-    let theta = math::atan2(lean, height) - math::atan2(l2 * math::sin(bend), l1 + l2 * math::cos(bend));
-    Some([theta, theta + bend])
-}
-
-/// Angular velocities of neck and lip from the rates of lean and drop.
-fn link_rates(linkage: &Linkage, [theta, phi]: [f64; 2], lean_rate: f64, drop_rate: f64) -> [f64; 2] {
-    let (l1, l2) = (linkage.l1_m, linkage.l2_m);
-    let determinant = l1 * l2 * math::sin(phi - theta);
-    [
-        l2 * (math::sin(phi) * lean_rate - math::cos(phi) * drop_rate) / determinant,
-        l1 * (math::cos(theta) * drop_rate - math::sin(theta) * lean_rate) / determinant,
-    ]
 }
