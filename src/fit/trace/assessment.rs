@@ -208,7 +208,8 @@ fn compare_segment_lengths(
     sd: &[f64],
 ) -> Option<(Vec<f64>, Option<String>)> {
     let earlier = trace_covariance(model, shorter)?;
-    let variance = |i: usize| earlier.curvature[(i, i)].max(earlier.sandwich[(i, i)]).max(sd[i] * sd[i]);
+    let widening = earlier.gradient_scatter.max(1.0);
+    let variance = |i: usize| earlier.variance(i, widening).max(sd[i] * sd[i]);
     let moved = |i: usize| shorter.point[i] - end.point[i];
     let left = |i: usize| moved(i) * moved(i) - 4.0 * (variance(i) - sd[i] * sd[i]);
     let bias = (0..sd.len()).map(|i| left(i).max(0.0).sqrt()).collect();

@@ -209,10 +209,13 @@ fn carry_state_over(
     point.end_state([old.first, segment.first], &old.start_state())
 }
 
-/// Whether the constants are held at their prior means. They are held in all stages but the last, because far
-/// from the minimum they would absorb the misfit of wrong parameters.
+/// Whether the constants are held at their prior means. They are held in the first stage, because far from
+/// the minimum they would absorb the misfit of wrong parameters; longer segments do not fit with wrong
+/// constants.
 fn holds_constants(model: &TraceModel, settings: &TraceSearchSettings, at: &Iterate) -> bool {
-    at.stage + 1 < settings.segment_s.len() && (0..at.point.len()).any(|i| model.unknowns.is_constant(i))
+    at.stage == 0
+        && settings.segment_s.len() > 1
+        && (0..at.point.len()).any(|i| model.unknowns.is_constant(i))
 }
 
 /// One outer step; with `held`, the constants keep their values. If no step of the unknowns lowers the cost,

@@ -130,16 +130,19 @@ pub(super) fn carry_states(
     segments
 }
 
-/// Covariance of the coordinates of the unknowns, estimated in two ways: from the curvature of the cost, and
-/// as a sandwich estimate from the scatter between segments.
+/// Covariance of the coordinates of the unknowns, and the scatter of the cost gradients between segments.
 #[derive(Debug, Clone)]
 pub(crate) struct TraceCovariance {
     /// Information matrix of the recordings and the priors.
     pub information: DMatrix<f64>,
     /// Covariance from the curvature of the cost: the inverse of the information matrix, plus `heads`.
     pub curvature: DMatrix<f64>,
-    /// Sandwich estimate from the scatter of the cost gradients of the segments, plus `heads`.
-    pub sandwich: DMatrix<f64>,
+    /// Part of `curvature` that comes from the errors of the priors: C P C with the inverse C of the
+    /// information matrix and the information P of the priors.
+    priors: DMatrix<f64>,
+    /// Mean square of the cost gradients of the segments, compared with the one that noise of the measured
+    /// size gives. It is 1 on average for a right model and white residuals.
+    pub gradient_scatter: f64,
     /// Covariance due to errors of the recorded head positions.
     pub heads: DMatrix<f64>,
 }
@@ -147,20 +150,33 @@ pub(crate) struct TraceCovariance {
 /// Covariance of the unknowns at an iterate; `None` if the information matrix is singular.
 pub(crate) fn trace_covariance(model: &TraceModel, at: &Iterate) -> Option<TraceCovariance> {
     let found = normal_equations(model, &at.point, &at.segments, true)?;
-    let curvature = found.matrix.clone().cholesky()?.inverse();
-    let n = at.point.len();
-    let mut middle = DMatrix::zeros(n, n);
-    found.parts.iter().flatten().for_each(|part| middle += &part.slope * part.slope.transpose());
-    let used = found.parts.iter().flatten().count();
-    middle *= used as f64 / (used as f64 - n as f64).max(1.0);
-    for (i, unknown) in model.unknowns.0.iter().enumerate() {
-        if let Some([_, per_unit]) = unknown.prior_residual(at.point[i]) {
-            middle[(i, i)] += per_unit * per_unit;
-        }
+    let inverse = found.matrix.clone().cholesky()?.inverse();
+    let prior = model.unknowns.0.iter().zip(&at.point).map(|(unknown, z)| {
+        let residual = unknown.prior_residual(*z);
+        residual.map_or(0.0, |[_, slope]| slope * slope)
+    });
+    let prior = DVector::from_iterator(at.point.len(), prior);
+    // number of unknowns that the data determine, and not the priors
+    let determined = prior.len() as f64 - inverse.diagonal().dot(&prior);
+    let parts = || found.parts.iter().flatten();
+    let square: f64 = parts().map(|part| part.slope.dot(&(&inverse * &part.slope))).sum();
+    // at the minimum, the gradients of the segments have one degree of freedom less per determined unknown
+    let left = (parts().count() as f64 - determined).max(1.0);
+    let gradient_scatter = square / determined.max(1.0) * parts().count() as f64 / left;
+    let priors = &inverse * DMatrix::from_diagonal(&prior) * &inverse;
+    let heads = &inverse * head_curve_covariance(model, at)? * &inverse;
+    let curvature = inverse + &heads;
+    Some(TraceCovariance { information: found.matrix, curvature, priors, gradient_scatter, heads })
+}
+
+impl TraceCovariance {
+    /// Variance of the coordinate of unknown `i` if the variance of the noise is `widening` times the
+    /// measured one.
+    pub(super) fn variance(&self, i: usize, widening: f64) -> f64 {
+        let at = (i, i);
+        let by_noise = self.curvature[at] - self.heads[at] - self.priors[at];
+        widening * by_noise + self.priors[at] + self.heads[at]
     }
-    let heads = &curvature * head_curve_covariance(model, at)? * &curvature;
-    let sandwich = &curvature * middle * &curvature + &heads;
-    Some(TraceCovariance { information: found.matrix, curvature: curvature + &heads, sandwich, heads })
 }
 
 /// Covariance of the cost gradient due to errors of the recorded head positions. The curve fitted to these

@@ -91,11 +91,10 @@ pub(crate) struct SearchEnd<'a> {
     pub seed: u64,
     pub at: &'a Iterate,
     pub covariance: TraceCovariance,
-    /// Factor on the measured variance of the noise: chi2 per degree of freedom, but at least 1, because the
-    /// noise may be larger than measured.
+    /// Factor on the measured variance of the noise: chi2 per degree of freedom or the scatter of the cost
+    /// gradients of the segments, but at least 1, because the noise may be larger than measured.
     pub widening: f64,
-    /// Standard deviation of each coordinate: the larger of two estimates, one from the curvature of the cost
-    /// (with `widening`) and one from the sandwich formula.
+    /// Standard deviation of each coordinate, with `widening`.
     pub sd: Vec<f64>,
 }
 
@@ -108,9 +107,8 @@ impl<'a> SearchEnd<'a> {
         at: &'a Iterate,
     ) -> Option<Self> {
         let covariance = trace_covariance(model, at)?;
-        let widening = chi2_per_dof(at).0.max(1.0);
-        let variance = |i: usize| (widening * covariance.curvature[(i, i)]).max(covariance.sandwich[(i, i)]);
-        let sd = (0..at.point.len()).map(|i| variance(i).sqrt()).collect();
+        let widening = chi2_per_dof(at).0.max(covariance.gradient_scatter).max(1.0);
+        let sd = (0..at.point.len()).map(|i| covariance.variance(i, widening).sqrt()).collect();
         Some(Self { model, settings, seed, at, covariance, widening, sd })
     }
 
