@@ -2,9 +2,8 @@
 //! JSON per record.
 //!
 //! The first line is a [`CheckpointHeader`] with the fingerprint of the problem. Every other line is a
-//! [`CheckpointRecord`]: an evaluation of a fit or a point of a study. Numbers are written as
-//! [`ExactNumber`]s: strings with the shortest decimal that keeps every bit, because JSON readers may round
-//! numbers. Every line ends with a checksum. A complete line with a wrong checksum is refused, and an
+//! [`CheckpointRecord`]: an evaluation of a fit or a point of a study. A number is the shortest decimal that
+//! keeps every bit. Every line ends with a checksum. A complete line with a wrong checksum is refused, and an
 //! incomplete last line is dropped.
 
 mod checksum;
@@ -22,8 +21,6 @@ pub use read::{
     CheckpointEnd, CheckpointFile, CheckpointReader, RECHECKED_RECORDS, StoredRecord, check_recomputed,
     duplicate_record_error, read_checkpoint, sample_records,
 };
-pub(crate) use record::exact;
-pub use record::{
-    CheckpointRecord, CheckpointSink, ExactNumber, NullSink, format_header_line, format_record_line,
-};
+pub(crate) use read::{FIRST_LINE, describe_difference};
+pub use record::{CheckpointRecord, CheckpointSink, NullSink, format_header_line, format_record_line};
 pub use shard::Shard;

@@ -72,7 +72,7 @@ pub fn run_sweep(
                 return Err(SweepError::Interrupted);
             }
             let outcome = PointOutcome::run_point(study, scene, index);
-            let line = format_record_line(&SweepPoint { index, outcome }, index);
+            let line = format_record_line(&SweepPoint { index, outcome });
             // the channel closes only after a failure, which the writer reports
             to_disk.send(line).map_err(|_| SweepError::Interrupted)
         };

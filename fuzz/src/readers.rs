@@ -5,7 +5,7 @@ use wiperlab::checkpoint::{
     CheckpointFile, CheckpointRecord, append_checksum, format_header_line, format_record_line,
     read_checkpoint,
 };
-use wiperlab::fit::feature_checkpoint::EvaluationRecord;
+use wiperlab::fit::checkpoint::FitRecord;
 use wiperlab::fit::job::Job;
 use wiperlab::fit::result::FitResult;
 use wiperlab::recording::files::{RecordingFile, read_recording, trace_csv};
@@ -104,7 +104,7 @@ fn trace(text: &str) {
 fn journals(text: &str) {
     // as it is, and with new checksums: else nearly every change would end at the first of them
     for text in [text.to_owned(), resealed(text)] {
-        journal::<EvaluationRecord>(&text);
+        journal::<FitRecord>(&text);
         journal::<SweepPoint>(&text);
     }
 }
@@ -121,7 +121,7 @@ where
     R::Body: PartialEq + std::fmt::Debug,
 {
     let Ok(Some(found)) = read_checkpoint::<R>("journal.jsonl", text) else { return };
-    let lines = found.records.iter().enumerate().map(|(at, record)| format_record_line(record, at));
+    let lines = found.records.iter().map(format_record_line);
     let written = format_header_line(&found.header) + &lines.collect::<String>();
     let back: CheckpointFile<R> =
         read_checkpoint("journal.jsonl", &written).expect("reads back").expect("has a header");

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// Version of the layout of journals.
-pub(super) const LAYOUT: u32 = 3;
+pub(super) const LAYOUT: u32 = 4;
 
 /// Kind of computation that a journal records.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -15,8 +15,6 @@ pub(super) const LAYOUT: u32 = 3;
 pub enum CheckpointKind {
     /// Evaluations of a fit.
     Fit,
-    /// Iterates of a fit to traces.
-    Trace,
     /// Points of a study.
     Sweep,
 }
@@ -26,7 +24,6 @@ impl CheckpointKind {
     fn words(self) -> [&'static str; 3] {
         match self {
             Self::Fit => ["fit", "evaluation", "job"],
-            Self::Trace => ["trace fit", "iterate", "job"],
             Self::Sweep => ["sweep", "point", "study"],
         }
     }

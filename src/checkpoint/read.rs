@@ -7,11 +7,12 @@ use super::record::CheckpointRecord;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::de::DeserializeOwned;
+use serde_json::Value;
 use std::collections::HashMap;
 use std::io::{BufRead, Read};
 
 /// Line number of the first record, counted from 1.
-const FIRST_LINE: usize = 2;
+pub(crate) const FIRST_LINE: usize = 2;
 
 /// A journal in memory.
 #[derive(Debug, Clone, PartialEq)]
@@ -73,34 +74,46 @@ fn is_complete(line: &RawLine) -> bool {
     line.ended || LineChecksum::check(strip_byte_order_mark(line.bytes)) != LineChecksum::Absent
 }
 
-impl<R: CheckpointRecord> CheckpointFile<R> {
-    /// Compares the record at index `place` with the result of the same computation made again.
-    ///
-    /// # Errors
-    /// [`CheckpointError::Recomputed`] if they differ.
-    pub(crate) fn check_recomputed(
-        &self,
-        file: &str,
-        place: usize,
-        again: &R,
-    ) -> Result<(), CheckpointError> {
-        let Some(stored) = self.records.get(place) else { return Ok(()) };
-        check_recomputed(file, &StoredRecord { record: stored.clone(), line: place + FIRST_LINE }, again)
-    }
-}
-
 /// Compares a record with the result of the same computation made again.
 ///
 /// # Errors
-/// [`CheckpointError::Recomputed`] if they differ.
+/// [`CheckpointError::Recomputed`] if they differ in any bit.
 pub fn check_recomputed<R: CheckpointRecord>(
     file: &str,
     stored: &StoredRecord<R>,
     again: &R,
 ) -> Result<(), CheckpointError> {
-    let Some([found, computed]) = stored.record.difference(again) else { return Ok(()) };
+    let Some([found, computed]) = describe_difference(&stored.record, again) else { return Ok(()) };
     let (file, line, kind) = (file.to_owned(), stored.line, R::KIND);
     Err(CheckpointError::Recomputed { file, line, kind, found, computed })
+}
+
+/// First difference between two outcomes of the same computation, as a text for each outcome; `None` if they
+/// are equal.
+pub(crate) fn describe_difference<R: CheckpointRecord>(one: &R, other: &R) -> Option<[String; 2]> {
+    let [one, other] = [one, other].map(|record| serde_json::to_value(record).unwrap_or_default());
+    let (key, values) = first_difference(&one, &other)?;
+    Some(values.map(|value| format!("{} {value}", key.trim_start_matches('.'))))
+}
+
+/// Key and values of the first difference between two JSON values. Numbers are compared as texts, which
+/// keep every bit.
+fn first_difference(one: &Value, other: &Value) -> Option<(String, [String; 2])> {
+    let named = |key: String| move |(inner, values): (String, [String; 2])| (format!("{key}{inner}"), values);
+    match (one, other) {
+        (Value::Object(a), Value::Object(b)) if a.keys().eq(b.keys()) => {
+            let mut pairs = a.iter().zip(b.values());
+            pairs.find_map(|((key, a), b)| first_difference(a, b).map(named(format!(".{key}"))))
+        }
+        (Value::Array(a), Value::Array(b)) if a.len() == b.len() => {
+            let mut pairs = a.iter().zip(b).enumerate();
+            pairs.find_map(|(at, (a, b))| first_difference(a, b).map(named(format!("[{at}]"))))
+        }
+        _ => {
+            let values = [one, other].map(Value::to_string);
+            (values[0] != values[1]).then(|| (String::new(), values))
+        }
+    }
 }
 
 fn parse_header<R: CheckpointRecord>(
@@ -259,14 +272,9 @@ impl<R: CheckpointRecord, S: BufRead> CheckpointReader<R, S> {
             return Ok(None);
         }
         let refused = |problem| line_error::<R>(file, *line, problem);
-        let row = check_line(found.bytes).and_then(|object| parse_json(&object, R::KIND.record()));
-        let row = row.map_err(refused)?;
-        let expected = *line - FIRST_LINE;
-        if let Some(index) = R::line_index(&row).filter(|index| *index != expected) {
-            let problem = format!("`index`: found {index}, expected {expected}; lines are missing before it");
-            return Err(refused(problem));
-        }
-        let record = R::from_row(row, &header.body).map_err(refused)?;
+        let record = check_line(found.bytes).and_then(|object| parse_json::<R>(&object, R::KIND.record()));
+        let record = record.map_err(refused)?;
+        record.check_against(&header.body).map_err(refused)?;
         *end = CheckpointEnd { intact_bytes: found.end_offset, torn: false, unended: !found.ended };
         *line += 1;
         Ok(Some(StoredRecord { record, line: *line - 1 }))

@@ -9,12 +9,10 @@ use super::checkpoint::{CHECKPOINT_FILE, CheckpointWriter};
 use super::job::LoadedJob;
 use super::load::print_warnings;
 use super::prelude::*;
-use crate::checkpoint::{CheckpointFile, CheckpointRecord, Shard};
-use crate::fit::evaluation::EvaluationStage;
-use crate::fit::ledger::FitProgress;
+use crate::checkpoint::Shard;
+use crate::fit::checkpoint::FitCheckpoint;
+use crate::fit::journal::FitProgress;
 use crate::fit::result::{FitResult, FitStatus};
-use crate::fit::trace::{MAX_STARTS, UncertaintyRun};
-use crate::fit::trace_ledger::TraceProgress;
 use crate::fit::{FitContext, FitError};
 pub(crate) use batch::{BatchJobState, check_distinct_folders};
 use indicatif::ProgressBar;
@@ -101,50 +99,18 @@ impl LoadedJob {
         most: Option<usize>,
         overwrite: Overwrite,
     ) -> Outcome<CompletedFit> {
-        let limit = most.unwrap_or(usize::MAX);
-        if self.problem.traces().is_empty() {
-            let expected = self.expected_evaluations().min(limit);
-            return self.search(
-                global,
-                resume,
-                overwrite,
-                ("evaluations", expected),
-                |resume, sink, shown| {
-                    let context = FitContext { max_evaluations: most, resume, ..self.problem.new_context() };
-                    self.problem.fit_with(&context, sink, &mut |now: &FitProgress| {
-                        let journaled = if now.stage == EvaluationStage::Gate { 0 } else { now.evaluations };
-                        let words = format!("{}, cost {:.4}", now.stage.name(), now.best_cost);
-                        shown.advance(now.evaluations, now.replayed, journaled, words)
-                    })
-                },
-            );
-        }
-        let expected = self.expected_iterates().min(limit);
-        let stages = self.problem.segment_s();
-        self.search(global, resume, overwrite, ("iterates", expected), |resume, sink, shown| {
-            self.problem.fit_traces(resume, most, sink, &mut |now: &TraceProgress| {
-                shown.advance(now.iterates, now.replayed, now.iterates, describe_stage(now, stages))
-            })
-        })
-    }
-
-    /// Runs a search and writes its journal. `records` is the word for the records of the journal in
-    /// messages; `expected` is their approximate number.
-    fn search<R: CheckpointRecord>(
-        &self,
-        global: &GlobalArgs,
-        resume: bool,
-        overwrite: Overwrite,
-        (records, expected): (&'static str, usize),
-        search: impl FnOnce(ResumedCheckpoint<R>, &mut CheckpointWriter, &mut SearchDisplay) -> FitOutcome,
-    ) -> Outcome<CompletedFit> {
+        let (records, expected) = match self.problem.traces().is_empty() {
+            true => ("evaluations", self.expected_evaluations()),
+            false => ("iterates", self.expected_iterates()),
+        };
+        let expected = expected.min(most.unwrap_or(usize::MAX));
         let writer = global.write_policy(OutputCommand::Fit, overwrite);
         self.check_outputs(&writer)?;
         let path = self.folder.join(CHECKPOINT_FILE);
         let name = path.display().to_string();
         let (mut sink, resumed) = CheckpointWriter::open(&path, resume)?;
         let bar = progress::start_bar(expected as u64, "fit", records, global.quiet);
-        let found = resumed.as_ref().map_or(0, |found: &CheckpointFile<R>| found.records.len());
+        let found = resumed.as_ref().map_or(0, |found: &FitCheckpoint| found.records.len());
         let journaled = Arc::new(AtomicUsize::new(found));
         let kept = {
             let (journal, job, journaled) = (name.clone(), self.file.clone(), Arc::clone(&journaled));
@@ -159,7 +125,9 @@ impl LoadedJob {
         let mut shown = SearchDisplay { bar, replayed: 0, journaled };
         let clock = Instant::now();
         let resume = resumed.as_ref().map(|journal| (name.as_str(), journal));
-        let result = search(resume, &mut sink, &mut shown).map_err(|error| match error {
+        let context = FitContext { max_evaluations: most, resume, ..self.problem.new_context() };
+        let fitted = self.problem.fit_with(&context, &mut sink, &mut |now: &FitProgress| shown.advance(now));
+        let result = fitted.map_err(|error| match error {
             FitError::JournalWrite { .. } => Failure::internal(error),
             FitError::Journal(_) | FitError::OtherSeed { .. } => Failure::input(error),
             _ => Failure::at(&self.file, error),
@@ -194,10 +162,6 @@ impl LoadedJob {
     }
 }
 
-/// The journal from which a search continues, with its name.
-type ResumedCheckpoint<'a, R> = Option<(&'a str, &'a CheckpointFile<R>)>;
-type FitOutcome = Result<FitResult, FitError>;
-
 /// Approximate number of iterates in a stage of a fit to traces, from the recovery study. It serves to
 /// estimate the remaining time.
 const ITERATES_A_STAGE: usize = 14;
@@ -218,28 +182,15 @@ struct SearchDisplay {
 impl SearchDisplay {
     /// Moves the bar. The remaining time is estimated only from evaluations that were computed, not from
     /// those that were read from the journal.
-    fn advance(&mut self, made: usize, replayed: usize, journaled: usize, words: String) -> ControlFlow<()> {
-        self.bar.set_length(self.bar.length().unwrap_or(0).max(made as u64));
-        self.bar.set_position(made as u64);
-        if replayed > self.replayed {
+    fn advance(&mut self, now: &FitProgress) -> ControlFlow<()> {
+        self.bar.set_length(self.bar.length().unwrap_or(0).max(now.evaluations as u64));
+        self.bar.set_position(now.evaluations as u64);
+        if now.replayed > self.replayed {
             self.bar.reset_eta();
         }
-        self.bar.set_message(words);
-        self.replayed = replayed;
-        self.journaled.fetch_max(journaled, Ordering::Relaxed);
+        self.bar.set_message(now.activity.clone());
+        self.replayed = now.replayed;
+        self.journaled.fetch_max(now.journaled, Ordering::Relaxed);
         interrupt::control_flow()
     }
-}
-
-/// Describes the current stage of a fit to traces.
-fn describe_stage(now: &TraceProgress, stages: &[f64]) -> String {
-    let (bad, all) = (now.bad_segments, now.segments);
-    let length_ms = 1e3 * stages.get(now.stage).copied().unwrap_or_default();
-    let chain = match UncertaintyRun::from_chain_number(now.start) {
-        None if now.start >= MAX_STARTS => format!("minimum {}", now.start - MAX_STARTS + 1),
-        None => format!("start {}", now.start + 1),
-        Some(UncertaintyRun::Twin(twin)) => format!("twin {}", twin + 1),
-        Some(UncertaintyRun::Shorter | UncertaintyRun::Side { .. }) => "intervals".to_owned(),
-    };
-    format!("{chain}, segments of {length_ms} ms, {bad} of {all} bad, cost {:.1}", now.cost)
 }

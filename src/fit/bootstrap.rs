@@ -10,7 +10,8 @@
 
 use super::camera_calibration::draw_camera_errors;
 use super::evaluation::{Evaluation, EvaluationStage, Observed};
-use super::ledger::{Ledger, StopReason};
+use super::journal::StopReason;
+use super::ledger::Ledger;
 use super::linear_model::{broyden_update, damped_step, residuals_against, step_in_box};
 use super::objective::Objective;
 use super::target_value::TargetValue;

@@ -1,6 +1,5 @@
 //! One evaluation of the cost: a point, the features of the model there, and their cost.
 
-use crate::checkpoint::exact;
 use crate::simulate::RunStatus;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -12,20 +11,24 @@ use std::fmt;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Observation {
     /// Value of the feature, in its own SI unit; finite.
-    #[serde(with = "exact")]
     pub value: f64,
     /// Standard deviation of the feature over the starting states, in the unit of the feature; 0 for a single
     /// state.
-    #[serde(with = "exact")]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub spread: f64,
     /// Level of the strongest spectral peak of the band relative to the peak that is assigned to the feature,
     /// dB. It is 0 if the assigned peak is the strongest, and for features without peaks.
-    #[serde(with = "exact")]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub below_db: f64,
 }
 
+fn is_zero(number: &f64) -> bool {
+    *number == 0.0
+}
+
 /// A feature of a model run: its value, or the reason why it has none.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
 pub enum Observed {
     /// The feature has a value.
     Value(Observation),
@@ -75,15 +78,18 @@ pub struct Evaluation {
 
 /// An evaluation without costs. The costs also depend on the scatter of the features, which the search
 /// estimates.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct EvaluationOutcome {
     /// Point in the unit box, one coordinate per parameter.
     pub unit: Vec<f64>,
-    /// Parameter values in job order, in their SI units.
+    /// Parameter values in job order, in their SI units. They follow from the point and are not stored.
+    #[serde(skip)]
     pub values: Vec<f64>,
     /// Features in the order of the targets; empty when the run failed.
     pub features: Vec<Observed>,
     /// Reason why the run failed, if it did.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<RunFailure>,
 }
 
@@ -190,7 +196,6 @@ pub struct RunFailure {
     /// Description of the failure.
     pub message: String,
     /// Fraction of the run that was completed, 0 to 1.
-    #[serde(with = "exact")]
     pub progress: f64,
 }
 

@@ -11,7 +11,6 @@ use super::scene_model::{ModelCondition, SceneModel};
 use super::target_value::TargetValue;
 use super::targets::split_held_out;
 use super::trace::{FittedTraces, TraceUnknown, UnknownKind, first_fitting};
-use super::trace_checkpoint::camera_unknown_key;
 use crate::model::Pose;
 use crate::simulate::drive::Drive;
 use crate::simulate::scene::{Scene, StartKind};
@@ -45,7 +44,7 @@ impl Problem {
         let estimate = |unknown: &TraceUnknown| {
             let (recording, name) = match &unknown.kind {
                 UnknownKind::Parameter { name, .. } => (None, name.as_str()),
-                UnknownKind::Camera { film, what } => (names.get(*film), camera_unknown_key(*what)[0]),
+                UnknownKind::Camera { film, what } => (names.get(*film), what.key()),
             };
             let is_same = |n: &&NuisanceResult| n.recording.as_ref() == recording && n.name == name;
             let found = result.nuisances.iter().find(is_same).map(|nuisance| nuisance.estimate);

@@ -14,8 +14,7 @@ use super::objective::{Objective, residual};
 use super::problem::Problem;
 use super::target_value::TargetValue;
 use super::targets::{measure_targets, split_held_out};
-use super::trace::{TraceModel, fit_states_at, frame_residuals};
-use super::trace_checkpoint::HeaderCoordinate;
+use super::trace::{TraceModel, TraceUnknown, fit_states_at, frame_residuals};
 use crate::feature::Feature;
 use portable_math as math;
 use std::f64::consts::{LN_2, SQRT_2, TAU};
@@ -57,9 +56,8 @@ impl Posterior {
         if let Some(model) = problem.trace_model() {
             let model = model.map_err(|error| FitError::CannotBeFitted { why: error.to_string() })?;
             let recordings = problem.trace_recording_names();
-            let unknowns = model.unknowns.0.iter().map(|of| {
-                PosteriorParameter::from_coordinate(&HeaderCoordinate::from_unknown(of, &recordings))
-            });
+            let unknowns =
+                model.unknowns.0.iter().map(|of| PosteriorParameter::from_unknown(of, of.name(&recordings)));
             let (unknowns, data) = (unknowns.collect(), PosteriorData::Traces(Box::new(model)));
             return Ok(Self { problem, unknowns, data });
         }
@@ -168,11 +166,10 @@ impl PosteriorParameter {
         Self { name: name.to_owned(), bounds, is_log, prior }
     }
 
-    fn from_coordinate(coordinate: &HeaderCoordinate) -> Self {
-        let bounds = coordinate.range.map(|end| coordinate.value(end.0));
-        let unit = coordinate.per_unit.map_or(1.0, |unit| unit.0);
-        let prior = coordinate.prior.map(|[mean, sd]| [mean.0 * unit, sd.0 * unit]);
-        Self { name: coordinate.name.clone(), bounds, is_log: coordinate.per_unit.is_none(), prior }
+    fn from_unknown(of: &TraceUnknown, name: String) -> Self {
+        let unit = of.unit().unwrap_or(1.0);
+        let prior = of.prior.map(|prior| prior.map(|along| along * unit));
+        Self { name, bounds: of.range.map(|end| of.value(end)), is_log: of.unit().is_none(), prior }
     }
 
     fn coordinate(&self, value: f64) -> f64 {

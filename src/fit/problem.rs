@@ -2,14 +2,13 @@
 
 use super::context::FitContext;
 use super::job::{FreeParameter, HeadSource, Job};
-use super::ledger::{FitProgress, OnProgress};
+use super::journal::{FitProgress, OnProgress};
 use super::nuisance_parameters::{FreedConstant, NuisanceError, check_scaling, free_constants};
 use super::result::FitResult;
 use super::run::fit_features;
 use super::scene_model::{Instrument, ModelCondition, PlausibilityLimits, SceneModel};
 use super::trace::{TraceModel, TraceSource};
 use super::trace_data::{TraceData, TraceError, prepare_traces};
-use super::trace_ledger::TraceProgress;
 use super::{FitError, job};
 use crate::checkpoint::{CheckpointSink, NullSink, fingerprint};
 use crate::recording::quality::measure_quality;
@@ -230,18 +229,13 @@ impl Problem {
     pub fn fit_with(
         &self,
         context: &FitContext,
-        journal: &mut dyn CheckpointSink,
+        sink: &mut dyn CheckpointSink,
         on_progress: &mut OnProgress,
     ) -> Result<FitResult, FitError> {
         if !self.traces.is_empty() {
-            if context.resume.is_some() {
-                let why = "a job with [[trace]] goes on from a journal of iterates: `Problem::fit_traces`";
-                return Err(FitError::CannotBeFitted { why: why.to_owned() });
-            }
-            let mut flow = |now: &TraceProgress| on_progress(&(*now).into());
-            return self.fit_traces(None, context.max_evaluations, journal, &mut flow);
+            return self.fit_traces(context, sink, on_progress);
         }
-        fit_features(&self.job, &self.recordings, &self.model, context, journal, on_progress)
+        fit_features(&self.job, &self.recordings, &self.model, context, sink, on_progress)
     }
 }
 

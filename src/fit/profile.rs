@@ -14,7 +14,8 @@
 
 use super::bounds::clamp_unit;
 use super::evaluation::{Evaluation, EvaluationStage};
-use super::ledger::{Ledger, StopReason};
+use super::journal::StopReason;
+use super::ledger::Ledger;
 use super::linear_model::{self, FeatureSlopes, SingularDirections};
 use super::linear_model::{broyden_update, damped_step, difference_points, step_in_box};
 use super::objective::Objective;

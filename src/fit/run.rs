@@ -1,13 +1,12 @@
 //! Fit of features, from the targets to the result.
 
 use super::advice::advise_measurements;
+use super::checkpoint::FitHeader;
 use super::evaluation::Evaluation;
-use super::feature_checkpoint::{
-    EvaluationRecord, FeatureHeader, FeatureHeaderBody, HeaderFeature, HeaderParameter,
-};
 use super::identifiability::{Identifiability, assess_identifiability};
-use super::job::{FitTarget, FreeParameter, Job};
-use super::ledger::{Ledger, OnProgress, StopReason};
+use super::job::{FitTarget, Job};
+use super::journal::{Journal, OnProgress, StopReason};
+use super::ledger::Ledger;
 use super::misfit::{far_from_priors, unexplained_headline};
 use super::model::{Draw, Model, ModelFeatures};
 use super::objective::Objective;
@@ -19,11 +18,10 @@ use super::start_transient::start_notes;
 use super::target_value::TargetValue;
 use super::targets::{measure_targets, split_held_out};
 use super::uncertainty::{FeatureWeights, FitUncertainty};
-use super::{FitError, feature_checkpoint, search, uncertainty};
+use super::{FitError, search, uncertainty};
 use crate::checkpoint::CheckpointSink;
-use crate::feature::{FeatureUnit, FeatureValue};
+use crate::feature::FeatureValue;
 use crate::fit::context::FitContext;
-use crate::model::parameters::find_parameter;
 use crate::recording::Recording;
 use std::cell::OnceCell;
 use std::slice;
@@ -40,7 +38,7 @@ pub fn job_warnings(job: &Job) -> Vec<String> {
 /// Fits the parameters of a job on features. `measured` has one entry per condition, `None` for a condition
 /// without a recording; `model` simulates recordings as a function of the parameters.
 ///
-/// Every new evaluation is written to `journal` as a line and reported to `on_progress`. A new journal starts
+/// Every new evaluation is written to `sink` as a line and reported to `on_progress`. A new journal starts
 /// with a header; nothing is written before the identifiability is assessed. The result depends only on the
 /// fingerprint and the evaluation limit of the context, not on the number of threads or on interruptions.
 ///
@@ -52,25 +50,28 @@ pub fn fit_features(
     measured: &[Option<Recording>],
     model: &dyn Model,
     context: &FitContext,
-    journal: &mut dyn CheckpointSink,
+    sink: &mut dyn CheckpointSink,
     on_progress: &mut OnProgress,
 ) -> Result<FitResult, FitError> {
     let all = measure_targets(job, measured)?;
     let (aims, targets, held) = split_held_out(job, all);
     let names = job.parameter_names();
-    let header = checkpoint_header(job, &aims, &targets, context);
-    context.check_resumable(&header)?;
+    let header = FitHeader {
+        seed: job.search.seed,
+        unknowns: names.clone(),
+        data: targets.iter().map(|target| target.name.clone()).collect(),
+        segment_s: Vec::new(),
+    };
+    let mut journal = Journal::new(context, header, sink, on_progress)?;
+    journal.hold_lines();
     let seen = ModelFeatures::for_targets(model, &aims, &targets, job.ensemble.members);
     let objective = Objective::new(job.search_axes(), targets, &seen);
-    feature_checkpoint::recheck_sample(&objective, context, job.search.seed)?;
     let allowed = context.max_evaluations.unwrap_or(usize::MAX);
     let (rough, local) = (OnceCell::new(), OnceCell::new());
-    let mut ledger = Ledger::new(&objective, context.stored_records(), journal, on_progress, allowed);
-    ledger.hold_lines();
+    let mut ledger = Ledger::new(&objective, journal);
     let gate = check_identifiability(&mut ledger, job, model)?;
     ledger.change_objective(rough.get_or_init(|| objective.with_feature_scatter(&gate.scatter)));
-    let released = ledger.release_lines(&context.opening_lines(&header));
-    released.map_err(|problem| FitError::JournalWrite { problem })?;
+    ledger.release_lines()?;
     let searched = if ledger.stop_reason().is_some() || ledger.remaining_evaluations() == 0 {
         SearchOutcome { termination: SearchTermination::Stopped(StopReason::Budget), descents: Vec::new() }
     } else {
@@ -87,8 +88,8 @@ pub fn fit_features(
         true => uncertainty::confirm_identified(&mut ledger, &names, (&job.search, &job.intervals), found),
         false => found,
     });
-    if let Some(StopReason::Journal(problem)) = ledger.stop_reason() {
-        return Err(FitError::JournalWrite { problem: problem.clone() });
+    if let Some(found) = &found {
+        ledger.check_journal(&objective, &found.best.unit)?;
     }
     let Some(found) = found else { return Err(FitError::NoEvaluation { allowed }) };
     let mut found = add_reservations(found, weighed.as_ref(), &ledger, &searched);
@@ -101,7 +102,6 @@ pub fn fit_features(
     }
     let far = far_from_priors(&camera_nuisance_results(job, &found.cameras));
     let found = found.with_model_objection((!far.is_empty()).then(|| unexplained_headline(&far)));
-    feature_checkpoint::recheck_at(&objective, context, &found.best.unit)?;
     let held_out = predict_held_out(&held, model, &found.best.values);
     let status = fit_status(&ledger, &found.best, &searched.termination);
     let synthetic = measured.iter().flatten().any(Recording::is_synthetic);
@@ -197,25 +197,4 @@ pub(super) fn read_best_model(seen: &ModelFeatures, values: &[f64]) -> Vec<Optio
 fn search_allowance(allowed: usize, parameters: usize) -> usize {
     let sensitivities = 2 * parameters;
     if allowed >= 2 * sensitivities { allowed - sensitivities } else { allowed }
-}
-
-fn checkpoint_header(
-    job: &Job,
-    aims: &[FitTarget],
-    targets: &[TargetValue],
-    context: &FitContext,
-) -> FeatureHeader {
-    let parameter = |p: &FreeParameter| {
-        let unit = find_parameter(&p.name).map_or(FeatureUnit::DIMENSIONLESS.name, |known| known.unit);
-        HeaderParameter { name: p.name.clone(), unit: unit.to_owned(), axis: p.search_axis() }
-    };
-    let aimed = |(aim, target): (&FitTarget, &TargetValue)| HeaderFeature {
-        name: target.name.clone(),
-        unit: aim.feature.reading.unit().name.to_owned(),
-        target: target.clone(),
-    };
-    let parameters = job.parameters.iter().map(parameter).collect();
-    let features = aims.iter().zip(targets).map(aimed).collect();
-    let body = FeatureHeaderBody { seed: job.search.seed, parameters, features };
-    FeatureHeader::new::<EvaluationRecord>(context.fingerprint, context.version, body)
 }

@@ -14,7 +14,8 @@ mod simplex;
 mod stagnation;
 mod termination;
 
-use super::ledger::{Ledger, StopReason};
+use super::journal::StopReason;
+use super::ledger::Ledger;
 pub(super) use costs::Slab;
 pub(super) use excluded_region_search::{best_in_slab, search_excluded_region};
 pub(crate) use local::polish_best;

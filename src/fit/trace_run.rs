@@ -1,8 +1,11 @@
 //! Fit of traces, from the journal to the result.
 
 use super::FitError;
+use super::checkpoint::FitHeader;
+use super::context::FitContext;
 use super::identifiability::Identifiability;
 use super::job::{FreeParameter, TraceChannel};
+use super::journal::{Journal, OnProgress, StopReason};
 use super::linear_model::CHI_SQUARED_95;
 use super::misfit::{ChannelMisfit, StageMisfit, TraceMisfit, WorstSegment};
 use super::problem::Problem;
@@ -11,76 +14,46 @@ use super::result::{
 };
 use super::targets::measure_targets;
 use super::trace::{
-    Iterate, MAX_STARTS, SearchEnd, SegmentResiduals, SegmentState, TraceAssessment, TraceDescent,
-    TraceModel, TraceSearchOutcome, TraceSearchSettings, TraceUnknown, UncertaintyRun, UnknownKind,
-    chi2_per_dof, describe_start_limits, first_iterate, next_iterate, search_trace, segment_residuals,
-    start_point, undersampled_mode,
+    Iterate, SegmentResiduals, SegmentState, TraceAssessment, TraceDescent, TraceModel, TraceSearchOutcome,
+    TraceSearchSettings, TraceUnknown, UnknownKind, chi2_per_dof, describe_start_limits, search_trace,
+    segment_residuals, undersampled_mode,
 };
-use super::trace_checkpoint::{
-    HeaderCoordinate, IterateRecord, TraceCheckpoint, TraceHeader, TraceHeaderBody, camera_unknown_key,
-};
-use super::trace_ledger::{OnIterate, TraceLedger, TraceStopReason, recheck_iterates};
 use super::uncertainty::ParameterVerdict;
-use crate::checkpoint::{CheckpointSink, ExactNumber};
+use crate::checkpoint::CheckpointSink;
 use crate::recording::Recording;
 use std::collections::{BTreeMap, BTreeSet};
 
 impl Problem {
-    /// Fits the traces of the job in at most `most` iterates (`None`: no limit), and calls `on_iterate` after
-    /// each. `resume` is a journal to continue, with its file name for error messages.
+    /// Fits the traces of the job; every new iterate is written to `sink` as a line and reported to
+    /// `on_progress`.
     ///
     /// The result depends neither on the number of threads nor on interruptions.
     ///
     /// # Errors
     /// [`FitError`]. A search that stops early or does not converge is no error; the status of the
     /// result says so.
-    pub(crate) fn fit_traces(
+    pub(super) fn fit_traces(
         &self,
-        resume: Option<(&str, &TraceCheckpoint)>,
-        most: Option<usize>,
-        journal: &mut dyn CheckpointSink,
-        on_iterate: &mut OnIterate,
+        context: &FitContext,
+        sink: &mut dyn CheckpointSink,
+        on_progress: &mut OnProgress,
     ) -> Result<FitResult, FitError> {
         let model = self.trace_model().ok_or_else(|| cannot_be_fitted("it has no [[trace]]"))?;
         let model = model.map_err(|error| cannot_be_fitted(&error.to_string()))?;
         let targets = measure_targets(self.job(), self.recordings())?;
         let seed = self.job().search.seed;
-        let settings = TraceSearchSettings {
-            segment_s: self.segment_s().to_vec(),
-            twins: self.job().intervals.bootstrap,
-        };
-        let header = self.header_for_model(&model);
-        let most = most.unwrap_or(usize::MAX);
-        if most == 0 {
-            return Err(FitError::NoEvaluation { allowed: most });
+        let segment_s = self.segment_s().to_vec();
+        let recordings = self.trace_recording_names();
+        let unknowns = model.unknowns.0.iter().map(|unknown| unknown.name(&recordings)).collect();
+        let header = FitHeader { seed, unknowns, data: recordings, segment_s: segment_s.clone() };
+        let mut journal = Journal::new(context, header, sink, on_progress)?;
+        if journal.evaluation_limit() == 0 {
+            return Err(FitError::NoEvaluation { allowed: 0 });
         }
-        let mut ledger = TraceLedger::new(&header, resume, most, journal, on_iterate)?;
-        if let Some((file, found)) = resume {
-            recheck_iterates(file, found, |chain, before| match before {
-                // an uncertainty run starts from the best end, and the chain of a lobe from the best end of a
-                // start; neither is known yet
-                _ if UncertaintyRun::from_chain_number(chain).is_some() => None,
-                None if chain >= MAX_STARTS => None,
-                None => first_iterate(&model, &settings, &start_point(&model, seed, chain)),
-                Some(before) => next_iterate(&model, &settings, before),
-            })?;
-        }
-        let searched = search_trace(&model, &settings, seed, &mut ledger);
-        if let Some((file, found)) = resume {
-            let best = searched.descents.get(searched.best).and_then(TraceDescent::last_iterate);
-            let end = best.and_then(|at| SearchEnd::new(&model, &settings, seed, at));
-            recheck_iterates(file, found, |chain, before| {
-                match (UncertaintyRun::from_chain_number(chain), before) {
-                    (Some(run), before) => end.as_ref()?.next_iterate(run, before),
-                    (None, None) => searched.first_lobe_iterate(&model, &settings, chain),
-                    (None, Some(_)) => None,
-                }
-            })?;
-        }
-        if let Some(TraceStopReason::Journal(problem)) = ledger.stop_reason() {
-            return Err(FitError::JournalWrite { problem: problem.clone() });
-        }
-        let found = TraceFindings { problem: self, model: &model, searched: &searched, ledger: &ledger };
+        let settings = TraceSearchSettings { segment_s, twins: self.job().intervals.bootstrap };
+        let searched = search_trace(&model, &settings, seed, &mut journal);
+        journal.check_sound()?;
+        let found = TraceFindings { problem: self, model: &model, searched: &searched, journal: &journal };
         let mut result = found.into_result().ok_or_else(|| cannot_be_fitted(NO_SEGMENT_STARTED))?;
         if result.status != FitStatus::Interrupted {
             let (shown, held_out) = self.compare_with_targets(&result, targets)?;
@@ -94,15 +67,6 @@ impl Problem {
     pub(super) fn trace_recording_names(&self) -> Vec<String> {
         let name = |condition: usize| self.job().conditions[condition].name.clone();
         self.traces().iter().map(|trace| name(trace.condition)).collect()
-    }
-
-    fn header_for_model(&self, model: &TraceModel) -> TraceHeader {
-        let recordings = self.trace_recording_names();
-        let unknowns = model.unknowns.0.iter();
-        let unknowns = unknowns.map(|unknown| HeaderCoordinate::from_unknown(unknown, &recordings)).collect();
-        let segment_s = self.segment_s().iter().copied().map(ExactNumber).collect();
-        let body = TraceHeaderBody { seed: self.job().search.seed, recordings, segment_s, unknowns };
-        TraceHeader::new::<IterateRecord>(self.fingerprint(), env!("CARGO_PKG_VERSION"), body)
     }
 }
 
@@ -128,7 +92,7 @@ struct TraceFindings<'a, 'l> {
     problem: &'a Problem,
     model: &'a TraceModel,
     searched: &'a TraceSearchOutcome,
-    ledger: &'a TraceLedger<'l>,
+    journal: &'a Journal<'l>,
 }
 
 impl TraceFindings<'_, '_> {
@@ -165,7 +129,7 @@ impl TraceFindings<'_, '_> {
             waterfall: self.sorted_optima(),
             sensitivities: BTreeMap::new(),
             evaluations: EvaluationCounts {
-                total: self.ledger.count_iterates(),
+                total: self.journal.count_evaluations(),
                 ..EvaluationCounts::default()
             },
             synthetic: self.problem.recordings().iter().flatten().any(Recording::is_synthetic),
@@ -180,10 +144,10 @@ impl TraceFindings<'_, '_> {
         let is_at_end = best.stages.len() >= self.problem.segment_s().len()
             || best.last_iterate().is_some_and(Iterate::is_junk);
         let is_complete = self.searched.assessment.is_some() && is_at_end;
-        match self.ledger.stop_reason() {
+        match self.journal.stop_reason() {
             _ if !self.searched.stopped && is_complete => FitStatus::Converged,
             _ if !self.searched.stopped => FitStatus::Failed,
-            Some(TraceStopReason::Budget) => FitStatus::BudgetExhausted,
+            Some(StopReason::Budget) => FitStatus::BudgetExhausted,
             _ => FitStatus::Interrupted,
         }
     }
@@ -255,7 +219,7 @@ impl TraceFindings<'_, '_> {
             let (recording, name) = match &unknown.kind {
                 UnknownKind::Parameter { name, .. } => (None, name.clone()),
                 UnknownKind::Camera { film, what } => {
-                    (Some(self.recording_name(*film)), camera_unknown_key(*what)[0].to_owned())
+                    (Some(self.recording_name(*film)), what.key().to_owned())
                 }
             };
             NuisanceResult {
@@ -381,7 +345,7 @@ impl TraceFindings<'_, '_> {
             Some(LocalOptimum {
                 start_cost: first.cost,
                 cost: end.cost,
-                evaluations: self.ledger.count_start_iterates(descent.start),
+                evaluations: descent.iterates,
                 values: self.parameter_values(end),
                 failure,
             })

@@ -4,7 +4,9 @@
 
 use super::journal::{SweepHeader, SweepPoint};
 use super::point::PointOutcome;
-use crate::checkpoint::{CheckpointEnd, CheckpointError, CheckpointReader, CheckpointRecord, StoredRecord};
+use crate::checkpoint::{
+    CheckpointEnd, CheckpointError, CheckpointReader, StoredRecord, describe_difference,
+};
 use std::io::{self, BufRead, BufWriter, Read, Seek, SeekFrom, Write};
 
 /// Reason why points cannot be collected.
@@ -100,7 +102,7 @@ impl<F: Read + Write + Seek> PointCollection<F> {
     }
 
     fn spool_point(&mut self, found: &StoredRecord<SweepPoint>) -> Result<(), CollectError> {
-        let text = serde_json::to_vec(&found.record.to_row(0)).map_err(io::Error::from)?;
+        let text = serde_json::to_vec(&found.record).map_err(io::Error::from)?;
         let (file, line, length) = ((self.files.len() - 1) as u32, found.line as u64, text.len() as u32);
         let bytes = [&file.to_le_bytes()[..], &line.to_le_bytes(), &length.to_le_bytes(), &text].concat();
         self.spool.write_all(&bytes)?;
@@ -122,8 +124,7 @@ impl<F: Read + Write + Seek> PointCollection<F> {
         let mut text = vec![0; u32::from_le_bytes([e, f, g, h]) as usize];
         file.read_exact(&mut text)?;
         self.spool.seek(SeekFrom::Start(self.end))?;
-        let row = serde_json::from_slice(&text).map_err(io::Error::from)?;
-        let point = SweepPoint::from_row(row, &self.header.body).map_err(io::Error::other)?;
+        let point = serde_json::from_slice(&text).map_err(io::Error::from)?;
         let file = u32::from_le_bytes([a, b, c, d]) as usize;
         Ok(Some(SpooledPoint { point, file, line: u64::from_le_bytes(line) as usize }))
     }
@@ -133,7 +134,9 @@ impl<F: Read + Write + Seek> PointCollection<F> {
         there: &SpooledPoint,
         found: &StoredRecord<SweepPoint>,
     ) -> Result<(), CheckpointError> {
-        let Some([expected, differs]) = there.point.difference(&found.record) else { return Ok(()) };
+        let Some([expected, differs]) = describe_difference(&there.point, &found.record) else {
+            return Ok(());
+        };
         let name = |at: usize| self.files.get(at).cloned().unwrap_or_default();
         Err(CheckpointError::Conflict {
             file: name(self.files.len() - 1),

@@ -4,7 +4,7 @@ use super::grid::{AxisSpacing, SweepAxis};
 use super::point::{EarlyEnd, PointOutcome};
 use super::study::Study;
 use super::{MissingReason, SamplePlan, SweepMap};
-use crate::checkpoint::{self, CheckpointError, CheckpointKind, CheckpointRecord, ExactNumber, StoredRecord};
+use crate::checkpoint::{self, CheckpointError, CheckpointKind, CheckpointRecord, StoredRecord};
 use crate::simulate::scene::Scene;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -42,7 +42,7 @@ pub struct AxisRecord {
     #[serde(default, skip_serializing_if = "is_linear")]
     pub scale: AxisSpacing,
     /// Rising values.
-    pub values: Vec<ExactNumber>,
+    pub values: Vec<f64>,
 }
 
 fn is_linear(spacing: &AxisSpacing) -> bool {
@@ -50,7 +50,8 @@ fn is_linear(spacing: &AxisSpacing) -> bool {
 }
 
 /// One point in a journal.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(from = "PointRow", into = "PointRow")]
 pub struct SweepPoint {
     /// Index in the study, counted from 0.
     pub index: usize,
@@ -65,7 +66,7 @@ pub fn study_header(study: &Study, fingerprint: &str) -> SweepHeader {
         name: axis.parameter.name.to_owned(),
         unit: axis.parameter.unit.to_owned(),
         scale: if study.sample.is_some() { axis.spacing } else { AxisSpacing::Linear },
-        values: axis.values.iter().copied().map(ExactNumber).collect(),
+        values: axis.values.clone(),
     };
     let body = SweepHeaderBody {
         points: study.point_count(),
@@ -79,70 +80,47 @@ pub fn study_header(study: &Study, fingerprint: &str) -> SweepHeader {
 impl CheckpointRecord for SweepPoint {
     const KIND: CheckpointKind = CheckpointKind::Sweep;
     type Body = SweepHeaderBody;
-    type Row = PointRow;
     type Identity = usize;
 
     fn identity(&self) -> usize {
         self.index
     }
 
-    fn to_row(&self, _: usize) -> PointRow {
-        let PointOutcome { ended, stopped_at_s, values } = &self.outcome;
-        let cell = |value: &Result<f64, MissingReason>| match value {
-            Ok(value) => ValueCell::Value(ExactNumber(*value)),
-            Err(reason) => ValueCell::Missing { reason: *reason },
-        };
-        PointRow {
-            index: self.index,
-            ended: ended.clone(),
-            stopped_at_s: stopped_at_s.map(ExactNumber),
-            values: values.iter().map(cell).collect(),
+    fn check_against(&self, body: &SweepHeaderBody) -> Result<(), String> {
+        let (index, values) = (self.index, self.outcome.values.len());
+        if values != body.maps.len() {
+            return Err(format!("`values`: found {values}, expected {}", body.maps.len()));
         }
-    }
-
-    /// Returns `None`, because the points are not ordered by index.
-    fn line_index(_: &PointRow) -> Option<usize> {
-        None
-    }
-
-    fn from_row(row: PointRow, body: &SweepHeaderBody) -> Result<Self, String> {
-        if row.values.len() != body.maps.len() {
-            return Err(format!("`values`: found {}, expected {}", row.values.len(), body.maps.len()));
+        if index >= body.points {
+            return Err(format!("`index`: found {index}, expected less than {}", body.points));
         }
-        if row.index >= body.points {
-            return Err(format!("`index`: found {}, expected less than {}", row.index, body.points));
-        }
-        let value = |cell: ValueCell| match cell {
-            ValueCell::Value(value) => Ok(value.0),
-            ValueCell::Missing { reason } => Err(reason),
-        };
-        let (ended, stopped_at_s) = (row.ended, row.stopped_at_s.map(|at| at.0));
-        let values = row.values.into_iter().map(value).collect();
-        Ok(Self { index: row.index, outcome: PointOutcome { ended, stopped_at_s, values } })
-    }
-
-    fn difference(&self, other: &Self) -> Option<[String; 2]> {
-        let PointOutcome { ended, stopped_at_s, values } = &self.outcome;
-        let shown = |of: fn(&PointOutcome) -> String| Some([self, other].map(|point| of(&point.outcome)));
-        if *ended != other.outcome.ended {
-            return shown(|outcome| match &outcome.ended {
-                Some(EarlyEnd { reason, why }) => format!("the run ended as {} ({why})", reason.name()),
-                None => "the run completed".to_owned(),
-            });
-        }
-        if *stopped_at_s != other.outcome.stopped_at_s {
-            return shown(|outcome| format!("stopped_at_s {:?}", outcome.stopped_at_s));
-        }
-        let mut pairs = values.iter().zip(&other.outcome.values).enumerate();
-        let (at, (a, b)) = pairs.find(|(_, (a, b))| a != b)?;
-        Some([a, b].map(|value| match value {
-            Ok(value) => format!("value {} {value:?}", at + 1),
-            Err(reason) => format!("value {} missing ({})", at + 1, reason.name()),
-        }))
+        Ok(())
     }
 
     fn problem_difference(found: &SweepHeaderBody, expected: &SweepHeaderBody) -> Option<String> {
         (found != expected).then(|| "the header has other axes or maps than the study".to_owned())
+    }
+}
+
+impl From<SweepPoint> for PointRow {
+    fn from(SweepPoint { index, outcome }: SweepPoint) -> Self {
+        let PointOutcome { ended, stopped_at_s, values } = outcome;
+        let cell = |value| match value {
+            Ok(value) => ValueCell::Value(value),
+            Err(reason) => ValueCell::Missing { reason },
+        };
+        Self { index, ended, stopped_at_s, values: values.into_iter().map(cell).collect() }
+    }
+}
+
+impl From<PointRow> for SweepPoint {
+    fn from(PointRow { index, ended, stopped_at_s, values }: PointRow) -> Self {
+        let value = |cell| match cell {
+            ValueCell::Value(value) => Ok(value),
+            ValueCell::Missing { reason } => Err(reason),
+        };
+        let values = values.into_iter().map(value).collect();
+        Self { index, outcome: PointOutcome { ended, stopped_at_s, values } }
     }
 }
 
@@ -154,14 +132,14 @@ pub struct PointRow {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     ended: Option<EarlyEnd>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    stopped_at_s: Option<ExactNumber>,
+    stopped_at_s: Option<f64>,
     values: Vec<ValueCell>,
 }
 
 #[derive(Serialize, Deserialize)]
 #[serde(untagged, deny_unknown_fields)]
 enum ValueCell {
-    Value(ExactNumber),
+    Value(f64),
     Missing { reason: MissingReason },
 }
 
@@ -239,7 +217,7 @@ mod tests {
     }
 
     fn text(points: impl Iterator<Item = usize>) -> String {
-        let point = |index| format_record_line(&SweepPoint { index, outcome: outcome(index) }, 0);
+        let point = |index| format_record_line(&SweepPoint { index, outcome: outcome(index) });
         format_header_line(&study_header(&study(), "f")) + &points.map(point).collect::<String>()
     }
 
@@ -295,12 +273,12 @@ mod tests {
                 .starts_with("j:3: the line has the checksum")
         );
         let forged =
-            |index: usize| good.clone() + &format_record_line(&SweepPoint { index, outcome: outcome(3) }, 0);
+            |index: usize| good.clone() + &format_record_line(&SweepPoint { index, outcome: outcome(3) });
         assert!(refused(&forged(0)).starts_with("j:4: the point of line 2 a second time"));
         assert!(refused(&forged(200)).contains("found 200, expected less than 200"));
         let header = |layout| SweepHeader { layout, ..study_header(&study(), "f") };
-        let later = format_header_line(&header(4)) + good.split_once('\n').unwrap().1;
-        let said = "j: a journal of layout 4, expected layout 3; move it away and run the sweep again";
+        let later = format_header_line(&header(5)) + good.split_once('\n').unwrap().1;
+        let said = "j: a journal of layout 5, expected layout 4; move it away and run the sweep again";
         assert_eq!(refused(&later), said);
     }
 }

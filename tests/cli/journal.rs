@@ -98,7 +98,10 @@ fn what_stands_before_a_damaged_line_is_resumed() {
     let journal = "fits/x/journal.jsonl";
     let resume = [&FIT[..], &["--max-evaluations", "30"]].concat();
     let whole = project.read(journal);
-    let damaged = whole.replacen("\"index\":7,", "\"index\":8,", 1);
+    let damaged = {
+        let line = whole.lines().nth(8).unwrap();
+        whole.replacen(line, &line.replacen("\"unit\":[0", "\"unit\":[1", 1), 1)
+    };
     project.write(journal, &damaged);
     refused(&project, &resume, &["fits/x/journal.jsonl:9: ", "remove this line and all behind it"]);
     let before: String = damaged.split_inclusive('\n').take(8).collect();
@@ -110,13 +113,13 @@ fn what_stands_before_a_damaged_line_is_resumed() {
 #[test]
 fn a_journal_of_another_layout_is_refused_with_what_to_do() {
     let fit = of_a_fit();
-    let other = |text: &str| resealed(&text.replacen("\"layout\":3", "\"layout\":2", 1));
+    let other = |text: &str| resealed(&text.replacen("\"layout\":4", "\"layout\":3", 1));
     fit.write("fits/x/journal.jsonl", &other(&fit.read("fits/x/journal.jsonl")));
-    let said = "journal.jsonl: a journal of layout 2, expected layout 3; move it away and run the fit again";
+    let said = "journal.jsonl: a journal of layout 3, expected layout 4; move it away and run the fit again";
     refused(&fit, &FIT, &[said]);
     let study = of_a_study();
     study.write("out/journal.jsonl", &other(&study.read("out/journal.jsonl")));
-    refused(&study, &SWEEP, &["a journal of layout 2, expected layout 3", "run the sweep again"]);
+    refused(&study, &SWEEP, &["a journal of layout 3, expected layout 4", "run the sweep again"]);
 }
 
 #[test]
@@ -127,10 +130,14 @@ fn what_the_model_does_not_give_is_not_believed() {
     fs::remove_file(project.path("fits/x/result.json")).unwrap();
     // every evaluation is edited, and the checksums are made anew
     let (header, lines) = journal.split_once('\n').unwrap();
-    let edited = lines.replace("\"features\":[\"", "\"features\":[\"1");
+    let edited = lines.replace("\"features\":[{\"value\":", "\"features\":[{\"value\":1");
     let edited = resealed(&format!("{header}\n{edited}"));
     project.write("fits/x/journal.jsonl", &edited);
-    refused(&project, &resume, &["found feature 1 1", "but computed again the evaluation gives feature 1 "]);
+    refused(
+        &project,
+        &resume,
+        &["found evaluation.outcome.features[0].value 1", "but computed again the evaluation gives "],
+    );
     assert!(!project.path("fits/x/result.json").exists());
     // one alone is edited so that it meets every target, and becomes the best
     project.write("fits/x/journal.jsonl", &journal);
@@ -139,12 +146,14 @@ fn what_the_model_does_not_give_is_not_believed() {
     fs::remove_file(project.path("fits/x/result.json")).unwrap();
     let targets = [&result["components"][0]["target_hz"], &result["features"][0]["target"]];
     let [low, release] = targets.map(|target| target.as_f64().unwrap());
-    let edit = |(line, at): (&str, usize)| match line.split_once("\"features\":[\"") {
-        Some((unit, _)) if at == 17 => format!("{unit}\"features\":[\"{low:?}\",\"{release:?}\"]"),
+    let edit = |(line, at): (&str, usize)| match line.split_once("\"features\":[") {
+        Some((unit, _)) if at == 17 => {
+            format!("{unit}\"features\":[{{\"value\":{low:?}}},{{\"value\":{release:?}}}]}}}}")
+        }
         _ => line.to_owned(),
     };
     let edited: Vec<String> = journal.lines().zip(1..).map(edit).collect();
     project.write("fits/x/journal.jsonl", &resealed(&edited.join("\n")));
-    refused(&project, &resume, &["fits/x/journal.jsonl:17: found feature 1 "]);
+    refused(&project, &resume, &["fits/x/journal.jsonl:17: found evaluation.outcome.features["]);
     assert!(!project.path("fits/x/result.json").exists());
 }

@@ -201,7 +201,7 @@ fn a_job_that_turns_to_traces_begins_a_new_journal() {
     project.write("fits/small/job.toml", JOB);
     let (code, _, err) = project.run(&RESUME);
     assert_eq!(code, 2);
-    assert!(err.contains("the journal of a fit, expected that of a trace fit"), "{err}");
+    assert!(err.contains("the job, a scene or a recording has changed since it was written"), "{err}");
     let (code, out, err) = project.run(&[&FIT[..], &["--max-evaluations", "2"]].concat());
     assert_eq!(code, 3, "{out}{err}");
     assert!(err.contains("the old journal is kept as"), "{err}");

@@ -9,9 +9,9 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use wiperlab::checkpoint;
 use wiperlab::checkpoint::CheckpointError;
+use wiperlab::fit::checkpoint::FitCheckpoint;
 use wiperlab::fit::evaluation::{FailureReason, RunFailure};
-use wiperlab::fit::feature_checkpoint::FeatureCheckpoint;
-use wiperlab::fit::ledger::FitProgress;
+use wiperlab::fit::journal::FitProgress;
 use wiperlab::fit::model::{Draw, Model};
 use wiperlab::fit::result::{FitResult, FitStatus};
 use wiperlab::fit::{FitContext, FitError, fit_features, job::Job};
@@ -93,17 +93,17 @@ impl Ended {
         FitResult::parse("result.json", &self.result).unwrap()
     }
 
-    fn read(&self) -> FeatureCheckpoint {
+    fn read(&self) -> FitCheckpoint {
         read(&self.journal)
     }
 }
 
-fn read(text: &str) -> FeatureCheckpoint {
+fn read(text: &str) -> FitCheckpoint {
     checkpoint::read_checkpoint("journal.jsonl", text).unwrap().unwrap()
 }
 
 fn attempt(job: &str, text: &str, most: Option<usize>, version: &str) -> Result<Ended, FitError> {
-    let journal: Option<FeatureCheckpoint> = checkpoint::read_checkpoint("journal.jsonl", text).unwrap();
+    let journal: Option<FitCheckpoint> = checkpoint::read_checkpoint("journal.jsonl", text).unwrap();
     let resume = journal.as_ref().map(|journal| ("journal.jsonl", journal));
     let context = FitContext { fingerprint: "f", version, max_evaluations: most, resume };
     let (mut lines, mut watch, model) =
@@ -145,7 +145,7 @@ fn a_fit_cut_anywhere_in_any_stage_is_the_uninterrupted_one_to_the_last_byte() {
             let again = resumed(JOB, &uncut.journal[..cut]);
             assert_eq!((&again.result, &again.journal), (&uncut.result, &uncut.journal), "cut at byte {cut}");
             // twins are made again, everything else is replayed
-            let left: Option<FeatureCheckpoint> =
+            let left: Option<FitCheckpoint> =
                 checkpoint::read_checkpoint("journal.jsonl", &uncut.journal[..cut]).unwrap();
             assert!(
                 left.as_ref().is_none_or(|journal| journal.end.torn == (cut != end && cut != end - 1)),

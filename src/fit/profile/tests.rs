@@ -1,5 +1,7 @@
+use super::super::checkpoint::FitHeader;
+use super::super::context::FitContext;
 use super::super::evaluation::Observed;
-use super::super::ledger::FitProgress;
+use super::super::journal::{FitProgress, Journal};
 use super::super::model::FeaturePredictor;
 use super::super::objective::Objective;
 use super::*;
@@ -57,7 +59,8 @@ fn walked(model: &dyn FeaturePredictor, sds: [f64; 2], met: &[Vec<f64>]) -> (Vec
     let axes = vec![SearchAxis::from(Bounds::new(0.01, 100.0, BoundsSpacing::Log).unwrap()); 2];
     let objective = Objective::new(axes, sds.map(target).to_vec(), model);
     let (mut journal, mut watch) = (NullSink, |_: &FitProgress| ControlFlow::Continue(()));
-    let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
+    let journal = Journal::new(&FitContext::default(), FitHeader::default(), &mut journal, &mut watch);
+    let mut ledger = Ledger::new(&objective, journal.unwrap());
     let best = objective.evaluate(&[0.5, 0.5]);
     ledger
         .evaluate_points(EvaluationStage::Local, &[met, std::slice::from_ref(&best.unit)].concat())

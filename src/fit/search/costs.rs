@@ -1,7 +1,8 @@
 //! Costs for the solvers of a stage, and the part of the unit box (slab) to which a search may be limited.
 
 use crate::fit::evaluation::{Evaluation, EvaluationStage};
-use crate::fit::ledger::{Ledger, StopReason};
+use crate::fit::journal::StopReason;
+use crate::fit::ledger::Ledger;
 
 /// Part of the unit box in which one coordinate is limited to a range.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -6,7 +6,8 @@ use super::gauss_newton::descend_gauss_newton;
 use super::local::distinct_best_points;
 use super::population::{WIDE_EXTENT, evolve_population};
 use crate::fit::evaluation::{Evaluation, EvaluationStage};
-use crate::fit::ledger::{Ledger, StopReason};
+use crate::fit::journal::StopReason;
+use crate::fit::ledger::Ledger;
 use crate::fit::search::costs::Slab;
 
 /// Fraction of the evaluations that the population gets; the descents get the rest.

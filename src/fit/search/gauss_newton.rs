@@ -8,7 +8,8 @@
 use super::costs::StageCosts;
 use super::termination::{EXACT_COST, MIN_WORTHWHILE_GAIN};
 use crate::fit::evaluation::{Evaluation, EvaluationStage};
-use crate::fit::ledger::{Ledger, StopReason};
+use crate::fit::journal::StopReason;
+use crate::fit::ledger::Ledger;
 use crate::fit::linear_model::{
     FeatureSlopes, broyden_update, damped_step, difference_points, jacobian, residuals, step_in_box,
 };

@@ -10,7 +10,8 @@ use super::termination::{
     EXACT_COST, LocalDescent, MIN_START_DISTANCE, MIN_WORTHWHILE_GAIN, SIMPLEX_EDGES, SearchTermination,
 };
 use crate::fit::evaluation::{Evaluation, EvaluationStage};
-use crate::fit::ledger::{Ledger, StopReason};
+use crate::fit::journal::StopReason;
+use crate::fit::ledger::Ledger;
 
 /// Number of the best descents whose end points are refined with a population.
 const REFINED_ENDS: usize = 3;

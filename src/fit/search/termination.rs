@@ -1,7 +1,7 @@
 //! Outcome of a search, and its thresholds.
 
 use crate::fit::evaluation::Evaluation;
-use crate::fit::ledger::StopReason;
+use crate::fit::journal::StopReason;
 
 /// Reason why a search ended. The best point is in the ledger.
 #[derive(Debug, Clone, PartialEq, Eq)]

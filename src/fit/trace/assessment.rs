@@ -1,6 +1,6 @@
 //! Intervals of the estimates at the end of a search, and reasons to doubt them.
 
-use super::checkpoint::Iterate;
+use super::iterate::Iterate;
 use super::levenberg_marquardt::MAX_STEPS;
 use super::model::TraceModel;
 use super::normal_equations::trace_covariance;

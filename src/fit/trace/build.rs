@@ -5,7 +5,7 @@ use crate::fit::bounds::{BoundsSpacing, Prior};
 use crate::fit::job::{FreeParameter, HeadSource, TraceChannel};
 use crate::fit::nuisance_parameters::FreedConstant;
 use crate::fit::trace::camera_observation::{CameraObservation, ObservationSettings};
-use crate::fit::trace::checkpoint::{Iterate, TraceSearchSettings};
+use crate::fit::trace::iterate::{Iterate, TraceSearchSettings};
 use crate::fit::trace::levenberg_marquardt::{refit_plain, start_stage};
 use crate::fit::trace::model::{TraceModel, TraceRecording};
 use crate::fit::trace::segment_simulation::segment_residuals;

@@ -1,6 +1,6 @@
 //! Fits the starting state of each segment while the parameters and the camera errors are held fixed.
 
-use super::checkpoint::SegmentState;
+use super::iterate::SegmentState;
 use super::segment_simulation::{LinkState, RecordingModel};
 use nalgebra::{DMatrix, DVector, Matrix4};
 use rayon::prelude::*;

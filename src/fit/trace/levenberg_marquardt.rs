@@ -2,8 +2,8 @@
 //! resumes from a journal continues with exactly the same numbers.
 
 use super::camera_observation::CameraObservation;
-use super::checkpoint::{Iterate, SegmentState, TraceSearchSettings};
 use super::initial_states::{RescuePolicy, fit_states, join_states, rescue_states, update_states};
+use super::iterate::{Iterate, SegmentState, TraceSearchSettings};
 use super::model::TraceModel;
 use super::normal_equations::{NormalEquations, carry_states, damped_step, normal_equations};
 use super::normal_equations::{recording_models, segments_cost};

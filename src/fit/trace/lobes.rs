@@ -6,8 +6,8 @@
 //! evenly spaced in frequency, so all of them can be tried: the segments of normal length limit the
 //! frequency, and the long segments decide between the lobes within these limits.
 
-use super::checkpoint::SegmentState;
 use super::initial_states::{RescuePolicy, fit_states, update_states};
+use super::iterate::SegmentState;
 use super::levenberg_marquardt::{MAX_STATE_STEPS, cut_recordings, is_long};
 use super::normal_equations::{carry_states, normal_equations, recording_models};
 use super::uncertainty_run::SearchEnd;

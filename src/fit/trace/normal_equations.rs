@@ -1,6 +1,6 @@
 //! Normal equations of all segments, and a step of the outer search.
 
-use super::checkpoint::{Iterate, SegmentState};
+use super::iterate::{Iterate, SegmentState};
 use super::model::TraceModel;
 use super::segment_simulation::{LinkState, RecordingModel};
 use super::variable_projection::{ProjectedSegment, project_out_state};

@@ -1,6 +1,6 @@
 //! Compares different ends of a search, and tests whether the recordings decide between them.
 
-use super::checkpoint::{Iterate, is_same_end};
+use super::iterate::{Iterate, is_same_end};
 use super::segment_simulation::segment_residuals;
 use super::uncertainty_run::SearchEnd;
 use crate::model::parameters::find_parameter;

@@ -1,7 +1,7 @@
 //! The search of a trace fit: it iterates from several starting points and assesses the best result.
 
 use super::assessment::{TraceAssessment, assess_end};
-use super::checkpoint::{Checkpoint, Iterate, TraceDescent, TraceSearchSettings, is_same_end};
+use super::iterate::{Iterate, TraceDescent, TraceSearchSettings, is_same_end};
 use super::levenberg_marquardt::{first_iterate, next_iterate, start_stage};
 use super::lobes::{MAX_LOBES, find_lobes};
 use super::model::TraceModel;
@@ -10,6 +10,7 @@ use super::rivals::has_lost;
 use super::segment_simulation::RecordingModel;
 use super::uncertainty_run::{MAX_STARTS, SearchEnd, follow_runs};
 use super::unknowns::{TraceUnknown, UnknownKind};
+use crate::fit::journal::Journal;
 use crate::model::modes::{TipConstraint, natural_modes};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -30,10 +31,6 @@ pub struct TraceSearchOutcome {
     /// One descent per start, in the order of the starts; then one per lobe, whose last stage has whole
     /// segments.
     pub descents: Vec<TraceDescent>,
-    /// Points at which the descents of the lobes begin.
-    lobes: Vec<Vec<f64>>,
-    /// Index of the best descent from a start. The lobes are sought around its end.
-    rest: usize,
     /// Index of the descent with the best end.
     pub best: usize,
     /// Whether the search ended early because the checkpoint requested a stop.
@@ -43,20 +40,6 @@ pub struct TraceSearchOutcome {
     pub assessment: Option<TraceAssessment>,
 }
 
-impl TraceSearchOutcome {
-    /// The first iterate of the chain with number `chain`, if it is the chain of a lobe.
-    pub(crate) fn first_lobe_iterate(
-        &self,
-        model: &TraceModel,
-        settings: &TraceSearchSettings,
-        chain: usize,
-    ) -> Option<Iterate> {
-        let point = self.lobes.get(chain.checked_sub(MAX_STARTS)?)?;
-        let rest = self.descents.get(self.rest)?.last_iterate()?;
-        start_stage(model, settings, (rest.stage, true), point, &rest.segments)
-    }
-}
-
 /// Searches from the middle of the ranges, then from random points given by `seed`, until two searches end at
 /// the same point. If a segment is much longer than its stage, searches on with whole segments from each
 /// lobe. Then assesses the best end point.
@@ -64,15 +47,15 @@ pub fn search_trace(
     model: &TraceModel,
     settings: &TraceSearchSettings,
     seed: u64,
-    keep: &mut dyn Checkpoint,
+    journal: &mut Journal<'_>,
 ) -> TraceSearchOutcome {
     let mut found = TraceSearchOutcome::default();
     for start in 0..MAX_STARTS {
         let first_costs = found.descents.iter().filter_map(|descent| Some(descent.stages.first()?.cost));
         let limit = GIVE_UP_FACTOR * first_costs.fold(f64::INFINITY, f64::min);
         let first = || first_iterate(model, settings, &start_point(model, seed, start));
-        let (stages, stopped) = descend(model, settings, start, first, limit, keep);
-        found.descents.push(TraceDescent { start, stages });
+        let (descent, stopped) = descend(model, settings, start, first, limit, journal);
+        found.descents.push(descent);
         if stopped {
             return TraceSearchOutcome { stopped, ..found };
         }
@@ -81,34 +64,35 @@ pub fn search_trace(
         }
     }
     let starts = found.descents.len();
-    found.rest = best_descent(&found.descents);
-    found.best = found.rest;
-    let Some(rest) = SearchEnd::of_descent(model, settings, seed, &found.descents[found.rest]) else {
+    // the lobes are sought around the best end of a start
+    let best = best_descent(&found.descents);
+    found.best = best;
+    let Some(rest) = SearchEnd::of_descent(model, settings, seed, &found.descents[best]) else {
         return found;
     };
-    let confirmed = has_company(&rest, &found.descents, found.rest);
+    let confirmed = has_company(&rest, &found.descents, best);
     // another end that fits nearly as well may fit better with whole segments
     let mut lobes = if rest.at.plain { find_lobes(&rest) } else { Vec::new() };
     if !lobes.is_empty() {
-        let rivals = other_ends(&found.descents, found.rest).filter(|other| !has_lost(&rest, other));
+        let rivals = other_ends(&found.descents, best).filter(|other| !has_lost(&rest, other));
         lobes.extend(rivals.map(|rival| rival.point.clone()));
         lobes.truncate(MAX_LOBES);
     }
-    let earlier = found.descents[found.rest].stages[..rest.at.stage].to_vec();
+    let earlier = found.descents[best].stages[..rest.at.stage].to_vec();
     let mut ends = Vec::new();
     for (lobe, point) in lobes.iter().enumerate() {
         let start = MAX_STARTS + lobe;
         let first = || start_stage(model, settings, (rest.at.stage, true), point, &rest.at.segments);
-        let (stages, stopped) = descend(model, settings, start, first, f64::INFINITY, keep);
-        ends.push(TraceDescent { start, stages: earlier.iter().cloned().chain(stages).collect() });
+        let (descent, stopped) = descend(model, settings, start, first, f64::INFINITY, journal);
+        let stages = earlier.iter().cloned().chain(descent.stages).collect();
+        ends.push(TraceDescent { stages, ..descent });
         if stopped {
             found.stopped = true;
             break;
         }
     }
-    found.lobes = lobes;
     found.descents.extend(ends);
-    let compared = if found.lobes.is_empty() { 0..starts } else { starts..found.descents.len() };
+    let compared = if lobes.is_empty() { 0..starts } else { starts..found.descents.len() };
     found.best = compared.start + best_descent(&found.descents[compared.clone()]);
     if found.stopped {
         return found;
@@ -117,7 +101,7 @@ pub fn search_trace(
         return found;
     };
     let runs = end.uncertainty_runs();
-    let Some(ends) = follow_runs(&end, &runs, keep) else {
+    let Some(ends) = follow_runs(&end, &runs, journal) else {
         return TraceSearchOutcome { stopped: true, ..found };
     };
     let others: Vec<&Iterate> =
@@ -210,35 +194,36 @@ fn other_ends(descents: &[TraceDescent], best: usize) -> impl Iterator<Item = &I
 
 // Search from one start.
 
-/// Computes the iterates of one chain, from `first` to the end of its search. Returns the last iterate of
-/// each stage, and a flag that is true if the checkpoint requested a stop.
+/// Computes the iterates of one chain, from `first` to the end of its search. Returns the descent, and a flag
+/// that is true if the journal requested a stop.
 ///
 /// The chain is abandoned if its first stage ends with a cost above `limit`.
 fn descend(
     model: &TraceModel,
     settings: &TraceSearchSettings,
     chain: usize,
-    first: impl Fn() -> Option<Iterate>,
+    first: impl Fn() -> Option<Iterate> + Sync,
     limit: f64,
-    keep: &mut dyn Checkpoint,
-) -> (Vec<Iterate>, bool) {
-    let mut stages: Vec<Iterate> = Vec::new();
-    let mut stopped = false;
-    for place in 0.. {
-        let last = stages.last();
-        if stopped || last.is_some_and(|at| at.settled && at.stage == 0 && at.cost > limit) {
-            break;
+    journal: &mut Journal<'_>,
+) -> (TraceDescent, bool) {
+    let mut descent = TraceDescent { start: chain, stages: Vec::new(), iterates: 0 };
+    loop {
+        let last = descent.last_iterate();
+        if last.is_some_and(|at| at.settled && at.stage == 0 && at.cost > limit) {
+            return (descent, false);
         }
-        let known = keep.find_iterate(chain, place);
-        let is_new = known.is_none();
-        let next = known.or_else(|| match last {
+        let compute = |_| match last {
             None => first(),
             Some(before) => next_iterate(model, settings, before),
-        });
-        let Some(next) = next else { break };
-        stopped = is_new && keep.store_iterate(chain, place, &next).is_break();
-        stages.pop_if(|before| before.stage == next.stage);
-        stages.push(next);
+        };
+        match journal.compute_iterates(&[(chain, descent.iterates)], &compute) {
+            Err(_) => return (descent, true),
+            Ok(next) if next.is_empty() => return (descent, false),
+            Ok(next) => {
+                descent.stages.pop_if(|before| before.stage == next[0].stage);
+                descent.stages.extend(next);
+                descent.iterates += 1;
+            }
+        }
     }
-    (stages, stopped)
 }

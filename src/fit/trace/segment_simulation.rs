@@ -1,8 +1,8 @@
 //! A run of the model over one segment, as the camera records it, with its derivatives.
 
 use super::camera_observation::CameraObservation;
-use super::checkpoint::Iterate;
 use super::fitted_traces::ShownFrame;
+use super::iterate::Iterate;
 use super::model::{TraceModel, TraceRecording};
 use super::normal_equations::recording_models;
 use super::unknowns::{CameraParameters, CameraUnknown, TraceUnknowns, UnknownKind};

@@ -2,20 +2,21 @@
 //! fits with each parameter shifted to either side (profile), and fits to simulated recordings (twins;
 //! parametric bootstrap).
 
-use super::checkpoint::{Checkpoint, Iterate, TraceDescent, TraceSearchSettings, chi2_per_dof};
 use super::initial_states::RescuePolicy;
+use super::iterate::{Iterate, TraceDescent, TraceSearchSettings, chi2_per_dof};
 use super::levenberg_marquardt::{outer_step, refit, start_stage};
 use super::lobes::MAX_LOBES;
 use super::model::{TraceModel, TraceRecording};
 use super::normal_equations::{TraceCovariance, trace_covariance};
 use super::segment_simulation::{SegmentResiduals, segment_residuals};
+use crate::fit::journal::Journal;
 use crate::recording::noise::AutoregressiveNoise;
 use portable_math as math;
 use portable_math::StandardNormal;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use rayon::prelude::*;
 use std::borrow::Cow;
+use std::sync::OnceLock;
 
 /// Half width of a two-sided 95 % interval, in standard deviations of a normal variable.
 pub(super) const Z_95: f64 = 1.959_963_984_540_054;
@@ -144,16 +145,6 @@ impl<'a> SearchEnd<'a> {
         if above { far } else { -far }
     }
 
-    /// The first iterate of a run or, if `before` is given, the iterate that follows it; `None` at the end of
-    /// the run.
-    pub(crate) fn next_iterate(&self, run: UncertaintyRun, before: Option<&Iterate>) -> Option<Iterate> {
-        if before.is_some_and(|before| run.is_complete(before)) {
-            return None;
-        }
-        let (model, first) = self.start_run(run);
-        Some(before.map_or(first, |before| outer_step(&model, before, false)))
-    }
-
     /// The model of a run, and its first iterate.
     fn start_run(&self, run: UncertaintyRun) -> RunStart<'a> {
         let at = Iterate { plain: true, settled: false, ..self.at.clone() };
@@ -192,7 +183,7 @@ type RunStart<'a> = (Cow<'a, TraceModel>, Iterate);
 /// A run with its iterates so far.
 struct RunProgress<'a> {
     run: UncertaintyRun,
-    start: Option<RunStart<'a>>,
+    start: OnceLock<RunStart<'a>>,
     place: usize,
     last: Option<Iterate>,
 }
@@ -202,45 +193,35 @@ impl<'a> RunProgress<'a> {
         self.last.as_ref().is_none_or(|last| !self.run.is_complete(last))
     }
 
-    fn accept_iterate(&mut self, next: Iterate) {
-        (self.last, self.place) = (Some(next), self.place + 1);
-    }
-
-    fn next_iterate(&mut self, end: &SearchEnd<'a>) -> Iterate {
-        let (model, first) = self.start.get_or_insert_with(|| end.start_run(self.run));
+    /// The next iterate; the model and the first iterate are made when they are first needed.
+    fn next_iterate(&self, end: &SearchEnd<'a>) -> Iterate {
+        let (model, first) = self.start.get_or_init(|| end.start_run(self.run));
         self.last.as_ref().map_or_else(|| first.clone(), |last| outer_step(model, last, false))
     }
 }
 
 /// Computes several runs at once, each to its end. Returns the last iterate of each run, in order; an entry
-/// is `None` if the scene refuses the first point of that run. Returns `None` if the checkpoint requests a
+/// is `None` if the scene refuses the first point of that run. Returns `None` if the journal requests a
 /// stop.
 pub(super) fn follow_runs(
     end: &SearchEnd<'_>,
     runs: &[UncertaintyRun],
-    keep: &mut dyn Checkpoint,
+    journal: &mut Journal<'_>,
 ) -> Option<Vec<Option<Iterate>>> {
     let mut ends = Vec::new();
     // twins form their own groups, so that twins that are added later do not change the order of
     // the other iterates
     let kinds = runs.chunk_by(|a, b| a.is_twin() == b.is_twin());
     for runs in kinds.flat_map(|kind| kind.chunks(RUNS_TOGETHER)) {
-        let begin = |run: &UncertaintyRun| RunProgress { run: *run, start: None, place: 0, last: None };
+        let begin =
+            |run: &UncertaintyRun| RunProgress { run: *run, start: OnceLock::new(), place: 0, last: None };
         let mut ways: Vec<RunProgress<'_>> = runs.iter().map(begin).collect();
         while ways.iter().any(RunProgress::is_open) {
-            let mut due: Vec<&mut RunProgress<'_>> = Vec::new();
-            for way in ways.iter_mut().filter(|way| way.is_open()) {
-                match keep.find_iterate(way.run.chain_number(), way.place) {
-                    Some(known) => way.accept_iterate(known),
-                    None => due.push(way),
-                }
-            }
-            let made: Vec<Iterate> = due.par_iter_mut().map(|way| way.next_iterate(end)).collect();
-            for (way, made) in due.into_iter().zip(made) {
-                if keep.store_iterate(way.run.chain_number(), way.place, &made).is_break() {
-                    return None;
-                }
-                way.accept_iterate(made);
+            let mut open: Vec<&mut RunProgress<'_>> = ways.iter_mut().filter(|way| way.is_open()).collect();
+            let keys: Vec<_> = open.iter().map(|way| (way.run.chain_number(), way.place)).collect();
+            let made = journal.compute_iterates(&keys, &|at| Some(open[at].next_iterate(end))).ok()?;
+            for (way, next) in open.iter_mut().zip(made) {
+                (way.last, way.place) = (Some(next), way.place + 1);
             }
         }
         ends.extend(ways.into_iter().map(|way| way.last.filter(|last| last.cost < f64::MAX)));

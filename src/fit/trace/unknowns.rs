@@ -49,6 +49,22 @@ impl CameraUnknown {
             Self::Clock => 1e-4,
         }
     }
+
+    /// Key of the camera error in files; it ends with the unit.
+    pub(crate) fn key(self) -> &'static str {
+        match self {
+            Self::OffsetX => "offset_x_m",
+            Self::OffsetDrop => "offset_drop_m",
+            Self::TipAlong => "tip_along_lip_m",
+            Self::TipAcross => "tip_across_lip_m",
+            Self::DriftX => "drift_x_m_per_s",
+            Self::DriftDrop => "drift_drop_m_per_s",
+            Self::Scale => "scale_relative",
+            Self::Tilt => "tilt_rad",
+            Self::Curvature => "curvature_per_m",
+            Self::Clock => "clock_s",
+        }
+    }
 }
 
 /// Kind of an unknown.
@@ -86,8 +102,19 @@ pub struct TraceUnknown {
 }
 
 impl TraceUnknown {
+    /// For a parameter: its key in the scene file. For a camera error: the name of the recording and the key
+    /// of the error. `recordings` are the names of the recordings.
+    pub(crate) fn name(&self, recordings: &[String]) -> String {
+        match &self.kind {
+            UnknownKind::Parameter { name, .. } => name.clone(),
+            UnknownKind::Camera { film, what } => {
+                format!("{}: {}", recordings.get(*film).map_or("", String::as_str), what.key())
+            }
+        }
+    }
+
     /// Value that corresponds to a coordinate of 1; `None` if the coordinate is the logarithm of the value.
-    fn unit(&self) -> Option<f64> {
+    pub(crate) fn unit(&self) -> Option<f64> {
         match self.kind {
             UnknownKind::Parameter { unit, .. } => unit,
             UnknownKind::Camera { what, .. } => Some(what.coordinate_unit()),

@@ -1,5 +1,7 @@
+use super::super::checkpoint::FitHeader;
+use super::super::context::FitContext;
 use super::super::evaluation::Observed;
-use super::super::ledger::FitProgress;
+use super::super::journal::{FitProgress, Journal};
 use super::super::model::FeaturePredictor;
 use super::*;
 use crate::checkpoint::NullSink;
@@ -62,7 +64,8 @@ fn with(features: Features, sds: &[f64], tried: &[[f64; 2]], settings: IntervalS
     let fake = FakePredictor { features, sds };
     let objective = Objective::new(axes, sds.iter().enumerate().map(target).collect(), &fake);
     let (mut journal, mut watch) = (NullSink, |_: &FitProgress| ControlFlow::Continue(()));
-    let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
+    let journal = Journal::new(&FitContext::default(), FitHeader::default(), &mut journal, &mut watch);
+    let mut ledger = Ledger::new(&objective, journal.unwrap());
     ledger
         .evaluate_points(EvaluationStage::Local, &tried.iter().map(|unit| unit.to_vec()).collect::<Vec<_>>())
         .unwrap();
@@ -342,7 +345,8 @@ fn a_misfit_widens_the_deviations() {
     let axes = vec![SearchAxis::from(Bounds::new(0.1, 10.0, BoundsSpacing::Log).unwrap()); 2];
     let objective = Objective::new(axes, (0..3).map(target).collect(), &fake);
     let (mut journal, mut watch) = (NullSink, |_: &FitProgress| ControlFlow::Continue(()));
-    let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
+    let journal = Journal::new(&FitContext::default(), FitHeader::default(), &mut journal, &mut watch);
+    let mut ledger = Ledger::new(&objective, journal.unwrap());
     let best = vec![0.5, 0.5 - 0.025 / 100.0_f64.ln()];
     ledger.evaluate_points(EvaluationStage::Local, &[best]).unwrap();
     let found = weigh_features(&mut ledger).unwrap();
@@ -373,7 +377,8 @@ fn a_feature_that_is_not_smooth_counts_for_less() {
     let axes = vec![SearchAxis::from(Bounds::new(0.1, 10.0, BoundsSpacing::Log).unwrap()); 2];
     let objective = Objective::new(axes, (0..2).map(target).collect(), &fake);
     let (mut journal, mut watch) = (NullSink, |_: &FitProgress| ControlFlow::Continue(()));
-    let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
+    let journal = Journal::new(&FitContext::default(), FitHeader::default(), &mut journal, &mut watch);
+    let mut ledger = Ledger::new(&objective, journal.unwrap());
     ledger.evaluate_points(EvaluationStage::Local, &[vec![0.5, 0.5]]).unwrap();
     let found = weigh_features(&mut ledger).unwrap();
     assert!(found.scatter[0] > 0.01 && found.scatter[1] < 1e-9, "{found:?}");
@@ -415,7 +420,8 @@ fn confirmed_at(features: Features, sds: &[f64], unit: [f64; 2]) -> FitUncertain
     let fake = FakePredictor { features, sds };
     let objective = Objective::new(axes, sds.iter().enumerate().map(target).collect(), &fake);
     let (mut journal, mut watch) = (NullSink, |_: &FitProgress| ControlFlow::Continue(()));
-    let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
+    let journal = Journal::new(&FitContext::default(), FitHeader::default(), &mut journal, &mut watch);
+    let mut ledger = Ledger::new(&objective, journal.unwrap());
     ledger.evaluate_points(EvaluationStage::Local, &[unit.to_vec()]).unwrap();
     let names = ["p".to_owned(), "q".to_owned()];
     let settings = SearchSettings {

@@ -5,8 +5,8 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use wiperlab::checkpoint;
 use wiperlab::checkpoint::{CheckpointRecord, CheckpointSink, Shard, format_header_line};
-use wiperlab::fit::feature_checkpoint::FeatureCheckpoint;
-use wiperlab::fit::ledger::FitProgress;
+use wiperlab::fit::checkpoint::FitCheckpoint;
+use wiperlab::fit::journal::FitProgress;
 use wiperlab::fit::{FitContext, FitError, fit_features, job::Job};
 use wiperlab::simulate::scene::Scene;
 use wiperlab::sweep::{self, PointCollection, PointOutcome, Study, SweepError, journal as points};
@@ -54,7 +54,7 @@ fn a_fit_whose_journal_fails_at_any_write_ends_with_a_reason_and_goes_on() {
         }
         let expected = FitError::JournalWrite { problem: "input/output error".to_owned() };
         assert_eq!(ended, Err(expected), "write {failures}");
-        let kept: Option<FeatureCheckpoint> = checkpoint::read_checkpoint("j", &disk.text).unwrap();
+        let kept: Option<FitCheckpoint> = checkpoint::read_checkpoint("j", &disk.text).unwrap();
         let kept = kept.map_or(0, |journal| journal.records.len());
         // the gate holds its lines back until it has passed the job, and reports them before
         assert!(

@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use wiperlab::checkpoint::NullSink;
 use wiperlab::fit::evaluation::{FailureReason, RunFailure};
 use wiperlab::fit::job::Job;
-use wiperlab::fit::ledger::FitProgress;
+use wiperlab::fit::journal::FitProgress;
 use wiperlab::fit::model::{Draw, Model};
 use wiperlab::fit::result::FitResult;
 use wiperlab::fit::uncertainty::ParameterVerdict;

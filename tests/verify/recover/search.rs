@@ -9,10 +9,11 @@ use wiperlab::checkpoint::{CheckpointError, CheckpointSink};
 use wiperlab::feature::ValueComparison;
 use wiperlab::fit::bounds::SearchAxis;
 use wiperlab::fit::bounds::{Bounds, BoundsSpacing};
+use wiperlab::fit::checkpoint::{FitCheckpoint, FitHeader};
 use wiperlab::fit::evaluation::Observed;
 use wiperlab::fit::evaluation::{FailureReason, RunFailure};
-use wiperlab::fit::feature_checkpoint::FeatureCheckpoint;
-use wiperlab::fit::ledger::{FitProgress, Ledger, StopReason};
+use wiperlab::fit::journal::{FitProgress, Journal, StopReason};
+use wiperlab::fit::ledger::Ledger;
 use wiperlab::fit::model::{Draw, FeaturePredictor, Model};
 use wiperlab::fit::objective::Objective;
 use wiperlab::fit::result::{FitResult, FitStatus};
@@ -106,7 +107,8 @@ fn find(
     let model = Fake(model);
     let objective = Objective::new(axes, targets.iter().enumerate().map(target).collect(), &model);
     let (mut journal, mut watch) = (Memory::new(), carry_on);
-    let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
+    let journal = Journal::new(&FitContext::default(), FitHeader::default(), &mut journal, &mut watch);
+    let mut ledger = Ledger::new(&objective, journal.unwrap());
     let ended = search_minimum(&mut ledger, dimensions, &SETTINGS, limit).termination;
     let best = ledger.best_evaluation().unwrap().clone();
     Found {
@@ -298,7 +300,7 @@ fn job(text: &str) -> Job {
     Job::parse_with_names("job.toml", text, &["blade.stiffness", "friction.a"]).unwrap()
 }
 
-fn context<'a>(resume: Option<(&'a str, &'a FeatureCheckpoint)>) -> FitContext<'a> {
+fn context<'a>(resume: Option<(&'a str, &'a FitCheckpoint)>) -> FitContext<'a> {
     FitContext { fingerprint: "f", version: "0.1.0", max_evaluations: None, resume }
 }
 
@@ -365,7 +367,7 @@ fn a_journal_that_cannot_be_written_ends_the_fit() {
 #[test]
 fn a_journal_of_another_fit_is_refused() {
     let (_, text) = run(JOB, &Ringing::new(), &FitContext { max_evaluations: Some(3), ..context(None) });
-    let journal: FeatureCheckpoint = checkpoint::read_checkpoint("j", &text).unwrap().unwrap();
+    let journal: FitCheckpoint = checkpoint::read_checkpoint("j", &text).unwrap().unwrap();
     let (refused, appended) =
         run(JOB, &Ringing::new(), &FitContext { fingerprint: "g", ..context(Some(("j", &journal))) });
     assert!(matches!(refused, Err(FitError::Journal(CheckpointError::OtherProblem { .. }))));

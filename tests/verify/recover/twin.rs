@@ -3,7 +3,7 @@
 
 use std::ops::ControlFlow;
 use wiperlab::fit::job::Job;
-use wiperlab::fit::ledger::FitProgress;
+use wiperlab::fit::journal::FitProgress;
 use wiperlab::fit::result::{FitResult, FitStatus};
 use wiperlab::fit::uncertainty::ParameterVerdict;
 use wiperlab::fit::{MeasuredRecording, Problem};

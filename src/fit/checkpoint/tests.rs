@@ -1,63 +1,66 @@
 use super::*;
-use crate::checkpoint::{CheckpointError, format_header_line, format_record_line, read_checkpoint};
-use crate::feature::ValueComparison;
-use crate::fit::bounds::{Bounds, BoundsSpacing};
-use crate::fit::evaluation::FailureReason;
-use crate::fit::target_value::TargetValue;
+use crate::checkpoint::{
+    CheckpointError, CheckpointHeader, StoredRecord, check_recomputed, format_header_line,
+    format_record_line, read_checkpoint,
+};
+use crate::fit::evaluation::{FailureReason, Observation, Observed, RunFailure};
 use crate::simulate::RunStatus;
 
-fn header(fingerprint: &str) -> FeatureHeader {
-    let bounds =
-        [Bounds::new(0.001, 10.0, BoundsSpacing::Log), Bounds::new(-1.0, 2.0, BoundsSpacing::Linear)];
-    let parameters = ["a", "b"].iter().zip(bounds).map(|(name, bounds)| HeaderParameter {
-        name: (*name).to_owned(),
-        unit: "N".to_owned(),
-        axis: bounds.unwrap().into(),
-    });
-    let features = ["low", "high"].map(|name| HeaderFeature {
-        name: name.to_owned(),
-        unit: "Hz".to_owned(),
-        target: target(name),
-    });
-    let (parameters, features) = (parameters.collect(), features.into());
-    FeatureHeader::new::<EvaluationRecord>(
-        fingerprint,
-        "0.1.0",
-        FeatureHeaderBody { seed: 1, parameters, features },
-    )
+pub(in crate::fit) fn trace_header() -> FitHeader {
+    let [unknowns, data] =
+        [["friction.a", "film: tilt_rad"].map(str::to_owned).into(), vec!["film".to_owned()]];
+    FitHeader { seed: 3, unknowns, data, segment_s: vec![0.004, 0.008] }
 }
 
-fn target(name: &str) -> TargetValue {
-    let name = name.to_owned();
-    TargetValue {
-        name,
-        value: 0.1 + 0.2,
-        sd: 1e-3,
-        scatter: 0.0,
-        measure: ValueComparison::Log,
-        last: false,
-        calibration: None,
+/// An iterate number `step` of a chain with two stages of three iterates.
+pub(in crate::fit) fn iterate(step: usize) -> Iterate {
+    let x = 0.1 * step as f64;
+    let segment = |first: usize, chi2: f64| SegmentState {
+        recording: 0,
+        first,
+        last: first + 20,
+        start: [x.sin(), 1.0 / 3.0, -x, 1e-17],
+        shown: [0.1, 0.2, 0.3, 0.4],
+        chi2,
+        data: 40,
+    };
+    Iterate {
+        stage: step / 3,
+        number: step % 3,
+        cuts: step / 2,
+        rescues: step % 2,
+        whole: step % 2 == 1,
+        plain: step % 3 == 2,
+        settled: step % 3 == 2,
+        damping: 1e-3 * 0.2_f64.powi(step as i32),
+        point: vec![x.exp().ln() - 1.0, x.sqrt()],
+        segments: vec![segment(0, 41.5 + x), segment(20, if step == 0 { f64::INFINITY } else { 90.0 })],
+        cost: 1e3 / (1.0 + x),
     }
 }
 
-fn read(file: &str, bytes: impl AsRef<[u8]>) -> Result<Option<FeatureCheckpoint>, CheckpointError> {
+fn header(fingerprint: &str) -> CheckpointHeader<FitHeader> {
+    let names = |names: [&str; 2]| names.map(str::to_owned).into();
+    let (unknowns, data) = (names(["a", "b"]), names(["low", "high"]));
+    let body = FitHeader { seed: 1, unknowns, data, segment_s: Vec::new() };
+    CheckpointHeader::new::<FitRecord>(fingerprint, "0.1.0", body)
+}
+
+fn read(file: &str, bytes: impl AsRef<[u8]>) -> Result<Option<FitCheckpoint>, CheckpointError> {
     read_checkpoint(file, bytes)
 }
 
-fn entry_line(at: usize, stage: EvaluationStage, outcome: &EvaluationOutcome) -> String {
-    format_record_line(&EvaluationRecord { stage, outcome: outcome.clone() }, at)
+fn entry_line(stage: EvaluationStage, outcome: &EvaluationOutcome) -> String {
+    format_record_line(&FitRecord::Evaluation { stage, outcome: outcome.clone() })
 }
 
 fn outcome(u: f64) -> EvaluationOutcome {
     let features = vec![Observed::from_value(1e23 * u), Observed::Missing("no peak".to_owned())];
-    let unit = vec![u, 0.1 + 0.2];
-    let parameters = header("f").body.parameters;
-    let values = parameters.iter().zip(&unit).map(|(p, u)| p.axis.bounds.value_at_unit(*u)).collect();
-    EvaluationOutcome { unit, values, features, failure: None }
+    EvaluationOutcome { unit: vec![u, 0.1 + 0.2], values: Vec::new(), features, failure: None }
 }
 
 fn text(units: &[f64]) -> String {
-    let lines = units.iter().enumerate().map(|(i, u)| entry_line(i, EvaluationStage::Global, &outcome(*u)));
+    let lines = units.iter().map(|u| entry_line(EvaluationStage::Global, &outcome(*u)));
     format_header_line(&header("f")) + &lines.collect::<String>()
 }
 
@@ -67,17 +70,17 @@ fn every_bit_survives() {
     let journal = read("j", text(&units)).unwrap().unwrap();
     assert_eq!((journal.records.len(), journal.end.torn), (200, false));
     for (entry, u) in journal.records.iter().zip(&units) {
-        assert_eq!(entry.outcome, outcome(*u));
+        assert_eq!(*entry, FitRecord::Evaluation { stage: EvaluationStage::Global, outcome: outcome(*u) });
     }
     let failed = EvaluationOutcome {
         failure: Some(RunFailure::new(FailureReason::Ended(RunStatus::Jammed), "at 0.1 s", 0.3)),
         features: vec![],
         ..outcome(0.5)
     };
-    let line = format_header_line(&header("f")) + &entry_line(0, EvaluationStage::Local, &failed);
+    let line = format_header_line(&header("f")) + &entry_line(EvaluationStage::Local, &failed);
     assert_eq!(
         read("j", &line).unwrap().unwrap().records,
-        vec![EvaluationRecord { stage: EvaluationStage::Local, outcome: failed }]
+        vec![FitRecord::Evaluation { stage: EvaluationStage::Local, outcome: failed }]
     );
 }
 
@@ -111,14 +114,11 @@ fn damage_elsewhere_is_refused_with_its_line() {
     let good = text(&[0.25, 0.75]);
     let cut = forged(&good, "\"stage\"", "\"stag\"");
     assert!(refused(&cut).starts_with("j:2: no evaluation: unknown field `stag`"), "{}", refused(&cut));
-    let skipped =
-        good.lines().enumerate().filter(|(i, _)| *i != 1).map(|(_, l)| format!("{l}\n")).collect::<String>();
-    assert!(refused(&skipped).starts_with("j:2: `index`: found 1, expected 0;"), "{}", refused(&skipped));
     for (from, to, said) in [
-        ("[\"0.25\"", "[\"1.25\"", "`unit`: found 1.25, expected 0 to 1"),
-        ("[\"0.25\"", "[\"inf\"", "expected a finite number"),
-        ("\"unit\":[", "\"unit\":[\"0.5\",", "`unit`: found 3 numbers, expected 2"),
-        ("\"],\"features\":[", "\"],\"features\":[\"1.0\",", "`features`: found 3, expected 2"),
+        ("[0.25", "[1.25", "`unit`: found 1.25, expected 0 to 1"),
+        ("[0.25", "[null", "no evaluation: invalid type: null"),
+        ("\"unit\":[", "\"unit\":[0.5,", "`unit`: found 3, expected 2"),
+        ("],\"features\":[", "],\"features\":[{\"value\":1.0},", "`features`: found 3, expected 2"),
     ] {
         let refused = refused(&forged(&good, from, to));
         assert!(refused.starts_with("j:2: ") && refused.contains(said), "{refused}");
@@ -184,38 +184,32 @@ fn line_ends_of_other_systems_and_a_byte_order_mark_are_read() {
 #[test]
 fn a_journal_of_another_fit_is_refused_with_what_differs_and_what_to_do() {
     let expected = header("f");
-    let refused = |found: FeatureHeader| {
-        found.check_matches::<EvaluationRecord>("j", &expected).unwrap_err().to_string()
+    let refused = |found: CheckpointHeader<FitHeader>| {
+        found.check_matches::<FitRecord>("j", &expected).unwrap_err().to_string()
     };
-    assert_eq!(expected.check_matches::<EvaluationRecord>("j", &expected), Ok(()));
+    assert_eq!(expected.check_matches::<FitRecord>("j", &expected), Ok(()));
     assert!(
         refused(header("g"))
             .starts_with("j: fingerprint g, expected f: the job, a scene or a recording has changed")
     );
     let version =
-        refused(FeatureHeader { version: "0.0.9".to_owned(), fingerprint: "g".to_owned(), ..header("f") });
+        refused(CheckpointHeader { version: "0.0.9".to_owned(), fingerprint: "g".to_owned(), ..header("f") });
     assert!(
         version.starts_with("j: written by version 0.0.9 of the program, this is version 0.1.0")
             && version.contains("resume with version 0.0.9")
     );
-    let body = |body: FeatureHeaderBody| FeatureHeader { body, ..header("f") };
-    let mut wider = expected.body.clone();
-    wider.parameters[0].axis = Bounds::new(0.001, 20.0, BoundsSpacing::Log).unwrap().into();
-    for other in [FeatureHeaderBody { features: vec![], ..expected.body.clone() }, wider] {
-        assert!(
-            refused(body(other))
-                .starts_with("j:1: the header has other parameters, bounds, features or targets")
-        );
-    }
-    let seed = body(FeatureHeaderBody { seed: 7, ..expected.body.clone() });
-    assert_eq!(seed.check_matches::<EvaluationRecord>("j", &expected), Ok(()));
+    let body = |body: FitHeader| CheckpointHeader { body, ..header("f") };
+    let other = refused(body(FitHeader { data: vec![], ..expected.body.clone() }));
+    assert!(other.starts_with("j:1: the header has other unknowns, features, recordings or segments"));
+    let seed = body(FitHeader { seed: 7, ..expected.body.clone() });
+    assert_eq!(seed.check_matches::<FitRecord>("j", &expected), Ok(()));
 }
 
 #[test]
 fn journals_of_other_layouts_and_kinds_are_refused() {
     let refused = |text: &str| read("j", text).unwrap_err().to_string();
-    let said = "j: a journal of layout 2, expected layout 3; move it away and run the fit again";
-    assert_eq!(refused("{\"journal\":\"fit\",\"layout\":2}\n"), said);
+    let said = "j: a journal of layout 3, expected layout 4; move it away and run the fit again";
+    assert_eq!(refused("{\"journal\":\"fit\",\"layout\":3}\n"), said);
     let unsealed = text(&[]).split_once(",\"sha256\"").unwrap().0.to_owned() + "}\n";
     assert!(refused(&unsealed).starts_with("j:1: found no checksum"));
     let sweep = forged(&text(&[]), "\"fit\"", "\"sweep\"");
@@ -233,49 +227,54 @@ fn a_point_that_stands_twice_is_refused() {
 }
 
 #[test]
-fn an_evaluation_that_is_computed_otherwise_is_refused_with_both_outcomes() {
-    let mut journal = read("j", text(&[0.25, 0.5])).unwrap().unwrap();
-    let averaged = |spread, below_db| {
-        let shown = Observation { value: 5e22, spread, below_db };
-        vec![Observed::Value(shown), Observed::Missing("no peak".to_owned())]
-    };
-    let failed = |message: &str, progress| {
-        let failure = RunFailure::new(FailureReason::Ended(RunStatus::Jammed), message, progress);
+fn what_is_computed_otherwise_is_refused_with_both_outcomes() {
+    let failed = |message: &str| {
+        let failure = RunFailure::new(FailureReason::Ended(RunStatus::Jammed), message, 0.5);
         EvaluationOutcome { features: vec![], failure: Some(failure), ..outcome(0.5) }
     };
     let with = |features| EvaluationOutcome { features, ..outcome(0.5) };
-    let pairs: [(EvaluationOutcome, EvaluationOutcome, &str, &str); 7] = [
+    let averaged = Observation { value: 5e22, spread: 0.25, below_db: 0.0 };
+    let record = |outcome| FitRecord::Evaluation { stage: EvaluationStage::Local, outcome };
+    let step = |iterate| FitRecord::Iterate { chain: 0, step: 4, iterate };
+    let mut moved = iterate(4);
+    moved.point[1] += f64::EPSILON;
+    let pairs = [
         (
-            with(vec![Observed::from_value(2.0), Observed::from_value(1.0)]),
-            outcome(0.5),
-            "feature 1 2.0",
-            "feature 1 5e22",
-        ),
-        (with(averaged(0.25, 0.0)), outcome(0.5), "feature 1 5e22, spread 0.25", "feature 1 5e22"),
-        (
-            with(averaged(0.0, 3.0)),
-            outcome(0.5),
-            "feature 1 5e22, below the strongest by (dB) 3.0",
-            "feature 1 5e22",
+            record(with(vec![Observed::from_value(2.0), Observed::from_value(1.0)])),
+            record(outcome(0.5)),
+            "evaluation.outcome.features[0].value 2.0",
         ),
         (
-            with(vec![Observed::from_value(5e22), Observed::Missing("lost".to_owned())]),
-            outcome(0.5),
-            "feature 2 missing (lost)",
-            "feature 2 missing (no peak)",
+            record(with(vec![Observed::Value(averaged), Observed::Missing("no peak".to_owned())])),
+            record(outcome(0.5)),
+            "evaluation.outcome.features[0] {\"spread\":0.25,\"value\":5e+22}",
         ),
-        (failed("why", 0.5), outcome(0.5), "failure jammed (why) after 0.5 of the run", "no failure"),
-        (failed("wherefore", 0.5), failed("why", 0.5), "failure jammed (wherefore)", "failure jammed (why)"),
-        (failed("why", 0.25), failed("why", 0.5), "failure jammed (why) after 0.25", "failure jammed (why)"),
+        (record(failed("why")), record(outcome(0.5)), "evaluation.outcome {\"failure\":"),
+        (record(failed("why")), record(failed("wherefore")), "evaluation.outcome.failure.message \"why\""),
+        (step(iterate(4)), step(moved), "iterate.iterate.point[1] 0.632"),
     ];
-    for (stored, again, found, computed) in pairs {
-        journal.records[1].outcome = stored;
-        let again = EvaluationRecord { stage: EvaluationStage::Local, outcome: again };
-        let refused = journal.check_recomputed("j", 1, &again).unwrap_err().to_string();
-        let (before, after) = refused.split_once(", but computed again the evaluation gives ").unwrap();
-        assert!(before.starts_with(&format!("j:3: found {found}")), "{refused}");
-        assert!(after.starts_with(computed) && after.contains("to the last digit"), "{refused}");
+    for (record, again, found) in pairs {
+        let stored = StoredRecord { record, line: 3 };
+        assert_eq!(check_recomputed("j", &stored, &stored.record.clone()), Ok(()));
+        let refused = check_recomputed("j", &stored, &again).unwrap_err().to_string();
+        assert!(refused.starts_with(&format!("j:3: found {found}")), "{refused}");
+        assert!(refused.contains(", but computed again the evaluation gives "), "{refused}");
     }
-    let same = EvaluationRecord { stage: EvaluationStage::Local, outcome: outcome(0.25) };
-    assert_eq!(journal.check_recomputed("j", 0, &same), Ok(()), "the purpose of an evaluation may differ");
+}
+
+#[test]
+fn every_bit_of_an_iterate_comes_back_and_what_cannot_be_of_this_fit_is_refused() {
+    let records: Vec<FitRecord> =
+        (0..6).map(|step| FitRecord::Iterate { chain: 1, step, iterate: iterate(step) }).collect();
+    let header = CheckpointHeader::new::<FitRecord>("f", "0.1.0", trace_header());
+    let text = format_header_line(&header) + &records.iter().map(format_record_line).collect::<String>();
+    assert_eq!(read("j", &text).unwrap().unwrap().records, records);
+    for (from, to, words) in [
+        ("\"stage\":0,", "\"stage\":2,", "j:2: `stage`: found 2, expected below 2"),
+        ("\"recording\":0,", "\"recording\":1,", "of recording 1, expected rising frames of 1 recordings"),
+        ("\"point\":[", "\"point\":[1.0,", "`point`: found 3, expected 2"),
+    ] {
+        let refused = read("j", forged(&text, from, to)).unwrap_err().to_string();
+        assert!(refused.contains(words), "{refused}");
+    }
 }

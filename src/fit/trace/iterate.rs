@@ -1,27 +1,9 @@
-//! Iterates of a trace search, and the store for them.
+//! Iterates of a trace search.
 
 use super::segment_simulation::LinkState;
-use std::ops::ControlFlow;
-
-/// Store for the iterates of a search: a journal, or `()`, which stores nothing.
-pub trait Checkpoint {
-    /// The stored iterate with number `place` in the chain with number `chain`, both counted from 0; `None`
-    /// if it is not stored.
-    fn find_iterate(&mut self, chain: usize, place: usize) -> Option<Iterate>;
-    /// Stores a new iterate with number `place` in the chain with number `chain`; returns `Break` to end the
-    /// search.
-    fn store_iterate(&mut self, chain: usize, place: usize, iterate: &Iterate) -> ControlFlow<()>;
-}
-
-impl Checkpoint for () {
-    fn find_iterate(&mut self, _: usize, _: usize) -> Option<Iterate> {
-        None
-    }
-
-    fn store_iterate(&mut self, _: usize, _: usize, _: &Iterate) -> ControlFlow<()> {
-        ControlFlow::Continue(())
-    }
-}
+use super::uncertainty_run::{MAX_STARTS, UncertaintyRun};
+use crate::fit::misfit::or_infinite;
+use serde::{Deserialize, Serialize};
 
 /// Settings of a trace search.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,7 +15,8 @@ pub struct TraceSearchSettings {
 }
 
 /// A segment with its starting state and its misfit.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct SegmentState {
     /// Index of the recording.
     pub recording: usize,
@@ -50,6 +33,7 @@ pub struct SegmentState {
     pub data: usize,
     /// Chi2: sum of the squared residuals, each in standard deviations of the noise; infinite if the run of
     /// the model fails.
+    #[serde(deserialize_with = "or_infinite")]
     pub chi2: f64,
 }
 
@@ -70,7 +54,8 @@ impl SegmentState {
 }
 
 /// One accepted step of the search.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Iterate {
     /// Index of the stage.
     pub stage: usize,
@@ -147,10 +132,25 @@ pub struct TraceDescent {
     pub start: usize,
     /// Last iterate of each stage that was reached, in the order of the stages.
     pub stages: Vec<Iterate>,
+    /// Number of iterates of the chain.
+    pub iterates: usize,
 }
 
 impl TraceDescent {
     pub(crate) fn last_iterate(&self) -> Option<&Iterate> {
         self.stages.last()
     }
+}
+
+/// Describes the current iterate of a fit, for the display of its progress.
+pub(crate) fn describe_iterate(chain: usize, at: &Iterate, segment_s: &[f64]) -> String {
+    let length_ms = 1e3 * segment_s.get(at.stage).copied().unwrap_or_default();
+    let chain = match UncertaintyRun::from_chain_number(chain) {
+        None if chain >= MAX_STARTS => format!("minimum {}", chain - MAX_STARTS + 1),
+        None => format!("start {}", chain + 1),
+        Some(UncertaintyRun::Twin(twin)) => format!("twin {}", twin + 1),
+        Some(UncertaintyRun::Shorter | UncertaintyRun::Side { .. }) => "intervals".to_owned(),
+    };
+    let (bad, all) = (at.count_bad_segments(), at.segments.len());
+    format!("{chain}, segments of {length_ms} ms, {bad} of {all} bad, cost {:.1}", at.cost)
 }
