@@ -26,7 +26,6 @@ use std::time::Instant;
 use table::{Line, write_table};
 use truth::{Blade, Fault, SOUGHT, draw_blade, write_job};
 use wiperlab::fit::job::Job;
-use wiperlab::fit::journal::{FitProgress, Journal};
 use wiperlab::fit::result::FitResult;
 use wiperlab::fit::trace::{Iterate, chi2_per_dof};
 use wiperlab::fit::{MeasuredRecording, Problem};

@@ -171,21 +171,6 @@ pub(crate) fn line_to_unit(line: f64) -> f64 {
     clamp_unit(0.5 * (1.0 + math::sin(line)))
 }
 
-/// A free parameter in a search: its range and its prior.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SearchAxis {
-    /// Range of the parameter.
-    pub bounds: Bounds,
-    /// Prior of the parameter, if any.
-    pub prior: Option<Prior>,
-}
-
-impl From<Bounds> for SearchAxis {
-    fn from(bounds: Bounds) -> Self {
-        Self { bounds, prior: None }
-    }
-}
-
 /// Prior: a normal distribution of a parameter or of the logarithm of the parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub enum Prior {

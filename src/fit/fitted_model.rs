@@ -104,7 +104,7 @@ impl Problem {
             return Ok((ModelledTargets { components: Vec::new(), features: Vec::new() }, held_out));
         }
         let seen = ModelFeatures::for_targets(&model, &aims, &targets, job.ensemble.members);
-        let objective = Objective::new(job.search_axes(), targets, &seen);
+        let objective = Objective::new(job.parameters.clone(), targets, &seen);
         let best = objective.evaluate_values(values.clone());
         let reads = read_best_model(&seen, &values);
         let shown = ModelledTargets::compare(&aims, objective.targets(), &[], &best, &reads);

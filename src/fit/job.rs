@@ -15,14 +15,14 @@ mod settings;
 mod targets;
 mod traces;
 
-use super::bounds::SearchAxis;
 use super::search::SearchSettings;
 use super::target_value::TargetCalibration;
 use crate::feature::Feature;
 use crate::simulate::twin::Camera;
 use crate::toml_file::{self, KeyRefusal, TomlError, check_above_zero, check_format, parse_toml};
 pub(crate) use conditions::{FeatureCamera, HeadSource, JobCondition, is_same_quantity};
-pub(crate) use parameters::{Constants, FreeParameter, NuisanceParameter};
+pub use parameters::FreeParameter;
+pub(crate) use parameters::{Constants, NuisanceParameter};
 use serde::Serialize;
 pub(crate) use settings::{Ensemble, IntervalSettings};
 pub use targets::{FitTarget, TargetSource, TargetStage};
@@ -105,11 +105,6 @@ impl Job {
     #[must_use]
     pub fn schema() -> serde_json::Value {
         toml_file::schema_of::<as_written::JobFile>()
-    }
-
-    /// Ranges and priors of the free parameters, in job order.
-    pub(crate) fn search_axes(&self) -> Vec<SearchAxis> {
-        self.parameters.iter().map(FreeParameter::search_axis).collect()
     }
 
     /// Names of the free parameters, in job order.

@@ -5,9 +5,10 @@
 //! parameter. Slopes are central differences with the step `DIFFERENCE_STEP`, which is wide enough to average
 //! over the scatter of features that are measured on sampled traces.
 
-use super::bounds::{Prior, SearchAxis, clamp_unit};
+use super::bounds::{Prior, clamp_unit};
 use super::camera_calibration::{CameraEstimate, CameraFit};
 use super::evaluation::Evaluation;
+use super::job::FreeParameter;
 use super::objective::{LOSS_KNEE, Objective, prior_residuals, residual, total_sd};
 use super::target_value::TargetValue;
 use crate::feature::ValueComparison;
@@ -101,7 +102,7 @@ pub(crate) fn residuals(objective: &Objective, evaluation: &Evaluation) -> Vec<O
 
 /// Residuals against the given targets; `None` where a feature is missing or its target is NaN.
 pub(crate) fn residuals_against(
-    axes: &[SearchAxis],
+    axes: &[FreeParameter],
     targets: &[TargetValue],
     evaluation: &Evaluation,
 ) -> Vec<Option<f64>> {
@@ -338,7 +339,7 @@ impl SingularDirections {
     pub(crate) fn combinations(
         &self,
         names: &[String],
-        axes: &[SearchAxis],
+        axes: &[FreeParameter],
         unit: &[f64],
     ) -> Vec<ParameterCombination> {
         let slopes: Vec<f64> =
@@ -377,7 +378,7 @@ mod tests {
         ["p".to_owned(), "q".to_owned()]
     }
 
-    fn axes() -> Vec<SearchAxis> {
+    fn axes() -> Vec<FreeParameter> {
         vec![
             Bounds::new(0.1, 10.0, BoundsSpacing::Log).unwrap().into(),
             Bounds::new(1.0, 10.0, BoundsSpacing::Log).unwrap().into(),

@@ -20,9 +20,9 @@
 //! A failing run costs at least as much as a run in which all features are missing; the later it fails, the
 //! less it costs.
 
-use super::bounds::SearchAxis;
 use super::camera_calibration::CameraFit;
 use super::evaluation::{Evaluation, EvaluationOutcome, FailureReason, Observation, Observed, RunFailure};
+use super::job::FreeParameter;
 use super::model::FeaturePredictor;
 use super::target_value::{MAX_RATIO, TargetValue};
 use crate::feature::ASSIGN_DB;
@@ -36,7 +36,7 @@ pub(crate) const LOSS_KNEE: f64 = 3.0;
 
 /// The cost function of a fit: bounds, targets and model.
 pub struct Objective<'a> {
-    axes: Vec<SearchAxis>,
+    axes: Vec<FreeParameter>,
     targets: Vec<TargetValue>,
     model: &'a dyn FeaturePredictor,
 }
@@ -46,12 +46,12 @@ impl<'a> Objective<'a> {
     /// finite and have a standard deviation above zero. It must not be zero if values are compared by
     /// logarithms.
     #[must_use]
-    pub fn new(axes: Vec<SearchAxis>, targets: Vec<TargetValue>, model: &'a dyn FeaturePredictor) -> Self {
+    pub fn new(axes: Vec<FreeParameter>, targets: Vec<TargetValue>, model: &'a dyn FeaturePredictor) -> Self {
         Self { axes, targets, model }
     }
 
     /// The free parameters in job order.
-    pub(crate) fn axes(&self) -> &[SearchAxis] {
+    pub(crate) fn axes(&self) -> &[FreeParameter] {
         &self.axes
     }
 
@@ -148,7 +148,7 @@ impl<'a> Objective<'a> {
 }
 
 /// Distances of the parameters with a prior from their prior means, in prior standard deviations.
-pub(crate) fn prior_residuals(axes: &[SearchAxis], values: &[f64]) -> impl Iterator<Item = f64> {
+pub(crate) fn prior_residuals(axes: &[FreeParameter], values: &[f64]) -> impl Iterator<Item = f64> {
     axes.iter().zip(values).filter_map(|(axis, value)| Some(axis.prior.as_ref()?.residual(*value)))
 }
 
@@ -243,7 +243,7 @@ mod tests {
 
     fn objective(fake: &Fake, prior: Option<Prior>) -> Objective<'_> {
         let bounds = Bounds::new(0.0, 100.0, BoundsSpacing::Linear).unwrap();
-        Objective::new(vec![SearchAxis { bounds, prior }], vec![low()], fake)
+        Objective::new(vec![FreeParameter { prior, ..bounds.into() }], vec![low()], fake)
     }
 
     fn low() -> TargetValue {

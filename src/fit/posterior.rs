@@ -7,7 +7,7 @@
 //! minimised over the starting states of the segments (`fit_states_at`).
 
 use super::FitError;
-use super::bounds::{BoundsSpacing, Prior, SearchAxis};
+use super::bounds::{BoundsSpacing, Prior};
 use super::job::FreeParameter;
 use super::model::ModelFeatures;
 use super::objective::{Objective, residual};
@@ -65,8 +65,7 @@ impl Posterior {
         let all = measure_targets(job, problem.recordings())?;
         let (aims, targets, _) = split_held_out(job, all);
         let features = aims.into_iter().map(|aim| aim.feature).collect();
-        let unknown = |p: &FreeParameter| PosteriorParameter::from_axis(&p.name, &p.search_axis());
-        let unknowns = job.parameters.iter().map(unknown).collect();
+        let unknowns = job.parameters.iter().map(PosteriorParameter::from_free).collect();
         Ok(Self { problem, unknowns, data: PosteriorData::Features { features, targets } })
     }
 
@@ -102,8 +101,8 @@ impl Posterior {
         match &self.data {
             PosteriorData::Features { features, targets } => {
                 let seen = self.feature_model(features, targets);
-                let flat =
-                    self.problem.job().parameters.iter().map(|free| SearchAxis::from(free.bounds)).collect();
+                let flat = self.problem.job().parameters.iter();
+                let flat = flat.map(|free| FreeParameter::from(free.bounds)).collect();
                 let found = Objective::new(flat, targets.clone(), &seen).evaluate_values(values.to_vec());
                 if found.failure.is_some() { f64::NEG_INFINITY } else { -found.cost / 2.0 }
             }
@@ -156,14 +155,14 @@ fn unknown_coordinates(model: &TraceModel, values: &[f64]) -> Vec<f64> {
 }
 
 impl PosteriorParameter {
-    fn from_axis(name: &str, axis: &SearchAxis) -> Self {
-        let bounds = [axis.bounds.lower(), axis.bounds.upper()];
-        let is_log = axis.bounds.spacing() == BoundsSpacing::Log;
-        let prior = axis.prior.map(|prior| match prior {
+    fn from_free(free: &FreeParameter) -> Self {
+        let bounds = [free.bounds.lower(), free.bounds.upper()];
+        let is_log = free.bounds.spacing() == BoundsSpacing::Log;
+        let prior = free.prior.map(|prior| match prior {
             Prior::Linear { mean, sd } => [mean, sd],
             Prior::Log { mean_ln, sd_ln } => [mean_ln, sd_ln],
         });
-        Self { name: name.to_owned(), bounds, is_log, prior }
+        Self { name: free.name.clone(), bounds, is_log, prior }
     }
 
     fn from_unknown(of: &TraceUnknown, name: String) -> Self {

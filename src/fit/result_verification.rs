@@ -105,7 +105,7 @@ impl Problem {
         let rows: Vec<StoredFeature> =
             targets.iter().map(|target| StoredFeature::find(stored, &target.name)).collect();
         let scatter: Vec<f64> = rows.iter().map(|row| row.scatter.unwrap_or(0.0)).collect();
-        let objective = Objective::new(job.search_axes(), targets, &seen).with_feature_scatter(&scatter);
+        let objective = Objective::new(job.parameters.clone(), targets, &seen).with_feature_scatter(&scatter);
         let values = stored.parameter_estimates(job);
         let model = objective.evaluate_values(values.clone());
         let as_stored = objective.add_costs(evaluation_as_stored(&model, &rows).into());

@@ -65,7 +65,7 @@ pub fn fit_features(
     let mut journal = Journal::new(context, header, sink, on_progress)?;
     journal.hold_lines();
     let seen = ModelFeatures::for_targets(model, &aims, &targets, job.ensemble.members);
-    let objective = Objective::new(job.search_axes(), targets, &seen);
+    let objective = Objective::new(job.parameters.clone(), targets, &seen);
     let allowed = context.max_evaluations.unwrap_or(usize::MAX);
     let (rough, local) = (OnceCell::new(), OnceCell::new());
     let mut ledger = Ledger::new(&objective, journal);

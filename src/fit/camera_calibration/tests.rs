@@ -1,9 +1,9 @@
 use super::*;
 use crate::feature::LengthCalibration;
-use crate::fit::bounds::SearchAxis;
 use crate::fit::bounds::{Bounds, BoundsSpacing};
 use crate::fit::evaluation::Evaluation;
 use crate::fit::evaluation::RunFailure;
+use crate::fit::job::FreeParameter;
 use crate::fit::linear_model::{FeatureSlopes, camera_estimates, difference_points, jacobian, residuals};
 use crate::fit::model::FeaturePredictor;
 use crate::fit::objective::Objective;
@@ -127,7 +127,7 @@ impl FeaturePredictor for LengthPredictor {
 }
 
 fn objective() -> Objective<'static> {
-    let axes = vec![SearchAxis::from(Bounds::new(0.5, 2.0, BoundsSpacing::Log).unwrap()); 2];
+    let axes = vec![FreeParameter::from(Bounds::new(0.5, 2.0, BoundsSpacing::Log).unwrap()); 2];
     let targets = vec![
         target(5.4e-3, 0.02, Some(FREE)),
         target(-4.8e-3, 0.01, Some(FREE)),
@@ -196,7 +196,7 @@ fn an_unknown_offset_takes_away_what_it_can_explain() {
 fn the_interval_of_an_offset_is_that_of_least_squares() {
     // if only the offset is unknown and one position is measured, 1 / sd^2 = 1 + (1e-3 / 5e-3 / 0.02)^2
     let alone = TargetCalibration { scale_sd: 0.0, ..FREE };
-    let axes = vec![SearchAxis::from(Bounds::new(0.5, 2.0, BoundsSpacing::Log).unwrap()); 2];
+    let axes = vec![FreeParameter::from(Bounds::new(0.5, 2.0, BoundsSpacing::Log).unwrap()); 2];
     let objective = |targets| Objective::new(axes.clone(), targets, &LengthPredictor);
     let unmoved = |sd| vec![target(1.0, sd, None); 3];
     let of = |first: TargetValue| {

@@ -3,7 +3,7 @@
 use super::as_written::{self, JobNuisanceEntry, ListedNuisance};
 use super::checks::find_repeated;
 use super::{KeyRefusal, check_above_zero, is_same_quantity};
-use crate::fit::bounds::{Bounds, BoundsSpacing, Prior, SearchAxis};
+use crate::fit::bounds::{Bounds, BoundsSpacing, Prior};
 use crate::toml_file::suggest_key;
 use portable_math as math;
 use serde::Serialize;
@@ -19,10 +19,10 @@ pub struct FreeParameter {
     pub prior: Option<Prior>,
 }
 
-impl FreeParameter {
-    /// Bounds and prior in the form that the search uses.
-    pub(crate) fn search_axis(&self) -> SearchAxis {
-        SearchAxis { bounds: self.bounds, prior: self.prior }
+/// A parameter without a name and without a prior.
+impl From<Bounds> for FreeParameter {
+    fn from(bounds: Bounds) -> Self {
+        Self { name: String::new(), bounds, prior: None }
     }
 }
 

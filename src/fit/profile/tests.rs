@@ -7,8 +7,9 @@ use super::super::objective::Objective;
 use super::*;
 use crate::checkpoint::NullSink;
 use crate::feature::ValueComparison;
-use crate::fit::bounds::{Bounds, BoundsSpacing, SearchAxis};
+use crate::fit::bounds::{Bounds, BoundsSpacing};
 use crate::fit::evaluation::RunFailure;
+use crate::fit::job::FreeParameter;
 use crate::fit::linear_model::{FeatureSlopes, difference_points, jacobian};
 use crate::fit::target_value::TargetValue;
 use std::ops::ControlFlow;
@@ -56,7 +57,7 @@ fn walked(model: &dyn FeaturePredictor, sds: [f64; 2], met: &[Vec<f64>]) -> (Vec
         last: false,
         calibration: None,
     };
-    let axes = vec![SearchAxis::from(Bounds::new(0.01, 100.0, BoundsSpacing::Log).unwrap()); 2];
+    let axes = vec![FreeParameter::from(Bounds::new(0.01, 100.0, BoundsSpacing::Log).unwrap()); 2];
     let objective = Objective::new(axes, sds.map(target).to_vec(), model);
     let (mut journal, mut watch) = (NullSink, |_: &FitProgress| ControlFlow::Continue(()));
     let journal = Journal::new(&FitContext::default(), FitHeader::default(), &mut journal, &mut watch);

@@ -6,8 +6,9 @@ use super::super::model::FeaturePredictor;
 use super::*;
 use crate::checkpoint::NullSink;
 use crate::feature::ValueComparison;
-use crate::fit::bounds::{Bounds, BoundsSpacing, SearchAxis};
+use crate::fit::bounds::{Bounds, BoundsSpacing};
 use crate::fit::evaluation::{FailureReason, RunFailure};
+use crate::fit::job::FreeParameter;
 use crate::fit::search::SearchSettings;
 use crate::fit::target_value::TargetValue;
 use portable_math::StandardNormal;
@@ -51,7 +52,7 @@ fn at(features: Features, sds: &[f64], unit: [f64; 2], settings: IntervalSetting
 
 /// Like [`at`], after a search that evaluated the points `tried`.
 fn with(features: Features, sds: &[f64], tried: &[[f64; 2]], settings: IntervalSettings) -> FitUncertainty {
-    let axes = vec![SearchAxis::from(Bounds::new(0.1, 10.0, BoundsSpacing::Log).unwrap()); 2];
+    let axes = vec![FreeParameter::from(Bounds::new(0.1, 10.0, BoundsSpacing::Log).unwrap()); 2];
     let target = |(i, sd): (usize, &f64)| TargetValue {
         name: format!("f{i}"),
         value: 1.0,
@@ -306,7 +307,7 @@ fn a_misfit_that_one_search_alone_came_to_identifies_nothing() {
         last: false,
         calibration: None,
     };
-    let axes = vec![SearchAxis::from(Bounds::new(0.1, 10.0, BoundsSpacing::Log).unwrap()); 2];
+    let axes = vec![FreeParameter::from(Bounds::new(0.1, 10.0, BoundsSpacing::Log).unwrap()); 2];
     let objective = Objective::new(axes, (0..3).map(target).collect(), &fake);
     let best = objective.evaluate(&[0.5, 0.5 - 0.025 / 100.0_f64.ln()]);
     // the sum of squares is 12.5 with one degree of freedom; by chance, one in a thousand exceeds 10.8
@@ -342,7 +343,7 @@ fn a_misfit_widens_the_deviations() {
         last: false,
         calibration: None,
     };
-    let axes = vec![SearchAxis::from(Bounds::new(0.1, 10.0, BoundsSpacing::Log).unwrap()); 2];
+    let axes = vec![FreeParameter::from(Bounds::new(0.1, 10.0, BoundsSpacing::Log).unwrap()); 2];
     let objective = Objective::new(axes, (0..3).map(target).collect(), &fake);
     let (mut journal, mut watch) = (NullSink, |_: &FitProgress| ControlFlow::Continue(()));
     let journal = Journal::new(&FitContext::default(), FitHeader::default(), &mut journal, &mut watch);
@@ -374,7 +375,7 @@ fn a_feature_that_is_not_smooth_counts_for_less() {
         last: false,
         calibration: None,
     };
-    let axes = vec![SearchAxis::from(Bounds::new(0.1, 10.0, BoundsSpacing::Log).unwrap()); 2];
+    let axes = vec![FreeParameter::from(Bounds::new(0.1, 10.0, BoundsSpacing::Log).unwrap()); 2];
     let objective = Objective::new(axes, (0..2).map(target).collect(), &fake);
     let (mut journal, mut watch) = (NullSink, |_: &FitProgress| ControlFlow::Continue(()));
     let journal = Journal::new(&FitContext::default(), FitHeader::default(), &mut journal, &mut watch);
@@ -407,7 +408,7 @@ fn a_model_that_fails_on_one_side_is_differenced_on_the_other() {
 
 /// Like [`at`], followed by the searches for rival values.
 fn confirmed_at(features: Features, sds: &[f64], unit: [f64; 2]) -> FitUncertainty {
-    let axes = vec![SearchAxis::from(Bounds::new(0.1, 10.0, BoundsSpacing::Log).unwrap()); 2];
+    let axes = vec![FreeParameter::from(Bounds::new(0.1, 10.0, BoundsSpacing::Log).unwrap()); 2];
     let target = |(i, sd): (usize, &f64)| TargetValue {
         name: format!("f{i}"),
         value: 1.0,

@@ -7,7 +7,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use wiperlab::checkpoint;
 use wiperlab::checkpoint::{CheckpointError, CheckpointSink};
 use wiperlab::feature::ValueComparison;
-use wiperlab::fit::bounds::SearchAxis;
 use wiperlab::fit::bounds::{Bounds, BoundsSpacing};
 use wiperlab::fit::checkpoint::{FitCheckpoint, FitHeader};
 use wiperlab::fit::evaluation::Observed;
@@ -21,7 +20,11 @@ use wiperlab::fit::search::{STAGNANT_GENERATIONS, SearchSettings};
 use wiperlab::fit::search::{SearchTermination, search_minimum};
 use wiperlab::fit::target_value::TargetValue;
 use wiperlab::fit::uncertainty::ParameterVerdict;
-use wiperlab::fit::{FitContext, FitError, fit_features, job::Job, job_warnings};
+use wiperlab::fit::{
+    FitContext, FitError, fit_features,
+    job::{FreeParameter, Job},
+    job_warnings,
+};
 use wiperlab::recording::Recording;
 
 /// A journal in memory; refuses lines after `room`.
@@ -94,7 +97,7 @@ fn find(
     limit: usize,
     model: impl Fn(&[f64]) -> Features + Sync,
 ) -> Found {
-    let axes = vec![SearchAxis::from(Bounds::new(0.1, 10.0, BoundsSpacing::Log).unwrap()); dimensions];
+    let axes = vec![FreeParameter::from(Bounds::new(0.1, 10.0, BoundsSpacing::Log).unwrap()); dimensions];
     let target = |(i, (value, sd)): (usize, &(f64, f64))| TargetValue {
         name: i.to_string(),
         value: *value,
