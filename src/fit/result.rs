@@ -89,7 +89,7 @@ pub struct NuisanceResult {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recording: Option<String>,
     /// Key of the constant in the scene file, or a camera error: `tilt_rad`, `scale_relative`, `offset_x_m`,
-    /// `offset_drop_m`, `tip_along_lip_m`, `tip_across_lip_m`, `clock_s` or a drift.
+    /// `offset_drop_m`, `curvature_per_m`, `tip_along_lip_m`, `tip_across_lip_m`, `clock_s` or a drift.
     pub name: String,
     /// Mean of the prior, in the unit that `name` states; `None` if nothing is known before the fit.
     pub prior: Option<f64>,
@@ -259,7 +259,7 @@ pub struct FitResult {
     /// Estimated calibration errors of cameras and freed constants.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub nuisances: Vec<NuisanceResult>,
-    /// Fitted starting states for runs of the model over whole recordings, in a trace fit.
+    /// Segments of a trace fit with their fitted starting states.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub segments: Vec<FittedSegment>,
     /// Components in job order.

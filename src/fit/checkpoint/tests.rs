@@ -27,7 +27,7 @@ pub(in crate::fit) fn iterate(step: usize) -> Iterate {
     Iterate {
         stage: step / 3,
         number: step % 3,
-        cuts: step / 2,
+        repeats: step / 2,
         rescues: step % 2,
         whole: step % 2 == 1,
         plain: step % 3 == 2,

@@ -61,8 +61,9 @@ pub struct Iterate {
     pub stage: usize,
     /// Number of the step within the stage, counted from 0.
     pub number: usize,
-    /// Number of times that this stage was repeated with new segment boundaries.
-    pub cuts: usize,
+    /// Number of times that this stage was repeated: the first one with free constants, the last one with new
+    /// segment boundaries.
+    pub repeats: usize,
     /// Number of times that bad segments of this stage were restarted from other states.
     pub rescues: usize,
     /// Whether segments count to their end. If false, a segment that is much longer than the length of the

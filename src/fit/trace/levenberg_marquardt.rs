@@ -63,7 +63,11 @@ pub fn next_iterate(model: &TraceModel, settings: &TraceSearchSettings, before: 
     if !before.settled {
         return Some(outer_step(model, before, holds_constants(model, settings, before)));
     }
-    if before.is_junk() && !holds_constants(model, settings, before) {
+    if holds_constants(model, settings, before) {
+        let next = Iterate { settled: false, number: 0, damping: FIRST_DAMPING, ..before.clone() };
+        return Some(Iterate { repeats: 1, ..next });
+    }
+    if before.is_junk() {
         return None; // neither other starting states nor longer segments help
     }
     let bad = before.count_bad_segments();
@@ -103,11 +107,11 @@ fn rescue_segments(model: &TraceModel, before: &Iterate) -> Option<Iterate> {
 /// Repeats the last stage if the parameters and camera errors at its end give other segment boundaries, so
 /// that the result does not depend on the path of the search. `None` if the boundaries do not change.
 fn resegment(model: &TraceModel, settings: &TraceSearchSettings, before: &Iterate) -> Option<Iterate> {
-    const MOST_CUTS: usize = 3;
+    const MOST_REPEATS: usize = 3;
     let points = recording_models(model, &before.point)?;
     let cut = cut_recordings(&points, settings.segment_s[before.stage], before.whole);
     let frames = |segment: &SegmentState| (segment.recording, segment.frames());
-    if cut.iter().map(frames).eq(before.segments.iter().map(frames)) || before.cuts == MOST_CUTS {
+    if cut.iter().map(frames).eq(before.segments.iter().map(frames)) || before.repeats == MOST_REPEATS {
         return None;
     }
     let again = start_stage(model, settings, (before.stage, before.whole), &before.point, &before.segments)?;
@@ -115,7 +119,7 @@ fn resegment(model: &TraceModel, settings: &TraceSearchSettings, before: &Iterat
         return None;
     }
     let cost = total_cost(model, &again.point, &again.segments, before.plain);
-    Some(Iterate { cuts: before.cuts + 1, plain: before.plain, cost, ..again })
+    Some(Iterate { repeats: before.repeats + 1, plain: before.plain, cost, ..again })
 }
 
 /// The first iterate of a stage: new segments whose starting states lie on the fitted motion of the segments
@@ -138,7 +142,7 @@ pub(super) fn start_stage(
     let first = Iterate {
         stage,
         number: 0,
-        cuts: 0,
+        repeats: 0,
         rescues: 0,
         whole,
         plain: false,
@@ -209,11 +213,12 @@ fn carry_state_over(
     point.end_state([old.first, segment.first], &old.start_state())
 }
 
-/// Whether the constants are held at their prior means. They are held in the first stage, because far from
-/// the minimum they would absorb the misfit of wrong parameters; longer segments do not fit with wrong
-/// constants.
+/// Whether the constants are held at their prior means. They are held in the first stage until it is repeated,
+/// because far from the minimum they would absorb the misfit of wrong parameters. Longer segments do not fit
+/// with wrong constants.
 fn holds_constants(model: &TraceModel, settings: &TraceSearchSettings, at: &Iterate) -> bool {
     at.stage == 0
+        && at.repeats == 0
         && settings.segment_s.len() > 1
         && (0..at.point.len()).any(|i| model.unknowns.is_constant(i))
 }

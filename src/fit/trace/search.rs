@@ -6,6 +6,7 @@ use super::levenberg_marquardt::{first_iterate, next_iterate, start_stage};
 use super::lobes::{MAX_LOBES, find_lobes};
 use super::model::TraceModel;
 use super::normal_equations::recording_models;
+use super::prior_conflict::prior_conflicts;
 use super::rivals::has_lost;
 use super::segment_simulation::RecordingModel;
 use super::uncertainty_run::{MAX_STARTS, SearchEnd, follow_runs};
@@ -18,7 +19,8 @@ use std::cmp::Reverse;
 
 const MIN_STARTS: usize = 2;
 /// Minimum number of starts if the frame rate undersamples the fastest mode, because several sets of
-/// parameter values may then fit the frames equally well.
+/// parameter values may then fit the frames equally well. It is also the number of starts that must explain
+/// nothing before a search with free constants gives up.
 const MIN_STARTS_SLOW: usize = 4;
 
 /// A start is abandoned if its cost after the first stage exceeds this factor times the lowest cost of any
@@ -131,9 +133,9 @@ pub fn start_point(model: &TraceModel, seed: u64, start: usize) -> Vec<f64> {
     model.unknowns.0.iter().map(place).collect()
 }
 
-/// Whether no further start is needed. This is so if the minimum number of starts is reached, and another
-/// start ends at the same point as the best start; or if the best end explains nothing, and at least two
-/// starts explain nothing with segments longer than the first.
+/// Whether no further start is needed. This is so if the minimum number of starts is reached, another start
+/// ends at the same point as the best start, and no constant contradicts its prior there; or if the best end
+/// explains nothing, and enough starts explain nothing with segments longer than the first.
 fn has_enough_starts(
     model: &TraceModel,
     settings: &TraceSearchSettings,
@@ -146,12 +148,16 @@ fn has_enough_starts(
     let grows = |descent: &&TraceDescent| {
         descent.stages.len() > 1 && descent.last_iterate().is_some_and(Iterate::is_junk)
     };
-    if end.is_junk() && descents.iter().filter(grows).count() >= MIN_STARTS {
+    let has_constants = (0..end.point.len()).any(|i| model.unknowns.is_constant(i));
+    let most_junk = if has_constants { MIN_STARTS_SLOW } else { MIN_STARTS };
+    if end.is_junk() && descents.iter().filter(grows).count() >= most_junk {
         return true;
     }
     let fewest = if undersampled_mode(model, end).is_some() { MIN_STARTS_SLOW } else { MIN_STARTS };
-    descents.len() >= fewest
-        && SearchEnd::new(model, settings, seed, end).is_some_and(|end| has_company(&end, descents, best))
+    // constants that contradict their priors may come from a wrong minimum, even if two starts end there
+    let is_plausible =
+        |end: SearchEnd<'_>| has_company(&end, descents, best) && prior_conflicts(&end).is_empty();
+    descents.len() >= fewest && SearchEnd::new(model, settings, seed, end).is_some_and(is_plausible)
 }
 
 /// Whether another start ends at the same point as the best start.

@@ -137,6 +137,26 @@ fn the_zero_of_the_picture_does_not_matter() {
     }
 }
 
+/// On a windshield with a radius of one metre, the head appears nearer to the centre of the arc by its height
+/// times the slope of the glass, and rises towards the ends.
+#[test]
+fn a_curved_glass_does_not_matter() {
+    const RADIUS_M: f64 = 1.0;
+    let whole = recording();
+    let scene = scene();
+    let glass_y_m = -(scene.linkage.l1_m + scene.linkage.l2_m);
+    let mut traces = whole.traces().clone();
+    let points = [(&mut traces.tip_x_m, &mut traces.tip_y_m), (&mut traces.head_x_m, &mut traces.head_y_m)];
+    for (xs, ys) in points {
+        for (x, y) in xs.iter_mut().flatten().zip(ys.iter_mut().flatten()) {
+            let (angle, from_centre) = (*x / RADIUS_M, RADIUS_M - (*y - glass_y_m));
+            *x = from_centre * angle.sin();
+            *y = glass_y_m + RADIUS_M - from_centre * angle.cos();
+        }
+    }
+    assert_found(&fitted("", Recording::new("twin", whole.grid(), traces, true).unwrap()), &scene);
+}
+
 /// A preload that is five prior deviations off: either the model does not explain the recording, or nothing is
 /// identified.
 #[test]
