@@ -22,5 +22,6 @@ pub use read::{
     duplicate_record_error, read_checkpoint, sample_records,
 };
 pub(crate) use read::{FIRST_LINE, describe_difference};
+pub(crate) use record::or_infinite;
 pub use record::{CheckpointRecord, CheckpointSink, NullSink, format_header_line, format_record_line};
 pub use shard::Shard;

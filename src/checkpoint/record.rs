@@ -2,8 +2,8 @@
 
 use super::checksum::append_checksum;
 use super::header::{CheckpointHeader, CheckpointKind, LAYOUT};
-use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Deserializer, Serialize};
 use std::fmt::Debug;
 use std::hash::Hash;
 
@@ -53,6 +53,11 @@ pub fn format_record_line<R: CheckpointRecord>(record: &R) -> String {
 fn format_json_line<T: Serialize>(value: &T) -> String {
     // serializing string keys and numbers cannot fail; if it did, the empty line would be refused by a reader
     append_checksum(&serde_json::to_string(value).unwrap_or_default()) + "\n"
+}
+
+/// Reads `null` as infinity, for the attribute `#[serde(deserialize_with)]`: JSON has no infinity.
+pub(crate) fn or_infinite<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::INFINITY))
 }
 
 /// Stores lines durably: when `append` returns, they are on disk. A record is counted or reported only after

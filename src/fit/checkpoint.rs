@@ -23,7 +23,7 @@ pub enum FitRecord {
     Iterate {
         /// Number of the chain: the number of a start or lobe, or of an uncertainty run.
         chain: usize,
-        /// Number of the iterate in its chain, counted from 0. Each iterate is computed from the previous one.
+        /// Number of the iterate in its chain, counted from 0. Each iterate is computed from the one before.
         step: usize,
         /// The iterate.
         iterate: Iterate,

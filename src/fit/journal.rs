@@ -1,13 +1,13 @@
 //! The journal of a running fit: every evaluation is made once, and written before it is counted.
 //!
 //! A fit that continues a journal takes the evaluations from it, in the order in which it asks for them. A
-//! sample of them is computed again on the way, so that a fit never continues from numbers that the model does
-//! not give.
+//! sample of them is computed again on the way, so that a fit never continues from numbers that the model
+//! does not give.
 
 use super::FitError;
 use super::checkpoint::{FitHeader, FitRecord, iterate_key};
 use super::context::FitContext;
-use super::trace::{Iterate, describe_iterate};
+use super::trace::Iterate;
 use crate::checkpoint::{
     self, CheckpointError, CheckpointHeader, CheckpointRecord, CheckpointSink, FIRST_LINE, StoredRecord,
     format_header_line, format_record_line, sample_records,
@@ -34,15 +34,19 @@ pub struct FitProgress {
 pub(crate) type OnProgress<'a> = dyn FnMut(&FitProgress) -> ControlFlow<()> + Send + 'a;
 
 /// Reason why no more evaluations are made.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum StopReason {
     /// The evaluations allowed are used up.
+    #[error("the evaluations allowed are used up")]
     Budget,
     /// The progress callback asked to stop.
+    #[error("interrupted")]
     Interrupted,
     /// The journal cannot be written.
+    #[error("the journal cannot be written: {0}")]
     Journal(String),
     /// The model does not give what a line of the resumed journal says.
+    #[error(transparent)]
     Refused(CheckpointError),
 }
 
@@ -56,7 +60,6 @@ pub struct Journal<'a> {
     known: HashMap<Vec<u64>, (usize, &'a FitRecord)>,
     /// Line numbers of the records that are computed again.
     checked: HashSet<usize>,
-    segment_s: Vec<f64>,
     /// Lines that are not yet written.
     pending: String,
     /// Whether lines wait for [`Self::release_lines`].
@@ -96,22 +99,9 @@ impl<'a> Journal<'a> {
                 checked = sample.into_iter().map(|at| FIRST_LINE + at).collect();
             }
         }
-        let (file, segment_s) = (context.resume.map_or("", |(file, _)| file), header.body.segment_s);
+        let file = context.resume.map_or("", |(file, _)| file);
         let (held, made, replayed, stop) = (false, 0, 0, None);
-        Ok(Self {
-            sink,
-            on_progress,
-            file,
-            known,
-            checked,
-            segment_s,
-            pending,
-            held,
-            made,
-            replayed,
-            limit,
-            stop,
-        })
+        Ok(Self { sink, on_progress, file, known, checked, pending, held, made, replayed, limit, stop })
     }
 
     /// Makes the evaluations with the given keys in parallel, or takes them from the resumed journal.
@@ -127,8 +117,8 @@ impl<'a> Journal<'a> {
         count: &mut dyn FnMut(FitRecord) -> String,
     ) -> Result<(), StopReason> {
         let within = keys.len().min(self.remaining_evaluations());
-        // evaluations are written in chunks, in the order of the keys, so that little is lost if the program is
-        // killed
+        // evaluations are written in chunks, in the order of the keys, so that little is lost if the program
+        // is killed
         let places: Vec<usize> = (0..within).collect();
         for places in places.chunks(2 * rayon::current_num_threads()) {
             if let Some(stop) = &self.stop {
@@ -159,7 +149,8 @@ impl<'a> Journal<'a> {
     }
 
     /// Iterates of a trace fit: `keys` are the numbers of their chains and their numbers in the chains;
-    /// `compute` makes the iterate with an index of `keys`, `None` at the end of a chain.
+    /// `compute` makes the iterate with an index of `keys`, `None` at the end of a chain, and `describe` says
+    /// in words what the iterate of a chain is.
     ///
     /// # Errors
     /// [`StopReason`] if some iterates could not be made.
@@ -167,15 +158,16 @@ impl<'a> Journal<'a> {
         &mut self,
         keys: &[(usize, usize)],
         compute: &(dyn Fn(usize) -> Option<Iterate> + Sync),
+        describe: &dyn Fn(usize, &Iterate) -> String,
     ) -> Result<Vec<Iterate>, StopReason> {
         let make = |at: usize| {
             let (chain, step) = keys[at];
             compute(at).map(|iterate| FitRecord::Iterate { chain, step, iterate })
         };
-        let (segment_s, mut found) = (self.segment_s.clone(), Vec::new());
+        let mut found = Vec::new();
         let mut count = |record| match record {
             FitRecord::Iterate { chain, iterate, .. } => {
-                let words = describe_iterate(chain, &iterate, &segment_s);
+                let words = describe(chain, &iterate);
                 found.push(iterate);
                 words
             }

@@ -1,5 +1,5 @@
-//! Ledger of a fit of features: it evaluates every point only once, and keeps the evaluations in an order that
-//! does not depend on the number of threads.
+//! Ledger of a fit of features: it evaluates every point only once, and keeps the evaluations in an order
+//! that does not depend on the number of threads.
 
 use super::FitError;
 use super::checkpoint::{FitRecord, point_key};

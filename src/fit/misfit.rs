@@ -7,9 +7,10 @@
 //! evidence.
 
 use super::result::NuisanceResult;
+use crate::checkpoint::or_infinite;
 use crate::text::format_trimmed;
 use portable_math as math;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Relative standard deviation of the noise that is measured on a recording. Chi2 per degree of freedom,
@@ -95,11 +96,6 @@ pub struct StageMisfit {
     pub chi2_per_dof: f64,
     /// Parameters at the end of the stage, in SI units.
     pub estimates: BTreeMap<String, f64>,
-}
-
-/// Reads `null` as infinity.
-pub(super) fn or_infinite<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::INFINITY))
 }
 
 impl StageMisfit {

@@ -1,9 +1,9 @@
 //! The search in the unit box: CMA-ES populations, then a local search from each of the best distinct points,
 //! then a polish of the best point until the cost no longer falls.
 //!
-//! Covariance matrix adaptation and damped Gauss-Newton steps are implemented here; the simplex comes from
-//! argmin (`simplex.rs`). The ledger counts the budget, stores the best point and handles every failure, so
-//! the solvers never see errors or costs that are not numbers.
+//! argmin's executor runs all solvers: covariance matrix adaptation and damped Gauss-Newton steps, which
+//! argmin does not have, and its own simplex. The ledger counts the budget, stores the best point and handles
+//! every failure, so the solvers never see costs that are not numbers.
 
 pub(crate) mod costs;
 mod excluded_region_search;

@@ -30,7 +30,6 @@ pub use assessment::{TraceAssessment, UnknownEstimate};
 pub(crate) use build::{TraceSource, fit_states_at, frame_residuals};
 pub(crate) use fitted_traces::{FittedTraces, first_fitting};
 pub use iterate::{Iterate, SegmentState, TraceSearchSettings, chi2_per_dof};
-pub(crate) use iterate::{TraceDescent, describe_iterate};
 pub use levenberg_marquardt::{first_iterate, next_iterate};
 pub use model::TraceModel;
 pub use search::{TraceSearchOutcome, search_trace, start_point, undersampled_mode};

@@ -261,11 +261,11 @@ fn the_bytes_do_not_depend_on_threads_nor_on_a_journal() {
         fs::remove_dir_all(project.path("cut")).unwrap();
     }
     // what the journal holds is taken, unless running it again gives something else
-    let edited = journal.replacen("\"stopped_at_s\":\"0.78\"", "\"stopped_at_s\":\"0.77\"", 1);
+    let edited = journal.replacen("\"stopped_at_s\":0.78,", "\"stopped_at_s\":0.77,", 1);
     project.write("cut/journal.jsonl", &resealed(&edited));
     project.refused(
         &["--out", "cut", "--resume"],
-        &["found stopped_at_s Some(0.77), but computed again the point gives stopped_at_s Some(0.78)"],
+        &["found stopped_at_s 0.77, but computed again the point gives stopped_at_s 0.78"],
     );
     assert!(results(&project.path("cut")).is_empty());
     // without --resume everything is

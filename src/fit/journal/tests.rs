@@ -42,7 +42,9 @@ fn searched_with(
     for chain in 0..STARTS {
         let mut last: Option<Iterate> = None;
         for step in 0.. {
-            match journal.compute_iterates(&[(chain, step)], &|_| compute(last.as_ref())) {
+            match journal
+                .compute_iterates(&[(chain, step)], &|_| compute(last.as_ref()), &|_, _| String::new())
+            {
                 Ok(made) if made.is_empty() => break,
                 Ok(made) => last = made.into_iter().next(),
                 Err(stop) => {
@@ -102,7 +104,7 @@ fn a_journal_that_cannot_be_written_ends_the_search() {
     let (mut full, mut on_progress) = (Full, |_: &FitProgress| ControlFlow::Continue(()));
     let mut journal =
         Journal::new(&FitContext::default(), trace_header(), &mut full, &mut on_progress).unwrap();
-    assert!(journal.compute_iterates(&[(0, 0)], &|_| next(None)).is_err());
+    assert!(journal.compute_iterates(&[(0, 0)], &|_| next(None), &|_, _| String::new()).is_err());
     assert_eq!(journal.count_evaluations(), 0);
     assert_eq!(journal.check_sound(), Err(FitError::JournalWrite { problem: "no space".to_owned() }));
 }

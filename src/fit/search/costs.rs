@@ -1,8 +1,15 @@
-//! Costs for the solvers of a stage, and the part of the unit box (slab) to which a search may be limited.
+//! The cost of a fit of features as a problem of argmin.
+//!
+//! argmin ends a run at the first error, so a stop of the ledger reaches its executor as an error. Its
+//! observers and its checkpoints must own all they use, and its interrupts are its own; so the journal of a
+//! fit counts, stores and reports the evaluations, and the executor runs the solvers.
 
 use crate::fit::evaluation::{Evaluation, EvaluationStage};
 use crate::fit::journal::StopReason;
 use crate::fit::ledger::Ledger;
+use argmin::core::{CostFunction, Error, Executor, Solver, State, SyncAlias};
+use std::borrow::Borrow;
+use std::cell::RefCell;
 
 /// Part of the unit box in which one coordinate is limited to a range.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,39 +42,47 @@ impl Slab {
     }
 }
 
-/// Cost that is returned for every point after the ledger has stopped. The solver is abandoned before it uses
-/// this cost.
-pub(super) const STOPPED_COST: f64 = 1e100;
+/// Maps a point of a solver to the unit box.
+pub(super) type ToUnit<'f> = dyn Fn(&[f64]) -> Vec<f64> + 'f;
 
-/// Computes the costs of points in the unit box, for the solvers of one stage of the search.
-pub(super) struct StageCosts<'l, 'a> {
-    pub(super) ledger: &'l mut Ledger<'a>,
-    pub(super) stage: EvaluationStage,
-    /// Reason why the ledger has stopped; `None` while it still makes evaluations.
-    pub(super) stop: Option<StopReason>,
-    /// Slab into which the points are mapped before they are evaluated; `None` for the whole box.
-    pub(super) slab: Option<Slab>,
+/// Computes the costs of points for a solver.
+pub(super) struct LedgerCosts<'l, 'a> {
+    pub(super) ledger: RefCell<&'l mut Ledger<'a>>,
+    stage: EvaluationStage,
+    to_unit: &'l ToUnit<'l>,
 }
 
-impl<'l, 'a> StageCosts<'l, 'a> {
-    pub(super) fn new(ledger: &'l mut Ledger<'a>, stage: EvaluationStage) -> Self {
-        Self { ledger, stage, stop: None, slab: None }
+impl CostFunction for LedgerCosts<'_, '_> {
+    type Param = Vec<f64>;
+    type Output = f64;
+
+    fn cost(&self, point: &Vec<f64>) -> Result<f64, Error> {
+        Ok(self.bulk_cost(&[point])?[0])
     }
 
     /// One cost per point, in order; the ledger evaluates them in parallel.
-    pub(super) fn evaluate_points(&mut self, points: &[Vec<f64>]) -> Vec<f64> {
+    fn bulk_cost<P: Borrow<Vec<f64>> + SyncAlias>(&self, points: &[P]) -> Result<Vec<f64>, Error> {
+        let points: Vec<Vec<f64>> = points.iter().map(|point| (self.to_unit)(point.borrow())).collect();
         let global = self.stage == EvaluationStage::Global;
-        let cost = |e: &Evaluation| if global { e.global_cost } else { e.cost };
-        let moved: Option<Vec<Vec<f64>>> =
-            self.slab.map(|slab| points.iter().map(|point| slab.map_into(point.clone())).collect());
-        match self.ledger.evaluate_points(self.stage, moved.as_deref().unwrap_or(points)) {
-            Ok(found) if found.len() == points.len() => return found.into_iter().map(cost).collect(),
-            found => self.stop = found.err().or(self.stop.take()),
-        }
-        vec![STOPPED_COST; points.len()]
+        let cost = |found: &Evaluation| if global { found.global_cost } else { found.cost };
+        let mut ledger = self.ledger.borrow_mut();
+        Ok(ledger.evaluate_points(self.stage, &points)?.into_iter().map(cost).collect())
     }
+}
 
-    pub(super) fn evaluate_point(&mut self, point: Vec<f64>) -> f64 {
-        self.evaluate_points(&[point]).first().copied().unwrap_or(STOPPED_COST)
-    }
+/// Runs a solver whose points `to_unit` maps to the unit box. Returns the reason if the ledger stopped it.
+pub(super) fn run_solver<'l, 'a, S, I>(
+    ledger: &'l mut Ledger<'a>,
+    stage: EvaluationStage,
+    to_unit: &'l ToUnit<'l>,
+    solver: S,
+    configure: impl FnOnce(I) -> I,
+) -> Option<StopReason>
+where
+    S: Solver<LedgerCosts<'l, 'a>, I>,
+    I: State,
+{
+    let costs = LedgerCosts { ledger: RefCell::new(ledger), stage, to_unit };
+    let run = Executor::new(costs, solver).configure(configure).ctrlc(false).timer(false).run();
+    run.err().map(|error| error.downcast().unwrap_or(StopReason::Budget))
 }

@@ -1,14 +1,13 @@
 //! A search outside the interval of one parameter: how well the model fits at other values of this parameter.
 
 use super::SearchSettings;
-use super::costs::StageCosts;
+use super::costs::Slab;
 use super::gauss_newton::descend_gauss_newton;
 use super::local::distinct_best_points;
 use super::population::{WIDE_EXTENT, evolve_population};
 use crate::fit::evaluation::{Evaluation, EvaluationStage};
 use crate::fit::journal::StopReason;
 use crate::fit::ledger::Ledger;
-use crate::fit::search::costs::Slab;
 
 /// Fraction of the evaluations that the population gets; the descents get the rest.
 const POPULATION_SHARE: f64 = 0.6;
@@ -35,8 +34,9 @@ pub(crate) fn search_excluded_region(
     // the seed differs from slab to slab and from the seeds of the other populations
     let seed = settings.seed.rotate_left(32) ^ (slab.axis as u64 + 1) ^ slab.lower.to_bits();
     let middle = vec![0.5; ledger.objective().axes().len()];
-    let costs = StageCosts { slab: Some(slab), ..StageCosts::new(ledger, EvaluationStage::Elsewhere) };
-    let mut stop = evolve_population(costs, middle, WIDE_EXTENT, seed, settings);
+    let to_unit = |point: &[f64]| slab.map_into(point.to_vec());
+    let stage = EvaluationStage::Elsewhere;
+    let mut stop = evolve_population(ledger, (stage, &to_unit), middle, WIDE_EXTENT, seed, settings);
     until(ledger, 1.0);
     for start in distinct_best_points(evaluations_in_slab(ledger, slab), DESCENTS) {
         if !matches!(stop, None | Some(StopReason::Budget)) {

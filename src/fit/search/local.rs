@@ -2,7 +2,7 @@
 //! the best point.
 
 use super::SearchSettings;
-use super::costs::StageCosts;
+use super::costs::ToUnit;
 use super::gauss_newton::descend_gauss_newton;
 use super::population::{NEAR_EXTENT, evolve_population};
 use super::simplex::run_simplex;
@@ -85,8 +85,8 @@ fn refine_with_population(
     settings: &SearchSettings,
 ) -> (LocalDescent, Option<StopReason>) {
     let made = ledger.run_evaluations().len();
-    let costs = StageCosts::new(ledger, EvaluationStage::Local);
-    let stop = evolve_population(costs, from.end.unit.clone(), NEAR_EXTENT, seed, settings);
+    let (place, middle) = ((EvaluationStage::Local, &<[f64]>::to_vec as &ToUnit<'_>), from.end.unit.clone());
+    let stop = evolve_population(ledger, place, middle, NEAR_EXTENT, seed, settings);
     let added = ledger.run_evaluations().iter().skip(made);
     let better = added.filter(|found| found.cost < from.end.cost).min_by(|a, b| a.cost.total_cmp(&b.cost));
     let (end, stop) = match (stop, better.cloned()) {
@@ -103,8 +103,8 @@ fn refine_with_population(
 /// Gauss-Newton descent from an evaluated point.
 fn descend_from(ledger: &mut Ledger, start: Evaluation) -> (LocalDescent, Option<StopReason>) {
     let made = ledger.run_evaluations().len();
-    let (unit, stop) = descend_gauss_newton(ledger, &start.unit);
-    let end = ledger.find_evaluation(&unit).cloned().unwrap_or_else(|| start.clone());
+    let (end, stop) = descend_gauss_newton(ledger, &start.unit);
+    let end = end.unwrap_or_else(|| start.clone());
     (LocalDescent { start, end, evaluations: ledger.run_evaluations().len() - made }, stop)
 }
 

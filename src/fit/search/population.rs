@@ -6,12 +6,13 @@
 //! the box. argmin does not provide this method.
 
 use super::SearchSettings;
-use super::costs::StageCosts;
+use super::costs::{LedgerCosts, ToUnit, run_solver};
 use super::stagnation::StagnationCounter;
 use crate::fit::bounds::clamp_unit;
 use crate::fit::evaluation::EvaluationStage;
 use crate::fit::journal::StopReason;
 use crate::fit::ledger::Ledger;
+use argmin::core::{Error, IterState, KV, Problem, Solver, TerminationReason, TerminationStatus};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use portable_math::{self as math, StandardNormal};
 use rand::{Rng, SeedableRng};
@@ -32,8 +33,8 @@ pub(super) fn search_with_populations(
     let mut used = ledger.remaining_evaluations();
     while ledger.remaining_evaluations() > 0 {
         let seed = generator.random();
-        let costs = StageCosts::new(ledger, EvaluationStage::Global);
-        if let stop @ Some(_) = evolve_population(costs, middle, WIDE_EXTENT, seed, settings) {
+        let place = (EvaluationStage::Global, &<[f64]>::to_vec as &ToUnit<'_>);
+        if let stop @ Some(_) = evolve_population(ledger, place, middle, WIDE_EXTENT, seed, settings) {
             return stop;
         }
         middle = (0..dimensions).map(|_| generator.random()).collect();
@@ -46,23 +47,23 @@ pub(super) fn search_with_populations(
     None
 }
 
-/// Evolves one population around the point `middle` until it converges or stagnates. Returns the reason if
-/// the ledger stopped.
-pub(super) fn evolve_population(
-    mut costs: StageCosts,
+/// Evolves one population around the point `middle` until it converges or stagnates. Its evaluations have the
+/// purpose `stage`, and `to_unit` maps its points to the unit box. Returns the reason if the ledger stopped.
+pub(super) fn evolve_population<'l>(
+    ledger: &'l mut Ledger<'_>,
+    (stage, to_unit): (EvaluationStage, &'l ToUnit<'l>),
     middle: Vec<f64>,
     extent: PopulationExtent,
     seed: u64,
     settings: &SearchSettings,
 ) -> Option<StopReason> {
     let generator = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let mut solver = CmaEs::new(middle, settings.particles, extent, generator);
-    let mut patience = StagnationCounter::new(settings.stagnation_generations, STAGNANT_GAIN);
-    while costs.stop.is_none() && !solver.has_converged() && !patience.is_stagnant(solver.least_cost) {
-        solver.run_generation(&mut costs);
-    }
-    costs.stop
+    let patience = StagnationCounter::new(settings.stagnation_generations, STAGNANT_GAIN);
+    let solver = CmaEs::new(middle, settings.particles, extent, generator, patience);
+    run_solver(ledger, stage, to_unit, solver, |state: GenerationState| state)
 }
+
+type GenerationState = IterState<Vec<f64>, (), (), (), (), f64>;
 
 /// Lengths, in the unit box, of the longest principal axis of a population: `first` at the start, `last` at
 /// convergence.
@@ -96,6 +97,7 @@ struct CmaEs {
     generation: usize,
     last: f64,
     least_cost: f64,
+    patience: StagnationCounter,
 }
 
 /// A step from the mean of the population, in units of `length`.
@@ -135,7 +137,13 @@ impl AdaptationRates {
 
 impl CmaEs {
     /// A population of `points` points (at least 4) around the point `mean` of the unit box.
-    fn new(mean: Vec<f64>, points: usize, extent: PopulationExtent, generator: Xoshiro256PlusPlus) -> Self {
+    fn new(
+        mean: Vec<f64>,
+        points: usize,
+        extent: PopulationExtent,
+        generator: Xoshiro256PlusPlus,
+        patience: StagnationCounter,
+    ) -> Self {
         let (n, points) = (mean.len(), points.max(4));
         let raw = |rank| math::ln((points as f64 + 1.0) / 2.0) - math::ln(rank as f64 + 1.0);
         let sum: f64 = (0..points / 2).map(raw).sum();
@@ -154,19 +162,8 @@ impl CmaEs {
             generation: 0,
             last: extent.last,
             least_cost: f64::INFINITY,
+            patience,
         }
-    }
-
-    /// Draws and evaluates one generation of points, and adapts the distribution to the costs.
-    fn run_generation(&mut self, costs: &mut StageCosts) {
-        let steps = self.draw_steps();
-        let points: Vec<Vec<f64>> = steps.iter().map(|step| self.point_of(step)).collect();
-        let costs = costs.evaluate_points(&points);
-        let mut order: Vec<usize> = (0..points.len()).collect();
-        order.sort_by(|a, b| costs[*a].total_cmp(&costs[*b]));
-        let ranked: Vec<_> = order.iter().map(|at| steps[*at].clone()).collect();
-        self.update_distribution(&ranked);
-        self.least_cost = order.first().map_or(self.least_cost, |at| self.least_cost.min(costs[*at]));
     }
 
     /// Whether the longest principal axis has shrunk to the length at convergence.
@@ -245,6 +242,36 @@ impl CmaEs {
     }
 }
 
+impl<'l, 'a> Solver<LedgerCosts<'l, 'a>, GenerationState> for CmaEs {
+    fn name(&self) -> &str {
+        "CMA-ES"
+    }
+
+    /// Draws and evaluates one generation of points, and adapts the distribution to the costs.
+    fn next_iter(
+        &mut self,
+        problem: &mut Problem<LedgerCosts<'l, 'a>>,
+        state: GenerationState,
+    ) -> Result<(GenerationState, Option<KV>), Error> {
+        let steps = self.draw_steps();
+        let points: Vec<Vec<f64>> = steps.iter().map(|step| self.point_of(step)).collect();
+        let costs = problem.bulk_cost(&points)?;
+        let mut order: Vec<usize> = (0..points.len()).collect();
+        order.sort_by(|a, b| costs[*a].total_cmp(&costs[*b]));
+        let ranked: Vec<_> = order.iter().map(|at| steps[*at].clone()).collect();
+        self.update_distribution(&ranked);
+        self.least_cost = order.first().map_or(self.least_cost, |at| self.least_cost.min(costs[*at]));
+        Ok((state.cost(self.least_cost), None))
+    }
+
+    fn terminate(&mut self, _: &GenerationState) -> TerminationStatus {
+        match self.has_converged() || self.patience.is_stagnant(self.least_cost) {
+            true => TerminationStatus::Terminated(TerminationReason::SolverConverged),
+            false => TerminationStatus::NotTerminated,
+        }
+    }
+}
+
 /// Reflects a coordinate at 0 and 1 until it is in the unit interval.
 fn reflect_into_unit(u: f64) -> f64 {
     let folded = u.rem_euclid(2.0);
@@ -258,7 +285,8 @@ mod tests {
 
     /// The mean of a population after a number of generations on `cost`.
     fn run(cost: impl Fn(&[f64]) -> f64, generations: usize) -> Vec<f64> {
-        let mut cloud = CmaEs::new(vec![0.5; 3], 16, WIDE_EXTENT, Xoshiro256PlusPlus::seed_from_u64(1));
+        let (generator, patience) = (Xoshiro256PlusPlus::seed_from_u64(1), StagnationCounter::new(20, 0.0));
+        let mut cloud = CmaEs::new(vec![0.5; 3], 16, WIDE_EXTENT, generator, patience);
         for _ in 0..generations {
             let drawn = cloud.draw_steps();
             let mut steps: Vec<(f64, _)> =

@@ -1,34 +1,55 @@
-//! Nelder-Mead simplices, with the solver of argmin.
-//!
-//! argmin's loop can neither stop when the ledger stops nor count steps that do not lower the cost, so the
-//! loop is written here. The solver has no bounds, so it works on the real line ([`line_to_unit`]). It panics
-//! if one of its first costs is an error, so costs are never errors.
+//! Nelder-Mead simplices, with the solver of argmin. It has no bounds, so it works on the real line
+//! ([`line_to_unit`]).
 
-use super::costs::StageCosts;
+use super::costs::{LedgerCosts, run_solver};
 use super::stagnation::StagnationCounter;
 use super::termination::{EXACT_COST, SIMPLEX_COST_SPREAD, SearchTermination};
 use crate::fit::bounds::{line_to_unit, unit_to_line};
 use crate::fit::evaluation::EvaluationStage;
 use crate::fit::journal::StopReason;
 use crate::fit::ledger::Ledger;
-use argmin::core::{CostFunction, Error, IterState, Problem, Solver, State};
+use argmin::core::{Error, IterState, KV, Problem, Solver, TerminationReason, TerminationStatus};
 use argmin::solver::neldermead::NelderMead;
-use std::cell::RefCell;
 
 /// Number of steps per vertex that do not lower the cost, after which a simplex ends.
 const STAGNANT_STEPS: usize = 20;
 
 type SimplexState = IterState<Vec<f64>, (), (), (), (), f64>;
 
-/// Costs as a function of unbounded coordinates on the real line.
-struct UnboundedCost<'l, 'a>(RefCell<StageCosts<'l, 'a>>);
+/// A simplex of argmin that also ends when it no longer lowers the cost.
+struct Simplex {
+    solver: NelderMead<Vec<f64>, f64>,
+    patience: StagnationCounter,
+}
 
-impl CostFunction for UnboundedCost<'_, '_> {
-    type Param = Vec<f64>;
-    type Output = f64;
+impl<'l, 'a> Solver<LedgerCosts<'l, 'a>, SimplexState> for Simplex {
+    fn name(&self) -> &str {
+        "Nelder-Mead"
+    }
 
-    fn cost(&self, place: &Vec<f64>) -> Result<f64, Error> {
-        Ok(self.0.borrow_mut().evaluate_point(place.iter().map(|z| line_to_unit(*z)).collect()))
+    fn init(
+        &mut self,
+        problem: &mut Problem<LedgerCosts<'l, 'a>>,
+        state: SimplexState,
+    ) -> Result<(SimplexState, Option<KV>), Error> {
+        self.solver.init(problem, state)
+    }
+
+    fn next_iter(
+        &mut self,
+        problem: &mut Problem<LedgerCosts<'l, 'a>>,
+        state: SimplexState,
+    ) -> Result<(SimplexState, Option<KV>), Error> {
+        self.solver.next_iter(problem, state)
+    }
+
+    fn terminate(&mut self, state: &SimplexState) -> TerminationStatus {
+        let shrunk =
+            <NelderMead<_, _> as Solver<LedgerCosts, SimplexState>>::terminate(&mut self.solver, state);
+        match shrunk.terminated() || self.patience.is_stagnant(state.get_cost()) {
+            true => TerminationStatus::Terminated(TerminationReason::SolverConverged),
+            false => TerminationStatus::NotTerminated,
+        }
     }
 }
 
@@ -36,36 +57,25 @@ impl CostFunction for UnboundedCost<'_, '_> {
 /// longer lowers the cost.
 pub(super) fn run_simplex(ledger: &mut Ledger, start: &[f64], edge: f64) -> SearchTermination {
     let vertices = initial_simplex(start, edge);
-    let steps = ledger.remaining_evaluations().saturating_mul(2).saturating_add(vertices.len());
     if ledger.remaining_evaluations() < vertices.len() {
         return SearchTermination::Stopped(StopReason::Budget);
     }
-    let stop = step_simplex(StageCosts::new(ledger, EvaluationStage::Local), vertices, steps);
-    stop.map_or(SearchTermination::Converged, SearchTermination::Stopped)
-}
-
-/// Steps a simplex until it ends. Returns the reason if the ledger stopped.
-fn step_simplex(costs: StageCosts, vertices: Vec<Vec<f64>>, steps: usize) -> Option<StopReason> {
-    let mut patience = StagnationCounter::new(STAGNANT_STEPS * vertices.len(), 0.0);
-    let mut solver = NelderMead::new(vertices).with_sd_tolerance(SIMPLEX_COST_SPREAD).ok()?;
-    let mut problem = Problem::new(UnboundedCost(RefCell::new(costs)));
-    let (mut state, _) = solver.init(&mut problem, SimplexState::new()).ok()?;
-    for _ in 0..steps {
-        let stop = problem.problem.as_ref().and_then(|costs| costs.0.borrow().stop.clone());
-        if stop.is_some() {
-            return stop;
-        }
-        let cost = state.get_cost();
-        if cost <= EXACT_COST || has_shrunk(&mut solver, &state) || patience.is_stagnant(cost) {
-            return None;
-        }
-        (state, _) = solver.next_iter(&mut problem, state).ok()?;
+    let to_unit = |place: &[f64]| place.iter().map(|z| line_to_unit(*z)).collect::<Vec<f64>>();
+    let points: Vec<Vec<f64>> = vertices.iter().map(|vertex| to_unit(vertex)).collect();
+    // argmin panics if one of the first costs is an error
+    let first = ledger.evaluate_points(EvaluationStage::Local, &points).err();
+    if let Some(stop) = first.or_else(|| ledger.stop_reason().cloned()) {
+        return SearchTermination::Stopped(stop);
     }
-    None
-}
-
-fn has_shrunk(solver: &mut NelderMead<Vec<f64>, f64>, state: &SimplexState) -> bool {
-    <NelderMead<_, _> as Solver<UnboundedCost, SimplexState>>::terminate(solver, state).terminated()
+    let steps = ledger.remaining_evaluations().saturating_mul(2).saturating_add(vertices.len()) as u64;
+    let patience = StagnationCounter::new(STAGNANT_STEPS * vertices.len(), 0.0);
+    let Ok(solver) = NelderMead::new(vertices).with_sd_tolerance(SIMPLEX_COST_SPREAD) else {
+        return SearchTermination::Converged;
+    };
+    let configure = |state: SimplexState| state.max_iters(steps).target_cost(EXACT_COST);
+    let solver = Simplex { solver, patience };
+    let stop = run_solver(ledger, EvaluationStage::Local, &to_unit, solver, configure);
+    stop.map_or(SearchTermination::Converged, SearchTermination::Stopped)
 }
 
 /// Vertices of a simplex, mapped from the unit box to the real line: `start`, and for each coordinate a point

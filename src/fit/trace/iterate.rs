@@ -1,8 +1,7 @@
 //! Iterates of a trace search.
 
 use super::segment_simulation::LinkState;
-use super::uncertainty_run::{MAX_STARTS, UncertaintyRun};
-use crate::fit::misfit::or_infinite;
+use crate::checkpoint::or_infinite;
 use serde::{Deserialize, Serialize};
 
 /// Settings of a trace search.
@@ -141,17 +140,4 @@ impl TraceDescent {
     pub(crate) fn last_iterate(&self) -> Option<&Iterate> {
         self.stages.last()
     }
-}
-
-/// Describes the current iterate of a fit, for the display of its progress.
-pub(crate) fn describe_iterate(chain: usize, at: &Iterate, segment_s: &[f64]) -> String {
-    let length_ms = 1e3 * segment_s.get(at.stage).copied().unwrap_or_default();
-    let chain = match UncertaintyRun::from_chain_number(chain) {
-        None if chain >= MAX_STARTS => format!("minimum {}", chain - MAX_STARTS + 1),
-        None => format!("start {}", chain + 1),
-        Some(UncertaintyRun::Twin(twin)) => format!("twin {}", twin + 1),
-        Some(UncertaintyRun::Shorter | UncertaintyRun::Side { .. }) => "intervals".to_owned(),
-    };
-    let (bad, all) = (at.count_bad_segments(), at.segments.len());
-    format!("{chain}, segments of {length_ms} ms, {bad} of {all} bad, cost {:.1}", at.cost)
 }

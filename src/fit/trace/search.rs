@@ -9,7 +9,7 @@ use super::normal_equations::recording_models;
 use super::prior_conflict::prior_conflicts;
 use super::rivals::has_lost;
 use super::segment_simulation::RecordingModel;
-use super::uncertainty_run::{MAX_STARTS, SearchEnd, follow_runs};
+use super::uncertainty_run::{MAX_STARTS, SearchEnd, describe_iterate, follow_runs};
 use super::unknowns::{TraceUnknown, UnknownKind};
 use crate::fit::journal::Journal;
 use crate::model::modes::{TipConstraint, natural_modes};
@@ -212,6 +212,7 @@ fn descend(
     limit: f64,
     journal: &mut Journal<'_>,
 ) -> (TraceDescent, bool) {
+    let describe = |chain: usize, at: &Iterate| describe_iterate(chain, at, &settings.segment_s);
     let mut descent = TraceDescent { start: chain, stages: Vec::new(), iterates: 0 };
     loop {
         let last = descent.last_iterate();
@@ -222,7 +223,7 @@ fn descend(
             None => first(),
             Some(before) => next_iterate(model, settings, before),
         };
-        match journal.compute_iterates(&[(chain, descent.iterates)], &compute) {
+        match journal.compute_iterates(&[(chain, descent.iterates)], &compute, &describe) {
             Err(_) => return (descent, true),
             Ok(next) if next.is_empty() => return (descent, false),
             Ok(next) => {

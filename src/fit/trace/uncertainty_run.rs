@@ -173,6 +173,19 @@ impl<'a> SearchEnd<'a> {
     }
 }
 
+/// Describes the current iterate of a fit, for the display of its progress.
+pub(super) fn describe_iterate(chain: usize, at: &Iterate, segment_s: &[f64]) -> String {
+    let length_ms = 1e3 * segment_s.get(at.stage).copied().unwrap_or_default();
+    let chain = match UncertaintyRun::from_chain_number(chain) {
+        None if chain >= MAX_STARTS => format!("minimum {}", chain - MAX_STARTS + 1),
+        None => format!("start {}", chain + 1),
+        Some(UncertaintyRun::Twin(twin)) => format!("twin {}", twin + 1),
+        Some(UncertaintyRun::Shorter | UncertaintyRun::Side { .. }) => "intervals".to_owned(),
+    };
+    let (bad, all) = (at.count_bad_segments(), at.segments.len());
+    format!("{chain}, segments of {length_ms} ms, {bad} of {all} bad, cost {:.1}", at.cost)
+}
+
 /// Number of runs that are computed together. It is fixed, so that the order of the iterates does not depend
 /// on the number of threads.
 const RUNS_TOGETHER: usize = 8;
@@ -208,6 +221,7 @@ pub(super) fn follow_runs(
     runs: &[UncertaintyRun],
     journal: &mut Journal<'_>,
 ) -> Option<Vec<Option<Iterate>>> {
+    let describe = |chain: usize, at: &Iterate| describe_iterate(chain, at, &end.settings.segment_s);
     let mut ends = Vec::new();
     // twins form their own groups, so that twins that are added later do not change the order of
     // the other iterates
@@ -219,7 +233,8 @@ pub(super) fn follow_runs(
         while ways.iter().any(RunProgress::is_open) {
             let mut open: Vec<&mut RunProgress<'_>> = ways.iter_mut().filter(|way| way.is_open()).collect();
             let keys: Vec<_> = open.iter().map(|way| (way.run.chain_number(), way.place)).collect();
-            let made = journal.compute_iterates(&keys, &|at| Some(open[at].next_iterate(end))).ok()?;
+            let made =
+                journal.compute_iterates(&keys, &|at| Some(open[at].next_iterate(end)), &describe).ok()?;
             for (way, next) in open.iter_mut().zip(made) {
                 (way.last, way.place) = (Some(next), way.place + 1);
             }
