@@ -29,6 +29,7 @@ mod variable_projection;
 pub use assessment::{TraceAssessment, UnknownEstimate};
 pub(crate) use build::{TraceSource, fit_states_at, frame_residuals};
 pub(crate) use fitted_traces::{FittedTraces, first_fitting};
+pub(crate) use iterate::TraceDescent;
 pub use iterate::{Iterate, SegmentState, TraceSearchSettings, chi2_per_dof};
 pub use levenberg_marquardt::{first_iterate, next_iterate};
 pub use model::TraceModel;
