@@ -1,6 +1,8 @@
 //! Compares different ends of a search, and tests whether the recordings decide between them.
 
+use super::initial_states::RescuePolicy;
 use super::iterate::{Iterate, is_same_end};
+use super::levenberg_marquardt::{MAX_STATE_STEPS, refit};
 use super::segment_simulation::segment_residuals;
 use super::uncertainty_run::SearchEnd;
 use crate::model::parameters::find_parameter;
@@ -10,17 +12,53 @@ use std::collections::BTreeMap;
 /// Smallest difference of the chi2 of two ends that decides against the worse one, in standard deviations of
 /// this difference.
 const LOST_SD: f64 = 4.0;
+/// Smallest barrier of the cost between two minima: noise lifts the cost by as much over two standard
+/// deviations of an estimate.
+const LEAST_BARRIER: f64 = 4.0;
 /// Smallest number of frames in a block.
 const MIN_BLOCK_FRAMES: usize = 4;
 
-/// Whether `other` is no rival: the recordings decide against it, it is the same end, or its cost is not
-/// comparable.
+/// Whether `other` is no rival: the recordings decide against it, it belongs to the same minimum, or its cost
+/// is not comparable.
 pub(super) fn has_lost(end: &SearchEnd<'_>, other: &Iterate) -> bool {
     let comparable = (other.stage, other.plain, other.whole) == (end.at.stage, end.at.plain, end.at.whole);
     !comparable
         || !other.plain
         || is_same_end(end.at, other, &end.sd)
         || evidence_against(end, other) >= LOST_SD
+        || is_same_valley(end, other)
+}
+
+/// Whether another end belongs to the same minimum as the best end: they are close, or no barrier of the cost
+/// lies between them. A search may stop anywhere along a direction that the recordings hardly determine.
+pub(super) fn is_same_minimum(end: &SearchEnd<'_>, other: &Iterate) -> bool {
+    other.plain == end.at.plain
+        && (is_same_end(end.at, other, &end.sd) || (other.plain && is_same_valley(end, other)))
+}
+
+/// Whether the cost on the straight line between two ends nowhere exceeds that of the higher end by more than
+/// [`LEAST_BARRIER`]. The places are not evenly spaced, so that they do not all fall into minima of a
+/// periodic cost.
+fn is_same_valley(end: &SearchEnd<'_>, other: &Iterate) -> bool {
+    const PLACES: [f64; 5] = [0.25, 0.4, 0.5, 0.6, 0.75];
+    let at = end.at;
+    let frames = |iterate: &Iterate| -> Vec<_> {
+        iterate.segments.iter().map(|segment| (segment.recording, segment.frames())).collect()
+    };
+    if (other.stage, other.whole) != (at.stage, at.whole) || frames(at) != frames(other) {
+        return false;
+    }
+    let highest = at.cost.max(other.cost) + LEAST_BARRIER;
+    PLACES.iter().all(|share| {
+        let between = |a: f64, b: f64| a + share * (b - a);
+        let mut middle = at.clone();
+        middle.point.iter_mut().zip(&other.point).for_each(|(a, b)| *a = between(*a, *b));
+        for (segment, far) in middle.segments.iter_mut().zip(&other.segments) {
+            segment.start.iter_mut().zip(far.start).for_each(|(a, b)| *a = between(*a, b));
+        }
+        let middle = refit(end.model, middle, MAX_STATE_STEPS, RescuePolicy::Never);
+        middle.is_some_and(|middle| middle.cost <= highest)
+    })
 }
 
 /// A reason to doubt the end if the recordings do not decide against `other`. It names the parameter that

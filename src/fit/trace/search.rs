@@ -1,13 +1,13 @@
 //! The search of a trace fit: it iterates from several starting points and assesses the best result.
 
 use super::assessment::{TraceAssessment, assess_end};
-use super::iterate::{Iterate, TraceDescent, TraceSearchSettings, is_same_end};
+use super::iterate::{Iterate, TraceDescent, TraceSearchSettings};
 use super::levenberg_marquardt::{first_iterate, next_iterate, start_stage};
 use super::lobes::{MAX_LOBES, find_lobes};
 use super::model::TraceModel;
 use super::normal_equations::recording_models;
 use super::prior_conflict::prior_conflicts;
-use super::rivals::has_lost;
+use super::rivals::{has_lost, is_same_minimum};
 use super::segment_simulation::RecordingModel;
 use super::uncertainty_run::{MAX_STARTS, SearchEnd, describe_iterate, follow_runs};
 use super::unknowns::{TraceUnknown, UnknownKind};
@@ -160,9 +160,9 @@ fn has_enough_starts(
     descents.len() >= fewest && SearchEnd::new(model, settings, seed, end).is_some_and(is_plausible)
 }
 
-/// Whether another start ends at the same point as the best start.
+/// Whether another start ends in the same minimum as the best start.
 fn has_company(end: &SearchEnd<'_>, descents: &[TraceDescent], best: usize) -> bool {
-    other_ends(descents, best).any(|other| other.plain == end.at.plain && is_same_end(end.at, other, &end.sd))
+    other_ends(descents, best).any(|other| is_same_minimum(end, other))
 }
 
 /// Frame rate and frequency of the blade's fastest mode, both in Hz, if there are fewer than two frames per
