@@ -174,9 +174,10 @@ impl<'a> Journal<'a> {
             FitRecord::Evaluation { .. } => String::new(),
         };
         let bits: Vec<Vec<u64>> = keys.iter().map(|(chain, step)| iterate_key(*chain, *step)).collect();
-        // a smaller limit does not shorten a search that the journal holds
+        // a smaller limit shortens neither a search that the journal holds nor one that has come to its end
         let limit = self.limit;
-        if bits.iter().all(|key| self.known.contains_key(key)) {
+        let is_new = |at: usize| !self.known.contains_key(&bits[at]) && compute(at).is_some();
+        if self.remaining_evaluations() < keys.len() && !(0..keys.len()).any(is_new) {
             self.limit = usize::MAX;
         }
         let computed = self.compute_records(&bits, &make, &mut count);

@@ -147,7 +147,7 @@ impl TraceFindings<'_, '_> {
         match self.journal.stop_reason() {
             _ if !self.searched.stopped && is_complete => FitStatus::Converged,
             _ if !self.searched.stopped => FitStatus::Failed,
-            Some(StopReason::Budget) => FitStatus::BudgetExhausted,
+            None | Some(StopReason::Budget) => FitStatus::BudgetExhausted,
             _ => FitStatus::Interrupted,
         }
     }
