@@ -14,9 +14,9 @@ const MIN_PRESENT: f64 = 0.8;
 /// recording.
 const MIN_AMPLITUDE: f64 = 0.2;
 
-/// Cycles by which the oscillation of `model` at the frequency `frequency_hz` runs ahead of that of `measured`
-/// from the first window in which both oscillate to the last: the phase difference is measured in windows of
-/// four cycles and followed from window to window. `None` with fewer than two such windows.
+/// Cycles by which the oscillation of `model` at the frequency `frequency_hz` gets ahead of that of
+/// `measured`, from the first window in which both oscillate to the last. The phase difference is measured in
+/// windows of four cycles and followed from window to window. `None` with fewer than two such windows.
 pub(super) fn drift_cycles(
     [measured, model]: [&[Option<f64>]; 2],
     rate_hz: f64,

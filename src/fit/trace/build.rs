@@ -82,7 +82,7 @@ impl TraceModel {
 fn build_recording(source: &TraceSource<'_>) -> Result<TraceRecording, HeadMotionError> {
     let TraceSource { recording, traced, exposure_s, .. } = *source;
     let glass = measure_glass(recording);
-    let flat = glass.as_ref().and_then(|glass| glass.flatten(recording));
+    let flat = glass.as_ref().and_then(|glass| glass.flatten_recording(recording));
     let recording = flat.as_ref().unwrap_or(recording);
     let mut scene = source.scene.clone();
     // every segment has its own starting state, so the start of the scene is not used

@@ -3,7 +3,7 @@
 use super::camera_observation::CameraObservation;
 use super::model::TraceModel;
 use super::normal_equations::recording_models;
-use super::segment_simulation::{LinkState, RecordingModel};
+use super::segment_simulation::{LinkState, RecordingModel, ShownFrame};
 use super::unknowns::CameraParameters;
 use crate::fit::result::FittedSegment;
 use crate::recording::FrameGrid;
@@ -107,14 +107,6 @@ impl FittedTraces {
             offsets_m: [along_m, tip_m - along_m, drop_m],
         }
     }
-}
-
-/// A frame of a run of the model.
-pub(super) struct ShownFrame {
-    /// Position of the tip along the sweep and drop of the head in the picture, m.
-    pub picture: [f64; 2],
-    /// True positions of tip and head along the sweep, and true drop, m.
-    pub truth: [f64; 3],
 }
 
 /// The first segment that fits; if none does, the first segment.

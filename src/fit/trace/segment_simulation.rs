@@ -1,7 +1,6 @@
 //! A run of the model over one segment, as the camera records it, with its derivatives.
 
 use super::camera_observation::CameraObservation;
-use super::fitted_traces::ShownFrame;
 use super::iterate::Iterate;
 use super::model::{TraceModel, TraceRecording};
 use super::normal_equations::recording_models;
@@ -114,6 +113,14 @@ impl TangentObserver for ShutterAverage<'_> {
             shot.end = Some(LinkState::new(pose.theta, pose.phi, pose.theta_rate, pose.phi_rate));
         }
     }
+}
+
+/// A frame of a run of the model.
+pub(super) struct ShownFrame {
+    /// Position of the tip along the sweep and drop of the head in the picture, m.
+    pub picture: [f64; 2],
+    /// True positions of tip and head along the sweep, and true drop, m.
+    pub truth: [f64; 3],
 }
 
 /// Residuals of a segment, and the derivatives of the residuals with respect to the starting state and with

@@ -161,7 +161,7 @@ impl CameraTilt {
     /// The recording with positions along the glass and heights above it, if the glass is curved. The glass
     /// is taken as an arc; a point above it appears nearer to the centre of the arc or farther from it. The
     /// result has the same tilt.
-    pub(crate) fn flatten(&self, recording: &Recording) -> Option<Recording> {
+    pub(crate) fn flatten_recording(&self, recording: &Recording) -> Option<Recording> {
         let curvature = self.curvature?;
         let traces = recording.traces();
         let mut flat = traces.clone();
@@ -326,7 +326,7 @@ mod tests {
             let recording = Recording::new("arc", grid, traces, true).unwrap();
             let instants = ReversalInstants::find_instants(&recording);
             let tilt = measure_tilt(&recording, &instants, &measure_quality(&recording, None)).unwrap();
-            let flat = tilt.flatten(&recording).unwrap();
+            let flat = tilt.flatten_recording(&recording).unwrap();
             let of = |column: &[Option<f64>], i: usize| column[i].unwrap();
             let (sin, cos) = (math::sin(tilt.angle_rad), math::cos(tilt.angle_rad));
             for i in 0..frames {
