@@ -142,6 +142,9 @@ fn enlarged_text(case: &ConditionComparison, history: &TimeHistory) -> FigureTex
 /// Clause that names the drawn motions: the recording over the model, or the model without a recording.
 fn whose_motion(case: &ConditionComparison) -> String {
     match case.recording() {
+        Some(_) if case.restarted.is_some() => {
+            format!("{} over one run of the fitted model", case.source_kind())
+        }
         Some(_) => format!("{} over the fitted model", case.source_kind()),
         None => case.source_kind().to_owned(),
     }
@@ -169,6 +172,7 @@ fn describe_miss((of, rms_m, over_noise): (Channel, f64, Option<f64>)) -> String
 /// Heading of the whole motion.
 fn motion_title(case: &ConditionComparison) -> String {
     match rms_difference(case, None) {
+        Some(found) if case.restarted.is_some() => format!("In one run {}", describe_miss(found)),
         Some(found) => capitalise(&describe_miss(found)),
         None if case.alignment.opposite_turn => {
             "The recorded head turns the other way than the model's".into()

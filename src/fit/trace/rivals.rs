@@ -36,28 +36,25 @@ pub(super) fn is_same_minimum(end: &SearchEnd<'_>, other: &Iterate) -> bool {
         && (is_same_end(end.at, other, &end.sd) || (other.plain && is_same_valley(end, other)))
 }
 
-/// Whether the cost on the straight line between two ends nowhere exceeds that of the higher end by more than
-/// [`LEAST_BARRIER`]. The places are not evenly spaced, so that they do not all fall into minima of a
-/// periodic cost.
+/// Whether the cost on the straight line from one end to another nowhere exceeds that of the higher end by
+/// more than [`LEAST_BARRIER`]. The places are not evenly spaced, so that they do not all fall into minima of
+/// a periodic cost. The starting states follow from place to place.
 fn is_same_valley(end: &SearchEnd<'_>, other: &Iterate) -> bool {
     const PLACES: [f64; 5] = [0.25, 0.4, 0.5, 0.6, 0.75];
     let at = end.at;
-    let frames = |iterate: &Iterate| -> Vec<_> {
-        iterate.segments.iter().map(|segment| (segment.recording, segment.frames())).collect()
-    };
-    if (other.stage, other.whole) != (at.stage, at.whole) || frames(at) != frames(other) {
+    if (other.stage, other.whole) != (at.stage, at.whole) {
         return false;
     }
     let highest = at.cost.max(other.cost) + LEAST_BARRIER;
+    let mut place = Some(at.clone());
     PLACES.iter().all(|share| {
-        let between = |a: f64, b: f64| a + share * (b - a);
-        let mut middle = at.clone();
-        middle.point.iter_mut().zip(&other.point).for_each(|(a, b)| *a = between(*a, *b));
-        for (segment, far) in middle.segments.iter_mut().zip(&other.segments) {
-            segment.start.iter_mut().zip(far.start).for_each(|(a, b)| *a = between(*a, b));
-        }
-        let middle = refit(end.model, middle, MAX_STATE_STEPS, RescuePolicy::Never);
-        middle.is_some_and(|middle| middle.cost <= highest)
+        let moved = place.take().and_then(|mut place| {
+            let between = at.point.iter().zip(&other.point).map(|(a, b)| a + share * (b - a));
+            place.point = between.collect();
+            refit(end.model, place, MAX_STATE_STEPS, RescuePolicy::Never)
+        });
+        place = moved.filter(|place| place.cost <= highest);
+        place.is_some()
     })
 }
 
