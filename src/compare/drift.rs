@@ -37,7 +37,7 @@ pub(super) fn drift_cycles(
     let least = MIN_AMPLITUDE * phasors.iter().map(|[measured, _]| size(*measured)).fold(0.0, f64::max);
     let is_clear =
         |pair: &&[[f64; 2]; 2]| pair.iter().all(|phasor| size(*phasor) >= least.max(f64::MIN_POSITIVE));
-    let ahead = |[[a, b], [c, d]]: &[[f64; 2]; 2]| math::atan2(a * d - b * c, a * c + b * d) / TAU;
+    let ahead = |[[a, b], [c, d]]: &[[f64; 2]; 2]| math::atan2(b * c - a * d, a * c + b * d) / TAU;
     let phases: Vec<f64> = phasors.iter().filter(is_clear).map(ahead).collect();
     let steps = phases.windows(2).map(|pair| {
         let step = pair[1] - pair[0];
@@ -67,13 +67,15 @@ mod tests {
         (0..2000).map(|i| Some(at(i)).filter(|_| i % 17 != 3)).collect()
     }
 
-    /// In 0.4 s, an oscillation at 702.5 Hz gains one cycle on one at 700 Hz.
+    /// From the middle of the first window of 29 frames to that of the last, an oscillation at 702.5 Hz gains
+    /// nearly one cycle on one at 700 Hz.
     #[test]
     fn the_cycles_between_two_frequencies_are_counted() {
         let drift =
             |model_hz| drift_cycles([&wave(700.0, 1.0), &wave(model_hz, 0.6)], 5000.0, 700.0).unwrap();
-        assert!((drift(702.5) - 1.0).abs() < 0.03, "{}", drift(702.5));
-        assert!((drift(695.0) + 2.0).abs() < 0.06, "{}", drift(695.0));
+        let lasts_s = 67.0 * 29.0 / 5000.0;
+        assert!((drift(702.5) - 2.5 * lasts_s).abs() < 0.01, "{}", drift(702.5));
+        assert!((drift(695.0) + 5.0 * lasts_s).abs() < 0.02, "{}", drift(695.0));
         assert!(drift(700.0).abs() < 1e-3, "{}", drift(700.0));
     }
 

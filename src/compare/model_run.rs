@@ -44,9 +44,10 @@ pub fn run_conditions(
         let scene = model.scene_at(&values, condition)?;
         let mut recorder = MotionRecorder::new(&scene);
         let mut view = model.record_scene(&scene, condition, &mut recorder)?;
-        let traces = model.fitted_traces(condition).cloned();
-        if let Some(shown) = traces.as_ref().and_then(|traces| view_through_camera(&view, traces)) {
-            view.recording = shown;
+        let mut traces = model.fitted_traces(condition).cloned();
+        match traces.as_ref().and_then(|traces| view_through_camera(&view, traces)) {
+            Some(shown) => view.recording = shown,
+            None => traces = None,
         }
         Ok(ModelRun { motion: recorder.into_motion(&scene, view.run), scene, view, traces })
     };
