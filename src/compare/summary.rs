@@ -2,6 +2,7 @@
 
 use super::condition::{ConditionComparison, FitWindow, TimedRecording, group_fit_windows};
 use super::ridge::TrackedRidge;
+use super::tables::recording_kind;
 use crate::recording::alignment::AlignmentPoint;
 use crate::recording::channel::Channel;
 use crate::recording::motion_traces::{MOTION_CHANNELS, MotionTraces};
@@ -16,6 +17,8 @@ pub struct ComparisonSummary {
     pub condition: String,
     /// Name of the recording.
     pub recording: Option<String>,
+    /// Kind of the data that the model is compared with: `measured`, `synthetic` or `published`.
+    pub recording_kind: &'static str,
     /// Time added to the times of the model to align it with the recording, s.
     pub clock_shift_s: Option<f64>,
     /// Standard deviation of the shift between the clocks of model and recording, s. Infinite if the path
@@ -120,7 +123,12 @@ impl ComparisonSummary {
         };
         let mut single_run = ratios(&self.residuals);
         single_run.insert("drift_cycles".to_owned(), json!(self.drift_cycles));
-        json!({ "condition": self.condition, "restarted": ratios(&self.restarted), "single_run": single_run })
+        json!({
+            "condition": self.condition,
+            "recording_kind": self.recording_kind,
+            "restarted": ratios(&self.restarted),
+            "single_run": single_run,
+        })
     }
 
     /// The numbers of a condition.
@@ -132,6 +140,7 @@ impl ComparisonSummary {
         Self {
             condition: case.name().to_owned(),
             recording: case.recording().map(|r| r.name().to_owned()),
+            recording_kind: recording_kind(case.recording()),
             clock_shift_s: alignment.map(|a| a.shift_s),
             clock_shift_sd_s: alignment.and_then(|a| a.shift_sd_s),
             along_m: alignment.map(|a| a.along_m),

@@ -77,7 +77,7 @@ fn format_csv(rows: impl IntoIterator<Item = Vec<String>>) -> String {
 }
 
 /// Kind of the data that the model is compared with.
-fn recording_kind(recording: Option<&Recording>) -> &'static str {
+pub(super) fn recording_kind(recording: Option<&Recording>) -> &'static str {
     match recording {
         None => "published",
         Some(recording) if recording.is_synthetic() => "synthetic",
