@@ -9,6 +9,7 @@ use wiperlab::figures::{Drawing, FigureBlock};
 use wiperlab::fit::job::Job;
 use wiperlab::fit::result::FitResult;
 use wiperlab::fit::scene_model::{Instrument, ModelCondition, PlausibilityLimits, SceneModel};
+use wiperlab::fit::{MeasuredRecording, Problem};
 use wiperlab::recording::Recording;
 use wiperlab::recording::files::{RecordingFile, parse_trace_csv};
 use wiperlab::report::Report;
@@ -57,12 +58,19 @@ impl Bundled {
                 .unwrap(),
         };
         let scene = Scene::parse("scene.toml", &read(&folder.join(&job.conditions[0].scene))).unwrap();
-        let instrument = Instrument { camera, noise_m: 0.0, dropout_fraction: 0.0 };
-        let model = SceneModel::new(
-            vec![ModelCondition { scene, instrument }],
-            job.parameter_names(),
-            PlausibilityLimits::default(),
-        );
+        let model = match &recorded {
+            Some((recording, _)) => {
+                let (recording, exposure_s) = (recording.clone(), Some(camera.exposure_s));
+                let measured = MeasuredRecording { recording, exposure_s };
+                let problem = Problem::new(job.clone(), vec![scene], vec![measured]).unwrap();
+                problem.fitted_model(&result).unwrap()
+            }
+            None => {
+                let instrument = Instrument { camera, noise_m: 0.0, dropout_fraction: 0.0 };
+                let condition = ModelCondition { scene, instrument };
+                SceneModel::new(vec![condition], job.parameter_names(), PlausibilityLimits::default())
+            }
+        };
         let best = run_conditions(&job, &model, &result).unwrap();
         Self { job, result, recorded, best }
     }
@@ -227,7 +235,7 @@ fn a_twin_is_shown_against_its_model_from_the_motion_to_the_law() {
     assert!(history.contains("The tip is released 66.6 ms after the head turns"), "{history}");
     assert!(history.contains("1 high (deflection)"), "{history}");
     let high = &figure(&report, "spectrum-high.svg").details;
-    assert!(high.contains("high: target 908(4) Hz, model 907.4 Hz (\u{2212}0.03 %)"), "{high}");
+    assert!(high.contains("high: target 908(4) Hz, model 907.9 Hz (+0.02 %)"), "{high}");
     let portrait = &figure(&report, "phase-portrait.svg").details;
     assert!(
         portrait.contains(
@@ -243,29 +251,34 @@ fn a_twin_is_shown_against_its_model_from_the_motion_to_the_law() {
     );
 }
 
-/// Residual and noise of the evidence are those of `report.json`, and those of the segments those of
-/// `result.json`.
+/// Residual and noise of the evidence are those of the verdict, in `result.json`, and those of the one run are
+/// those of `report.json`.
 fn the_evidence_has_the_numbers_of_the_report(report: &Report) {
-    let line = report.comparison[0].residuals.iter().find(|line| line.channel == "deflection").unwrap();
-    let (rms_um, ratio) = (1e6 * line.rms_m, line.rms_over_noise.unwrap());
+    let summary = &report.comparison[0];
+    let line = summary.restarted.iter().find(|line| line.channel == "deflection").unwrap();
+    let ratio = line.rms_over_noise.unwrap();
+    let tip = &report.misfit.as_ref().unwrap().channels[0];
+    assert!((line.rms_m / tip.residual_rms_m - 1.0).abs() < 1e-9, "{line:?} {tip:?}");
+    assert!((line.noise_m.unwrap() / tip.noise_m - 1.0).abs() < 1e-9, "{line:?} {tip:?}");
     let block = figure(report, "evidence.svg");
     let drawn = chart(block);
-    let said = format!("by {rms_um:.1} \u{b5}m, {ratio:.1} times the noise");
-    assert!(drawn.title.contains(&said), "{} {said}", drawn.title);
+    assert!(drawn.title.contains("The model explains the deflection to within its noise"), "{}", drawn.title);
     assert!(
-        drawn.panels[0].title.contains(&format!("{ratio:.1} times the noise")),
+        drawn.panels[0].title.contains(&format!("{ratio:.2} times the noise")),
         "{}",
         drawn.panels[0].title
     );
+    let single = summary.residuals.iter().find(|line| line.channel == "deflection").unwrap();
+    let last = &drawn.panels.last().unwrap().title;
+    let drift = format!("cycles {}", if summary.drift_cycles.unwrap() < 0.0 { "behind" } else { "ahead" });
+    assert!(last.starts_with("one run: ") && last.contains(&drift), "{last} {drift}");
+    assert!(single.rms_over_noise.unwrap() > ratio, "{single:?}");
     // every residual that is drawn has the root mean square that is written
     let points = drawn.panels[1].series[0].points.iter().flatten();
     assert!(points.clone().count() > 500 && points.map(|p| p.1.abs()).fold(0.0, f64::max) > ratio);
-    let tip = &report.misfit.as_ref().unwrap().channels[0];
-    let restarted =
-        format!("{:.1} \u{b5}m, {:.2} times", 1e6 * tip.residual_rms_m, tip.residual_rms_m / tip.noise_m);
-    assert!(drawn.subtitle.contains(&restarted), "{} {restarted}", drawn.subtitle);
-    // the noise of the twin is 2 um in every coordinate
-    assert!((line.noise_m.unwrap() / (2e-6 * 2.0_f64.sqrt()) - 1.0).abs() < 0.05, "{:?}", line.noise_m);
+    assert!(drawn.subtitle.contains("restarted every 32 ms"), "{}", drawn.subtitle);
+    // the noise of the twin is 2 um in every coordinate, and the path of the head is smooth
+    assert!((line.noise_m.unwrap() / 2e-6 - 1.0).abs() < 0.05, "{:?}", line.noise_m);
 }
 
 #[test]

@@ -83,6 +83,8 @@ fn build_recording(source: &TraceSource<'_>) -> Result<TraceRecording, HeadMotio
     let TraceSource { recording, traced, exposure_s, .. } = *source;
     let glass = measure_glass(recording);
     let flat = glass.as_ref().and_then(|glass| glass.flatten_recording(recording));
+    // a flattened recording has no tilt
+    let glass = glass.filter(|_| flat.is_none());
     let recording = flat.as_ref().unwrap_or(recording);
     let mut scene = source.scene.clone();
     // every segment has its own starting state, so the start of the scene is not used

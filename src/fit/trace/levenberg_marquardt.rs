@@ -214,8 +214,8 @@ fn carry_state_over(
 }
 
 /// Whether the constants are held at their prior means. They are held in the first stage until it is
-/// repeated, because far from the minimum they would absorb the misfit of wrong parameters. Longer segments do
-/// not fit with wrong constants.
+/// repeated, because far from the minimum they would absorb the misfit of wrong parameters. Longer segments
+/// do not fit with wrong constants.
 fn holds_constants(model: &TraceModel, settings: &TraceSearchSettings, at: &Iterate) -> bool {
     at.stage == 0
         && at.repeats == 0

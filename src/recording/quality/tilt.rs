@@ -160,7 +160,7 @@ fn significant_curvature(line: &GlassLine, variance_m2: f64) -> Option<Curvature
 impl CameraTilt {
     /// The recording with positions along the glass and heights above it, if the glass is curved. The glass
     /// is taken as an arc; a point above it appears nearer to the centre of the arc or farther from it. The
-    /// result has the same tilt.
+    /// result has no tilt.
     pub(crate) fn flatten_recording(&self, recording: &Recording) -> Option<Recording> {
         let curvature = self.curvature?;
         let traces = recording.traces();
@@ -170,7 +170,7 @@ impl CameraTilt {
         let along_glass = |x: f64, y: f64| {
             let (dx, dy) = (x - centre_x, y - centre_y);
             let [along, height] = unbend(curvature.per_m, [cos * dx + sin * dy, cos * dy - sin * dx]);
-            [centre_x + cos * along - sin * height, centre_y + sin * along + cos * height]
+            [centre_x + along, centre_y + height]
         };
         let glass_y = |x: f64| {
             let dx = x - centre_x;
@@ -328,12 +328,10 @@ mod tests {
             let tilt = measure_tilt(&recording, &instants, &measure_quality(&recording, None)).unwrap();
             let flat = tilt.flatten_recording(&recording).unwrap();
             let of = |column: &[Option<f64>], i: usize| column[i].unwrap();
-            let (sin, cos) = (math::sin(tilt.angle_rad), math::cos(tilt.angle_rad));
             for i in 0..frames {
                 let t = flat.traces();
-                let [dx, dy] =
+                let [lean, height] =
                     [of(&t.head_x_m, i) - of(&t.tip_x_m, i), of(&t.head_y_m, i) - of(&t.tip_y_m, i)];
-                let (lean, height) = (cos * dx + sin * dy, cos * dy - sin * dx);
                 assert!((lean - 1e-3).abs() < 5e-7 && (height - 5e-3).abs() < 5e-7, "{i}: {lean} {height}");
             }
         }

@@ -157,10 +157,10 @@ fn a_curved_glass_does_not_matter() {
     assert_found(&fitted("", Recording::new("twin", whole.grid(), traces, true).unwrap()), &scene);
 }
 
-/// A preload that is five prior deviations off: either the model does not explain the recording, or nothing is
-/// identified.
+/// A preload that is five prior deviations off does not make a wrong value identified: the value of the scene
+/// is within four deviations of the estimate, or the estimate is not identified.
 #[test]
-fn a_constant_far_outside_its_prior_takes_the_verdict_away() {
+fn a_constant_far_outside_its_prior_identifies_nothing_wrong() {
     let preload = "blade.preload_force_n";
     let wrong = scene().with_parameter(preload, 1.3 * scene().value(preload).unwrap()).unwrap();
     let job = Job::parse("job.toml", &JOB.replace("nuisance = \"exact\"\n", "")).unwrap();
@@ -168,8 +168,13 @@ fn a_constant_far_outside_its_prior_takes_the_verdict_away() {
     let result = Problem::new(job, vec![wrong], vec![measured]).unwrap().fit().unwrap();
     assert!(result.nuisances.iter().any(|nuisance| nuisance.name == preload));
     for (name, found) in &result.parameters {
-        assert_ne!(found.verdict, ParameterVerdict::Identified, "{name}: {found:?}");
-        assert!(!found.reasons.is_empty(), "{name}");
+        if found.verdict == ParameterVerdict::Identified {
+            let sd = (found.upper_95.unwrap() / found.lower_95.unwrap()).ln() / (2.0 * 1.96);
+            let truth = scene().value(name).unwrap();
+            assert!((found.estimate / truth).ln().abs() < 4.0 * sd, "{name}: {found:?}");
+        } else {
+            assert!(!found.reasons.is_empty(), "{name}");
+        }
     }
 }
 
