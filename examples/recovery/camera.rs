@@ -1,4 +1,4 @@
-//! A camera and a tracking program, without a function of the fit.
+//! A camera and a tracking program. They use no function of the fit.
 
 use crate::linkage_run::Place;
 use portable_math::StandardNormal;
@@ -6,35 +6,37 @@ use rand::Rng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use wiperlab::recording::{FrameGrid, Recording, Traces};
 
-/// How a blade is filmed. Lengths are those of a blade of size 1 times the size of the blade.
+/// How a blade is filmed.
 #[derive(Clone)]
 pub struct Filming {
     pub frame_rate_hz: f64,
-    /// Steps of the run in a frame, and in the time for which the shutter is open; both even.
+    /// Numbers of steps of the run in one frame period and in one exposure; both are even.
     pub steps: [usize; 2],
     pub origin_m: [f64; 2],
     pub tilt_rad: f64,
     pub scale: f64,
-    /// Marker of the head against the hinge: along the sweep and upwards, m.
+    /// Position of the head's marker relative to the hinge: along the sweep and upwards, m.
     pub head_marker_m: [f64; 2],
-    /// Marker of the tip against the edge of the lip: along and across it, m.
+    /// Position of the tip's marker relative to the edge of the lip: along and across the lip, m.
     pub tip_marker_m: [f64; 2],
-    /// Curvature of the glass, 1/m, and the place where it is level, m.
+    /// Curvature of the glass, 1/m, and the position along the sweep at which the glass is level, m.
     pub curvature_per_m: f64,
     pub level_at_m: f64,
-    /// Standard deviation of a coordinate, its correlation from frame to frame, and the part of its variance
-    /// that tip and head share.
+    /// Noise of a coordinate: standard deviation, m, correlation between neighbouring frames, and fraction of
+    /// the variance that tip and head share.
     pub noise_m: f64,
     pub correlation: f64,
     pub shared: f64,
-    /// Share of the frames in which a point is lost.
+    /// Probability that a point is lost in a frame.
     pub lost: f64,
-    /// First frame and number of frames in which the tracker sits at a wrong place, ten noises off.
+    /// First frame and number of the frames in which the tracked tip is off along the sweep, by ten standard
+    /// deviations of the noise.
     pub glued: Option<[usize; 2]>,
 }
 
 impl Filming {
-    /// Draws a camera for a blade of a size and time scale relative to the usual blade.
+    /// Draws a camera. Its lengths and times scale with `size` and `time`, which are 1 for the blade of the
+    /// scene.
     pub fn draw(
         generator: &mut Xoshiro256PlusPlus,
         size: f64,
@@ -42,7 +44,7 @@ impl Filming {
         stroke_m: f64,
         lip_hz: f64,
     ) -> Self {
-        /// Steps of the run in a period of the lip.
+        /// Minimum number of steps of the run in a period of the lip.
         const STEPS_A_PERIOD: f64 = 100.0;
         let mut within = |low: f64, high: f64| low + (high - low) * generator.random::<f64>();
         let frame_rate_hz = 2_000.0 * within(0.0, 5.0_f64.ln()).exp() / time;
@@ -73,7 +75,8 @@ impl Filming {
         filming
     }
 
-    /// The film of a run whose places are a step apart; `upright_m` is the height of the upright head.
+    /// Films a run. `places` are one step apart; `upright_m` is the height of the head of an upright blade,
+    /// m.
     pub fn film(&self, places: &[Place], upright_m: f64, generator: &mut Xoshiro256PlusPlus) -> Recording {
         let [steps, open] = self.steps;
         let mut noise = [0.0_f64; 6];
@@ -99,7 +102,7 @@ impl Filming {
         Recording::new("synthetic", grid, traces, true).expect("finite places")
     }
 
-    /// Mean over the open shutter, by Simpson's rule: tip x, tip y, head x, head y.
+    /// Mean over the exposure, by Simpson's rule: x and y of the tip, then of the head, m.
     fn expose(&self, places: &[Place], upright_m: f64) -> [f64; 4] {
         let last = places.len() - 1;
         let mut sum = [0.0; 4];
@@ -111,7 +114,7 @@ impl Filming {
         sum
     }
 
-    /// Both markers in the picture at one instant.
+    /// Both markers in the picture at one instant: x and y of the tip, then of the head, m.
     fn show(&self, place: &Place, upright_m: f64) -> [f64; 4] {
         let ([along, across], (sin, cos)) = (self.tip_marker_m, place.lip_rad.sin_cos());
         let tip =
@@ -127,7 +130,8 @@ impl Filming {
         [tip_x, tip_y, head_x, head_y]
     }
 
-    /// A point at a distance along the glass and a height above it, on a glass that is an arc.
+    /// Position, m, of a point that is `along_m` along the glass and `height_m` above it. The glass is an
+    /// arc.
     fn bend(&self, along_m: f64, height_m: f64) -> (f64, f64) {
         if self.curvature_per_m == 0.0 {
             return (along_m, height_m);

@@ -1,4 +1,5 @@
-//! Descents from the truth, and the Cramér-Rao deviations at their ends, by finite differences.
+//! Descents from the true values, and the Cramér-Rao standard deviations at their ends, from finite
+//! differences.
 
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 use std::collections::BTreeMap;
@@ -17,14 +18,14 @@ fn parameter_name(unknown: &TraceUnknown) -> Option<&str> {
     }
 }
 
-/// Deviations of the priors that a model has for constants, by name.
+/// Standard deviations of the priors of the constants, in the logarithm, by name.
 pub fn read_priors(model: &TraceModel) -> BTreeMap<String, f64> {
     let unknowns = model.unknowns.0.iter();
     unknowns.filter_map(|unknown| Some((parameter_name(unknown)?.to_owned(), unknown.prior?[1]))).collect()
 }
 
-/// The end of a descent that starts at the values of a scene, if the model runs through every segment. Errors
-/// of the camera start where a search starts.
+/// The end of a descent that starts at the values of the scene `truth`; `None` if the model does not run
+/// through every segment. Camera errors start at the values at which a search starts.
 pub fn descend_from(problem: &Problem, truth: &Scene) -> Option<(TraceModel, Iterate)> {
     let model = problem.trace_model()?.ok()?;
     let mut point = start_point(&model, 1, 0);
@@ -38,11 +39,11 @@ pub fn descend_from(problem: &Problem, truth: &Scene) -> Option<(TraceModel, Ite
     while let Some(next) = next_iterate(&model, &settings, &at) {
         at = next;
     }
-    // elsewhere the cost is not chi2, or the model cannot run through a segment
+    // otherwise the cost is not chi2, or the model cannot run through a segment
     (at.plain && chi2_per_dof(&at).0.is_finite()).then_some((model, at))
 }
 
-/// Whitened residuals by segment and channel.
+/// Whitened residuals by segment and by channel, which is `true` for the drop.
 type Residuals = BTreeMap<(usize, bool), Vec<f64>>;
 
 fn whitened(model: &TraceModel, at: &Iterate) -> Residuals {
@@ -52,7 +53,8 @@ fn whitened(model: &TraceModel, at: &Iterate) -> Residuals {
         .collect()
 }
 
-/// Half of the difference of two sets of residuals per `step`; a part that one of them lacks says nothing.
+/// Central differences: residuals `above` minus `below` over twice the step. A segment or channel that one of
+/// them lacks is left out.
 fn slopes(above: &Residuals, below: &Residuals, step: f64) -> Residuals {
     let slope = |(key, above): (&(usize, bool), &Vec<f64>)| {
         let below = below.get(key)?;
@@ -61,8 +63,9 @@ fn slopes(above: &Residuals, below: &Residuals, step: f64) -> Residuals {
     above.iter().filter_map(slope).collect()
 }
 
-/// Deviations of the logarithms of the parameters: the inverse of the information of the residuals and the
-/// priors, the starting states of the segments unknown. `lip_rad_per_s` sets the steps of their rates.
+/// Cramér-Rao standard deviations of the logarithms of the parameters, by name: from the inverse of the
+/// information of residuals and priors, with unknown starting states of the segments. `lip_rad_per_s` sets
+/// the steps of the starting rates.
 pub fn find_deviations(
     model: &TraceModel,
     at: &Iterate,
@@ -92,7 +95,7 @@ pub fn find_deviations(
             let move_all = |iterate: &mut Iterate, by: f64| {
                 iterate.segments.iter_mut().for_each(|segment| segment.start[i] += by);
             };
-            // in units of the step, so that the four are of one size
+            // per step, so that the slopes of angles and rates have similar sizes
             let mut slopes = difference(&move_all, step);
             slopes.values_mut().flatten().for_each(|slope| *slope *= step);
             slopes

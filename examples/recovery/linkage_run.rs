@@ -1,4 +1,5 @@
-//! Runs of the linkage by Lagrange's equations, without the equations, integrator and events of the library.
+//! Runs of the linkage by Lagrange's equations. They use neither equations nor integrator nor events of the
+//! library.
 
 use crate::blade::Parts;
 use crate::lagrangian::Linkage;
@@ -8,8 +9,8 @@ use wiperlab::simulate::scene::{Scene, StartKind};
 /// Angles of neck and lip, rad, and their rates, rad/s.
 type State = [f64; 4];
 
-/// Positions of a blade at one instant: head along the sweep, its drop, tip along the sweep, its height, m, and
-/// the angle of the lip, rad.
+/// Positions of a blade at one instant: head along the sweep, its drop, tip along the sweep, its height, m,
+/// and the angle of the lip, rad.
 #[derive(Clone, Copy)]
 pub struct Place {
     pub head_x_m: f64,
@@ -19,8 +20,8 @@ pub struct Place {
     pub lip_rad: f64,
 }
 
-/// A blade on its cosine drive: `direction` is that of the sliding tip, 0 in stick; `side` is that of the
-/// shoulder on which the neck leans, 0 off it.
+/// A blade on a drive with a cosine motion. `direction` is the sign of the tip's speed, 0 while it sticks.
+/// `side` is the sign of the neck's angle while the neck leans on the shoulder, otherwise 0.
 struct Sweep {
     parts: Parts,
     amplitude_m: f64,
@@ -29,14 +30,16 @@ struct Sweep {
     side: f64,
 }
 
-/// The tip lost contact or jammed, or events accumulate.
+/// A run that did not reach its end: the tip lost contact or jammed, there were more than [`MOST_EVENTS`]
+/// events, or the scene starts in no given state.
 pub struct Stopped;
 
 /// Largest number of events of a run.
 const MOST_EVENTS: usize = 20_000;
 
-/// Places of a scene at `count` times from its start, `step_s` apart: the classical Runge-Kutta scheme with
-/// one step from one time to the next, shortened at stick, slip, and contact of the shoulder.
+/// Places of the blade of a scene at `count` times, `step_s` apart from the start of the scene on. The
+/// classical Runge-Kutta scheme makes one step from each time to the next; a step ends early where stick,
+/// slip or contact with the shoulder begins or ends.
 pub fn run_linkage(scene: &Scene, step_s: f64, count: usize) -> Result<Vec<Place>, Stopped> {
     let StartKind::State(pose) = scene.start else { return Err(Stopped) };
     let number = |name: &str| scene.value(name).unwrap_or(0.0);
@@ -62,7 +65,7 @@ pub fn run_linkage(scene: &Scene, step_s: f64, count: usize) -> Result<Vec<Place
         if end[2] <= 0.0 || end[2].is_nan() {
             return Err(Stopped);
         }
-        // the first guard that falls below zero
+        // the guard that first falls below zero ends the step
         let crossed = (0..2).filter(|&g| end[g] < 0.0);
         let first = crossed.map(|g| (sweep.crossing(t, &y, h, g, [start[g], end[g]]), g));
         let Some((within, guard)) = first.min_by(|a, b| a.0.total_cmp(&b.0)) else {
@@ -92,7 +95,7 @@ impl Sweep {
         self.parts.shoulder.map_or(f64::INFINITY, |[angle, ..]| angle)
     }
 
-    /// Position, velocity and acceleration of the head.
+    /// Position, m, velocity, m/s, and acceleration, m/s^2, of the head.
     fn head(&self, t: f64) -> [f64; 3] {
         let (a, (sin, cos)) = (self.amplitude_m, (self.omega * t).sin_cos());
         [a * (1.0 - cos), a * self.omega * sin, a * self.omega * self.omega * cos]
@@ -114,7 +117,7 @@ impl Sweep {
         }
     }
 
-    /// The state with the tip exactly at rest, if it sticks.
+    /// The state; if the tip sticks, with a rate of the lip for which the tip is exactly at rest.
     fn without_drift(&self, t: f64, mut y: State) -> State {
         if self.direction == 0.0 {
             y[3] -= self.tip_speed(t, &y) / (self.parts.l[1] * y[1].cos());
@@ -122,8 +125,8 @@ impl Sweep {
         y
     }
 
-    /// Accelerations of the angles without friction and by a unit of it; normal force and acceleration of the
-    /// tip likewise.
+    /// Accelerations of neck and lip, normal force, and acceleration of the tip: without friction, and the
+    /// changes for each newton of friction.
     fn responses(&self, t: f64, y: &State) -> [[f64; 4]; 2] {
         let ([x, v, a], [l1, l2]) = (self.head(t), self.parts.l);
         let drop = l1 * (1.0 - y[0].cos()) + l2 * (1.0 - y[1].cos());
@@ -151,8 +154,8 @@ impl Sweep {
         [friction, along(2), along(0), along(1)]
     }
 
-    /// What stays positive in a mode: the speed of the slip or the reserve of the stick, the distance from the
-    /// shoulder's contact, the normal force.
+    /// Quantities that are positive while the mode lasts: the speed of the slip or the friction that the
+    /// stick has left, the angle between the neck and the contact with the shoulder, and the normal force.
     fn guards(&self, t: f64, y: &State) -> [f64; 3] {
         let [friction, normal, ..] = self.forces(t, y);
         let [a, _, c] = self.parts.friction;
@@ -167,7 +170,7 @@ impl Sweep {
         [of_mode, lean, normal]
     }
 
-    /// Direction of a tip at rest: 0 if friction holds it.
+    /// Sign of the speed with which a tip at rest starts to slide; 0 if friction holds it.
     fn decide_direction(&mut self, t: f64, y: &State) -> f64 {
         self.direction = 0.0;
         let [friction, normal, ..] = self.forces(t, y);
@@ -188,8 +191,8 @@ impl Sweep {
         std::array::from_fn(|i| y[i] + h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]))
     }
 
-    /// Time within a step at which a guard vanishes, by the Illinois method; a guard that begins at zero
-    /// vanishes at the end.
+    /// Time from the start of a step of length `h` to the zero of a guard, by the Illinois method. It is `h`
+    /// for a guard that is not above zero at the start.
     fn crossing(&self, t: f64, y: &State, h: f64, guard: usize, [start, end]: [f64; 2]) -> f64 {
         if start <= 0.0 {
             return h;
@@ -213,7 +216,7 @@ impl Sweep {
     }
 }
 
-/// Parts of the blade of a scene.
+/// Reads the parts of the blade of a scene.
 fn read_parts(scene: &Scene) -> Parts {
     let v = |name: &str| scene.value(name).unwrap_or(0.0);
     let of = |part: &str, what: &str| v(&format!("blade.{part}_{what}"));

@@ -1,14 +1,14 @@
-//! Whether fits to traces find known values again: synthetic recordings of blades of many sizes and speeds,
-//! half of them made by an independent integration of Lagrange's equations, filmed by a camera that shares no
-//! function with the fit.
+//! Tests whether fits to traces recover known values. The recordings are synthetic: no camera took any of
+//! them. They show blades of many sizes and speeds. Half of the blades are simulated by the library, the
+//! other half by a separate integration of Lagrange's equations. The camera shares no function with the fit.
 //!
-//! `cargo run --release --example recovery -- DIR` makes the whole study, hours of two cores. It keeps every
-//! fit in `DIR/recovery.csv` as it ends, goes on from there, and writes the table `DIR/recovery.md`.
-//! `-- DIR right` makes the blades without a fault alone, `-- DIR faults 6..12` six of those with one. Every
-//! recording is synthetic: no camera took any of them.
+//! `cargo run --release --example recovery -- DIR` makes the whole study, which takes hours on two cores. It
+//! adds each finished fit to `DIR/recovery.csv`, leaves out the fits that this file already has, and writes
+//! the tables of all fits to `DIR/recovery.md`. With the further argument `right` it makes only the blades
+//! without a fault, with `faults 6..12` only the six blades 6 to 11 with a fault.
 
 #[path = "../../tests/common/blade.rs"]
-#[allow(dead_code)] // parts alone are used
+#[allow(dead_code)] // only `Parts` is used
 mod blade;
 mod camera;
 mod information;
@@ -32,7 +32,7 @@ use wiperlab::fit::{MeasuredRecording, Problem};
 use wiperlab::simulate::scene::Scene;
 
 const SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
-/// Blades of a case.
+/// Number of blades of a case, `right` or `faults`.
 const BLADES: u64 = 60;
 
 fn main() {
@@ -78,14 +78,14 @@ fn main() {
     std::fs::write(format!("{folder}/recovery.md"), text).expect("a folder that can be written");
 }
 
-/// Adds what a fit found to the file.
+/// Adds the lines of a fit to the file.
 fn keep_lines(path: &str, found: &[Line]) {
     let mut file = std::fs::OpenOptions::new().append(true).open(path).expect("a file to write");
     let text: String = found.iter().map(Line::csv).collect();
     file.write_all(text.as_bytes()).expect("a file that can be written");
 }
 
-/// Deviations of the default priors of the constants of a scene, as the fit has them.
+/// Standard deviations that the fit gives the default priors of the constants of a scene.
 fn default_priors(scene: &Scene) -> BTreeMap<String, f64> {
     let none = BTreeMap::new();
     let blade = draw_blade(scene, &none, 0, None).expect("a blade that runs");
@@ -94,7 +94,7 @@ fn default_priors(scene: &Scene) -> BTreeMap<String, f64> {
     )
 }
 
-/// The problem of a blade for a fit that believes a scene.
+/// The problem of fitting the film of a blade, with the scene `believed` in the job.
 fn make_problem(blade: &Blade, believed: &Scene, number: u64) -> Problem {
     let job = Job::parse("job.toml", &write_job(blade, number)).expect("a job");
     let filming = &blade.filming;
@@ -104,13 +104,13 @@ fn make_problem(blade: &Blade, believed: &Scene, number: u64) -> Problem {
     Problem::new(job, vec![believed.clone()], vec![measured]).expect("a job that goes with the scene")
 }
 
-/// One fit: a line a parameter.
+/// Fits the film of a blade. Returns one line for each parameter.
 fn fit_blade(blade: &Blade, number: u64, fault: Option<Fault>) -> Vec<Line> {
     let problem = make_problem(blade, &blade.believed, number);
     let begun = Instant::now();
     let result = problem.fit();
     let seconds = begun.elapsed().as_secs_f64();
-    // what the truth as a start gives: its cost, and the Cramér-Rao deviations
+    // a descent from the true values gives a cost to compare with, and the Cramér-Rao standard deviations
     let truth = descend_from(&problem, &blade.filmed);
     let lip_rad_per_s = TAU * blade.believed.value("blade.lip_natural_frequency_hz").unwrap_or(f64::NAN);
     let deviations = truth.as_ref().and_then(|(model, at)| find_deviations(model, at, lip_rad_per_s));
@@ -121,7 +121,7 @@ fn fit_blade(blade: &Blade, number: u64, fault: Option<Fault>) -> Vec<Line> {
     };
     let visible = fault.and_then(|fault| match fault {
         Fault::Constant(name) => {
-            // what the right belief in this constant would save
+            // how much lower the cost is with the true value of this constant as the mean of its prior
             let right = blade.believed.with_parameter(name, blade.filmed.value(name)?).ok()?;
             let (_, at) = descend_from(&make_problem(blade, &right, number), &blade.filmed)?;
             Some(excess(&truth.as_ref()?.1) - excess(&at))

@@ -1,9 +1,9 @@
-//! Lines of the study and the table of them.
+//! Lines of the study, and the tables made of them.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-/// What was found of one parameter in one fit.
+/// Result of one fit for one parameter.
 #[derive(Default)]
 pub struct Line {
     pub case: String,
@@ -17,17 +17,19 @@ pub struct Line {
     pub verdict: String,
     pub explained: bool,
     pub seconds: f64,
-    /// Cramér-Rao deviation of the logarithm, with the priors.
+    /// Cramér-Rao standard deviation of the logarithm, with the priors.
     pub bound: Option<f64>,
-    /// Cost of the fit above that of a descent from the truth, each less its degrees of freedom.
+    /// Cost of the fit minus that of a descent from the true values. From each cost its number of degrees of
+    /// freedom is subtracted first.
     pub above_truth: Option<f64>,
-    /// What the cost would fall by, were the fault known.
+    /// Fall of the cost if the mean of the prior of the wrong constant is its true value; `None` for other
+    /// faults, or if a descent fails.
     pub visible: Option<f64>,
     pub reasons: String,
 }
 
-/// Fall of the cost at which a wrong belief in a constant is visible in the recording: chi2 with one degree of
-/// freedom exceeds it once in a thousand times.
+/// Fall of the cost above which a wrong constant counts as visible in the recording. By chance, chi2 with one
+/// degree of freedom exceeds it once in a thousand times.
 const VISIBLE: f64 = 10.8;
 
 impl Line {
@@ -46,7 +48,7 @@ impl Line {
         )
     }
 
-    /// Lines of a file, whole ones alone.
+    /// Lines of a file without its header; incomplete lines are left out.
     pub fn read_all(text: &str) -> Vec<Self> {
         text.lines().skip(1).filter_map(Self::parse).collect()
     }
@@ -83,24 +85,25 @@ impl Line {
         self.verdict == "identified"
     }
 
-    /// Half width of the interval of the logarithm, where that is closed.
+    /// Half width of the interval in the logarithm; `None` if an end is missing.
     fn half_width(&self) -> Option<f64> {
         Some(0.5 * (self.ends[1]? / self.ends[0]?).ln())
     }
 
-    /// Whether it is called identified, but the truth is over four of its deviations off.
+    /// Whether the parameter is called identified although its interval lacks an end, or the estimate is more
+    /// than four of its standard deviations from the true value.
     fn is_wrong(&self) -> bool {
         let off = (self.estimate / self.truth).ln().abs();
         self.is_identified() && self.half_width().is_none_or(|half| off > 4.0 * half / 1.96)
     }
 
-    /// Half width against 1.96 Cramér-Rao deviations.
+    /// Half width of the interval over 1.96 Cramér-Rao standard deviations.
     fn width_ratio(&self) -> Option<f64> {
         Some(self.half_width()? / (1.96 * self.bound?))
     }
 }
 
-/// The study as tables in Markdown.
+/// Tables of the study in Markdown: one for each case, with a column for each maker and each fault.
 pub fn write_table(lines: &[Line]) -> String {
     let mut text = String::from("Synthetic recordings: no camera took any of them.\n");
     for case in ["right", "faults"] {
@@ -163,7 +166,8 @@ fn right_rows(lines: &[&Line]) -> Rows {
 
 fn fault_rows(lines: &[&Line]) -> Rows {
     let fits = split_fits(lines);
-    // a marker that is 5 mm off and a lost contact are visible by their size
+    // a marker that is 5 mm off, a lost contact and a tip that is tracked wrongly count as visible without a
+    // test
     let visible: Vec<&Vec<&Line>> =
         fits.iter().filter(|fit| fit[0].visible.is_none_or(|fall| fall > VISIBLE)).collect();
     let said = visible.iter().filter(|fit| !fit[0].explained).count();
@@ -195,8 +199,9 @@ fn split_fits<'a>(lines: &[&'a Line]) -> Vec<Vec<&'a Line>> {
     fits.into_values().collect()
 }
 
-/// Share of the intervals that hold their truth, and Wilson's 95 % interval of it for as many independent
-/// intervals as have the scatter between blades.
+/// Fraction of the intervals that contain the true value, averaged over the blades, and its 95 % interval by
+/// Wilson's formula. The intervals of one blade are not independent. So the formula gets the number of
+/// independent intervals whose fraction would scatter as much as the average over the blades.
 fn find_coverage(fits: &[Vec<&Line>]) -> String {
     let shares: Vec<f64> = fits
         .iter()

@@ -1,4 +1,4 @@
-//! Blades whose values are known: what is believed of them, what they are, and their films.
+//! Blades whose true values are known, the values that the job of a fit has, and their films.
 
 use crate::camera::Filming;
 use crate::linkage_run::{Place, run_linkage};
@@ -15,8 +15,8 @@ use wiperlab::simulate::scene::contact::ContactLossRule;
 use wiperlab::simulate::scene::{Scene, StartKind};
 use wiperlab::simulate::{RunStatus, SolverOptions, run_scene_with};
 
-/// Parameters that a fit seeks. For a blade of size 1: the range from which the truth is drawn, evenly in the
-/// logarithm, and the bounds of the fit.
+/// Parameters that a fit seeks. For a blade of the scene's size, time scale and mass: the range from which
+/// the true value is drawn, evenly in the logarithm, and the bounds of the fit.
 pub const SOUGHT: [(&str, [f64; 2], [f64; 2]); 5] = [
     ("friction.a", [0.07, 0.2], [0.03, 0.4]),
     ("friction.b_s_per_m", [2.5, 9.0], [1.0, 20.0]),
@@ -24,20 +24,21 @@ pub const SOUGHT: [(&str, [f64; 2], [f64; 2]); 5] = [
     ("blade.neck_stiffness_n_m_per_rad", [0.0013, 0.0027], [0.0009, 0.0038]),
     ("shoulder.stiffness_n_m_per_rad", [0.018, 0.055], [0.008, 0.12]),
 ];
-/// Time from the start of a run to the reversal, and from there to its end, s, at time scale 1.
+/// Times from the start of a run to the reversal, and from the reversal to the end, s, at time scale 1.
 const BEFORE_S: f64 = 0.108;
 const AFTER_S: f64 = 0.482;
-/// Blades that are drawn for one that runs, at most.
+/// Maximum number of draws until a blade is accepted.
 const TRIES: u64 = 400;
 
-/// What is wrong with a blade beyond what the fit allows for.
+/// Error of a blade or its film that the fit does not allow for.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Fault {
-    /// A constant is 5 to 6 deviations of its prior off.
+    /// The constant with this name is 5 to 6 standard deviations of its prior off.
     Constant(&'static str),
-    /// The tip's marker is 5 to 6 deviations of its prior, 1 mm, off the edge of the lip.
+    /// The tip's marker is 5 to 6 mm off the edge of the lip; the standard deviation of its prior is 1 mm.
     Marker,
-    /// The tip leaves the glass; a run without flight has a tracker that sits 10 noises off for 30 ms.
+    /// The tip leaves the glass. The runs by Lagrange's equations have no flight: there the tracked tip is
+    /// off by ten standard deviations of the noise, for 30 ms at time scale 1.
     Contact,
 }
 
@@ -51,7 +52,7 @@ const FAULTS: [Fault; 6] = [
 ];
 
 impl Fault {
-    /// The fault of a number: each comes to both makers.
+    /// The fault of blade `number`. Neighbouring numbers share a fault, so that both makers have every fault.
     pub fn of_number(number: u64) -> Self {
         FAULTS[(number / 2) as usize % FAULTS.len()]
     }
@@ -67,21 +68,23 @@ impl Fault {
 
 /// A blade with its film.
 pub struct Blade {
-    /// Factors of its lengths, times and masses, against the scene.
+    /// Factors by which lengths, times and masses differ from those of the scene.
     pub size: f64,
     pub time: f64,
     mass: f64,
-    /// What the fit believes, and what was filmed.
+    /// The scene of the job, and the true scene.
     pub believed: Scene,
     pub filmed: Scene,
     pub filming: Filming,
     pub recording: Recording,
-    /// Largest distance, m, of the tip from that of the library's run in the first 50 ms, at time scale 1.
+    /// Largest distance, m, between the tips of this run and of the library's run, in the first 50 ms at time
+    /// scale 1.
     pub apart_m: f64,
 }
 
-/// Blade `number`: the first that runs to its end, flips, and stays in contact unless that is its fault.
-/// `prior_sd` are the deviations of the fit's priors. Odd blades are run by Lagrange's equations.
+/// Draws blade `number`: the first draw that runs to its end, flips over, and stays in contact (or leaves the
+/// glass, if that is its fault). `prior_sd` are the standard deviations of the priors of the fit. Lagrange's
+/// equations move the blades with odd numbers.
 pub fn draw_blade(
     scene: &Scene,
     prior_sd: &BTreeMap<String, f64>,
@@ -165,13 +168,13 @@ fn draw_once(
     Some(Blade { size, time, mass, believed, filmed, filming, recording, apart_m })
 }
 
-/// A distance of 5 to 6 deviations, to either side.
+/// A distance of 5 to 6 standard deviations, to either side.
 fn beyond(generator: &mut Xoshiro256PlusPlus) -> f64 {
     let far = generator.random_range(5.0..6.0);
     if generator.random::<bool>() { far } else { -far }
 }
 
-/// Places of a run of the library; `None` if it does not reach its end.
+/// Places of the blade in a run of the library; `None` if the run does not reach its end.
 fn run_library(scene: &Scene, flies: bool, step_s: f64, count: usize) -> Option<Vec<Place>> {
     let mut scene = scene.clone();
     scene.loss = if flies { ContactLossRule::Fly } else { ContactLossRule::Stop };
@@ -191,7 +194,7 @@ fn run_library(scene: &Scene, flies: bool, step_s: f64, count: usize) -> Option<
     (run.status == RunStatus::Completed && places.len() == count).then_some(places)
 }
 
-/// Factor of a quantity of a blade whose lengths, times and masses are multiplied.
+/// Factor of the quantity `name` if lengths, times and masses are multiplied by `size`, `time` and `mass`.
 fn unit_of(name: &str, size: f64, time: f64, mass: f64) -> f64 {
     match name.rsplit_once('.').map_or(name, |(_, key)| key) {
         key if key.ends_with("_kg") => mass,
@@ -205,8 +208,8 @@ fn unit_of(name: &str, size: f64, time: f64, mass: f64) -> f64 {
     }
 }
 
-/// The job of a blade: bounds several times wider than the ranges of the truths, constants within the default
-/// priors.
+/// The job of a blade. Its bounds are wider than the ranges of the true values, and the constants have the
+/// default priors.
 pub fn write_job(blade: &Blade, number: u64) -> String {
     let mut text = format!(
         "format = 1\ntitle = \"Recovery\"\nscene = \"scene\"\nseed = {}\n[[recording]]\npath = \"film\"\n",

@@ -52,7 +52,7 @@ impl LoadedJob {
         let scene_files = job.conditions.iter().map(|condition| found("scene", &condition.scene));
         let scene_files = scene_files.collect::<Result<Vec<_>, _>>()?;
         let scenes = scene_files.iter().zip(&job.conditions).map(|(file, condition)| {
-            // traces start from recorded states, and a recorded head has another start
+            // segments start from recorded states, and a run with a recorded head starts elsewhere
             let own_start = job.traces.is_empty() && condition.head == HeadSource::Scene;
             if own_start { read_driven_scene(file) } else { read_scene_of_any_start(file) }
         });

@@ -177,8 +177,8 @@ impl<'a> ConditionComparison<'a> {
         traces.measured[column].iter().any(Option::is_some).then_some(traces.noise_m[column])
     }
 
-    /// Measured minus model as the verdict of the fit compares them: the model restarts at every segment if
-    /// traces were fitted, and runs once otherwise.
+    /// Measured minus model, as the fit judges them: the model restarts at every segment if traces were
+    /// fitted, and runs once otherwise.
     pub(crate) fn judged_residual(&self) -> Option<&MotionTraces> {
         self.restarted.as_ref().or(self.residual.as_ref())
     }

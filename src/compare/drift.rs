@@ -46,8 +46,8 @@ pub(super) fn drift_cycles(
     (phases.len() >= 2).then(|| steps.sum())
 }
 
-/// Amplitude of samples at an angular frequency, rad per frame, as real and imaginary part, after a straight
-/// line is removed.
+/// Fourier sum of samples at an angular frequency, rad per frame: real and imaginary part. A straight line is
+/// removed first. Each sample is its frame and its value.
 fn phasor(samples: impl Iterator<Item = (f64, f64)>, per_frame: f64) -> [f64; 2] {
     let points: Vec<(f64, f64)> = samples.collect();
     let ([mean_i, mean], [spread, both]) = central_moments(&points);

@@ -1,7 +1,7 @@
 //! Recording and model on one clock and with one origin.
 //!
-//! After a fit to traces, the model is shown through the fitted camera, and the recording as the fit compares
-//! it. Otherwise the clock and the origin of the model are those with which its head follows the recorded
+//! After a fit to traces, the model is seen through the fitted camera, and the recording is that which the
+//! fit compares. Otherwise clock and origin of the model are shifted so that its head follows the recorded
 //! head.
 
 use super::model_run::ModelRun;
@@ -39,7 +39,7 @@ impl ModelRun {
         motion
     }
 
-    /// Recording minus model, which restarts at every segment of the fit; `None` without fitted traces.
+    /// Recording minus the model that restarts at every segment of the fit; `None` without fitted traces.
     pub(crate) fn restarted_residual(&self, recording: &Recording) -> Option<MotionTraces> {
         let traces = self.traces.as_ref()?;
         let [tip_x_m, head_drop_m] = [0, 1].map(|k| subtract(&traces.measured[k], &traces.restarted[k]));
@@ -68,7 +68,7 @@ fn traces_alignment(traces: &FittedTraces) -> Alignment {
 }
 
 /// The view of a run through the fitted camera, in the frames of the recording. The constant offsets of the
-/// camera are removed, as they are the alignment. `None` if the run has fewer than two frames.
+/// camera are removed, because the alignment contains them. `None` if the run has fewer than two frames.
 pub(super) fn view_through_camera(view: &TwinView, traces: &FittedTraces) -> Option<Recording> {
     let alignment = traces_alignment(traces);
     let grid = FrameGrid { start_s: traces.grid.start_s - traces.clock_s, ..traces.grid };

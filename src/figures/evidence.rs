@@ -127,7 +127,8 @@ fn draw_panels(shown: &EvidencePlot, index: usize, part: &EvidencePart) -> Vec<P
         ribbons: vec![Ribbon::new("95 % of the noise", Colour::SkyBlue, noise)],
         ..Panel::new(time, y, RESIDUAL_HEIGHT_MM, [residual])
     };
-    // at the scale of the whole recording, the curves of a run that drifts look the same
+    // over the whole recording, the two curves of a single run look the same, so only their difference is
+    // drawn
     if single_run { vec![lower] } else { vec![upper, lower] }
 }
 

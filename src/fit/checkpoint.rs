@@ -1,4 +1,4 @@
-//! The journal of a fit as it is read: one evaluation per line.
+//! Records and header of the journal of a fit.
 
 use super::evaluation::{EvaluationOutcome, EvaluationStage};
 use super::trace::{Iterate, SegmentState};
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 /// The journal of a fit.
 pub type FitCheckpoint = CheckpointFile<FitRecord>;
 
-/// One evaluation of a fit: a line of its journal.
+/// One evaluation of a fit, or one iterate of a trace fit: a line of its journal.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase", deny_unknown_fields)]
 pub enum FitRecord {
@@ -74,7 +74,7 @@ impl CheckpointRecord for FitRecord {
     }
 
     fn problem_difference(found: &FitHeader, expected: &FitHeader) -> Option<String> {
-        // a resumed journal of another seed is refused with an advice of its own
+        // `Journal::new` refuses another seed with its own advice
         let differs = FitHeader { seed: expected.seed, ..found.clone() } != *expected;
         differs.then(|| {
             "the header has other unknowns, features, recordings or segments than the fit".to_owned()

@@ -20,7 +20,8 @@ impl Problem {
     /// model of the problem.
     ///
     /// # Errors
-    /// [`FitError::CannotBeFitted`] if a scene refuses a fitted value.
+    /// [`FitError::CannotBeFitted`] if a scene refuses a fitted value, or if the result lacks the estimate of
+    /// an unknown of the traces.
     pub fn fitted_model(&self, result: &FitResult) -> Result<SceneModel, FitError> {
         let mut traces: Vec<Option<FittedTraces>> = vec![None; self.model().conditions().len()];
         for (traced, fitted) in self.traces().iter().zip(self.fitted_traces(result)?) {
@@ -34,8 +35,8 @@ impl Problem {
         Ok(self.model().with_conditions(whole.collect::<Result<_, FitError>>()?, traces))
     }
 
-    /// The fitted recordings of the traces beside the model at the estimates, in the order of the traces;
-    /// empty without traces.
+    /// Each fitted recording together with the model at the estimates, in the order of the traces; empty
+    /// without traces.
     fn fitted_traces(&self, result: &FitResult) -> Result<Vec<FittedTraces>, FitError> {
         let refused = |why: String| FitError::CannotBeFitted { why };
         let Some(model) = self.trace_model() else { return Ok(Vec::new()) };

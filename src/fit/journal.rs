@@ -1,8 +1,7 @@
 //! The journal of a running fit: every evaluation is made once, and written before it is counted.
 //!
-//! A fit that continues a journal takes the evaluations from it, in the order in which it asks for them. A
-//! sample of them is computed again on the way, so that a fit never continues from numbers that the model
-//! does not give.
+//! A fit that continues a journal asks for its evaluations in the same order as before, and takes those in
+//! the journal from it. It computes a sample of them again, and stops if the model gives other numbers.
 
 use super::FitError;
 use super::checkpoint::{FitHeader, FitRecord, iterate_key};
@@ -105,7 +104,7 @@ impl<'a> Journal<'a> {
     }
 
     /// Makes the evaluations with the given keys in parallel, or takes them from the resumed journal.
-    /// `compute` makes the evaluation with an index of `keys`; `None` is not stored. `count` is called with
+    /// `compute(i)` makes the evaluation with the key `keys[i]`; `None` is not stored. `count` is called with
     /// every evaluation in order, after it is written, and describes what the fit does.
     ///
     /// # Errors
@@ -148,9 +147,10 @@ impl<'a> Journal<'a> {
         if within == keys.len() { Ok(()) } else { Err(self.stop.clone().unwrap_or(StopReason::Budget)) }
     }
 
-    /// Iterates of a trace fit: `keys` are the numbers of their chains and their numbers in the chains;
-    /// `compute` makes the iterate with an index of `keys`, `None` at the end of a chain, and `describe` says
-    /// in words what the iterate of a chain is.
+    /// Makes iterates of a trace fit in parallel, or takes them from the resumed journal. Each of `keys` is
+    /// the number of a chain and the number of an iterate in this chain. `compute(i)` makes the iterate with
+    /// the key `keys[i]`, or returns `None` at the end of the chain. `describe` describes an iterate of a
+    /// chain. Returns the iterates in the order of `keys`.
     ///
     /// # Errors
     /// [`StopReason`] if some iterates could not be made.
@@ -174,7 +174,7 @@ impl<'a> Journal<'a> {
             FitRecord::Evaluation { .. } => String::new(),
         };
         let bits: Vec<Vec<u64>> = keys.iter().map(|(chain, step)| iterate_key(*chain, *step)).collect();
-        // a smaller limit shortens neither a search that the journal holds nor one that has come to its end
+        // the limit stops only new iterates: not those of the journal, and not the ends of chains
         let limit = self.limit;
         let is_new = |at: usize| !self.known.contains_key(&bits[at]) && compute(at).is_some();
         if self.remaining_evaluations() < keys.len() && !(0..keys.len()).any(is_new) {
@@ -191,7 +191,7 @@ impl<'a> Journal<'a> {
         (line, stored): (usize, &FitRecord),
         mut again: FitRecord,
     ) -> Result<(), StopReason> {
-        // another search may evaluate the same point in another stage
+        // a point may be evaluated again for another purpose
         if let (FitRecord::Evaluation { stage: stored, .. }, FitRecord::Evaluation { stage, .. }) =
             (stored, &mut again)
         {
@@ -205,7 +205,7 @@ impl<'a> Journal<'a> {
     /// Compares an evaluation that is made again with the resumed journal, if it contains this evaluation.
     pub(crate) fn check_if_known(&mut self, compute: impl FnOnce() -> FitRecord, key: &[u64]) {
         if let Some(stored) = self.known.get(key).copied() {
-            let _ = self.check_again(stored, compute()); // (the difference is the reason for the stop)
+            let _ = self.check_again(stored, compute()); // (`stop` keeps the difference)
         }
     }
 
@@ -217,7 +217,7 @@ impl<'a> Journal<'a> {
     /// Writes the lines that were delayed.
     pub(crate) fn release_lines(&mut self) {
         self.held = false;
-        let _ = self.write_pending(); // (the failure is the reason for the stop)
+        let _ = self.write_pending(); // (`stop` keeps the failure)
     }
 
     /// Writes new lines in one call, so that the run waits for the disk only once.

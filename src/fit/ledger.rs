@@ -69,7 +69,7 @@ impl<'a> Ledger<'a> {
     /// Evaluates a point again, if the resumed journal contains it, and compares every bit.
     ///
     /// # Errors
-    /// [`FitError`] if the journal cannot be written, or if the model does not give what it says.
+    /// [`FitError`] if the journal cannot be written, or if the model gives another outcome than the journal.
     pub(crate) fn check_journal(&mut self, objective: &Objective, unit: &[f64]) -> Result<(), FitError> {
         self.journal
             .check_if_known(|| record_point(objective, EvaluationStage::Local, unit), &point_key(unit));

@@ -161,7 +161,7 @@ fn no_segment_compared(stages: &[StageMisfit]) -> Option<String> {
     (!compared).then(|| "no segment of it could be started".to_owned())
 }
 
-/// Evidence against the model: a channel has no compared frames, although there are segments that run.
+/// Evidence against the model: a channel has no compared frames, although some segments fit.
 fn unseen_channel(channels: &[ChannelMisfit], stages: &[StageMisfit]) -> Option<String> {
     stages.last().filter(|stage| stage.bad_segments < stage.segments)?;
     let unseen = channels.iter().find(|channel| channel.frames == 0)?;

@@ -1,8 +1,8 @@
 //! The search in the unit box: CMA-ES populations, then a local search from each of the best distinct points,
 //! then a polish of the best point until the cost no longer falls.
 //!
-//! argmin's executor runs all solvers: covariance matrix adaptation and damped Gauss-Newton steps, which
-//! argmin does not have, and its own simplex. The ledger counts the budget, stores the best point and handles
+//! argmin's executor runs all solvers: argmin's simplex, and two that argmin does not have, covariance matrix
+//! adaptation and damped Gauss-Newton steps. The ledger counts the budget, stores the best point and handles
 //! every failure, so the solvers never see costs that are not numbers.
 
 pub(crate) mod costs;

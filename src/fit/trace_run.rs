@@ -193,7 +193,7 @@ impl TraceFindings<'_, '_> {
             return found;
         };
         let own = &known.estimates[at];
-        // an infinite end is no number of a file
+        // a file contains no infinite numbers
         let finite = |ends: &[f64; 2]| ends.iter().all(|end| end.is_finite());
         found.linear_95 = Some(own.ends_95).filter(finite);
         found.bootstrap_95 = own.twins_95.filter(finite);

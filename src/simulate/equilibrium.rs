@@ -192,8 +192,8 @@ mod tests {
     use super::*;
     use crate::simulate::scene::Scene;
 
-    /// A blade in steady slip is at rest relative to its head, so the pose that its lean alone gives, without
-    /// the law of friction, is the same.
+    /// A blade in steady slip is at rest relative to its head, so its lean gives its pose without the law of
+    /// friction.
     #[test]
     fn the_lean_of_a_steady_slip_gives_its_pose() {
         let scenes = [

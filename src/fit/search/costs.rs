@@ -1,8 +1,8 @@
 //! The cost of a fit of features as a problem of argmin.
 //!
-//! argmin ends a run at the first error, so a stop of the ledger reaches its executor as an error. Its
-//! observers and its checkpoints must own all they use, and its interrupts are its own; so the journal of a
-//! fit counts, stores and reports the evaluations, and the executor runs the solvers.
+//! argmin's executor ends a run at the first error, so a stop of the ledger is an error of the cost function.
+//! The observers and checkpoints of argmin must own all that they use, and it has its own handler of Ctrl-C.
+//! So they are not used: the journal of the fit counts, stores and reports the evaluations.
 
 use crate::fit::evaluation::{Evaluation, EvaluationStage};
 use crate::fit::journal::StopReason;
@@ -42,7 +42,7 @@ impl Slab {
     }
 }
 
-/// Maps a point of a solver to the unit box.
+/// Map from the coordinates of a solver to the unit box.
 pub(super) type ToUnit<'f> = dyn Fn(&[f64]) -> Vec<f64> + 'f;
 
 /// Computes the costs of points for a solver.

@@ -24,8 +24,8 @@ const DAMPINGS: [f64; 4] = [1.0, 3e1, 1e3, 3e4];
 /// times longer than wide.
 const MAX_STEPS: u64 = 60;
 
-/// Descends from `start`. Returns the evaluation at the last point, if there is any, and the reason if the
-/// ledger stopped.
+/// Descends from `start`. Returns the evaluation at the last point, if there is one, and the reason if the
+/// ledger stopped the descent.
 pub(super) fn descend_gauss_newton(
     ledger: &mut Ledger,
     start: &[f64],
@@ -43,7 +43,7 @@ type DescentState = IterState<Vec<f64>, (), (), (), (), f64>;
 /// A descent in the unit box. It ends when a step with a Jacobian from finite differences lowers the cost by
 /// less than [`MIN_WORTHWHILE_GAIN`].
 struct GaussNewton<'r> {
-    /// The last point, also if the ledger stops the descent.
+    /// The last point. The caller reads it even if the ledger stops the descent.
     reached: &'r mut Vec<f64>,
     /// Jacobian for the next step, updated by Broyden's rule; `None` if it must be computed from finite
     /// differences.

@@ -48,7 +48,8 @@ pub(super) fn search_with_populations(
 }
 
 /// Evolves one population around the point `middle` until it converges or stagnates. Its evaluations have the
-/// purpose `stage`, and `to_unit` maps its points to the unit box. Returns the reason if the ledger stopped.
+/// purpose `stage`, and `to_unit` maps its points to the unit box. Returns the reason if the ledger stopped
+/// it.
 pub(super) fn evolve_population<'l>(
     ledger: &'l mut Ledger<'_>,
     (stage, to_unit): (EvaluationStage, &'l ToUnit<'l>),

@@ -211,9 +211,10 @@ impl CameraPrior {
 /// tracked, positions along the sweep from an arbitrary place, so these offsets have no prior. If the path of
 /// the tip on the glass shows the tilt, this tilt is the mean of the prior.
 fn camera_unknowns(film: usize, source: &TraceSource<'_>, data: &CameraObservation) -> Vec<TraceUnknown> {
-    /// Change of the slope of the glass over the travel of the head, rad, by which the measured curvature may
-    /// be wrong: that of a windshield with a radius of one metre over a stroke of 0.1 m. The path of the tip
-    /// shows the curvature only roughly, since its marker moves up and down as the lip turns.
+    /// Standard deviation of the curvature that was not measured, times the travel of the head: a change of
+    /// the slope of the glass, rad. It is that of a windshield with a radius of one metre over a stroke of
+    /// 0.1 m. The path of the tip shows the curvature only roughly, since the marker of the tip moves up and
+    /// down as the lip turns.
     const CHANGE_OF_SLOPE_RAD: f64 = 0.1;
     let TraceData { camera: doubt, head, .. } = source.traced;
     let linkage = &source.scene.linkage;

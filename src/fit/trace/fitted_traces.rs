@@ -1,4 +1,4 @@
-//! A recording beside its fitted model, both as the picture shows them.
+//! A fitted recording together with its model, both as they appear in the picture.
 
 use super::camera_observation::CameraObservation;
 use super::model::TraceModel;
@@ -14,8 +14,7 @@ use crate::simulate::scene::Scene;
 /// value is missing.
 pub(crate) type PictureColumns = [Vec<Option<f64>>; 2];
 
-/// A fitted recording and the model at the estimates, through the fitted camera, in the frames of the
-/// recording.
+/// A fitted recording, and the model at the estimates as the fitted camera shows it in the same frames.
 #[derive(Debug, Clone)]
 pub(crate) struct FittedTraces {
     /// The recording as the fit compares it.
@@ -24,7 +23,8 @@ pub(crate) struct FittedTraces {
     pub measured_head_x_m: Vec<Option<f64>>,
     /// The model, which restarts at every segment in its fitted state.
     pub restarted: PictureColumns,
-    /// One run of the model, from the first segment that fits to its end or that of the recording.
+    /// One run of the model, from the start of the first segment that fits. It ends with the fitted frames,
+    /// or earlier if the model cannot run on.
     pub single_run: PictureColumns,
     /// The frames of the recording.
     pub grid: FrameGrid,
@@ -34,19 +34,19 @@ pub(crate) struct FittedTraces {
     pub head_x_m: Vec<Option<f64>>,
     /// Whether the recorded head drives the model.
     pub own_head: bool,
-    /// The scene of the single run, without the start of this run.
+    /// The scene of the single run; its start is not that of this run.
     pub scene: Scene,
     /// Clock of the camera minus clock of the drive, s.
     pub clock_s: f64,
-    /// Median difference, m, between the picture and the true motion of the model: of head and tip along the
-    /// sweep, of the tip relative to the head, and of the drop.
+    /// Offsets of the picture from the true motion of the model, m: of head and tip along the sweep, of the
+    /// tip relative to the head, and of the drop. The last two are medians over the single run.
     pub offsets_m: [f64; 3],
 }
 
 impl FittedTraces {
-    /// The recordings of a trace model at the point `z`, each with those of the `segments` that bear its
-    /// name in `names`. Segments that lie outside the recording are left out. `None` if a scene refuses the
-    /// point.
+    /// One entry for each recording of a trace model; the model is at the point `z`. `names` are the names of
+    /// the recordings, and each recording has the `segments` with its name. Segments that lie outside the
+    /// recording are left out. `None` if a scene refuses the point.
     pub(crate) fn show_recordings(
         model: &TraceModel,
         z: &[f64],

@@ -140,8 +140,8 @@ pub(crate) struct TraceCovariance {
     /// Part of `curvature` that comes from the errors of the priors: C P C with the inverse C of the
     /// information matrix and the information P of the priors.
     priors: DMatrix<f64>,
-    /// Mean square of the cost gradients of the segments, compared with the one that noise of the measured
-    /// size gives. It is 1 on average for a right model and white residuals.
+    /// Mean square of the cost gradients of the segments, relative to the mean square that noise of the
+    /// measured size gives. It is 1 on average if the model is right and the residuals are white.
     pub gradient_scatter: f64,
     /// Covariance due to errors of the recorded head positions.
     pub heads: DMatrix<f64>,
@@ -156,7 +156,7 @@ pub(crate) fn trace_covariance(model: &TraceModel, at: &Iterate) -> Option<Trace
         residual.map_or(0.0, |[_, slope]| slope * slope)
     });
     let prior = DVector::from_iterator(at.point.len(), prior);
-    // number of unknowns that the data determine, and not the priors
+    // number of unknowns that the recordings determine, rather than the priors
     let determined = prior.len() as f64 - inverse.diagonal().dot(&prior);
     let parts = || found.parts.iter().flatten();
     let square: f64 = parts().map(|part| part.slope.dot(&(&inverse * &part.slope))).sum();

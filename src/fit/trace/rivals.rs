@@ -12,8 +12,8 @@ use std::collections::BTreeMap;
 /// Smallest difference of the chi2 of two ends that decides against the worse one, in standard deviations of
 /// this difference.
 const LOST_SD: f64 = 4.0;
-/// Smallest barrier of the cost between two minima: noise lifts the cost by as much over two standard
-/// deviations of an estimate.
+/// Rise of the cost above which a barrier separates two minima. Within one minimum, the cost rises by as much
+/// at two standard deviations from the estimate.
 const LEAST_BARRIER: f64 = 4.0;
 /// Smallest number of frames in a block.
 const MIN_BLOCK_FRAMES: usize = 4;
@@ -36,9 +36,10 @@ pub(super) fn is_same_minimum(end: &SearchEnd<'_>, other: &Iterate) -> bool {
         && (is_same_end(end.at, other, &end.sd) || (other.plain && is_same_valley(end, other)))
 }
 
-/// Whether the cost on the straight line from one end to another nowhere exceeds that of the higher end by
-/// more than [`LEAST_BARRIER`]. The places are not evenly spaced, so that they do not all fall into minima of
-/// a periodic cost. The starting states follow from place to place.
+/// Whether the cost at five places on the straight line from one end to another never exceeds that of the
+/// higher end by more than [`LEAST_BARRIER`]. The places are not evenly spaced, so that they do not all fall
+/// into minima of a periodic cost. At each place the starting states are fitted again, from those of the
+/// place before.
 fn is_same_valley(end: &SearchEnd<'_>, other: &Iterate) -> bool {
     const PLACES: [f64; 5] = [0.25, 0.4, 0.5, 0.6, 0.75];
     let at = end.at;

@@ -19,8 +19,8 @@ use std::cmp::Reverse;
 
 const MIN_STARTS: usize = 2;
 /// Minimum number of starts if the frame rate undersamples the fastest mode, because several sets of
-/// parameter values may then fit the frames equally well. It is also the number of starts that must explain
-/// nothing before a search with free constants gives up.
+/// parameter values may then fit the frames equally well. A search with free constants gives up after as many
+/// starts that explain nothing.
 const MIN_STARTS_SLOW: usize = 4;
 
 /// A start is abandoned if its cost after the first stage exceeds this factor times the lowest cost of any
@@ -35,15 +35,15 @@ pub struct TraceSearchOutcome {
     pub descents: Vec<TraceDescent>,
     /// Index of the descent with the best end.
     pub best: usize,
-    /// Whether the search ended early because the checkpoint requested a stop.
+    /// Whether the search ended early because the journal requested a stop.
     pub stopped: bool,
     /// Intervals of the estimates at the best end, and reasons to doubt them; `None` if the search was
     /// stopped, or if the covariance at the best end does not exist.
     pub assessment: Option<TraceAssessment>,
 }
 
-/// Searches from the middle of the ranges, then from random points given by `seed`, until two searches end at
-/// the same point. If a segment is much longer than its stage, searches on with whole segments from each
+/// Searches from the middle of the ranges, then from random points given by `seed`, until two searches end in
+/// the same minimum. If a segment is much longer than its stage, searches on with whole segments from each
 /// lobe. Then assesses the best end point.
 pub fn search_trace(
     model: &TraceModel,
@@ -108,7 +108,7 @@ pub fn search_trace(
     };
     let others: Vec<&Iterate> =
         compared.filter(|at| *at != found.best).filter_map(|at| found.descents[at].last_iterate()).collect();
-    let lonely = (!confirmed).then(|| format!("no two of {starts} starts end at the same place"));
+    let lonely = (!confirmed).then(|| format!("no two of {starts} starts end in the same minimum"));
     let runs: Vec<_> = runs.into_iter().zip(ends).collect();
     found.assessment = Some(assess_end(&end, &others, lonely, &runs));
     found
@@ -134,8 +134,8 @@ pub fn start_point(model: &TraceModel, seed: u64, start: usize) -> Vec<f64> {
 }
 
 /// Whether no further start is needed. This is so if the minimum number of starts is reached, another start
-/// ends at the same point as the best start, and no constant contradicts its prior there; or if the best end
-/// explains nothing, and enough starts explain nothing with segments longer than the first.
+/// ends in the same minimum as the best start, and no constant contradicts its prior there. It is also so if
+/// the best end explains nothing, and enough starts explain nothing with segments longer than the first.
 fn has_enough_starts(
     model: &TraceModel,
     settings: &TraceSearchSettings,

@@ -230,7 +230,8 @@ impl<'a> RecordingModel<'a> {
         Some(self.simulate_segment(frames, state, &self.none)?.held_s)
     }
 
-    /// The frames `frames` of a run that starts in `state`, up to the frame in which the run ends.
+    /// The model in the frames from `frames[0]` to before `frames[1]`, in a run that starts in `state`; fewer
+    /// frames if the run ends early.
     pub(super) fn show_frames(&self, frames: [usize; 2], state: &LinkState) -> Vec<ShownFrame> {
         let (shot, complete) = self.run_segment(frames, state, &self.none);
         let show = |(at, means): (usize, &[f64; 4])| ShownFrame {
@@ -251,7 +252,7 @@ impl<'a> RecordingModel<'a> {
         (is_whole && (shot.is_known || seeds.is_empty())).then_some(shot)
     }
 
-    /// Runs the model over a segment; also returns the number of frames before the run ends.
+    /// Runs the model over a segment. Also returns the number of frames that the run completes.
     fn run_segment(
         &self,
         [first, last]: [usize; 2],
@@ -396,9 +397,9 @@ impl<'a> RecordingModel<'a> {
         ]
     }
 
-    /// Effect of a curvature of the glass of 1/m on tip and drop in the picture, m^2, at a distance `along`
-    /// along the glass from the middle. The head, which is above the glass, appears displaced towards the
-    /// centre of the arc; if the recorded head drives the model, the tip is farther from it by as much.
+    /// Changes of tip and drop in the picture per curvature of the glass, m^2; `along` is the distance from
+    /// the middle along the glass, m. The head is above the glass and appears nearer to the centre of the
+    /// arc. If the recorded head drives the model, the distance from head to tip is larger by as much.
     fn bend_by_curvature(&self, along: f64, drop: f64) -> [f64; 2] {
         let height = self.scene.linkage.l1_m + self.scene.linkage.l2_m - drop;
         [if self.observation.own_head { height * along } else { 0.0 }, -0.5 * along * along]

@@ -56,8 +56,8 @@ pub(super) fn nominal_frames(film: &CameraObservation, length_s: f64) -> usize {
 
 /// Boundaries of segments at distances of about `length_s`. Of the frames in which the tip slides and the
 /// blade leans enough, the frame nearest to the nominal position is chosen. (The frame with the fastest tip
-/// would often be a frame with large noise.) The blade starts there as if it passed through its poses at
-/// rest: lean and drop alone do not determine the state of a nearly straight blade.
+/// would often be a frame with large noise.) The state there is that of a blade that passes through its poses
+/// at rest, because lean and drop alone do not determine the state of a nearly straight blade.
 pub(super) fn segment_boundaries(
     scene: &Scene,
     film: &CameraObservation,
@@ -98,7 +98,7 @@ pub(super) fn segment_boundaries(
     found
 }
 
-/// Describes in which frames of a recording a segment can start: the limits, and what was measured.
+/// Says why no segment of a recording was started: the limits of speed and lean, and the measured values.
 pub(crate) fn describe_start_limits(shoot: &TraceRecording, view: &CameraParameters) -> String {
     let film = &shoot.observation;
     let milli = |metres: f64| format_trimmed(1e3 * metres, 3);

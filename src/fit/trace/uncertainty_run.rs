@@ -21,7 +21,7 @@ use std::sync::OnceLock;
 /// Half width of a two-sided 95 % interval, in standard deviations of a normal variable.
 pub(super) const Z_95: f64 = 1.959_963_984_540_054;
 
-/// Maximum number of starts. A search ends sooner if two starts end at the same point.
+/// Maximum number of starts. A search ends sooner if two starts end in the same minimum.
 pub(crate) const MAX_STARTS: usize = 6;
 
 /// Number of the first chain of an uncertainty run.
@@ -92,8 +92,8 @@ pub(crate) struct SearchEnd<'a> {
     pub seed: u64,
     pub at: &'a Iterate,
     pub covariance: TraceCovariance,
-    /// Factor on the measured variance of the noise: chi2 per degree of freedom or the scatter of the cost
-    /// gradients of the segments, but at least 1, because the noise may be larger than measured.
+    /// Factor on the measured variance of the noise, which may be larger than measured: the largest of 1,
+    /// chi2 per degree of freedom, and the scatter of the cost gradients of the segments.
     pub widening: f64,
     /// Standard deviation of each coordinate, with `widening`.
     pub sd: Vec<f64>,

@@ -182,7 +182,7 @@ impl CameraTilt {
         ];
         for (flat_x, flat_y, x_m, y_m) in columns {
             let heights = x_m.iter().zip(y_m).filter_map(|(x, y)| Some((*y)? - glass_y((*x)?)));
-            // where a point has no height, its usual one serves
+            // a position without a height is taken at the median height
             let usual_m = median_in_place(&mut heights.collect::<Vec<f64>>()).unwrap_or(0.0);
             for (i, (x, y)) in x_m.iter().zip(y_m).enumerate() {
                 let Some(x) = x else { continue };
@@ -298,8 +298,8 @@ mod tests {
     use crate::recording::quality::measure_quality;
     use crate::recording::{FrameGrid, Traces};
 
-    /// A tip on a tilted arc with a head 5 mm above it that leans by 1 mm; both are 0.1 um from where the
-    /// flat recording has them.
+    /// A tip on a tilted arc, with a head 5 mm above the glass and 1 mm ahead of the tip. After flattening,
+    /// both distances are right to 0.5 um.
     #[test]
     fn a_recording_on_an_arc_is_flattened() {
         for per_m in [0.9, -0.3] {

@@ -62,7 +62,8 @@ fn fitted(keys: &str, recording: Recording) -> FitResult {
     Problem::new(job, vec![scene()], vec![measured]).unwrap().fit().unwrap()
 }
 
-/// The values of the scene lie inside intervals of 99.7 % and within a hundredth.
+/// All parameters are identified. Each estimate is within 1 % of the value of the scene, and this value lies
+/// in the 99.7 % interval.
 fn assert_found(result: &FitResult, scene: &Scene) {
     let misfit = result.misfit.as_ref().unwrap();
     assert!(misfit.explained, "{:?}", misfit.reasons);
@@ -280,8 +281,8 @@ fn blades_of_other_sizes_and_speeds_are_fitted_like_the_usual_one() {
     }
 }
 
-/// A blade whose neck and lip are always within 0.1 rad of one line. Lean and drop do not determine its state,
-/// and near the middle of the bounds of [`STRAIGHT_JOB`] its tip jams.
+/// A blade whose neck and lip are always within 0.1 rad of one line. Lean and drop do not determine its
+/// state, and near the middle of the bounds of [`STRAIGHT_JOB`] its tip jams.
 const STRAIGHT_SCENE: &str = r#"format = 1
 title = "Straight blade"
 
