@@ -14,15 +14,23 @@ fn motions() -> impl Strategy<Value = Motion> {
     let frame = (point.clone(), point)
         .prop_map(|(tip, head)| [tip.map(|p| p.0), tip.map(|p| p.1), head.map(|p| p.0), head.map(|p| p.1)]);
     let whole = |frame: [Option<f64>; 4]| frame.map(|value| value.or(Some(7.125)));
-    (proptest::collection::vec(frame, 12..40), prop_oneof![Just(500.0), Just(1000.0), Just(200.0)]).prop_map(
-        move |(mut frames, rate_hz)| {
-            // the first and last frames are tracked, so that all layouts show the same length
-            for end in [0, 1, frames.len() - 1] {
-                frames[end] = whole(frames[end]);
-            }
-            Motion { rate_hz, frames }
-        },
-    )
+    let motions =
+        (proptest::collection::vec(frame, 12..40), prop_oneof![Just(500.0), Just(1000.0), Just(200.0)])
+            .prop_map(move |(mut frames, rate_hz)| {
+                // the first and last frames are tracked, so that all layouts show the same length
+                for end in [0, 1, frames.len() - 1] {
+                    frames[end] = whole(frames[end]);
+                }
+                Motion { rate_hz, frames }
+            });
+    motions.prop_filter("a point that is tracked in every second frame implies another rate", |motion| {
+        [0, 2].iter().all(|point| {
+            let tracked = |frame: &[[Option<f64>; 4]]| frame.iter().all(|values| values[*point].is_some());
+            let follow = motion.frames.windows(2).filter(|pair| tracked(pair)).count();
+            let steps = motion.frames.iter().filter(|values| values[*point].is_some()).count() - 1;
+            3 * follow >= 2 * steps
+        })
+    })
 }
 
 fn read(exporter: &Exporter, motion: &Motion, source: ImportSource) -> Result<Import, String> {
