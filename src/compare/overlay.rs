@@ -7,7 +7,7 @@
 use super::model_run::ModelRun;
 use crate::fit::trace::FittedTraces;
 use crate::recording::alignment::{Alignment, AlignmentPoint};
-use crate::recording::motion_traces::MotionTraces;
+use crate::recording::motion_traces::{MotionTraces, subtract_columns};
 use crate::recording::{FrameGrid, Recording, Traces};
 use crate::simulate::twin::TwinView;
 
@@ -30,7 +30,7 @@ impl ModelRun {
         if tip.iter().any(Option::is_some) {
             motion.tip_x_m.clone_from(tip);
             if traces.own_head {
-                motion.deflection_m = subtract(tip, &traces.head_x_m);
+                motion.deflection_m = subtract_columns(tip, &traces.head_x_m);
             }
         }
         if drop.iter().any(Option::is_some) {
@@ -42,16 +42,13 @@ impl ModelRun {
     /// Recording minus the model that restarts at every segment of the fit; `None` without fitted traces.
     pub(crate) fn restarted_residual(&self, recording: &Recording) -> Option<MotionTraces> {
         let traces = self.traces.as_ref()?;
-        let [tip_x_m, head_drop_m] = [0, 1].map(|k| subtract(&traces.measured[k], &traces.restarted[k]));
+        let [tip_x_m, head_drop_m] =
+            [0, 1].map(|k| subtract_columns(&traces.measured[k], &traces.restarted[k]));
         let empty = || vec![None; tip_x_m.len()];
         let deflection_m = if traces.own_head { tip_x_m.clone() } else { empty() };
         let time_s = MotionTraces::from_recording(recording).time_s;
         Some(MotionTraces { time_s, head_x_m: empty(), deflection_m, tip_x_m, head_drop_m })
     }
-}
-
-fn subtract(a: &[Option<f64>], b: &[Option<f64>]) -> Vec<Option<f64>> {
-    a.iter().zip(b).map(|(a, b)| Some((*a)? - (*b)?)).collect()
 }
 
 fn traces_alignment(traces: &FittedTraces) -> Alignment {

@@ -24,6 +24,11 @@ pub struct MotionTraces {
 pub(crate) const MOTION_CHANNELS: [Channel; 4] =
     [Channel::TipX, Channel::HeadX, Channel::Deflection, Channel::HeadDrop];
 
+/// A column minus another one, frame by frame; missing if either is missing.
+pub(crate) fn subtract_columns(a: &[Option<f64>], b: &[Option<f64>]) -> Vec<Option<f64>> {
+    a.iter().zip(b).map(|(a, b)| Some((*a)? - (*b)?)).collect()
+}
+
 impl MotionTraces {
     /// Motion of a recording, on its own clock.
     pub(crate) fn from_recording(recording: &Recording) -> Self {
@@ -57,10 +62,7 @@ impl MotionTraces {
 
     /// This motion minus another one in the same frames; missing if either is missing.
     pub(crate) fn subtract(&self, other: &Self) -> Self {
-        let less = |channel: Channel| {
-            let pairs = self.column(channel).iter().zip(other.column(channel));
-            pairs.map(|(a, b)| Some((*a)? - (*b)?)).collect()
-        };
+        let less = |channel: Channel| subtract_columns(self.column(channel), other.column(channel));
         Self {
             time_s: self.time_s.clone(),
             tip_x_m: less(Channel::TipX),
