@@ -273,6 +273,10 @@ fn model_states_curve(
 fn figure_title(case: &ConditionComparison, channel: Channel, rms: f64, noise_m: f64) -> String {
     let (label, left, noise) = (channel.label(), format_length(rms * noise_m), format_length(noise_m));
     let model = if case.restarted.is_some() { "The model" } else { "One run of the model" };
+    let is_verdict = case.result.status.has_ended() && case.result.explains_recordings();
+    if rms <= NOTHING_LEFT && case.restarted.is_some() && !is_verdict {
+        return format!("What the model leaves of the {label} is no more than its noise of {noise}");
+    }
     if rms <= NOTHING_LEFT {
         return format!("{model} explains the {label} to within its noise of {noise}");
     }
