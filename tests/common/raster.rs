@@ -117,8 +117,12 @@ pub fn colliding(svg: &str) -> Vec<[String; 2]> {
 /// What every figure must be, whatever it shows.
 pub fn sound(name: &str, svg: &str) {
     assert_eq!(outside(svg), Vec::<String>::new(), "{name}");
-    for part in ["NaN", "inf\"", "<image", "<script", "href="] {
-        assert!(!svg.contains(part), "{name}: {part}");
+    // pictures are part of the file, and the letters of their data have no meaning
+    let mut pieces = svg.split("href=\"data:image/png;base64,");
+    let first = pieces.next().unwrap_or_default().to_owned();
+    let text = pieces.fold(first, |text, piece| text + piece.split_once('"').map_or("", |(_, rest)| rest));
+    for part in ["NaN", "inf\"", "<script", "href="] {
+        assert!(!text.contains(part), "{name}: {part}");
     }
     let between = |open: &str, close: &str| {
         svg.split_once(open).and_then(|(_, rest)| rest.split_once(close)).map(|(text, _)| text.to_owned())

@@ -75,8 +75,8 @@ impl Canvas {
     }
 
     /// Draws a PNG image that fills `area` and is clipped to `within`.
-    pub(crate) fn draw_png(&mut self, area: &CanvasArea, within: &CanvasArea, png: &[u8]) {
-        self.back.append_png(area, within, png);
+    pub(crate) fn draw_png(&mut self, area: &CanvasArea, within: &CanvasArea, png: &[u8], smooth: bool) {
+        self.back.append_png(area, within, png, smooth);
     }
 
     pub(crate) fn fill_rectangle(&mut self, area: &CanvasArea, colour: Rgb, opacity: f64) {

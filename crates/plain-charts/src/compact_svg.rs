@@ -64,11 +64,12 @@ impl CompactSvg {
     }
 
     /// Appends a PNG image that fills `area` and is clipped to `within`, with its bytes as base64 text.
-    pub(crate) fn append_png(&mut self, area: &CanvasArea, within: &CanvasArea, png: &[u8]) {
+    pub(crate) fn append_png(&mut self, area: &CanvasArea, within: &CanvasArea, png: &[u8], smooth: bool) {
+        let rendering = if smooth { "" } else { "image-rendering=\"optimizeSpeed\" " };
         let (x, y) = (area.left - within.left, area.top - within.top);
         let _ = self.append_element(&format!(
             "<svg x=\"{:.0}\" y=\"{:.0}\" width=\"{:.0}\" height=\"{:.0}\"><image x=\"{x:.1}\" y=\"{y:.1}\" \
-             width=\"{:.1}\" height=\"{:.1}\" preserveAspectRatio=\"none\" \
+             width=\"{:.1}\" height=\"{:.1}\" preserveAspectRatio=\"none\" {rendering}\
              href=\"data:image/png;base64,{}\"/></svg>\n",
             within.left,
             within.top,

@@ -5,12 +5,10 @@ use super::axis::{AxisScale, CanvasAxis, ChartAxis};
 use super::canvas::{Canvas, Lettering, TextAnchor};
 use super::path::CanvasArea;
 use super::style::{
-    ColourMap, FRAME, LINE_MM, NO_VALUE, Rgb, TEXT_MM, TICK_MM, UNITS_PER_MM, Y_TICKS_MM, format_hex,
-    sample_colour_map,
+    ColourMap, FRAME, LINE_MM, NO_VALUE, Rgb, TEXT_MM, TICK_MM, UNITS_PER_MM, Y_TICKS_MM, sample_colour_map,
 };
 use super::text::{text_width, truncate_text};
-use std::collections::BTreeMap;
-use std::fmt::Write;
+use png::{BitDepth, ColorType, Compression, Encoder};
 use std::ops::Range;
 
 /// Values of cells over the axes of a panel.
@@ -99,69 +97,52 @@ pub(super) fn colour_at(heat: &HeatMap, (x, y): (AxisScale, AxisScale), at: (f64
     Some(sample_colour_map(heat.colour_map, colour_fraction(heat.value_range()?, value)))
 }
 
-// Cells as vector graphics: each run of one colour along a row is a thick line over a background of the most
-// common colour.
+// Cells as a picture.
 
-/// Maximum numbers of columns, rows and colours, from fine to coarse. A map uses the first entry with which
-/// its SVG takes at most [`MAX_CELL_BYTES`]. Finer cells are merged into one with their largest value, so
-/// that thin lines stay visible.
-const CELL_RESOLUTIONS: [(usize, usize, u32); 6] =
-    [(480, 240, 96), (320, 180, 64), (240, 135, 48), (200, 110, 32), (160, 90, 24), (120, 68, 16)];
-const MAX_CELL_BYTES: usize = 150_000;
-/// Amount, canvas units, by which a line is longer and thicker than its cells, so that no background shows
-/// between lines.
-const CELL_OVERLAP: i64 = 2;
+/// Number of pixels of the picture along the x and the y axis. Cells that are finer are merged into one pixel
+/// with their largest value, so that thin lines stay visible.
+const PIXELS: [usize; 2] = [440, 220];
+/// Number of colours of the picture; a value that is missing has one more. With these, 12 colours to a tenth
+/// of the range, neighbouring colours are hardly told apart.
+const COLOURS: u8 = 120;
 
-/// A row or column of the drawing: its two ends on the canvas, ascending, and the indices of the heat map's
-/// cells that it covers.
-type CellBlock = (i64, i64, Option<Range<usize>>);
-
-/// The cells of a heat map over the axes, as SVG; `None` without values.
-pub(super) fn heat_cells_svg(
-    heat: &HeatMap,
-    x: &CanvasAxis,
-    y: &CanvasAxis,
-    area: &CanvasArea,
-) -> Option<String> {
+/// The cells within the axes as a PNG; `None` without values.
+pub(super) fn encode_cells(heat: &HeatMap, x: &CanvasAxis, y: &CanvasAxis) -> Option<Vec<u8>> {
     let ends = heat.value_range()?;
-    let mut svg = None;
-    for (columns, rows, colours) in CELL_RESOLUTIONS {
-        let (columns, rows) = (cell_blocks(&heat.x, x, columns), cell_blocks(&heat.y, y, rows));
-        let drawn = svg.insert(cell_rows_svg((heat, ends), &columns, &rows, colours, area));
-        if drawn.len() <= MAX_CELL_BYTES {
-            break;
-        }
-    }
-    svg
-}
-
-/// The cells along an axis, one per block. If there are more than `most` cells, or if a cell is too narrow to
-/// be drawn, the axis is divided into `most` equal blocks instead.
-fn cell_blocks(middles: &[f64], axis: &CanvasAxis, most: usize) -> Vec<CellBlock> {
-    let edges = cell_edges(middles, axis.scale);
-    let (from, to) = (axis.from.min(axis.to), axis.from.max(axis.to));
-    let place = |value: f64| {
-        // a single cell has infinite edges
-        let beyond = if value > axis.low { axis.to } else { axis.from };
-        axis.canvas_position(value).unwrap_or(beyond).clamp(from, to).round() as i64
+    let last = f64::from(COLOURS - 1);
+    let columns = resample_cells(&heat.x, x, PIXELS[0]);
+    let rows = resample_cells(&heat.y, y, PIXELS[1]);
+    let level = |column: &Option<Range<usize>>, row: &Option<Range<usize>>| {
+        let value = heat.max_in_block(column.as_ref()?, row.as_ref()?)?;
+        Some((colour_fraction(ends, value) * last).round() as u8)
     };
-    let ordered = |a: i64, b: i64| (a.min(b), a.max(b));
-    let cells = edges.windows(2).enumerate().map(|(at, ends)| (ordered(place(ends[0]), place(ends[1])), at));
-    let shown = cells.filter(|((low, high), _)| low < high);
-    let shown: Vec<CellBlock> = shown.map(|((low, high), at)| (low, high, Some(at..at + 1))).collect();
-    // cells that overlap the range of the axis
-    let visible = edges.windows(2).filter(|ends| ends[1] > axis.low && ends[0] < axis.high).count();
-    if (1..=most).contains(&shown.len()) && shown.len() == visible {
-        return shown;
-    }
-    resample_cells(middles, &edges, axis, most)
+    // the y axis rises, and the rows of a picture go down
+    let pixels: Vec<u8> = rows
+        .iter()
+        .rev()
+        .flat_map(|row| columns.iter().map(|column| level(column, row).unwrap_or(COLOURS)))
+        .collect();
+    let palette = (0..COLOURS).map(|level| sample_colour_map(heat.colour_map, f64::from(level) / last));
+    let palette: Vec<u8> =
+        palette.chain([NO_VALUE]).flat_map(|(red, green, blue)| [red, green, blue]).collect();
+    let mut bytes = Vec::new();
+    let [width, height] = PIXELS;
+    let mut encoder = Encoder::new(&mut bytes, width as u32, height as u32);
+    encoder.set_color(ColorType::Indexed);
+    encoder.set_depth(BitDepth::Eight);
+    encoder.set_palette(palette);
+    encoder.set_compression(Compression::High);
+    let mut writer = encoder.write_header().ok()?;
+    writer.write_image_data(&pixels).ok()?;
+    writer.finish().ok()?;
+    Some(bytes)
 }
 
-/// The cells under each of `count` equal steps along an axis: those with centres in the step or, if there are
-/// none, the cell at the middle of the step.
-fn resample_cells(middles: &[f64], edges: &[f64], axis: &CanvasAxis, count: usize) -> Vec<CellBlock> {
+/// The cells under each of `count` equal steps along an axis, from its low end: those with centres in the step
+/// or, if there are none, the cell at the middle of the step.
+fn resample_cells(middles: &[f64], axis: &CanvasAxis, count: usize) -> Vec<Option<Range<usize>>> {
+    let edges = cell_edges(middles, axis.scale);
     let step = (axis.to - axis.from) / count as f64;
-    let place = |k: usize| axis.from + k as f64 * step;
     let value = |k: f64| axis.value_at(axis.from + k * step);
     let of = |k: usize| {
         if edges.is_empty() {
@@ -169,85 +150,12 @@ fn resample_cells(middles: &[f64], edges: &[f64], axis: &CanvasAxis, count: usiz
         }
         let at = k as f64;
         let [first, end] = [at, at + 1.0].map(|at| middles.partition_point(|m| *m < value(at)));
-        if first < end {
-            return Some(first..end);
-        }
-        let holder = edges.partition_point(|e| *e <= value(at + 0.5)).checked_sub(1)?;
-        (holder < middles.len()).then_some(holder..holder + 1)
+        let middle = edges.partition_point(|e| *e <= value(at + 0.5)).checked_sub(1);
+        let holder = middle.filter(|cell| *cell < middles.len());
+        // wide cells have their own edges; among narrow ones the step holds several
+        if end > first + 1 { Some(first..end) } else { holder.map(|cell| cell..cell + 1) }
     };
-    let ends = |k: usize| {
-        let (a, b) = (place(k).round() as i64, place(k + 1).round() as i64);
-        (a.min(b), a.max(b))
-    };
-    (0..count).map(|k| (ends(k).0, ends(k).1, of(k))).collect()
-}
-
-/// The rows as SVG, with one line for each run of one colour. All lines of the same colour and thickness form
-/// one path.
-fn cell_rows_svg(
-    (heat, ends): (&HeatMap, (f64, f64)),
-    columns: &[CellBlock],
-    rows: &[CellBlock],
-    colours: u32,
-    area: &CanvasArea,
-) -> String {
-    let last = f64::from(colours - 1);
-    let level = |column: &CellBlock, row: &CellBlock| {
-        let value = heat.max_in_block(column.2.as_ref()?, row.2.as_ref()?)?;
-        Some((colour_fraction(ends, value) * last).round() as u32)
-    };
-    let grid: Vec<Vec<Option<u32>>> =
-        rows.iter().map(|row| columns.iter().map(|column| level(column, row)).collect()).collect();
-    let ground = most_common_level(grid.iter().flatten().copied());
-    let rgb = |level: Option<u32>| {
-        level.map_or(NO_VALUE, |level| sample_colour_map(heat.colour_map, f64::from(level) / last))
-    };
-    let right = area.right as i64;
-    let mut lines: BTreeMap<(Option<u32>, i64), String> = BTreeMap::new();
-    for (row, levels) in rows.iter().zip(&grid) {
-        let (top, bottom) = (row.0, (row.1 + CELL_OVERLAP).min(area.bottom as i64));
-        let mut start = 0;
-        for run in levels.chunk_by(|a, b| a == b) {
-            let end = start + run.len();
-            if run[0] != ground {
-                let (from, to) = (columns[start].0, (columns[end - 1].1 + CELL_OVERLAP).min(right));
-                // the middle of a row may lie half way between two units
-                let middle = format_half(top + bottom);
-                let line = lines.entry((run[0], bottom - top)).or_default();
-                let _ = write!(line, "M{from} {middle}h{}", to - from); // (writing into a string cannot fail)
-            }
-            start = end;
-        }
-    }
-    let of = |((level, height), data): ((Option<u32>, i64), String)| {
-        format!("<path stroke=\"{}\" stroke-width=\"{height}\" d=\"{data}\"/>\n", format_hex(rgb(level)))
-    };
-    let whole = (area.left as i64, area.top as i64, area.right as i64, area.bottom as i64);
-    let filled = |(left, top, right, bottom), level| {
-        format!("<path fill=\"{}\" d=\"M{left} {top}H{right}V{bottom}H{left}z\"/>\n", format_hex(rgb(level)))
-    };
-    filled(whole, None)
-        + &filled(blocks_extent(columns, rows), ground)
-        + &lines.into_iter().map(of).collect::<String>()
-}
-
-/// Half of the whole number `twice`, written exactly as a decimal number.
-fn format_half(twice: i64) -> String {
-    if twice % 2 == 0 { (twice / 2).to_string() } else { format!("{}.5", twice / 2) }
-}
-
-/// The most common level; of equally common levels the lowest.
-fn most_common_level(levels: impl Iterator<Item = Option<u32>>) -> Option<u32> {
-    let mut counts: BTreeMap<Option<u32>, usize> = BTreeMap::new();
-    levels.for_each(|level| *counts.entry(level).or_default() += 1);
-    counts.into_iter().max_by(|a, b| a.1.cmp(&b.1).then(b.0.cmp(&a.0))).and_then(|(level, _)| level)
-}
-
-/// Left, top, right and bottom edge, in canvas units, of the area that the blocks cover.
-fn blocks_extent(columns: &[CellBlock], rows: &[CellBlock]) -> (i64, i64, i64, i64) {
-    let least = |blocks: &[CellBlock]| blocks.iter().map(|b| b.0).min().unwrap_or(0);
-    let most = |blocks: &[CellBlock]| blocks.iter().map(|b| b.1).max().unwrap_or(0);
-    (least(columns), least(rows), most(columns), most(rows))
+    (0..count).map(of).collect()
 }
 
 // Colour bar.
@@ -370,12 +278,7 @@ mod tests {
 
     #[test]
     fn every_step_of_an_axis_has_its_cells() {
-        let covered = |middles: &[f64], count| {
-            resample_cells(middles, &cell_edges(middles, AxisScale::Linear), &axis(0.0, 4.0), count)
-                .into_iter()
-                .map(|b| b.2)
-                .collect::<Vec<_>>()
-        };
+        let covered = |middles: &[f64], count| resample_cells(middles, &axis(0.0, 4.0), count);
         let some = |r: Range<usize>| Some(r);
         // the cells cover 0.5 to 3.5, each 1 wide; steps outside contain no cell
         assert_eq!(
@@ -384,43 +287,32 @@ mod tests {
         );
         assert_eq!(covered(&[0.1, 0.2, 0.3, 3.9], 2), [some(0..3), some(3..4)]);
         assert_eq!(covered(&[7.0], 2), [some(0..1), some(0..1)]);
-        assert_eq!(covered(&[], 1), [None]);
+        assert_eq!((covered(&[], 1), covered(&[2.0, 1.0], 1)), (vec![None], vec![None]));
+    }
+
+    fn decode(png: &[u8]) -> Vec<u8> {
+        let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut pixels).unwrap();
+        pixels
     }
 
     #[test]
-    fn few_cells_keep_their_own_edges_and_many_become_steps() {
-        assert_eq!(
-            cell_blocks(&[1.0, 2.0, 3.0], &axis(0.0, 4.0), 10),
-            [(5, 15, Some(0..1)), (15, 25, Some(1..2)), (25, 35, Some(2..3))]
-        );
-        assert_eq!(cell_blocks(&[1.0, 2.0, 3.0], &axis(0.0, 4.0), 2).len(), 2);
-        assert_eq!(cell_blocks(&[2.0, 1.0], &axis(0.0, 4.0), 2), [(0, 20, None), (20, 40, None)]);
-        let upwards = CanvasAxis { from: 40.0, to: 0.0, ..axis(0.0, 4.0) };
-        assert_eq!(cell_blocks(&[1.0, 2.0], &upwards, 10), [(25, 35, Some(0..1)), (15, 25, Some(1..2))]);
-    }
-
-    #[test]
-    fn runs_of_one_colour_are_one_line_on_a_ground_of_the_commonest() {
+    fn a_picture_has_the_colours_of_its_cells_and_the_low_end_of_the_axis_below() {
         let heat = HeatMap {
             x: vec![0.5, 1.5, 2.5, 3.5],
-            y: vec![2.0],
-            values: vec![vec![Some(0.0)], vec![Some(1.0)], vec![Some(1.0)], vec![Some(0.0)]],
+            y: vec![1.0, 3.0],
+            values: vec![vec![Some(0.0), Some(1.0)], vec![None; 2], vec![Some(0.5); 2], vec![Some(2.0); 2]],
             ..HeatMap::default()
         };
-        let area = CanvasArea { left: 0.0, top: 0.0, right: 40.0, bottom: 40.0 };
-        let svg = heat_cells_svg(
-            &heat,
-            &axis(0.0, 4.0),
-            &CanvasAxis { from: 40.0, to: 0.0, ..axis(0.0, 4.0) },
-            &area,
-        )
-        .unwrap();
-        assert_eq!(
-            svg,
-            "<path fill=\"#E4E4E4\" d=\"M0 0H40V40H0z\"/>\n<path fill=\"#440154\" d=\"M0 \
-             0H40V40H0z\"/>\n<path stroke=\"#FDE725\" stroke-width=\"40\" d=\"M10 20h22\"/>\n"
-        );
-        assert!(heat_cells_svg(&HeatMap::default(), &axis(0.0, 4.0), &axis(0.0, 4.0), &area).is_none());
+        let (x, y) = (axis(0.0, 4.0), CanvasAxis { from: 40.0, to: 0.0, ..axis(0.0, 4.0) });
+        let pixels = decode(&encode_cells(&heat, &x, &y).unwrap());
+        let at = |column: usize, row: usize| pixels[row * PIXELS[0] + column];
+        let [right, bottom] = [PIXELS[0] - 1, PIXELS[1] - 1];
+        let corners =
+            [at(0, 0), at(0, bottom), at(right / 2 - 50, bottom), at(right / 2 + 50, 0), at(right, 0)];
+        assert_eq!(corners, [60, 0, COLOURS, 30, COLOURS - 1]);
+        assert!(encode_cells(&HeatMap::default(), &x, &y).is_none());
     }
 
     #[test]
@@ -432,11 +324,7 @@ mod tests {
             values: (0..2000).map(column).collect(),
             ..HeatMap::default()
         };
-        let area = CanvasArea { left: 0.0, top: 0.0, right: 2000.0, bottom: 1000.0 };
-        let (x, y) = (
-            CanvasAxis { to: 2000.0, ..axis(0.0, 2000.0) },
-            CanvasAxis { from: 1000.0, to: 0.0, ..axis(0.0, 400.0) },
-        );
-        assert!(heat_cells_svg(&heat, &x, &y, &area).unwrap().len() < 170_000);
+        let (x, y) = (axis(0.0, 2000.0), CanvasAxis { from: 40.0, to: 0.0, ..axis(0.0, 400.0) });
+        assert!(encode_cells(&heat, &x, &y).unwrap().len() < 110_000);
     }
 }

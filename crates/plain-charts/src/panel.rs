@@ -113,7 +113,7 @@ fn draw_raster(canvas: &mut Canvas, placed: &PanelLayout, raster: &Raster) {
     else {
         return;
     };
-    canvas.draw_png(&CanvasArea { left, right, top, bottom }, &placed.area, &raster.png);
+    canvas.draw_png(&CanvasArea { left, right, top, bottom }, &placed.area, &raster.png, true);
 }
 
 fn draw_over_axes(canvas: &mut Canvas, placed: &PanelLayout, live: bool) {

@@ -93,13 +93,15 @@ fn render_svg(figure: &Figure, [title, name]: [&str; 2], style: &str, marked: bo
         ((figure.width_mm * UNITS_PER_MM).round() as u32, (layout.height * UNITS_PER_MM).round() as u32);
     let whole = CanvasArea { left: 0.0, top: 0.0, right: f64::from(size.0), bottom: f64::from(size.1) };
     let ground = Canvas::render_elements(size, |canvas| canvas.fill_rectangle(&whole, WHITE, 1.0));
-    let cells = |placed: &PanelLayout| {
-        let heat = placed.panel.heat_map.as_ref()?;
-        let cells = heat_map::heat_cells_svg(heat, &placed.x, &placed.y, &placed.area)?;
-        Some(format!("<g class=\"cells\">\n{cells}</g>\n"))
-    };
-    let maps: String = layout.panels.iter().filter_map(cells).collect();
     let drawn = Canvas::render_elements(size, |canvas| {
+        for placed in &layout.panels {
+            let heat = placed.panel.heat_map.as_ref();
+            if let Some(png) = heat.and_then(|heat| heat_map::encode_cells(heat, &placed.x, &placed.y)) {
+                canvas.draw_group(Some("class=\"cells\""), |canvas| {
+                    canvas.draw_png(&placed.area, &placed.area, &png, false);
+                });
+            }
+        }
         panel::draw_heading(canvas, figure, &layout);
         for placed in &layout.panels {
             panel::draw_panel(canvas, placed, live);
@@ -114,7 +116,7 @@ fn render_svg(figure: &Figure, [title, name]: [&str; 2], style: &str, marked: bo
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" aria-label=\"{name}\" width=\"{:.2}mm\" \
          height=\"{:.2}mm\" viewBox=\"0 0 {width} {height}\" \
-         stroke-linejoin=\"round\">\n<title>{title}</title>\n<desc>{}</desc>\n{style}{ground}{maps}{drawn}</svg>\n",
+         stroke-linejoin=\"round\">\n<title>{title}</title>\n<desc>{}</desc>\n{style}{ground}{drawn}</svg>\n",
         f64::from(width) / UNITS_PER_MM,
         f64::from(height) / UNITS_PER_MM,
         description.trim(),

@@ -115,7 +115,7 @@ mod tests {
     fn names_break_into_two_lines_of_small_letters() {
         let width_mm = 20.5 * WIDE_LETTER * SMALL_MM;
         assert_eq!(wrap_in_two_lines("high band", width_mm), "high band");
-        assert_eq!(wrap_in_two_lines("low band after flip", width_mm), "low band\nafter flip");
+        assert_eq!(wrap_in_two_lines("low band after flips", width_mm), "low band\nafter flips");
         assert_eq!(
             wrap_in_two_lines("deflection at 0.08 m/s, before", width_mm),
             "deflection at 0.08\nm/s, before"

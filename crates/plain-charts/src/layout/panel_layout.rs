@@ -253,7 +253,7 @@ mod tests {
             };
             y_axis_ticks(&panel, &y, 26.0).into_iter().filter_map(|tick| tick.label).collect::<Vec<_>>()
         };
-        assert_eq!(labels(11.0), ["deflection at\n0.08 m/s, before", "low"]);
+        assert_eq!(labels(12.0), ["deflection at\n0.08 m/s, before", "low"]);
         assert_eq!(labels(10.5), ["deflection at\u{2026}", "low"]);
     }
 }
