@@ -4,7 +4,9 @@
 pub mod condition;
 mod drift;
 pub mod friction;
+pub mod inverse_dynamics;
 pub mod model_run;
+mod model_states;
 mod overlay;
 pub mod ridge;
 pub mod rows;
@@ -15,6 +17,7 @@ pub use condition::{ConditionComparison, FittedRecording, TimedRecording};
 pub(crate) use friction::{FrictionPoint, MeasuredFriction};
 pub(crate) use model_run::RunSummary;
 pub use model_run::{ModelRun, run_conditions};
+pub(crate) use ridge::release_window;
 pub use ridge::{RidgePair, TrackedRidge};
 pub(crate) use rows::{NextPeak, ParameterLine, TargetComparison, TrueValue};
 pub(crate) use summary::ComparisonSummary;

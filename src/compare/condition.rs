@@ -3,6 +3,7 @@
 
 use super::drift::drift_cycles;
 use super::model_run::{ModelRun, RunSummary, summarize_run};
+use super::model_states::ModelStates;
 use super::ridge::RidgePair;
 use crate::feature::{FeatureBand, FeatureUnit};
 use crate::fit::job::{FitTarget, Job};
@@ -18,9 +19,13 @@ use rayon::prelude::*;
 use short_spectra::Target;
 use std::ops::Range;
 
-/// Channels on which the model is judged, in order of preference; the first one that is tracked is used. The
-/// deflection shows stick and slip best, but it can be computed only if the head is tracked.
+/// Channels on which the model is judged, in order of preference; the first one that is tracked in enough
+/// frames is used. The deflection shows stick and slip best, but it can be computed only if the head is
+/// tracked.
 const JUDGED: [Channel; 4] = [Channel::Deflection, Channel::TipX, Channel::HeadX, Channel::HeadDrop];
+
+/// A channel is judged if it is known in at least this fraction of the frames in which the best tracked one is.
+const LEAST_KNOWN: f64 = 0.5;
 
 /// A fitted recording with its description and its video.
 #[derive(Debug, Clone, Copy)]
@@ -56,6 +61,8 @@ pub struct ConditionComparison<'a> {
     pub residual: Option<MotionTraces>,
     /// Measured minus the model that restarts at every segment of the fit; `None` without fitted traces.
     pub(crate) restarted: Option<MotionTraces>,
+    /// States of the model, restarted at every segment of the fit if traces were fitted.
+    pub(crate) states: ModelStates<'a>,
     /// Ridges of recording and model: the frequency of the strongest component against time.
     pub ridges: RidgePair,
     noise: Option<RecordingNoise>,
@@ -78,7 +85,7 @@ impl<'a> ConditionComparison<'a> {
     /// Start and end of each interval in which the tip of the model sticks, s, on the clock of the recording.
     pub(crate) fn sticks_on_clock(&self) -> Vec<(f64, f64)> {
         let shift_s = self.alignment.shift_s;
-        self.model.view.stick_s.iter().map(|[from, to]| (from + shift_s, to + shift_s)).collect()
+        self.states.stick_s.iter().map(|[from, to]| (from + shift_s, to + shift_s)).collect()
     }
 
     /// Compares recording and model in every condition of a job, in the order of the job. The recordings
@@ -110,6 +117,7 @@ impl<'a> ConditionComparison<'a> {
                 residual,
                 restarted: recording.and_then(|seen| model.restarted_residual(seen)),
                 measured_motion,
+                states: ModelStates::simulate(model, &result.segments, &job.conditions[condition].name),
                 ridges: RidgePair::default(),
                 noise: recording.map(measure_noise),
                 measured_instants: recording.map(ReversalInstants::find_instants),
@@ -188,8 +196,10 @@ impl<'a> ConditionComparison<'a> {
     /// unknown.
     pub(crate) fn judged_channel(&self) -> Option<(Channel, f64)> {
         let residual = self.judged_residual().filter(|_| !self.alignment.opposite_turn)?;
-        let is_known = |channel: &Channel| residual.column(*channel).iter().any(Option::is_some);
-        let channel = JUDGED.into_iter().find(is_known)?;
+        let known = |channel: Channel| residual.column(channel).iter().flatten().count();
+        let most = JUDGED.into_iter().map(known).max().filter(|most| *most > 0)?;
+        let is_often_known = |channel: &Channel| known(*channel) as f64 >= LEAST_KNOWN * most as f64;
+        let channel = JUDGED.into_iter().find(is_often_known)?;
         Some((channel, self.noise_m(channel)?))
     }
 

@@ -17,6 +17,8 @@ const MIN_SEGMENTS: f64 = 3.0;
 /// For each segment length, the fraction of the segments that follow one component is computed. A length is
 /// good enough if its fraction is at least this multiple of the largest fraction found for any length.
 const NEARLY_BEST: f64 = 0.95;
+/// Number of columns of a drawn spectrogram per segment length: segments overlap by 90 %.
+const DRAWN_OVERLAP: usize = 10;
 /// Maximum number of points of a ridge that are plotted against speed; more would overlap in a figure.
 const MAX_SPEED_POINTS: usize = 40;
 
@@ -43,26 +45,34 @@ pub struct TrackedRidge {
     pub courses: Vec<Vec<RidgePoint>>,
     /// Frequency band that was searched for the ridge, Hz.
     pub band_hz: (f64, f64),
-    /// A selection of the points in `courses`, each with the speed of the tip.
+    /// A selection of those points in `courses` that follow the stick-slip cycle, each with the speed of the
+    /// tip.
     pub over_speed: Vec<SpeedPoint>,
 }
 
 impl RidgePair {
     pub(super) fn track(case: &ConditionComparison) -> Self {
         let track = |side: TimedRecording<'_>| {
-            track_ridge(case, &side, side.window_frames(&release_window(&side))?, None)
+            track_ridge(
+                case,
+                &side,
+                side.window_frames(&release_window(&side))?,
+                None,
+                case.alignment.shift_s,
+            )
         };
         let has_segments = |ridge: &TrackedRidge| ridge.spectrogram.amplitude_m.iter().any(Option::is_some);
         let measured = case.measured_side().and_then(track).filter(has_segments);
         let (segment_s, side) = (measured.as_ref().map(|m| m.spectrogram.segment_s), case.model_side());
-        let model = model_frames(case, &side).and_then(|frames| track_ridge(case, &side, frames, segment_s));
+        let model =
+            model_frames(case, &side).and_then(|frames| track_ridge(case, &side, frames, segment_s, 0.0));
         Self { measured, model }
     }
 }
 
 /// Window from the release of the tip at the first reversal to the hold at the second. If one of these
 /// instants is not found, the window is open at that end.
-fn release_window(side: &TimedRecording) -> Window {
+pub(crate) fn release_window(side: &TimedRecording) -> Window {
     let end = |anchor, reversal| match side.instants.time_s(anchor, reversal) {
         Ok(_) => WindowEnd::Found { anchor, reversal, offset_s: 0.0 },
         Err(_) => WindowEnd::Open,
@@ -113,6 +123,7 @@ fn track_ridge(
     side: &TimedRecording,
     frames: Range<usize>,
     segment_s: Option<f64>,
+    shift_s: f64,
 ) -> Option<TrackedRidge> {
     let rate_hz = side.recording.grid().frame_rate_hz;
     let samples = side.samples(Channel::Deflection);
@@ -126,14 +137,22 @@ fn track_ridge(
     let fast = remove_slow_components(&analysis, rate_hz, band_hz.0);
     let mut ridge =
         choose_ridge(&fast, rate_hz, band_hz, segment_s.or(job_segment_s(case)), min_segment_s(case))?;
-    let settings = SpectrogramSettings { segment_s: Some(ridge.segment_s), band_hz: Some(band_hz) };
+    let settings = SpectrogramSettings {
+        segment_s: Some(ridge.segment_s),
+        band_hz: Some(band_hz),
+        overlap: Some(DRAWN_OVERLAP),
+    };
     let spectrogram = Spectrogram::new(&analysis.detrended_m(), rate_hz, &settings).ok()?;
     let mut courses = course::coherent_parts(&ridge, &spectrogram);
     for point in ridge.points.iter_mut().chain(courses.iter_mut().flatten()) {
         point.frequency_sd_hz = side.recording.add_clock_sd(point.frequency_hz, point.frequency_sd_hz);
     }
-    let over_speed = ridge_over_speed(side, frames.start, &courses, ridge.segment_s);
     let start_s = side.recording.grid().time_s(frames.start);
+    let is_cycle = |p: &&RidgePoint| {
+        is_stick_slip_cycle(case, p.frequency_hz, start_s + p.time_s - shift_s, ridge.segment_s)
+    };
+    let cycle: Vec<RidgePoint> = courses.iter().flatten().filter(is_cycle).copied().collect();
+    let over_speed = ridge_over_speed(side, frames.start, &cycle, ridge.segment_s);
     Some(TrackedRidge { start_s, spectrogram, ridge, courses, band_hz, over_speed })
 }
 
@@ -148,7 +167,7 @@ fn choose_ridge(
     shortest_s: f64,
 ) -> Option<Ridge> {
     let cut = |segment_s: Option<f64>| {
-        let settings = SpectrogramSettings { segment_s, band_hz: Some(band_hz) };
+        let settings = SpectrogramSettings { segment_s, band_hz: Some(band_hz), overlap: None };
         let spectrogram = Spectrogram::new(fast, rate_hz, &settings).ok()?;
         let ridge = spectrogram.find_ridge(fast, band_hz).ok()?;
         let points: usize = course::coherent_parts(&ridge, &spectrogram).iter().map(Vec::len).sum();
@@ -183,12 +202,23 @@ fn remove_slow_components(analysis: &SpectralAnalysis, rate_hz: f64, low_hz: f64
     analysis.residual_m.iter().enumerate().map(at).collect()
 }
 
-/// Points of the courses (the parts of a ridge that follow one component), each with the mean speed of the
-/// tip in its segment.
+/// Smallest allowed ratio of a frequency to the rate of the model's sticks at which the frequency counts as
+/// that of the stick-slip cycle. The swing of the head is several times slower.
+const LEAST_OF_STICK_RATE: f64 = 0.6;
+
+/// Whether a component in a segment around an instant on the clock of the model, s, is the stick-slip cycle,
+/// and not the swing of the head: the tip of the model sticks there, and at most about as often.
+fn is_stick_slip_cycle(case: &ConditionComparison, frequency_hz: f64, time_s: f64, segment_s: f64) -> bool {
+    let within = |start_s: f64| (start_s - time_s).abs() <= 0.5 * segment_s;
+    let sticks = case.states.stick_s.iter().filter(|[start_s, _]| within(*start_s)).count();
+    sticks > 0 && frequency_hz >= LEAST_OF_STICK_RATE * sticks as f64 / segment_s
+}
+
+/// Points of the stick-slip cycle, each with the mean speed of the tip in its segment.
 fn ridge_over_speed(
     side: &TimedRecording,
     first: usize,
-    courses: &[Vec<RidgePoint>],
+    cycle: &[RidgePoint],
     segment_s: f64,
 ) -> Vec<SpeedPoint> {
     let (grid, tip) = (side.recording.grid(), &side.recording.traces().tip_x_m);
@@ -202,8 +232,8 @@ fn ridge_over_speed(
             frequency_sd_hz: Some(p.frequency_sd_hz),
         })
     };
-    let every = courses.iter().map(Vec::len).sum::<usize>().div_ceil(MAX_SPEED_POINTS).max(1);
-    courses.iter().flatten().step_by(every).filter_map(point).collect()
+    let every = cycle.len().div_ceil(MAX_SPEED_POINTS).max(1);
+    cycle.iter().step_by(every).filter_map(point).collect()
 }
 
 impl TrackedRidge {

@@ -11,7 +11,6 @@ use super::scene_model::{ModelCondition, SceneModel};
 use super::target_value::TargetValue;
 use super::targets::split_held_out;
 use super::trace::{FittedTraces, TraceUnknown, UnknownKind, first_fitting};
-use crate::model::Pose;
 use crate::simulate::drive::Drive;
 use crate::simulate::scene::{Scene, StartKind};
 
@@ -81,12 +80,7 @@ impl Problem {
                 scene.run.stop_s = motion.span_s()[1];
             }
             scene.start_s = start.time_s;
-            scene.start = StartKind::State(Pose {
-                theta: start.neck_angle_rad,
-                phi: start.lip_angle_rad,
-                theta_rate: start.neck_rate_rad_per_s,
-                phi_rate: start.lip_rate_rad_per_s,
-            });
+            scene.start = StartKind::State(start.pose());
         }
         Ok(scene)
     }

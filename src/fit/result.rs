@@ -9,6 +9,7 @@ use super::job::{FreeParameter, Job};
 use super::linear_model::ParameterCombination;
 use super::misfit::{TraceMisfit, far_from_priors};
 use super::uncertainty::ParameterVerdict;
+use crate::model::Pose;
 use crate::text::text_sha256;
 pub(super) use assembly::{FitFindings, ModelledTargets, camera_nuisance_results, predicted_feature_result};
 use serde::{Deserialize, Serialize};
@@ -124,6 +125,18 @@ pub struct FittedSegment {
     pub neck_rate_rad_per_s: f64,
     /// Angular velocity of the lip, rad/s.
     pub lip_rate_rad_per_s: f64,
+}
+
+impl FittedSegment {
+    /// Angles and rates of the links at the start.
+    pub(crate) fn pose(&self) -> Pose {
+        Pose {
+            theta: self.neck_angle_rad,
+            phi: self.lip_angle_rad,
+            theta_rate: self.neck_rate_rad_per_s,
+            phi_rate: self.lip_rate_rad_per_s,
+        }
+    }
 }
 
 /// The spectral peak of the model that is the second choice for a component.

@@ -38,14 +38,6 @@ pub enum AlignmentPoint {
 }
 
 impl AlignmentPoint {
-    /// Name of the point in a sentence and in files.
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Head => "head",
-            Self::Tip => "tip",
-        }
-    }
-
     fn path(self, recording: &Recording) -> &[Option<f64>] {
         match self {
             Self::Head => &recording.traces().head_x_m,

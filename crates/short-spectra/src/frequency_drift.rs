@@ -97,7 +97,7 @@ pub(super) fn find_drift_course(
 /// component may be weak or change fast in a part of the record.
 fn select_best_ridge(record: &[Option<f64>], frame_rate_hz: f64, band: (f64, f64)) -> Option<(f64, Ridge)> {
     let cut = |segment_s: Option<f64>| {
-        let settings = time_frequency::SpectrogramSettings { segment_s, band_hz: Some(band) };
+        let settings = time_frequency::SpectrogramSettings { segment_s, band_hz: Some(band), overlap: None };
         let spectrogram = Spectrogram::new(record, frame_rate_hz, &settings).ok()?;
         let ridge = spectrogram.find_ridge(record, band).ok()?;
         Some((ridge.points.len() as f64 / spectrogram.time_s.len().max(1) as f64, ridge))

@@ -179,13 +179,14 @@ impl SegmentLayout {
         record: usize,
         segment_s: f64,
         frame_rate_hz: f64,
+        overlap: usize,
     ) -> Result<Self, SpectrumError> {
         let frames = (segment_s * frame_rate_hz).round();
         if !(frames >= FEWEST_FRAMES as f64 && frames <= record as f64) {
             let (least_s, most_s) = (FEWEST_FRAMES as f64 / frame_rate_hz, record as f64 / frame_rate_hz);
             return Err(SpectrumError::Segment { found_s: segment_s, least_s, most_s });
         }
-        Ok(Self::with_overlap(record, frames as usize, OVERLAP, MOST_COLUMNS))
+        Ok(Self::with_overlap(record, frames as usize, overlap, MOST_COLUMNS))
     }
 
     /// First frame of a segment. The last segment need not end with the record.
@@ -219,6 +220,9 @@ pub struct SpectrogramSettings {
     pub segment_s: Option<f64>,
     /// Band for which the length is chosen, Hz; `None` uses [`default_band_hz`] with no slow component.
     pub band_hz: Option<(f64, f64)>,
+    /// Number of columns per segment length, if the length is given; `None` is 4. With 10, segments overlap by
+    /// 90 %.
+    pub overlap: Option<usize>,
 }
 
 /// Amplitude spectra of overlapping segments of a record.
@@ -257,7 +261,10 @@ impl Spectrogram {
         check_record(samples, frame_rate_hz, &checked)?;
         let band_hz = settings.band_hz.unwrap_or_else(|| default_band_hz(samples.len(), frame_rate_hz, None));
         let layout = match settings.segment_s {
-            Some(segment_s) => SegmentLayout::from_duration(samples.len(), segment_s, frame_rate_hz)?,
+            Some(segment_s) => {
+                let overlap = settings.overlap.unwrap_or(OVERLAP).max(1);
+                SegmentLayout::from_duration(samples.len(), segment_s, frame_rate_hz, overlap)?
+            }
             None => choose_segment_layout(samples, frame_rate_hz, band_hz),
         };
         let bins = SegmentBins::new(&layout, FINE_PADDING);

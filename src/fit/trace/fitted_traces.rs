@@ -6,6 +6,7 @@ use super::normal_equations::recording_models;
 use super::segment_simulation::{LinkState, RecordingModel, ShownFrame};
 use super::unknowns::CameraParameters;
 use crate::fit::result::FittedSegment;
+use crate::model::Pose;
 use crate::recording::FrameGrid;
 use crate::recording::channel::median_in_place;
 use crate::simulate::scene::Scene;
@@ -116,12 +117,8 @@ pub(crate) fn first_fitting<'a>(segments: &[&'a FittedSegment]) -> Option<&'a Fi
 }
 
 fn link_state(segment: &FittedSegment) -> LinkState {
-    LinkState::new(
-        segment.neck_angle_rad,
-        segment.lip_angle_rad,
-        segment.neck_rate_rad_per_s,
-        segment.lip_rate_rad_per_s,
-    )
+    let Pose { theta, phi, theta_rate, phi_rate } = segment.pose();
+    LinkState::new(theta, phi, theta_rate, phi_rate)
 }
 
 /// Columns of a recording; only the fitted frames have values.

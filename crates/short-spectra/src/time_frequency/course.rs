@@ -71,7 +71,7 @@ mod tests {
     /// in segments of 28.8 ms.
     fn times(at_m: impl Fn(f64) -> f64) -> [Vec<f64>; 2] {
         let record: Vec<Option<f64>> = (0..3000).map(|i| Some(at_m(f64::from(i) / RATE_HZ))).collect();
-        let settings = SpectrogramSettings { segment_s: Some(0.0288), band_hz: Some(BAND_HZ) };
+        let settings = SpectrogramSettings { segment_s: Some(0.0288), band_hz: Some(BAND_HZ), overlap: None };
         let spectrogram = Spectrogram::new(&record, RATE_HZ, &settings).unwrap();
         let ridge = spectrogram.find_ridge(&record, BAND_HZ).unwrap();
         let drawn = coherent_parts(&ridge, &spectrogram);

@@ -1,0 +1,220 @@
+//! Friction on the tip from a recorded motion: the equations of motion, solved for the friction force.
+//!
+//! Tip, drop and head give the pose, its rates and the acceleration of the tip. The tip accelerates by
+//! `a_free + f kappa` (see [`FrictionResponse`]), so that the friction force is `f = (a - a_free) / kappa`.
+
+use super::condition::ConditionComparison;
+use crate::model::shoulder::ShoulderContact;
+use crate::model::{HeadMotion, LinkDirections, Linkage, Pose};
+use crate::recording::channel::Channel;
+use crate::simulate::ModelSample;
+use portable_math as math;
+
+#[cfg(doc)]
+use crate::model::FrictionResponse;
+
+/// Velocity and deflection of the tip, with the friction on it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct TipFriction {
+    /// Velocity of the tip along the sweep, m/s.
+    pub velocity_m_per_s: f64,
+    /// Deflection of the blade, m.
+    pub deflection_m: f64,
+    /// Friction against motion in the positive direction, N: minus the force on the tip.
+    pub friction_n: f64,
+}
+
+/// Friction in the frames of a part of a recording.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct MeasuredCycle {
+    /// One entry per frame; `None` where a point is missing.
+    pub states: Vec<Option<TipFriction>>,
+    /// Standard deviation of the friction by the noise of the tip, N.
+    pub sd_n: f64,
+}
+
+/// Minimum number of frames per cycle of stick and slip: with fewer, the acceleration of the tip is lost in
+/// the smoothing or in the noise.
+const FRAMES_PER_CYCLE: f64 = 20.0;
+/// Length of the parabola that is fitted around a frame, as a fraction of a cycle: it lowers the acceleration
+/// of an oscillation with the frequency of the cycle by 6 %.
+const PARABOLA_CYCLES: f64 = 0.2;
+/// Smallest absolute sine of the angle between the links at which tip and drop give the pose.
+const LEAST_BEND: f64 = 0.05;
+/// Number of Newton steps for the pose, from the pose of the model.
+const STEPS: usize = 6;
+
+/// Friction in the frames between two instants on the clock of the recording, s. `None` without fitted traces,
+/// or with too few frames per cycle.
+pub(crate) fn measure_cycle(case: &ConditionComparison, (from_s, to_s): (f64, f64)) -> Option<MeasuredCycle> {
+    let (traces, residual) = (case.model.traces.as_ref()?, case.restarted.as_ref()?);
+    let (low_hz, high_hz) = case.ridges.measured.as_ref()?.frequency_range_hz()?;
+    let (rate_hz, shift_s) = (traces.grid.frame_rate_hz, case.alignment.shift_s);
+    let cycle = rate_hz / (0.5 * (low_hz + high_hz));
+    if cycle < FRAMES_PER_CYCLE {
+        return None;
+    }
+    let parabola = MovingParabola::new((0.5 * PARABOLA_CYCLES * cycle).round().max(2.0) as usize, rate_hz);
+    let states: Vec<&[ModelSample]> = case.states.between([from_s - shift_s, to_s - shift_s]).collect();
+    let frames = residual.time_s.iter().zip(residual.tip_x_m.iter().zip(&residual.head_drop_m));
+    let within = frames.filter(|(t, _)| **t >= from_s && **t <= to_s);
+    // the recorded motion is that of the model plus the residual, so that the camera needs no inversion
+    let recorded = within.map(|(t, (tip, drop))| {
+        let model = states.iter().find_map(|run| interpolate_state(run, t - shift_s))?;
+        Some((t - shift_s, model, model.tip_x_m + (*tip)?, model.head_drop_m + (*drop)?))
+    });
+    let recorded: Vec<Option<(f64, ModelSample, f64, f64)>> = recorded.collect();
+    let linkage = &traces.scene.linkage;
+    let friction = |window: &[Option<(f64, ModelSample, f64, f64)>]| {
+        let known: Vec<&(f64, ModelSample, f64, f64)> =
+            window.iter().map(Option::as_ref).collect::<Option<_>>()?;
+        let (time_s, model, ..) = known[parabola.half];
+        let tip = parabola.fit(known.iter().map(|(.., tip, _)| *tip));
+        let drop = parabola.fit(known.iter().map(|(.., drop)| *drop));
+        solve_friction(linkage, &traces.scene.drive.motion_at(*time_s), &model.pose, tip, drop)
+    };
+    let found: Vec<_> = recorded.windows(2 * parabola.half + 1).map(friction).collect();
+    let kappa = found.iter().flatten().map(|(_, kappa)| *kappa).reduce(f64::min)?;
+    let noise_m = case.noise_m(Channel::TipX)?;
+    Some(MeasuredCycle {
+        states: found.into_iter().map(|found| found.map(|(state, _)| state)).collect(),
+        sd_n: noise_m * parabola.acceleration_gain() / kappa,
+    })
+}
+
+/// State of a run at an instant on its clock, s, between two of its states; the tip by a cubic through
+/// positions and velocities. `None` outside the run.
+fn interpolate_state(run: &[ModelSample], time_s: f64) -> Option<ModelSample> {
+    let next = run.partition_point(|s| s.time_s < time_s);
+    let (a, b) = (run.get(next.checked_sub(1)?)?, run.get(next)?);
+    let step_s = b.time_s - a.time_s;
+    let u = (time_s - a.time_s) / step_s;
+    let (va, vb) = (a.tip_velocity_m_per_s * step_s, b.tip_velocity_m_per_s * step_s);
+    let way_m = b.tip_x_m - a.tip_x_m;
+    let tip_x_m = a.tip_x_m + u * (va + u * (3.0 * way_m - 2.0 * va - vb + u * (va + vb - 2.0 * way_m)));
+    let head_drop_m = a.head_drop_m + u * (b.head_drop_m - a.head_drop_m);
+    Some(ModelSample { tip_x_m, head_drop_m, ..*a })
+}
+
+/// The parabola that is fitted by least squares to a frame and `half` frames on either side of it.
+struct MovingParabola {
+    half: usize,
+    rate_hz: f64,
+    /// Number of frames, and sums of the squares and of the fourth powers of their distances in frames.
+    sums: [f64; 3],
+}
+
+impl MovingParabola {
+    fn new(half: usize, rate_hz: f64) -> Self {
+        let power = |n: i32| (1..=half).map(|k| 2.0 * math::powi(k as f64, n)).sum::<f64>();
+        Self { half, rate_hz, sums: [(2 * half + 1) as f64, power(2), power(4)] }
+    }
+
+    /// Value, first and second derivative in the middle frame, in units of the values per second.
+    fn fit(&self, values: impl Iterator<Item = f64>) -> [f64; 3] {
+        let [n, s2, s4] = self.sums;
+        let place = |i: usize| i as f64 - self.half as f64;
+        let moments = values.enumerate().fold([0.0; 3], |[a, b, c], (i, x)| {
+            let k = place(i);
+            [a + x, b + k * x, c + k * k * x]
+        });
+        let determinant = n * s4 - s2 * s2;
+        [
+            (s4 * moments[0] - s2 * moments[2]) / determinant,
+            moments[1] / s2 * self.rate_hz,
+            2.0 * (n * moments[2] - s2 * moments[0]) / determinant * self.rate_hz * self.rate_hz,
+        ]
+    }
+
+    /// Standard deviation of the second derivative for white noise of unit standard deviation, 1/s2.
+    fn acceleration_gain(&self) -> f64 {
+        let [n, s2, s4] = self.sums;
+        2.0 * (n / (n * s4 - s2 * s2)).sqrt() * self.rate_hz * self.rate_hz
+    }
+}
+
+/// Friction on the tip, with the acceleration of the tip per newton, 1/kg. `tip` and `drop` are values, m, with
+/// their first and second derivatives; `guess` is a pose nearby. `None` for links that are nearly in line.
+fn solve_friction(
+    linkage: &Linkage,
+    head: &HeadMotion,
+    guess: &Pose,
+    tip: [f64; 3],
+    drop: [f64; 3],
+) -> Option<(TipFriction, f64)> {
+    let (l1, l2) = (linkage.l1_m, linkage.l2_m);
+    let deflection_m = tip[0] - head.position_m;
+    let mut pose = *guess;
+    let solve = |d: &LinkDirections, along: f64, down: f64| {
+        let bend = d.sin_phi * d.cos_theta - d.cos_phi * d.sin_theta;
+        (bend.abs() > LEAST_BEND).then(|| {
+            [
+                (along * d.sin_phi - down * d.cos_phi) / (l1 * bend),
+                (down * d.cos_theta - along * d.sin_theta) / (l2 * bend),
+            ]
+        })
+    };
+    for _ in 0..STEPS {
+        let d = LinkDirections::from_pose(&pose);
+        let along = deflection_m - l1 * d.sin_theta - l2 * d.sin_phi;
+        let [theta, phi] = solve(&d, along, drop[0] - linkage.head_drop_m(&d))?;
+        pose = Pose { theta: pose.theta + theta, phi: pose.phi + phi, ..pose };
+    }
+    let d = LinkDirections::from_pose(&pose);
+    let [theta_rate, phi_rate] = solve(&d, tip[1] - head.velocity_m_per_s, drop[1])?;
+    let pose = Pose { theta_rate, phi_rate, ..pose };
+    let lean = linkage.shoulder.map_or(ShoulderContact::Off, |shoulder| shoulder.contact_at(pose.theta));
+    let response = linkage.friction_response(&pose, &d, head, lean);
+    let friction_n = (response.a_free - tip[2]) / response.kappa;
+    let found = TipFriction { velocity_m_per_s: tip[1], deflection_m, friction_n };
+    Some((found, response.kappa)).filter(|(found, _)| found.friction_n.is_finite())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::RunMotion;
+    use crate::simulate::mode::TipMode;
+    use crate::simulate::scene::Scene;
+
+    #[test]
+    fn a_parabola_is_fitted_exactly_and_noise_grows_as_said() {
+        let parabola = MovingParabola::new(3, 10.0);
+        let at = |i: i32| 2.0 + 0.3 * f64::from(i) / 10.0 - 4.0 * f64::from(i * i) / 100.0;
+        let [x, v, a] = parabola.fit((-3..=3).map(at));
+        assert!((x - 2.0).abs() < 1e-12 && (v - 0.3).abs() < 1e-12 && (a + 8.0).abs() < 1e-10, "{x} {v} {a}");
+        // the gain is the root of the sum of the squared responses to a unit value in one frame
+        let response = |at: usize| parabola.fit((0..7).map(|i| f64::from(u8::from(i == at))))[2];
+        let gain = (0..7).map(|at| response(at) * response(at)).sum::<f64>().sqrt();
+        assert!((parabola.acceleration_gain() / gain - 1.0).abs() < 1e-12);
+    }
+
+    /// The friction of a run comes back from the positions of tip and head alone, where the mode of contact
+    /// does not change within the parabola.
+    #[test]
+    fn the_friction_of_a_run_follows_from_its_motion() {
+        let text = include_str!("../../data/scenes/actual-blade.toml");
+        let scene = Scene::parse("s", text).unwrap();
+        let motion = RunMotion::simulate(&scene);
+        let rate_hz = 1.0 / (motion.fine[1].time_s - motion.fine[0].time_s);
+        // over 40 us, the parabola lowers an acceleration at the 900 Hz of the cycle by 0.3 %, and at twice that
+        // by 1.1 %
+        let parabola = MovingParabola::new(1, rate_hz);
+        let (mut slips, mut sticks) = (0, 0);
+        for window in motion.fine.windows(3) {
+            let middle = &window[1];
+            if window.iter().any(|s| s.mode != middle.mode) {
+                continue;
+            }
+            let tip = parabola.fit(window.iter().map(|s| s.tip_x_m));
+            let drop = parabola.fit(window.iter().map(|s| s.head_drop_m));
+            let head = scene.drive.motion_at(middle.time_s);
+            let guess = Pose { theta: middle.pose.theta + 0.01, phi: middle.pose.phi - 0.01, ..middle.pose };
+            let Some((found, _)) = solve_friction(&scene.linkage, &head, &guess, tip, drop) else { continue };
+            let off = (found.friction_n + middle.friction_n).abs();
+            assert!(off < 0.005 * 0.05, "{off} N of {} N at {} s", middle.friction_n, middle.time_s);
+            *(if middle.mode == TipMode::Stick { &mut sticks } else { &mut slips }) += 1;
+        }
+        assert!(slips > 10_000 && sticks > 2000, "{slips} {sticks}");
+    }
+}
