@@ -58,7 +58,7 @@ const FEATURED: [&str; 8] = [
     "reports/actual-blade-twin/poses.svg",
     "reports/actual-blade-twin/cycle.svg",
     "reports/actual-blade-twin/spectrogram.svg",
-    "reports/actual-blade-twin/phase-portrait.svg",
+    "reports/actual-blade-twin/stick-slip.svg",
     "reports/actual-blade-twin/friction.svg",
     "reports/actual-blade-twin/corner.svg",
     "data/sweeps/speed-preload/high-component.svg",

@@ -3,6 +3,7 @@
 
 pub mod analysis;
 pub mod animation;
+pub(crate) mod central_difference;
 pub mod corner;
 pub mod cycle;
 pub mod evidence;
@@ -11,7 +12,6 @@ pub mod friction;
 pub mod history;
 pub mod modes;
 pub mod motion;
-pub mod phase_portrait;
 pub mod poses;
 pub mod profiles;
 pub mod pulls;
@@ -20,6 +20,7 @@ pub mod residuals;
 pub mod ring_down;
 pub mod spectrogram;
 pub mod spectrum;
+pub mod stick_slip;
 pub mod sweep_map;
 pub mod sweep_sheet;
 pub mod twin;
@@ -45,6 +46,16 @@ pub struct FigureBlock {
     /// The drawing.
     #[serde(skip)]
     pub drawing: Drawing,
+}
+
+impl FigureBlock {
+    /// This figure with the first `panels` panels of another one below its own.
+    pub(crate) fn with_panels(mut self, other: Self, panels: usize) -> Self {
+        if let (Drawing::Chart(whole), Drawing::Chart(next)) = (&mut self.drawing, other.drawing) {
+            whole.panels.extend(next.panels.into_iter().take(panels));
+        }
+        self
+    }
 }
 
 /// The text of a figure.

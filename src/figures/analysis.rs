@@ -55,6 +55,7 @@ pub fn compare_spectra(measured: Option<&SpectralAnalysis>, model: Option<&Spect
         model: model.map(spectrum_curve),
         noise_floor_m,
         noise_floor: measured.and_then(|m| spectrum_level(m, &m.noise_floor_m)),
+        interval_95: measured.and_then(noise_interval),
         components: measured.map_or_else(Vec::new, components),
         model_components,
         lowest_hz: measured.or(model).map_or(1.0, |a| a.spectrum.resolution_hz),
@@ -74,8 +75,7 @@ impl AnalysedWindow<'_> {
             measured: Some(spectrum_curve(analysis)),
             noise_floor_m: Some(spectrum.noise_floor_m),
             noise_floor: spectrum_level(analysis, &analysis.noise_floor_m),
-            interval_95: spectrum_level(analysis, &analysis.noise_floor_m)
-                .map(|floor| AmplitudeInterval::from_noise_floor(&spectrum_curve(analysis), &floor)),
+            interval_95: noise_interval(analysis),
             leakage: spectrum_level(analysis, &analysis.leakage_m),
             components: spectrum.components.iter().map(|c| label_component(c, spectrum)).collect(),
             lowest_hz: spectrum.resolution_hz,
@@ -83,6 +83,12 @@ impl AnalysedWindow<'_> {
         };
         SpectraPlot { title: strongest_claim(&shown), ..shown }
     }
+}
+
+/// The 95 % interval of a spectrum by its noise floor.
+fn noise_interval(analysis: &SpectralAnalysis) -> Option<AmplitudeInterval> {
+    let floor = spectrum_level(analysis, &analysis.noise_floor_m)?;
+    Some(AmplitudeInterval::from_noise_floor(&spectrum_curve(analysis), &floor))
 }
 
 pub(super) fn spectrum_curve(analysis: &SpectralAnalysis) -> SpectrumCurve {
@@ -172,7 +178,7 @@ impl AnalysedWindow<'_> {
             ..SpectrogramPlot::default()
         };
         let segment_s = self.analysis.ridge.as_ref().map(|r| r.segment_s);
-        let settings = SpectrogramSettings { segment_s, band_hz: None };
+        let settings = SpectrogramSettings { segment_s, ..SpectrogramSettings::default() };
         let Ok(cut) = Spectrogram::new(&self.analysis.detrended_m(), grid.frame_rate_hz, &settings) else {
             return plot;
         };

@@ -13,7 +13,7 @@ use crate::compare::ConditionComparison;
 use crate::figures::{NO_TRACES, about, subtitle};
 use crate::model::Linkage;
 use crate::recording::Recording;
-use crate::recording::alignment::{Alignment, is_tracked};
+use crate::recording::alignment::Alignment;
 use crate::recording::channel::Channel;
 use crate::simulate::mode::TipMode;
 use crate::simulate::{ModelSample, RunMotion};
@@ -134,7 +134,7 @@ const MOST_SAMPLES: usize = 2500;
 pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     let shown = build_animation(case)?;
     let drawing = Drawing::Moving(render_svg(&shown));
-    Some(case.model_figure_block("animation", figure_text(&shown, case), drawing))
+    Some(case.model_figure_block("animation", figure_text(&shown), drawing))
 }
 
 fn build_animation(case: &ConditionComparison) -> Option<Animation> {
@@ -194,50 +194,24 @@ fn contact_modes(motion: &RunMotion, [from_s, to_s]: [f64; 2]) -> Vec<(f64, TipM
     first.into_iter().chain(inside.map(|t| (t.time_s, t.to))).collect()
 }
 
-/// Sentence on the tracked points that are drawn, and on how they are aligned with the model.
-fn describe_crosses(recording: &Recording, case: &ConditionComparison) -> String {
-    let traces = recording.traces();
-    let head = is_tracked(&traces.head_x_m) && is_tracked(&traces.head_y_m);
-    let points = match (is_tracked(&traces.tip_x_m), head) {
-        (true, false) => "tip",
-        (false, true) => "head",
-        _ => "tip and head",
-    };
-    let how = if case.alignment.opposite_turn {
-        "brought together at the turn of the head, which turns the other way in the model".to_owned()
-    } else {
-        format!("aligned by the path of the {}", case.alignment.followed.name())
-    };
-    format!(
-        " Crosses: {points} of {}, clock and origin {how}; the tip's height is that of the glass.",
-        case.source_name()
-    )
-}
-
-/// Caption and details, with the numbers of the hold.
-fn figure_text(shown: &Animation, case: &ConditionComparison) -> FigureText {
+/// Caption with the numbers of the hold.
+fn figure_text(shown: &Animation) -> FigureText {
     let [from_s, to_s] = shown.hold_s;
     let at = |time_s: f64| shown.samples.iter().rfind(|s| s.time_s <= time_s).or(shown.samples.first());
-    let mm = |x: f64| format_decimals(1e3 * x, 2);
-    let deflection = |s: &ModelSample| mm(s.tip_x_m - s.head_x_m);
     let held = at(from_s).zip(at(to_s)).map(|(from, to)| {
-        let (stick_ms, way) = (1e3 * (to_s - from_s), mm(to.head_x_m - from.head_x_m));
-        let stuck = format!("tip sticks for {stick_ms:.1} ms while its head moves by {way} mm");
-        (stuck, format!(" and its deflection goes from {} to {} mm.", deflection(from), deflection(to)))
+        let (stick_ms, way_m) = (1e3 * (to_s - from_s), to.head_x_m - from.head_x_m);
+        format!(
+            ": the tip sticks for {stick_ms:.1} ms while its head moves by {} mm",
+            format_decimals(1e3 * way_m, 2)
+        )
     });
-    let alone = || " The model alone: no traces are published.".to_owned();
-    let points = case.recording().map_or_else(alone, |r| describe_crosses(r, case));
-    let claim = held.as_ref().map_or_else(String::new, |(stuck, _)| format!(": the {stuck}"));
-    let caption = format!("The fitted model in motion through {}, slowed down{claim}.", shown.part_name());
-    let held = held.map_or_else(String::new, |(stuck, bends)| format!(" The model's {stuck}{bends}"));
-    let details = format!(
-        "Animation: the linkage of the fitted model through {}, its links to scale, {}; the size of the \
-         head's block is no measurement. \
-         Right: the tip enlarged, and its velocity, over the slowest part.{points}{held}",
+    let caption = format!(
+        "The fitted model in motion through {}, {}{}.",
         shown.part_name(),
         describe_pace(&shown.pace),
+        held.unwrap_or_default()
     );
-    FigureText { caption, details }
+    FigureText { caption, details: String::new() }
 }
 
 // Playback pace: parts of the motion, each with its slow-down factor.

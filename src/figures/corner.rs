@@ -7,7 +7,7 @@ use crate::figures::{Drawing, FigureBlock, about, full_figure, subtitle};
 use crate::fit::bounds::Bounds;
 use crate::fit::bounds::Prior;
 use crate::fit::job::{FreeParameter, Job};
-use crate::fit::result::FitResult;
+use crate::fit::result::{FitResult, LocalOptimum};
 use crate::text::{choose_prefix, format_digits, format_interval, join_with_and};
 use plain_charts::{ChartAxis, Colour, Figure, Mark, Panel, Ribbon, Series};
 use portable_math as math;
@@ -17,7 +17,7 @@ use portable_math as math;
 pub struct CornerParameter {
     /// Symbol in the equations.
     pub symbol: String,
-    /// The 95 % interval that the page states, with its unit, as text.
+    /// The estimate with its unit, and on a second line the 95 % interval that the page states.
     pub words: String,
     /// Estimate.
     pub estimate: f64,
@@ -31,9 +31,9 @@ pub struct CornerParameter {
     pub truth: Option<f64>,
     /// Values of the parameter, each with the ratio of its profile likelihood to the largest likelihood.
     pub profile: Vec<(f64, f64)>,
-    /// Values at which local searches ended. Listed are the ends whose cost exceeds the least cost by at most
-    /// the threshold of the 95 % interval.
-    pub optima: Vec<f64>,
+    /// Values at which local searches ended, and whether the cost there exceeds the least cost by at most the
+    /// threshold of the 95 % interval.
+    pub optima: Vec<(f64, bool)>,
 }
 
 /// Data of the figure.
@@ -67,6 +67,8 @@ const HALF: f64 = 0.5;
 const INSIDE: f64 = 0.44;
 /// Height of the likelihood curve in a diagonal cell; the distance between cell centres is 1.
 const CURVE: f64 = 0.72;
+/// Length of a tick; the distance between cell centres is 1.
+const TICK: f64 = 0.12;
 /// Each cell shows at least this number of standard deviations on either side of the estimate.
 const SHOWN_SD: f64 = 2.8;
 /// Margin on either side of the range that a cell shows, as a fraction of that range.
@@ -99,7 +101,7 @@ impl CornerPlot {
             condition: None,
             file: "corner.svg".to_owned(),
             caption: figure_caption(self),
-            details: DETAILS.to_owned(),
+            details: String::new(),
             drawing: Drawing::Chart(draw_figure(self)),
         })
     }
@@ -126,13 +128,16 @@ fn corner_parameter(
         ends.iter().map(|end| (bounds.unit_coordinate(*end) - estimate).abs()).fold(0.0, f64::max)
     });
     let (name, factor) = choose_prefix(line.map_or("", |line| line.unit.as_str()), [found.estimate]);
-    let words = format_interval(found.lower_95, found.upper_95, |v| format_digits(v * factor, 4));
-    let open = found.lower_95.or(found.upper_95).is_none();
+    let number = |v: f64| format_digits(v * factor, 4);
+    let ends = format_interval(found.lower_95, found.upper_95, number);
     let likelihood = |cost: f64| math::exp(-0.5 * (cost - result.cost).max(0.0));
-    let optima = result.waterfall.iter().filter(|o| o.cost - result.cost <= result.threshold);
+    let optimum = |end: &LocalOptimum| {
+        let value = bounds.unit_coordinate(*end.values.get(&free.name)?);
+        Some((value, end.cost - result.cost <= result.threshold))
+    };
     Some(CornerParameter {
         symbol: parameter_symbol(&free.name),
-        words: if open { words } else { format!("{words} {name}").trim_end().to_owned() },
+        words: format!("{} {name}\n{ends}", number(found.estimate)).replace(" \n", "\n"),
         estimate,
         stated: [found.lower_95, found.upper_95].map(|end| end.map(|v| bounds.unit_coordinate(v))),
         sd: half.map(|half| half / Z_95).filter(|sd| *sd > 0.0),
@@ -143,7 +148,7 @@ fn corner_parameter(
             .iter()
             .map(|(v, cost)| (bounds.unit_coordinate(*v), likelihood(*cost)))
             .collect(),
-        optima: optima.filter_map(|o| o.values.get(&free.name)).map(|v| bounds.unit_coordinate(*v)).collect(),
+        optima: result.waterfall.iter().filter_map(optimum).collect(),
     })
 }
 
@@ -190,7 +195,7 @@ pub fn draw_figure(shown: &CornerPlot) -> Figure {
             format!("{bounded} of {count} parameters have an interval with two ends")
         }
     };
-    let names = shown.parameters.iter().map(|p| format!("{}: {}", p.symbol, p.words));
+    let names = shown.parameters.iter().map(|p| format!("{} = {}", p.symbol, p.words));
     let x = ChartAxis::categorical("", shown.parameters.iter().map(|p| p.symbol.clone()));
     let y = ChartAxis::categorical("", names.rev().collect::<Vec<_>>());
     let panel = Panel {
@@ -250,11 +255,17 @@ fn draw_cells(shown: &CornerPlot) -> Vec<Series> {
         };
         all.push(Series::new(label, colour, mark, pairs().filter_map(region).flatten()));
     }
-    let optima = pairs().flat_map(|at| {
-        let (a, b) = pair(at);
-        b.optima.iter().zip(&a.optima).filter_map(move |(x, y)| point(at, *x, *y))
-    });
-    all.push(Series::new("searches within the threshold", Colour::Grey, Mark::Dots, optima));
+    for (label, mark, wanted) in [
+        ("other end of a search", Mark::Crosses, false),
+        ("end of a search within the threshold", Mark::Dots, true),
+    ] {
+        let optima = pairs().flat_map(|at| {
+            let (a, b) = pair(at);
+            let ends = b.optima.iter().zip(&a.optima).filter(move |((_, within), _)| *within == wanted);
+            ends.filter_map(move |((x, _), (y, _))| point(at, *x, *y))
+        });
+        all.push(Series::new(label, Colour::Grey, mark, optima));
+    }
     let estimates = pairs().map(|at| point(at, pair(at).1.estimate, pair(at).0.estimate));
     all.push(Series::new("estimate", Colour::Black, Mark::Circles, estimates));
     let truths = pairs().map(|at| point(at, pair(at).1.truth?, pair(at).0.truth?));
@@ -292,6 +303,18 @@ fn draw_cells(shown: &CornerPlot) -> Vec<Series> {
         };
         [end(low, -HALF), end(high, HALF), None]
     });
+    // the values of these ticks stand beside the row
+    let ticks = diagonal().flat_map(|(i, known)| {
+        let tick = |value: Option<f64>| {
+            let foot = |y: f64| upright(i, value?, y);
+            [foot(-HALF), foot(-HALF + TICK), None]
+        };
+        [known.stated[0], Some(known.estimate), known.stated[1]]
+            .into_iter()
+            .flat_map(tick)
+            .collect::<Vec<_>>()
+    });
+    all.push(Series::new("", Colour::Black, Mark::Thin, ticks));
     all.push(Series::new("95 % interval, as stated", Colour::Black, Mark::Thick, stated));
     all.retain(|series| series.points.iter().any(Option::is_some));
     all
@@ -324,11 +347,6 @@ fn out_of_bounds_ribbons(shown: &CornerPlot) -> Vec<Ribbon> {
     };
     shown.parameters.iter().enumerate().flat_map(strip).collect()
 }
-
-const DETAILS: &str = "Below the diagonal: every pair of estimates with the regions that hold 68 and 95 % by \
-    the linear model at the estimates, none where it does not determine one of the two. On the diagonal: the \
-    likelihood over its greatest value, by the linear model and, where it was made, by the profile, with the \
-    interval that the table states. Every cell is as wide as what is known; scales are those of the search.";
 
 /// Caption: contents of the figure, and its main number.
 pub(crate) fn figure_caption(shown: &CornerPlot) -> String {

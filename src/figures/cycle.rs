@@ -2,11 +2,11 @@
 //! and targets as lines.
 
 use super::spectrogram::speed_series;
-use super::{FigureBlock, FigureText};
+use super::{Drawing, FigureBlock, about};
 use crate::compare::{ConditionComparison, TrackedRidge};
 use crate::figures::full_figure;
 use crate::model::modes::body_frequencies;
-use crate::text::{format_digits, format_speed, join_with_and, truncate_text};
+use crate::text::{format_digits, format_speed, truncate_text};
 use plain_charts::{ChartAxis, Colour, Figure, Mark, MarkerShape, Panel, Ribbon, Series, TextAnnotation};
 pub use short_spectra::Target;
 pub use short_spectra::time_frequency::SpeedPoint;
@@ -20,14 +20,30 @@ pub struct CycleOverSpeed {
     pub note: String,
     /// Whether the measured motion is synthetic.
     pub synthetic: bool,
-    /// The measured cycle; empty without a recording.
-    pub measured: Vec<SpeedPoint>,
-    /// The cycle of the model.
-    pub model: Vec<SpeedPoint>,
+    /// The cycles, one entry per recording.
+    pub recordings: Vec<RecordedCycle>,
     /// Natural frequencies of the model in Hz, each with its name.
     pub natural_hz: Vec<(String, f64)>,
     /// Measured or published target frequencies.
     pub targets: Vec<Target>,
+}
+
+/// The stick-slip cycle in a recording and in its model.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct RecordedCycle {
+    /// Name of the recording; empty if there is only one.
+    pub name: String,
+    /// The measured cycle; empty without a recording.
+    pub measured: Vec<SpeedPoint>,
+    /// The cycle of the model.
+    pub model: Vec<SpeedPoint>,
+}
+
+impl RecordedCycle {
+    /// The points of the measured cycle or, if none was measured, those of the model.
+    fn points(&self) -> &[SpeedPoint] {
+        if self.measured.is_empty() { &self.model } else { &self.measured }
+    }
 }
 
 /// Height of the panel, mm.
@@ -48,7 +64,7 @@ const LABEL_OFFSET: f64 = 0.022;
 /// Draws the figure.
 #[must_use]
 pub fn draw_figure(shown: &CycleOverSpeed) -> Figure {
-    let points = || shown.measured.iter().chain(&shown.model);
+    let points = || shown.recordings.iter().flat_map(|cycle| cycle.measured.iter().chain(&cycle.model));
     let fastest = points().map(|p| p.speed_m_per_s * 1e3).fold(0.0, f64::max);
     let sought_hz = shown.targets.iter().map(|t| t.frequency_hz);
     let highest = points().map(|p| p.frequency_hz).chain(sought_hz).fold(0.0, f64::max);
@@ -114,92 +130,91 @@ fn level_names(lines: &[(String, f64, Colour)], (right, top): (f64, f64)) -> Vec
     named
 }
 
-/// The points of the cycle in model and recording; those of the recording are drawn on top.
+/// Symbols of the recordings, in turn.
+const SHAPES: [MarkerShape; 4] =
+    [MarkerShape::Disc, MarkerShape::Diamond, MarkerShape::Triangle, MarkerShape::InvertedTriangle];
+
+/// The points of the cycle in models and recordings; those of the recordings are drawn on top.
 fn cycle_series(shown: &CycleOverSpeed) -> impl Iterator<Item = Series> {
-    let model = speed_series("model", Colour::Vermilion, MarkerShape::Square, &shown.model);
-    let measured = speed_series("measured", Colour::Black, MarkerShape::Disc, &shown.measured);
-    [model, measured].into_iter().filter(|s| !s.points.is_empty())
+    let own = |cycle: &RecordedCycle, what: &str| about(&truncate_text(&cycle.name, MAX_LABEL_LETTERS), what);
+    let symbols = |of: fn(&RecordedCycle) -> &[SpeedPoint], what: &'static str, colour| {
+        let shapes = shown.recordings.iter().zip(SHAPES.into_iter().cycle());
+        shapes.map(move |(cycle, shape)| speed_series(&own(cycle, what), colour, shape, of(cycle)))
+    };
+    let model = symbols(|cycle| &cycle.model, "model", Colour::Vermilion);
+    let measured = symbols(|cycle| &cycle.measured, "measured", Colour::Black);
+    model.chain(measured).filter(|s| !s.points.is_empty()).collect::<Vec<_>>().into_iter()
 }
 
 // The cycle of a condition against the speed of the tip.
 
-/// Two neighbouring frequencies belong to different components if the ratio of the higher to the lower one
-/// exceeds this value.
-const COMPONENT_RATIO: f64 = 2.5;
 /// A cycle is called constant if its frequency range is below this fraction of its mean frequency.
 const CONSTANT_TOLERANCE: f64 = 0.03;
 /// The cycle frequency is said to rise or fall with the speed if its mean over the faster half of the points
 /// differs from its mean over the slower half by more than this fraction of the frequency range.
 const MIN_SPEED_TREND: f64 = 0.2;
 
-/// The figure of a condition; `None` if neither recording nor model shows a cycle.
-pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
-    let (measured, model) = (&case.ridges.measured, &case.ridges.model);
-    let all = [measured, model].into_iter().flatten().flat_map(|ridge| ridge.courses.iter().flatten());
-    let least_hz = cycle_threshold_hz(all.map(|p| p.frequency_hz).collect());
+/// The figure of some conditions; `None` if none of them shows a cycle. Targets and natural frequencies are
+/// those of the first one.
+pub(crate) fn figure_block(cases: &[&ConditionComparison]) -> Option<FigureBlock> {
     let over_speed = |followed: &Option<TrackedRidge>| {
-        let points = followed.iter().flat_map(|ridge| ridge.over_speed.iter().copied());
-        points.filter(|p| p.frequency_hz >= least_hz).collect::<Vec<_>>()
+        followed.as_ref().map_or_else(Vec::new, |ridge| ridge.over_speed.clone())
     };
-    let (measured, model) = (over_speed(measured), over_speed(model));
-    if measured.is_empty() && model.is_empty() {
-        return None;
-    }
+    let cycle = |case: &&ConditionComparison| RecordedCycle {
+        name: if cases.len() > 1 { case.name().to_owned() } else { String::new() },
+        measured: over_speed(&case.ridges.measured),
+        model: over_speed(&case.ridges.model),
+    };
+    let case = cases.first()?;
     let blade = body_frequencies(&case.model.scene.linkage);
     let natural_hz = [("head", blade.head_hz), ("neck", blade.neck_hz), ("lip", blade.lip_hz)];
     let shown = CycleOverSpeed {
         title: String::new(),
-        note: case.heading_note(""),
-        synthetic: case.is_synthetic(),
+        note: about(&case.figure_title(), &case.heading_note("")),
+        synthetic: cases.iter().any(|case| case.is_synthetic()),
         natural_hz: natural_hz.map(|(name, hz)| (name.to_owned(), hz)).to_vec(),
         targets: case.frequency_comparisons().map(|sought| sought.target).collect::<Vec<Target>>(),
-        measured,
-        model,
+        recordings: cases.iter().map(cycle).filter(|cycle| !cycle.points().is_empty()).collect(),
     };
-    let ridge = case.ridges.measured.as_ref().filter(|_| !shown.measured.is_empty());
-    let courses = ridge.or(case.ridges.model.as_ref())?.courses.iter().flatten();
-    let cycles = || courses.clone().map(|p| p.frequency_hz).filter(|hz| *hz >= least_hz);
-    let range_hz = (cycles().reduce(f64::min)?, cycles().reduce(f64::max)?);
-    let claim = claim_sentence(&shown, range_hz);
+    let points = claimed_points(&shown);
+    let claim = claim_sentence(&shown, &points)?;
     let shown = CycleOverSpeed { title: claim.clone(), ..shown };
-    let words = figure_text(case, &shown, &claim);
-    Some(case.figure_block("cycle", words, draw_figure(&shown)))
+    let speeds = || points.iter().map(|p| p.speed_m_per_s);
+    let (slow, fast) = (speeds().reduce(f64::min)?, speeds().reduce(f64::max)?);
+    Some(FigureBlock {
+        file: "cycle.svg".to_owned(),
+        caption: format!("{claim}, at tip speeds of {} to {}.", format_speed(slow), format_speed(fast)),
+        details: String::new(),
+        condition: None,
+        drawing: Drawing::Chart(draw_figure(&shown)),
+    })
 }
 
-/// Lowest frequency, Hz, that counts as the stick-slip cycle. A ridge may jump between the cycle and the slow
-/// swing of the head, so the frequencies are sorted and those below the highest wide gap are excluded; 0
-/// without such a gap.
-fn cycle_threshold_hz(mut all: Vec<f64>) -> f64 {
-    all.sort_by(f64::total_cmp);
-    let gap = all.windows(2).rev().find(|pair| pair[1] > COMPONENT_RATIO * pair[0]);
-    gap.map_or(0.0, |pair| pair[1])
+/// The points of the recordings that show a cycle; if none does, those of the models.
+fn claimed_points(shown: &CycleOverSpeed) -> Vec<SpeedPoint> {
+    let is_measured = shown.recordings.iter().any(|cycle| !cycle.measured.is_empty());
+    let counts = |cycle: &&RecordedCycle| !is_measured || !cycle.measured.is_empty();
+    shown.recordings.iter().filter(counts).flat_map(|cycle| cycle.points().iter().copied()).collect()
 }
 
-/// The main result, from the recording if it shows a cycle, otherwise from the model. A component below the
-/// natural frequency of the neck may be the swing of the head, so it is not called a cycle.
-fn claim_sentence(shown: &CycleOverSpeed, (low, high): (f64, f64)) -> String {
-    let neck_hz = shown.natural_hz.iter().find(|(name, _)| name == "neck").map_or(0.0, |(_, hz)| *hz);
-    let what = if high < neck_hz { "strongest component" } else { "cycle" };
-    let whose = if shown.measured.is_empty() { format!("The model's {what}") } else { format!("The {what}") };
-    let points = cycle_points(shown);
+/// The main result: the range of the frequency, and whether it rises or falls with the speed. `None` without a
+/// point.
+fn claim_sentence(shown: &CycleOverSpeed, points: &[SpeedPoint]) -> Option<String> {
+    let is_measured = shown.recordings.iter().any(|cycle| !cycle.measured.is_empty());
+    let whose = if is_measured { "The cycle" } else { "The model's cycle" };
+    let hz = || points.iter().map(|p| p.frequency_hz);
+    let (low, high) = (hz().reduce(f64::min)?, hz().reduce(f64::max)?);
     let [low_hz, high_hz] = [low, high].map(|hz| format_digits(hz, 3));
-    if high - low < CONSTANT_TOLERANCE * (high + low) / 2.0 {
-        return format!("{whose} stays between {low_hz} and {high_hz} Hz whatever the speed of the tip");
-    }
-    match frequency_rise_hz(points) / (high - low) {
-        r if r > MIN_SPEED_TREND => {
-            format!("{whose} rises from {low_hz} to {high_hz} Hz as the tip speeds up")
-        }
-        r if r < -MIN_SPEED_TREND => {
-            format!("{whose} falls from {high_hz} to {low_hz} Hz as the tip speeds up")
-        }
-        _ => format!("{whose} runs from {low_hz} to {high_hz} Hz"),
-    }
-}
-
-/// The points of the measured cycle or, if none was measured, those of the cycle of the model.
-fn cycle_points(shown: &CycleOverSpeed) -> &[SpeedPoint] {
-    if shown.measured.is_empty() { &shown.model } else { &shown.measured }
+    let rise = frequency_rise_hz(points) / (high - low);
+    Some(if high - low < CONSTANT_TOLERANCE * (high + low) / 2.0 {
+        format!("{whose} stays between {low_hz} and {high_hz} Hz whatever the speed of the tip")
+    } else if rise > MIN_SPEED_TREND {
+        format!("{whose} rises from {low_hz} to {high_hz} Hz as the tip speeds up")
+    } else if rise < -MIN_SPEED_TREND {
+        format!("{whose} falls from {high_hz} to {low_hz} Hz as the tip speeds up")
+    } else {
+        format!("{whose} runs from {low_hz} to {high_hz} Hz")
+    })
 }
 
 /// Mean frequency, Hz, of the faster half of the points minus that of the slower half.
@@ -211,30 +226,6 @@ fn frequency_rise_hz(points: &[SpeedPoint]) -> f64 {
     if slow.is_empty() { 0.0 } else { mean(fast) - mean(slow) }
 }
 
-fn figure_text(case: &ConditionComparison, shown: &CycleOverSpeed, claim: &str) -> FigureText {
-    let points = cycle_points(shown);
-    let speeds = || points.iter().map(|p| p.speed_m_per_s);
-    let span = speeds().reduce(f64::min).zip(speeds().reduce(f64::max));
-    let span = span.map_or_else(String::new, |(from, to)| {
-        format!(", at mean speeds of the tip from {} to {}", format_speed(from), format_speed(to))
-    });
-    let whose = match (shown.measured.is_empty(), case.recording()) {
-        (false, _) => format!("{} and the fitted model", case.source_kind()),
-        (true, Some(_)) => "the fitted model alone, as the recording shows no cycle".to_owned(),
-        (true, None) => case.source_kind().to_owned(),
-    };
-    let caption = format!("{claim}{span}: {whose}.");
-    let natural: Vec<String> =
-        shown.natural_hz.iter().map(|(name, hz)| format!("{name} {} Hz", format_digits(*hz, 3))).collect();
-    let details = format!(
-        "Every symbol is the strongest component of a segment after the release of the tip, where neighbouring \
-         segments agree on it, over the mean speed of the tip in that segment. Natural frequencies of the \
-         fitted blade off its shoulder, each link by itself: {}; those above the axis are left out.",
-        join_with_and(&natural)
-    );
-    FigureText { caption, details }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -243,8 +234,11 @@ mod tests {
         let point =
             |v: f64, f: f64| SpeedPoint { speed_m_per_s: v, frequency_hz: f, frequency_sd_hz: Some(2.0) };
         CycleOverSpeed {
-            measured: vec![point(0.05, 910.0), point(0.2, 700.0)],
-            model: vec![point(0.05, 905.0)],
+            recordings: vec![RecordedCycle {
+                measured: vec![point(0.05, 910.0), point(0.2, 700.0)],
+                model: vec![point(0.05, 905.0)],
+                ..RecordedCycle::default()
+            }],
             natural_hz: vec![("neck".to_owned(), 195.0), ("lip".to_owned(), 608.0), ("far".to_owned(), 5e3)],
             targets: vec![Target {
                 name: "high".to_owned(),
@@ -271,41 +265,40 @@ mod tests {
         assert_eq!((panel.x.range, panel.series.len()), (Some((0.0, 1.0)), 0));
     }
 
-    fn shown_cycles(cycles: &[(f64, f64)]) -> CycleOverSpeed {
+    fn claim(cycles: &[(f64, f64)]) -> String {
         let point =
             |(v, f): &(f64, f64)| SpeedPoint { speed_m_per_s: *v, frequency_hz: *f, frequency_sd_hz: None };
-        CycleOverSpeed { measured: cycles.iter().map(point).collect(), ..CycleOverSpeed::default() }
-    }
-
-    #[test]
-    fn a_slow_swing_is_no_cycle() {
-        assert_eq!(cycle_threshold_hz(vec![700.0, 64.0, 75.0, 910.0]), 700.0);
-        assert_eq!(cycle_threshold_hz(vec![700.0, 359.0, 910.0]), 0.0);
-        assert_eq!(cycle_threshold_hz(Vec::new()), 0.0);
+        let measured = cycles.iter().map(point).collect();
+        let recordings = vec![RecordedCycle { measured, ..RecordedCycle::default() }];
+        let shown = CycleOverSpeed { recordings, ..CycleOverSpeed::default() };
+        claim_sentence(&shown, &claimed_points(&shown)).unwrap()
     }
 
     #[test]
     fn the_claim_says_which_way_the_cycle_goes() {
-        let falls = shown_cycles(&[(0.2, 693.0), (0.05, 913.0), (0.1, 800.0)]);
         assert_eq!(
-            claim_sentence(&falls, (693.0, 913.0)),
+            claim(&[(0.2, 693.0), (0.05, 913.0), (0.1, 800.0)]),
             "The cycle falls from 913 to 693 Hz as the tip speeds up"
         );
-        let rises = shown_cycles(&[(0.1, 359.0), (0.3, 692.0)]);
-        assert!(claim_sentence(&rises, (359.0, 692.0)).contains("rises from 359 to 692 Hz"));
-        assert!(
-            claim_sentence(&shown_cycles(&[(0.1, 900.0), (0.3, 905.0)]), (900.0, 905.0))
-                .contains("stays between")
-        );
-        assert!(
-            claim_sentence(&shown_cycles(&[(0.1, 700.0)]), (600.0, 800.0))
-                .contains("runs from 600 to 800 Hz")
-        );
-        let natural_hz = vec![("head".to_owned(), 20.0), ("neck".to_owned(), 195.0)];
-        let swing = CycleOverSpeed { natural_hz, ..shown_cycles(&[(0.1, 77.0)]) };
-        assert!(
-            claim_sentence(&swing, (46.0, 79.0))
-                .starts_with("The strongest component runs from 46.0 to 79.0 Hz")
+        assert!(claim(&[(0.1, 359.0), (0.3, 692.0)]).contains("rises from 359 to 692 Hz"));
+        assert!(claim(&[(0.1, 900.0), (0.3, 905.0)]).contains("stays between 900 and 905 Hz"));
+        assert!(claim(&[(0.1, 600.0), (0.2, 800.0), (0.3, 640.0), (0.4, 760.0)]).contains("runs from 600"));
+        assert_eq!(claim_sentence(&CycleOverSpeed::default(), &[]), None);
+    }
+
+    #[test]
+    fn several_recordings_share_one_panel() {
+        let cycle = |name: &str| RecordedCycle {
+            name: name.to_owned(),
+            measured: vec![SpeedPoint { speed_m_per_s: 0.1, frequency_hz: 800.0, frequency_sd_hz: None }],
+            ..RecordedCycle::default()
+        };
+        let recordings = vec![cycle("dry"), cycle("wet")];
+        let drawn = draw_figure(&CycleOverSpeed { recordings, ..CycleOverSpeed::default() });
+        let labels: Vec<&str> = drawn.panels[0].series.iter().map(|s| s.label.as_str()).collect();
+        assert_eq!(
+            (drawn.panels.len(), labels),
+            (1, vec!["dry; measured \u{b1} 2 sd", "wet; measured \u{b1} 2 sd"])
         );
     }
 }

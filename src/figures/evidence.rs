@@ -9,7 +9,7 @@ use crate::figures::full_figure;
 use crate::recording::channel::{Channel, InstantKind};
 use crate::recording::motion_traces::MotionTraces;
 use crate::simulate::ModelSample;
-use crate::text::{capitalise, format_decimals, format_digits, format_length, format_trimmed};
+use crate::text::{capitalise, format_digits, format_length, format_trimmed};
 use plain_charts::{ChartAxis, Colour, Figure, Mark, Panel, Ribbon, SampledSeries, Series, ShadedSpan};
 
 /// Times, s, and values; `None` interrupts the curve.
@@ -168,6 +168,7 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     let measured = case.measured_motion.as_ref()?;
     let restarted = case.restarted.as_ref().map(|restarted| measured.subtract(restarted));
     let single = MotionTraces::from_model(&case.model.view.recording, &case.alignment);
+    let frame_s = 1.0 / case.measured_or_model().recording.grid().frame_rate_hz;
     let whole_s = (*residual.time_s.first()?, *residual.time_s.last()?);
     let drift = case.drift_cycles().map(|cycles| format!(", {}", describe_drift(cycles)));
     let part = |name: String, span_s: (f64, f64)| {
@@ -187,7 +188,7 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
             model: fine.unwrap_or_else(|| channel_between(model, channel, span_s)),
             residual: left.map(|p| p.map(|(t, x)| (t, x / noise_m))).collect(),
             rms,
-            sticks: history::stick_spans(&case.sticks_on_clock(), span_s),
+            sticks: history::stick_spans(&case.sticks_on_clock(), span_s, frame_s),
             remark: drift.clone().filter(|_| restarted.is_some() && is_single).unwrap_or_default(),
         })
     };
@@ -210,7 +211,7 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
         quantity: channel.label(),
         parts,
     };
-    Some(case.figure_block("evidence", figure_text(case, &shown, channel, noise_m), draw_figure(&shown)))
+    Some(case.figure_block("evidence", figure_text(&shown), draw_figure(&shown)))
 }
 
 /// Start and end, s, of the part of length [`LATE_S`] within a time interval whose residual has the largest
@@ -283,60 +284,20 @@ fn figure_title(case: &ConditionComparison, channel: Channel, rms: f64, noise_m:
     format!("{model} misses the {label} by {left}, {} times the noise", format_digits(rms, 2))
 }
 
-fn figure_text(
-    case: &ConditionComparison,
-    shown: &EvidencePlot,
-    channel: Channel,
-    noise_m: f64,
-) -> FigureText {
-    let [whole, parts @ ..] = shown.parts.as_slice() else { return FigureText::default() };
-    let restarted = restart_clause(case);
-    let enlarged = parts.iter().filter(|part| part.name != SINGLE_RUN);
-    let rms = |part: &EvidencePart| {
-        let at = match part.name.as_str() {
-            "worst later" => "where it fits worst later",
-            "worst part" => "where it fits worst",
-            _ => "at the release of the tip",
-        };
-        format!("{} {at}", format_digits(part.rms, 2))
+/// Caption: the claim, with the parts in units of the noise and the drift of the single run.
+fn figure_text(shown: &EvidencePlot) -> FigureText {
+    let ratio = |part: &EvidencePart| {
+        let digits = format_digits(part.rms, 2);
+        match part.name.as_str() {
+            SINGLE_RUN => format!("{digits} in one run{}", part.remark),
+            "worst later" | "worst part" => format!("{digits} where it fits worst"),
+            "release" => format!("{digits} at the release of the tip"),
+            _ => format!("{digits} over the recording"),
+        }
     };
-    let enlarged: Vec<String> = enlarged.map(rms).collect();
-    let enlarged = if enlarged.is_empty() { String::new() } else { format!(": {}", enlarged.join(", ")) };
-    let caption = format!(
-        "The {} of {} and of {} lie {} apart (root mean square), {} times the noise{enlarged}.",
-        channel.label(),
-        case.source_kind(),
-        match &restarted {
-            Some(how) => format!("the fitted model, {how},"),
-            None => "one run of the fitted model".to_owned(),
-        },
-        format_length(whole.rms * noise_m),
-        format_digits(whole.rms, 2),
-    );
-    let span = |part: &EvidencePart| {
-        let (from_s, to_s) = part.span_s;
-        format!("{} from {} to {} s", part.name, format_decimals(from_s, 4), format_decimals(to_s, 4))
-    };
-    let spans: Vec<String> = shown.parts.iter().map(span).collect();
-    let details = format!(
-        "Shown: {}. The noise of the {} is {}, measured on the recording where nothing but noise moves it \
-         from frame to frame; the shaded strip holds 95 % of such noise. {}",
-        spans.join("; "),
-        channel.label(),
-        format_length(noise_m),
-        match &restarted {
-            Some(how) => format!(
-                "The model is seen through the fitted camera, {how} as in the fit; every dot is a frame. One run \
-                 from the start has its own panel: its phase may drift, because small errors of its frequency \
-                 add up."
-            ),
-            None =>
-                "The model runs once from its start state through the same camera, so that small errors of \
-                     its frequency add up; enlarged, its line is its own motion, and every dot is a frame."
-                    .to_owned(),
-        },
-    );
-    FigureText { caption, details }
+    let parts: Vec<String> = shown.parts.iter().map(ratio).collect();
+    let caption = format!("{}: residual over noise {}.", shown.title, parts.join(", "));
+    FigureText { caption, details: String::new() }
 }
 
 /// Clause on the segments of a fit to traces, at whose starts the model restarts; `None` for other fits.

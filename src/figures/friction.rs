@@ -8,7 +8,7 @@ use crate::figures::full_figure;
 use crate::model::friction::FrictionLaw;
 use crate::simulate::ModelSample;
 use crate::simulate::mode::TipMode;
-use crate::text::{format_digits, format_percent, format_speed, join_with_and};
+use crate::text::{format_digits, format_speed, join_with_and, pluralise};
 use plain_charts::{ChartAxis, Colour, Figure, Mark, MarkerShape, Panel, Ribbon, Series, VerticalLine};
 use serde::Serialize;
 
@@ -183,7 +183,7 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
         shares: slip_time_shares(&slips, top),
         head: Some(mean_head_speed(case)),
     };
-    let words = figure_text(case, &law, &slips, half.as_deref(), &measured);
+    let words = figure_text(case, &law, fastest.0, half.as_deref(), &measured);
     Some(case.figure_block("friction", words, draw_figure(&shown)))
 }
 
@@ -242,42 +242,23 @@ fn mean_head_speed(case: &ConditionComparison) -> f64 {
     samples.iter().map(speed).sum::<f64>() / samples.len().max(1) as f64
 }
 
+/// Caption: the claim, how far measured points lie from the law, and the uncertainty of the law.
 fn figure_text(
     case: &ConditionComparison,
     law: &FrictionLaw,
-    slips: &[(f64, f64)],
+    fastest: f64,
     half: Option<&(dyn Fn(f64) -> f64 + '_)>,
     measured: &MeasuredFriction,
 ) -> FigureText {
-    let fastest = slips.last().map_or(0.0, |s| s.0);
-    let (median, head) = (slips.get(slips.len() / 2).map_or(0.0, |s| s.0), mean_head_speed(case));
-    let slower = slips.partition_point(|s| s.0 < head) as f64 / slips.len().max(1) as f64;
-    let mut said = vec![format!(
-        "Friction law of the model at the estimates, \u{b5} = A exp(\u{2212}B|v|) + C with A = {}, B = {} \
-         s/m, C = {}: from {} at rest to {} at {}, the greatest \
-         speed of the tip.",
-        format_digits(law.a, 3),
-        format_digits(law.b_s_per_m, 3),
-        format_digits(law.c, 3),
-        format_digits(law.static_coefficient(), 3),
-        format_digits(law.dynamic_coefficient(fastest), 3),
-        format_speed(fastest),
-    )];
-    said.extend(describe_points(case, law, measured));
-    said.push(format!(
-        "Below: the time of slip at each speed; half of it is slower than {}, {} of it slower than the head \
-         on average ({}).",
-        format_speed(median),
-        format_percent(slower),
-        format_speed(head)
-    ));
-    said.push(describe_uncertainty(case, median, half));
     let even = largest_deviation(law, &measured.steady_sliding).map_or_else(String::new, |(count, off)| {
-        let off = format_digits(off, 2);
-        format!("; {count} points measured where the tip slides evenly lie within {off} of it")
+        let points = pluralise("point", count);
+        format!(
+            "; {count} {points} measured where the tip slides evenly lie within {} of it",
+            format_digits(off, 2)
+        )
     });
     let caption = format!("{} in the law of the fitted model{even}.", claim_sentence(law, fastest));
-    FigureText { caption, details: said.join(" ") + &case.sharing_note() }
+    FigureText { caption, details: describe_uncertainty(case, half).unwrap_or_default() }
 }
 
 /// Number of points and their largest deviation from the law; `None` without points.
@@ -286,70 +267,24 @@ fn largest_deviation(law: &FrictionLaw, points: &[FrictionPoint]) -> Option<(usi
     points.iter().map(off).reduce(f64::max).map(|most| (points.len(), most))
 }
 
-/// Sentences on the measured points and on their deviation from the law.
-fn describe_points(
-    case: &ConditionComparison,
-    law: &FrictionLaw,
-    measured: &MeasuredFriction,
-) -> Option<String> {
-    case.recording()?;
-    let even = largest_deviation(law, &measured.steady_sliding).map_or_else(
-        || "The recorded tip nowhere slides evenly.".to_owned(),
-        |(count, off)| {
-            format!(
-                "Full circles ({count}): where the recorded tip slides evenly its deflection gives the friction, as \
-                 the blade is in equilibrium there; stiffnesses and preload are the model's. The farthest is {} off \
-                 the law.",
-                format_digits(off, 2)
-            )
-        },
-    );
-    let cycles = if measured.over_cycles.is_empty() {
-        ""
-    } else {
-        " Hollow circles: means over cycles of stick and slip, which lie off the law as sticking counts in them; \
-         crosses are the model's, read in the same way."
-    };
-    Some(format!("{even}{cycles}"))
-}
-
-/// Sentence on the uncertainty of the law.
+/// Sentence on the uncertainty of the law at rest; `None` if no coefficient was fitted.
 fn describe_uncertainty(
     case: &ConditionComparison,
-    at: f64,
     half: Option<&(dyn Fn(f64) -> f64 + '_)>,
-) -> String {
-    let (free, held): (Vec<_>, Vec<_>) = COEFFICIENTS.iter().partition(|c| is_fitted(case.job, c));
-    let symbols =
-        |of: &[&LawCoefficient]| join_with_and(&of.iter().map(|c| c.symbol.to_owned()).collect::<Vec<_>>());
-    let taken = match held.len() {
-        0 => String::new(),
-        1 => format!(" {} is taken as known.", symbols(&held)),
-        _ => format!(" {} are taken as known.", symbols(&held)),
-    };
-    match half {
-        _ if free.is_empty() => "A, B and C were not fitted.".to_owned(),
-        Some(half) => format!(
-            "Shaded: 95 %, propagated from the intervals of {}{}, \u{b1}{} at rest and \u{b1}{} at {}.{taken}",
-            symbols(&free),
-            if free.len() > 1 { " with their correlations" } else { "" },
-            format_digits(half(0.0), 2),
-            format_digits(half(at), 2),
-            format_speed(at)
-        ),
-        None => {
-            let is_open =
-                |c: &LawCoefficient| case.result.parameters.get(c.name).is_none_or(|p| !p.has_interval());
-            let open: Vec<_> = free.iter().copied().filter(|c| is_open(c)).collect();
-            // the linear model may determine each of the coefficients but not their correlation
-            let which = if open.is_empty() { symbols(&free) } else { symbols(&open) };
-            let separately = if open.is_empty() { "" } else { " separately" };
-            format!(
-                "The data do not fix {which}{separately}, so the law has no interval here: other values meet \
-                 the same targets.{taken}"
-            )
-        }
+) -> Option<String> {
+    let free: Vec<&LawCoefficient> = COEFFICIENTS.iter().filter(|c| is_fitted(case.job, c)).collect();
+    if free.is_empty() {
+        return None;
     }
+    if let Some(half) = half {
+        return Some(format!("At rest the law is known to \u{b1}{} (95 %).", format_digits(half(0.0), 2)));
+    }
+    let is_open = |c: &LawCoefficient| case.result.parameters.get(c.name).is_none_or(|p| !p.has_interval());
+    let open: Vec<&LawCoefficient> = free.iter().copied().filter(|c| is_open(c)).collect();
+    // the linear model may determine each of the coefficients but not their correlation
+    let which = if open.is_empty() { &free } else { &open };
+    let symbols = join_with_and(&which.iter().map(|c| c.symbol.to_owned()).collect::<Vec<_>>());
+    Some(format!("The data do not fix {symbols}, so the law has no interval."))
 }
 
 #[cfg(test)]

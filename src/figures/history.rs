@@ -14,8 +14,6 @@ use portable_math as math;
 pub struct TimeHistory {
     /// Heading: the main result with its number.
     pub title: String,
-    /// Heading of the enlarged figure.
-    pub enlarged_title: String,
     /// Whether the measured motion is synthetic.
     pub synthetic: bool,
     /// Measured motion; `None` if only published numbers are known.
@@ -26,19 +24,17 @@ pub struct TimeHistory {
     pub residual: Option<MotionTraces>,
     /// Intervals in which the model's tip sticks, s.
     pub stick_s: Vec<(f64, f64)>,
+    /// Time between two frames, s.
+    pub frame_s: f64,
     /// Named instants, s.
     pub instants: Vec<(String, f64)>,
     /// Named windows: name, start, s, and end, s, in order of time.
     pub windows: Vec<(String, f64, f64)>,
-    /// Time interval of the enlarged figure, s.
-    pub zoom_s: Option<(f64, f64)>,
 }
 
 /// Height, mm, of a panel of the whole motion; four quantities with their residuals and a few windows fit on
 /// a page.
 const HEIGHT_MM: f64 = 24.0;
-/// Height, mm, of a panel of the enlarged part.
-const ENLARGED_HEIGHT_MM: f64 = 32.0;
 /// Height, mm, of a panel with a residual.
 const RESIDUAL_HEIGHT_MM: f64 = 13.0;
 /// Height, mm, of the row of one window in the panel of windows.
@@ -49,31 +45,11 @@ const LEAST_ROWS_MM: f64 = 12.0;
 /// m.
 const MICROMETRES_BELOW_M: f64 = 2e-4;
 
-/// Channels of the enlarged figure. The position of the head is omitted, since it is only a parabola there.
-const ENLARGED: [Channel; 3] = [Channel::TipX, Channel::Deflection, Channel::HeadDrop];
-
 /// Draws the whole motion.
 #[must_use]
 pub fn draw_figure(history: &TimeHistory) -> Figure {
-    let mut panels = stack_panels(history, &MOTION_CHANNELS, motion_span_s(history), HEIGHT_MM);
-    if let Some((from, to)) = history.zoom_s.filter(|(from, to)| from < to) {
-        // drawn as an outline: in grey, a third shade could not be told from the two shades of the sticks
-        let marked = ShadedSpan::outline("enlarged", Colour::Black, from, to);
-        panels.iter_mut().for_each(|panel| panel.shaded_spans.push(marked.clone()));
-    }
+    let mut panels = stack_panels(history, motion_span_s(history));
     panels.extend(draw_window_panel(history));
-    compose_figure(history, panels, "around the reversal of the head")
-}
-
-/// Draws the enlarged part; `None` without one.
-pub(crate) fn draw_enlarged(history: &TimeHistory) -> Option<Figure> {
-    let zoom_s = history.zoom_s.filter(|(from, to)| from < to)?;
-    let panels = stack_panels(history, &ENLARGED, zoom_s, ENLARGED_HEIGHT_MM);
-    let figure = compose_figure(history, panels, "around the release of the tip");
-    Some(Figure { title: history.enlarged_title.clone(), ..figure })
-}
-
-fn compose_figure(history: &TimeHistory, panels: Vec<Panel>, part: &str) -> Figure {
     let source = match (&history.measured, &history.model) {
         (Some(_), Some(_)) => "",
         (None, Some(_)) => NO_TRACES,
@@ -84,7 +60,7 @@ fn compose_figure(history: &TimeHistory, panels: Vec<Panel>, part: &str) -> Figu
         &history.title,
         history.synthetic,
         source,
-        format!("Time histories of tip, head, deflection and head drop {part}."),
+        "Time histories of tip, head, deflection and head drop.",
         panels,
     )
 }
@@ -99,18 +75,12 @@ fn motion_span_s(history: &TimeHistory) -> (f64, f64) {
 }
 
 /// One panel per quantity, each with its residual below.
-fn stack_panels(
-    history: &TimeHistory,
-    channels: &[Channel],
-    shown_s: (f64, f64),
-    height_mm: f64,
-) -> Vec<Panel> {
-    let first = channels.first();
-    let pair = |channel: &Channel| {
-        let upper = draw_channel_panel(history, *channel, shown_s, height_mm, first == Some(channel));
-        std::iter::once(upper).chain(draw_residual_panel(history, *channel, shown_s))
+fn stack_panels(history: &TimeHistory, shown_s: (f64, f64)) -> Vec<Panel> {
+    let pair = |channel: Channel| {
+        let upper = draw_channel_panel(history, channel, shown_s, channel == MOTION_CHANNELS[0]);
+        std::iter::once(upper).chain(draw_residual_panel(history, channel, shown_s))
     };
-    channels.iter().flat_map(pair).collect()
+    MOTION_CHANNELS.into_iter().flat_map(pair).collect()
 }
 
 /// The values within a time interval, thinned to what a figure can show.
@@ -125,13 +95,7 @@ fn scale_points(points: Vec<Option<(f64, f64)>>, factor: f64) -> Vec<Option<(f64
     points.into_iter().map(|p| p.map(|(t, x)| (t, x * factor))).collect()
 }
 
-fn draw_channel_panel(
-    history: &TimeHistory,
-    channel: Channel,
-    shown_s: (f64, f64),
-    height_mm: f64,
-    labelled: bool,
-) -> Panel {
+fn draw_channel_panel(history: &TimeHistory, channel: Channel, shown_s: (f64, f64), labelled: bool) -> Panel {
     let lines =
         [&history.model, &history.measured].map(|m| m.as_ref().map(|m| points_within(m, channel, shown_s)));
     let (unit, factor) = length_unit(lines.iter().flatten().flatten().flatten().map(|(_, x)| *x));
@@ -146,9 +110,9 @@ fn draw_channel_panel(
     let x = ChartAxis::time().with_ends(Some(shown_s));
     let y = ChartAxis::linear(format!("{}, {unit}", channel.label()));
     Panel {
-        shaded_spans: stick_spans(&history.stick_s, shown_s),
+        shaded_spans: stick_spans(&history.stick_s, shown_s, history.frame_s),
         vertical_lines: history.instants.iter().map(rule).collect(),
-        ..Panel::new(x, y, height_mm, series)
+        ..Panel::new(x, y, HEIGHT_MM, series)
     }
 }
 
@@ -208,20 +172,27 @@ const MIN_STICK_GAP: f64 = 0.005;
 const STICKS_LABEL: &str = "tip sticks (model)";
 const CYCLES_LABEL: &str = "stick-slip cycles (model)";
 
-/// Shaded spans: one for each long stick, and one for each group of short sticks that are too close together
-/// to be told apart.
-pub(crate) fn stick_spans(stick_s: &[(f64, f64)], (from, to): (f64, f64)) -> Vec<ShadedSpan> {
+/// Minimum number of frames of a stick that has a span of its own: a camera does not show a shorter one.
+const MIN_STICK_FRAMES: f64 = 5.0;
+
+/// Shaded spans of the intervals of stick that lie between two instants, s: one for each stick of at least
+/// [`MIN_STICK_FRAMES`] frames that is long enough to be seen, and one for each group of shorter sticks, which
+/// shows that the tip sticks and slips. `frame_s` is the time between two frames, s; 0 for a motion without
+/// camera.
+pub(crate) fn stick_spans(stick_s: &[(f64, f64)], (from, to): (f64, f64), frame_s: f64) -> Vec<ShadedSpan> {
     let shown: Vec<(f64, f64)> =
         stick_s.iter().filter(|s| s.1 > from && s.0 < to).map(|s| (s.0.max(from), s.1.min(to))).collect();
-    let apart = MIN_STICK_GAP * (to - from);
-    let long = |s: &(f64, f64)| s.1 - s.0 > apart;
-    // a stick that is long enough to be seen has a span of its own
-    let groups = shown.chunk_by(|a, b| b.0 - a.1 < apart && !long(a) && !long(b));
+    let (seen_s, apart_s) = (MIN_STICK_GAP * (to - from), MIN_STICK_FRAMES * frame_s);
+    let is_long = |s: &(f64, f64)| s.1 - s.0 > seen_s.max(apart_s);
+    // the slips between the sticks of a cycle are a few times as long as the sticks
+    let gap_s = seen_s.max(2.0 * apart_s);
+    let groups = shown.chunk_by(|a, b| b.0 - a.1 < gap_s && !is_long(a) && !is_long(b));
     let band = |group: &[(f64, f64)]| {
         let (first, last) = (group.first()?, group.last()?);
+        let is_stick = group.len() == 1 && first.1 - first.0 >= apart_s;
         // black is darker than orange in a grey print too
         let (label, colour) =
-            if group.len() > 1 { (CYCLES_LABEL, Colour::Orange) } else { (STICKS_LABEL, Colour::Black) };
+            if is_stick { (STICKS_LABEL, Colour::Black) } else { (CYCLES_LABEL, Colour::Orange) };
         Some(ShadedSpan::new(label, colour, first.0, last.1))
     };
     groups.filter_map(band).collect()
@@ -264,21 +235,15 @@ pub(crate) fn thin_points(points: &[Option<(f64, f64)>], (from, to): (f64, f64))
 /// Motions with at most this many frames are not thinned.
 const MAX_FULL_FRAMES: usize = 20_000;
 
-/// The frames of a long motion that its figures show: all frames of the enlarged part and, in each of
-/// [`THINNING_PARTS`] parts of the whole interval, the frames in which a column has its lowest or highest
-/// value. Three unthinned motions of a million frames would need more memory than the rest of a report.
-pub(super) fn thin_frames(
-    motion: MotionTraces,
-    (from, to): (f64, f64),
-    enlarged_s: Option<(f64, f64)>,
-) -> MotionTraces {
+/// The frames of a long motion that its figure shows: in each of [`THINNING_PARTS`] parts of the whole
+/// interval, the frames in which a column has its lowest or highest value. Three unthinned motions of a
+/// million frames would need more memory than the rest of a report.
+pub(super) fn thin_frames(motion: MotionTraces, (from, to): (f64, f64)) -> MotionTraces {
     let times = &motion.time_s;
     let Some(last) = times.len().checked_sub(1).filter(|_| times.len() > MAX_FULL_FRAMES && from < to) else {
         return motion;
     };
-    let inside = |t: f64| enlarged_s.is_some_and(|(from, to)| t >= from && t <= to);
-    let mut kept: Vec<bool> =
-        times.iter().enumerate().map(|(i, t)| i == 0 || i == last || inside(*t)).collect();
+    let mut kept: Vec<bool> = (0..=last).map(|i| i == 0 || i == last).collect();
     let part = |i: &usize| ((times[*i] - from) / (to - from) * THINNING_PARTS as f64).floor();
     for channel in MOTION_CHANNELS {
         let column = motion.column(channel);
@@ -336,7 +301,7 @@ mod tests {
     }
 
     fn history() -> TimeHistory {
-        TimeHistory { measured: Some(motion(0.01, 500)), zoom_s: Some((0.1, 0.2)), ..TimeHistory::default() }
+        TimeHistory { measured: Some(motion(0.01, 500)), ..TimeHistory::default() }
     }
 
     #[test]
@@ -354,23 +319,12 @@ mod tests {
     }
 
     #[test]
-    fn the_enlarged_part_has_its_own_figure_with_three_quantities() {
-        let part = draw_enlarged(&history()).unwrap();
-        assert_eq!(
-            part.panels.iter().map(|p| p.y.label.as_str()).collect::<Vec<_>>(),
-            ["tip x, mm", "deflection, mm", "head drop, \u{b5}m"]
-        );
-        assert_eq!(part.panels[0].x.range, Some((0.1, 0.2)));
-        assert_eq!(draw_enlarged(&TimeHistory { zoom_s: None, ..history() }), None);
-    }
-
-    #[test]
     fn every_quantity_stands_over_its_residual() {
         let shown = TimeHistory { residual: Some(motion(1e-5, 500)), ..history() };
         let labels: Vec<String> = draw_figure(&shown).panels.into_iter().map(|p| p.y.label).collect();
         assert_eq!(labels[..4], ["tip x, mm", "\u{394}, \u{b5}m", "head x, mm", "\u{394}, \u{b5}m"]);
         assert_eq!(draw_figure(&shown).panels[1].y.range, Some((-24.0, 24.0)));
-        assert_eq!((labels.len(), draw_enlarged(&shown).unwrap().panels.len()), (8, 6));
+        assert_eq!(labels.len(), 8);
     }
 
     #[test]
@@ -407,14 +361,11 @@ mod tests {
             stick_s,
             instants,
             windows,
-            zoom_s: Some((0.1, 0.12)),
             ..TimeHistory::default()
         };
         for medium in [Medium::Screen, Medium::Column, Medium::Page] {
-            for drawn in [draw_figure(&shown), draw_enlarged(&shown).unwrap()] {
-                let bytes = drawn.to_svg(medium).len();
-                assert!(bytes < 200_000, "{medium:?}: {bytes} bytes");
-            }
+            let bytes = draw_figure(&shown).to_svg(medium).len();
+            assert!(bytes < 200_000, "{medium:?}: {bytes} bytes");
         }
         let height_mm: f64 = draw_figure(&shown).panels.iter().map(|p| p.height_mm).sum();
         assert!(height_mm < 200.0, "{height_mm} mm and the gaps between them do not fit a page");
@@ -426,7 +377,7 @@ mod tests {
         stick_s.extend((0..100).map(|i| (f64::from(500 + i) / 1000.0, f64::from(5004 + 10 * i) / 10_000.0)));
         stick_s.push((2.0, 3.0));
         let found: Vec<_> =
-            stick_spans(&stick_s, (0.0, 1.0)).into_iter().map(|b| (b.label, b.from, b.to)).collect();
+            stick_spans(&stick_s, (0.0, 1.0), 0.0).into_iter().map(|b| (b.label, b.from, b.to)).collect();
         let sticks = |from, to| (STICKS_LABEL.to_owned(), from, to);
         assert_eq!(found, [sticks(0.1, 0.3), sticks(0.301, 0.302), (CYCLES_LABEL.to_owned(), 0.5, 0.5994)]);
     }
@@ -459,8 +410,8 @@ mod tests {
             deflection_m: column(3.0),
             head_drop_m: column(4.0),
         };
-        let (span, part) = ((10.0, 90_000.0), (40_000.0, 40_500.0));
-        let light = thin_frames(whole.clone(), span, Some(part));
+        let span = (10.0, 90_000.0);
+        let light = thin_frames(whole.clone(), span);
         assert!(
             light.time_s.len() < 6000 && light.time_s.last() == whole.time_s.last(),
             "{}",
@@ -476,7 +427,6 @@ mod tests {
                 thin_points(&inside.map(|(t, x)| x.map(|x| (*t, x))).collect::<Vec<_>>(), (from, to))
             };
             assert_eq!(drawn(&light, span), drawn(&whole, span), "{channel}");
-            assert_eq!(drawn(&light, part), drawn(&whole, part), "{channel}");
         }
     }
 

@@ -63,7 +63,7 @@ fn draw_force_panel(motion: &RunMotion, history: &TimeHistory) -> Option<Panel> 
     let (x, y) = (ChartAxis::time().with_ends(Some(span_s)), ChartAxis::linear("normal force, N"));
     let series = Series::new("model", Colour::Vermilion, Mark::Line, thin_points(&points, span_s));
     (most > 0.0 && span_s.0 < span_s.1).then(|| Panel {
-        shaded_spans: history::stick_spans(&history.stick_s, span_s),
+        shaded_spans: history::stick_spans(&history.stick_s, span_s, history.frame_s),
         vertical_lines: flights.map(rule).collect(),
         ..Panel::new(x, y.with_range(0.0, 1.05 * most), FORCE_MM, [series])
     })

@@ -8,7 +8,7 @@ use crate::recording::channel::InstantKind;
 use crate::simulate::mode::TipMode;
 use crate::simulate::{ModelSample, RunMotion};
 use crate::text;
-use crate::text::{format_decimals, format_milliseconds, format_short, join_with_and};
+use crate::text::{format_decimals, format_short, join_with_and};
 use plain_charts::{
     ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, MarkerShape, Panel, Series, TextAnnotation,
 };
@@ -175,7 +175,7 @@ pub(crate) fn figure_caption(shown: &PoseSequence) -> String {
         format!("{joint} neck leans over from {}\u{b0} to {}\u{b0}", lean(before), lean(after))
     });
     format!(
-        "The blade of the fitted model through the reversal, drawn to scale{}{}.",
+        "The blade through the reversal, to scale{}{}.",
         rests.unwrap_or_default(),
         leans.unwrap_or_default()
     )
@@ -191,30 +191,21 @@ fn describe_rest(shown: &PoseSequence) -> Option<(String, String)> {
     Some((format!("{} ms", format_short(1e3 * (to - from))), way))
 }
 
-/// Details under the caption.
+/// Sentences on the arrows, and on drawings with the tip off the glass.
 pub(crate) fn figure_details(shown: &PoseSequence) -> String {
     let longest = ArrowScale::from_poses(&shown.poses);
-    let mut sentences = vec![format!(
-        "The fitted model on the glass, to scale, with the head in the middle of every drawing; times are \
-         counted from the turn of the head. Arrows: velocity \
-         of the head, the longest {} m/s, and friction on the tip, ending where it acts, the longest {} N; \
-         short ones are left out.",
+    let arrows = format!(
+        "Arrows: velocity of the head, up to {} m/s, and friction on the tip, up to {} N.",
         format_short(longest.speed_m_per_s),
         format_short(longest.force_n)
-    )];
-    sentences.extend(shown.released_after_s.map(|release_s| {
-        format!(
-            "The release of the fit, {} after the turn, is when the tip has left its place by more than the \
-             noise: a little after its stick ends.",
-            format_milliseconds(release_s)
-        )
-    }));
+    );
     let flights = shown.poses.iter().filter(|p| p.sample.tip_height_m > 0.0);
     let flights: Vec<String> = flights.map(|p| format!("\u{201c}{}\u{201d}", p.name)).collect();
-    if !flights.is_empty() {
-        sentences.push(format!("The tip is off the glass in {}.", join_with_and(&flights)));
+    if flights.is_empty() {
+        arrows
+    } else {
+        format!("{arrows} The tip is off the glass in {}.", join_with_and(&flights))
     }
-    sentences.join(" ")
 }
 
 // One drawing per pose: head, links, glass and arrows.

@@ -72,10 +72,7 @@ impl PullPlot {
             condition: None,
             file: "pulls.svg".to_owned(),
             caption: figure_caption(self),
-            details: "A feature of a right model lies within 1.96 deviations in 95 % of all cases. The \
-                      deviation is that of the target alone; the scatter of the model, which counts in the \
-                      fit too, is in the table."
-                .to_owned(),
+            details: String::new(),
             drawing: Drawing::Chart(draw_figure(self)),
         })
     }

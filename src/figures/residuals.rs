@@ -170,23 +170,7 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     };
     let white_95 = format_decimals(shown.white_95, 2);
     let caption = format!("{}; that of white noise lies within \u{b1}{white_95}.", shown.title);
-    let growth = match (shown.growth.first(), shown.growth.last()) {
-        (Some(first), Some(last)) => format!(
-            " Chi2 per degree of freedom is {} in segments of {} ms and {} in segments of {} ms; one that does not \
-             grow speaks for the model.",
-            format_digits(first.1, 3),
-            format_digits(1e3 * first.0, 2),
-            format_digits(last.1, 3),
-            format_digits(1e3 * last.0, 2)
-        ),
-        _ => String::new(),
-    };
-    let details = format!(
-        "Measured minus model of the {} in {run}, in deviations of the noise: density of its values with that \
-         of the noise, correlation with itself some frames later, and its power density over that of the noise \
-         ({TAPERS} tapers).{growth}",
-        channel.label()
-    );
+    let details = String::new();
     Some(case.figure_block("residuals", FigureText { caption, details }, draw_figure(&shown)))
 }
 

@@ -1,7 +1,5 @@
 //! Ring-down: data with the fit, the residual, and the decaying component alone.
 
-pub mod caption;
-
 use super::full_figure;
 use super::history::{length_unit, thin_points};
 use crate::text::format_with_sd;

@@ -65,6 +65,10 @@ pub struct SpectrogramPlot {
     pub shown_hz: Option<(f64, f64)>,
     /// The ridge in order of time.
     pub ridge: Vec<SpectrogramRidgePoint>,
+    /// Frequencies that are related to the ridge, by name: multiples of it, or sidebands.
+    pub related: Vec<(String, Vec<SpectrogramRidgePoint>)>,
+    /// Natural frequencies of the model in Hz, each with its name.
+    pub natural_hz: Vec<(String, f64)>,
     /// Named instants, s.
     pub instants: Vec<(String, f64)>,
     /// The target frequencies, each with its window.
@@ -132,13 +136,41 @@ fn draw_map(shown: &SpectrogramPlot) -> Panel {
     // lines with an edge are visible on every colour
     let targets = target_lines(&shown.targets, "target \u{b1} 2 sd", Colour::Black, Mark::Edged);
     let ridge = Series::new("ridge", Colour::Vermilion, Mark::Edged, ridge_points(&shown.ridge));
-    let lines = [targets, ridge].into_iter().filter(|s| s.points.iter().any(Option::is_some));
+    let related = shown
+        .related
+        .iter()
+        .map(|(name, points)| Series::new(name, Colour::Orange, Mark::ThinDashed, ridge_points(points)));
+    let lines = related.chain([targets, ridge]).filter(|s| s.points.iter().any(Option::is_some));
+    let lines: Vec<Series> = natural_lines(shown).chain(lines).collect();
+    let mut annotations = target_names(shown);
+    annotations.extend(natural_names(shown));
     Panel {
         vertical_lines: shown.instants.iter().map(rule).collect(),
-        annotations: target_names(shown),
+        annotations,
         heat_map: Some(heat),
         ..Panel::new(ChartAxis::time().with_ends(time_span(&shown.time_s)), y, HEIGHT_MM, lines)
     }
+}
+
+/// Natural frequencies as lines across the map.
+fn natural_lines(shown: &SpectrogramPlot) -> impl Iterator<Item = Series> {
+    let span_s = time_span(&shown.time_s).unwrap_or_default();
+    let line = move |(_, hz): &(String, f64)| {
+        Series::new("natural frequency", Colour::SkyBlue, Mark::Dotted, [(span_s.0, *hz), (span_s.1, *hz)])
+    };
+    shown.natural_hz.iter().map(line)
+}
+
+/// Names of the natural frequencies, at the right end of their lines.
+fn natural_names(shown: &SpectrogramPlot) -> Vec<TextAnnotation> {
+    let (Some((bottom, top)), Some((first, last))) =
+        (shown.shown_hz.or_else(|| frequency_range(shown)), time_span(&shown.time_s))
+    else {
+        return Vec::new();
+    };
+    let at = |hz: f64| (first + NAME_POSITION * (last - first), hz + 0.5 * LABEL_OFFSET * (top - bottom));
+    let inside = shown.natural_hz.iter().filter(|(_, hz)| *hz > bottom && *hz < top);
+    inside.map(|(name, hz)| TextAnnotation::new(name.clone(), Colour::White, at(*hz))).collect()
 }
 
 /// An amplitude, m, in dB re 1 um; zero gives a value below every colour.
@@ -233,6 +265,8 @@ pub(super) fn fill_map(
 
 // Target frequencies as lines over their windows, with error bars of two standard deviations.
 
+/// Position of the name of a natural frequency along the time axis, as a fraction of the width of the map.
+const NAME_POSITION: f64 = 0.93;
 /// Number of letters after which a name is cut in a map.
 const MAX_LABEL_LETTERS: usize = 14;
 /// Distance of a name from its line, as a fraction of the height of the map.
@@ -243,18 +277,6 @@ const CLOSE_TARGETS: f64 = 0.1;
 /// Limits for the position of the middle of a name along the time axis, as fractions of the width of the map;
 /// they keep the name inside the axes.
 const LABEL_LIMITS: (f64, f64) = (0.3, 0.7);
-
-/// Target lines over the ridges; met and missed targets have different styles.
-pub(super) fn target_lines_over_ridges(targets: &[TargetFrequency]) -> impl Iterator<Item = Series> {
-    let looks = [
-        (true, "target, met", Colour::Blue, Mark::Dashed),
-        (false, "target, missed", Colour::Purple, Mark::Dotted),
-    ];
-    looks.into_iter().filter_map(|(met, label, colour, mark)| {
-        let own: Vec<TargetFrequency> = targets.iter().filter(|t| t.met == met).cloned().collect();
-        (!own.is_empty()).then(|| target_lines(&own, label, colour, mark))
-    })
-}
 
 fn target_lines(targets: &[TargetFrequency], label: &str, colour: Colour, mark: Mark) -> Series {
     let line = |t: &TargetFrequency| {
@@ -397,8 +419,5 @@ mod tests {
             texts,
             [("lowest 359 Hz, met".to_owned(), 309.0), ("highest 400 Hz, missed".to_owned(), 450.0)]
         );
-        let labels: Vec<String> = target_lines_over_ridges(&shown.targets).map(|s| s.label).collect();
-        assert_eq!(labels, ["target, met", "target, missed"]);
-        assert!(target_lines_over_ridges(&[]).next().is_none());
     }
 }

@@ -60,6 +60,19 @@ const MICROMETRES: f64 = 1e6;
 /// Draws the figure.
 #[must_use]
 pub fn draw_figure(spectra: &SpectraPlot) -> Figure {
+    let alone = spectra.measured.is_none() && spectra.model.is_some();
+    let source = about(if alone { NO_TRACES } else { "" }, &spectra.note);
+    full_figure(
+        &spectra.title,
+        spectra.synthetic,
+        &source,
+        format!("Amplitude spectrum of {}; a sine of amplitude A reads A at its peak.", spectra.quantity),
+        [draw_panel(spectra)],
+    )
+}
+
+/// Draws the panel of the spectra.
+pub(crate) fn draw_panel(spectra: &SpectraPlot) -> Panel {
     let highest = [&spectra.measured, &spectra.model]
         .into_iter()
         .flatten()
@@ -69,22 +82,13 @@ pub fn draw_figure(spectra: &SpectraPlot) -> Figure {
     let x = ChartAxis::log("frequency, Hz").with_ends(shown_hz);
     let shown_um = amplitude_limits(spectra).map(|(low, high)| (low * MICROMETRES, high * MICROMETRES));
     let y = ChartAxis::log(format!("amplitude of {}, \u{b5}m", spectra.quantity)).with_ends(shown_um);
-    let panel = Panel {
+    Panel {
         shaded_spans: target_spans(&spectra.targets),
         vertical_lines: target_lines(spectra),
         top_labels: target_labels(spectra),
         ribbons: spectra.interval_95.iter().map(AmplitudeInterval::ribbon).collect(),
         ..Panel::new(x, y, HEIGHT_MM, spectrum_series(spectra, highest))
-    };
-    let alone = spectra.measured.is_none() && spectra.model.is_some();
-    let source = about(if alone { NO_TRACES } else { "" }, &spectra.note);
-    full_figure(
-        &spectra.title,
-        spectra.synthetic,
-        &source,
-        format!("Amplitude spectrum of {}; a sine of amplitude A reads A at its peak.", spectra.quantity),
-        [panel],
-    )
+    }
 }
 
 /// Heading of a spectrum without targets: its largest component.

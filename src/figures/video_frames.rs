@@ -204,10 +204,7 @@ pub(crate) fn caption(shown: &VideoFrames) -> String {
 /// Details under the caption.
 #[must_use]
 pub fn details(shown: &VideoFrames) -> String {
-    format!(
-        "The two links of the model to scale, with its head at 0, and the tracked points.{}",
-        frames_in_words(shown)
-    )
+    format!("Shown: the links of the model, and the tracked points.{}", frames_in_words(shown))
 }
 
 /// Sentences on the instants with and without a video frame.

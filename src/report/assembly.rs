@@ -11,12 +11,11 @@ use crate::compare::{
     ComparisonSummary, ComparisonTable, ConditionComparison, FittedRecording, ModelRun, run_conditions,
 };
 use crate::figures::corner::CornerPlot;
-use crate::figures::figure_text::make_file_names_unique;
 use crate::figures::profiles::ProfilePlot;
 use crate::figures::pulls::PullPlot;
 use crate::figures::{
-    FigureBlock, animation, cycle, evidence, friction, history, phase_portrait, poses, residuals,
-    spectrogram, spectrum, video_frames,
+    FigureBlock, animation, cycle, evidence, friction, history, poses, residuals, spectrogram, spectrum,
+    stick_slip, video_frames,
 };
 use crate::fit::Problem;
 use crate::fit::evaluation::{FailureReason, RunFailure};
@@ -53,15 +52,14 @@ pub fn build_report(
     let cases = ConditionComparison::compare_conditions(job, measured, models, result);
     let report = fill_report_sections(job, measured, &cases, result);
     let telling = summary::farthest_condition(&report.comparison).map_or(0, |(condition, _)| condition);
-    let mut evidence = cases.get(telling).map_or_else(Vec::new, |case| {
-        make_file_names_unique(condition_figures(case, shared_law_case(&cases, telling)))
-    });
+    let shown = shown_conditions(&cases, &report.comparison, telling);
+    let mut evidence = draw_conditions(&shown, &EVIDENCE);
     evidence.extend(summary_figures(job, result, &report));
     let profiles = ProfilePlot::from_fit(job, result, &report.parameters).figure_block();
     let groups = [
         (FigureSubject::Evidence, evidence),
-        (FigureSubject::Measured, measured_figures(&cases, telling)),
-        (FigureSubject::Blade, blade_figures(&cases)),
+        (FigureSubject::Measured, draw_conditions(&shown, &MEASURED)),
+        (FigureSubject::Blade, blade_figures(&shown)),
         (FigureSubject::Parameters, profiles.into_iter().collect()),
     ];
     let groups = groups.into_iter().filter(|(_, figures)| !figures.is_empty());
@@ -111,61 +109,80 @@ fn fill_report_sections(
     }
 }
 
-/// The condition whose friction figure also applies to the condition `of`: both have the same run, or are one
-/// and the same condition.
-fn shared_law_case<'a, 'b>(
+/// Draws a figure of one or several conditions, the one that tells most first.
+type DrawConditions = fn(&[&ConditionComparison]) -> Option<FigureBlock>;
+
+/// Maximum number of conditions in a figure; more do not fit on a printed page.
+const MOST_CONDITIONS: usize = 4;
+
+/// The figures that show whether the model explains the conditions.
+const EVIDENCE: [DrawConditions; 4] = [
+    |shown| join_conditions(shown, evidence::figure_block, 2),
+    |shown| join_conditions(shown, stick_slip::figure_block, 2),
+    |shown| friction::figure_block(shown.first()?),
+    |shown| residuals::figure_block(shown.first()?),
+];
+
+/// The figures of the motions and of their spectra.
+const MEASURED: [DrawConditions; 4] = [
+    |shown| join_conditions(shown, |case| Some(history::caption::figure_block(case)), 2),
+    cycle::figure_block,
+    |shown| join_conditions(shown, spectrogram::caption::figure_block, 2),
+    |shown| join_conditions(shown, spectrum::caption::figure_block, 1),
+];
+
+/// The conditions that figures show: `telling`, and then those in which the model leaves most.
+fn shown_conditions<'a, 'b>(
     cases: &'b [ConditionComparison<'a>],
-    of: usize,
-) -> Option<&'b ConditionComparison<'a>> {
-    let shares = |same: &Vec<usize>, case: &ConditionComparison| case.condition == of || same.contains(&of);
-    cases.iter().find(|case| case.same_run.as_ref().is_some_and(|same| shares(same, case)))
-}
-
-/// The figures that show whether the model explains a condition: recording and model on one axis, cycle
-/// against speed, friction, residuals.
-fn condition_figures(case: &ConditionComparison, law: Option<&ConditionComparison>) -> Vec<FigureBlock> {
-    let parts = [
-        evidence::figure_block(case),
-        cycle::figure_block(case),
-        law.and_then(friction::figure_block),
-        residuals::figure_block(case),
-    ];
-    parts.into_iter().flatten().collect()
-}
-
-/// The figures of all conditions: histories, spectra, spectrograms and phase portraits. All conditions except
-/// `telling` also get their [`condition_figures`] here; those of `telling` are in the answer at the top of
-/// the page.
-fn measured_figures(cases: &[ConditionComparison], telling: usize) -> Vec<FigureBlock> {
-    let all = |(i, case): (usize, &ConditionComparison)| {
-        let shown = shared_law_case(cases, telling).map(|law| law.condition);
-        let own = case.same_run.as_ref().map(|_| case).filter(|case| shown != Some(case.condition));
-        let first = if i == telling { Vec::new() } else { condition_figures(case, own) };
-        let parts = [
-            history::caption::figure_blocks(case),
-            spectrum::caption::figure_blocks(case),
-            spectrogram::caption::figure_blocks(case),
-            phase_portrait::figure_blocks(case),
-        ];
-        first.into_iter().chain(parts.into_iter().flatten()).collect::<Vec<_>>()
+    comparison: &[ComparisonSummary],
+    telling: usize,
+) -> Vec<&'b ConditionComparison<'a>> {
+    let left = |case: &ConditionComparison| {
+        let line = comparison.get(case.condition).and_then(ComparisonSummary::judged_residual);
+        line.and_then(|line| line.rms_over_noise).unwrap_or(0.0)
     };
-    make_file_names_unique(cases.par_iter().enumerate().flat_map_iter(all).collect())
+    let mut shown: Vec<&ConditionComparison> = cases.iter().collect();
+    shown.sort_by(|a, b| left(b).total_cmp(&left(a)));
+    shown.sort_by_key(|case| case.condition != telling);
+    shown.truncate(MOST_CONDITIONS);
+    shown
 }
 
-/// Figures of the poses of the blade in every run, of its links over frames of each video, and animations.
-fn blade_figures(cases: &[ConditionComparison]) -> Vec<FigureBlock> {
-    let runs = || cases.iter().filter(|case| case.same_run.is_some());
-    let filmed = cases.iter().filter_map(video_frames::block);
-    let moving = runs().filter_map(animation::figure_block);
-    runs().filter_map(poses::figure_block).chain(filmed).chain(moving).collect()
+fn draw_conditions(shown: &[&ConditionComparison], figures: &[DrawConditions]) -> Vec<FigureBlock> {
+    figures.par_iter().filter_map(|draw| draw(shown)).collect()
+}
+
+/// The figure of the first condition that has one, whole, and below it the first `panels` panels of that of
+/// each further condition.
+fn join_conditions(
+    shown: &[&ConditionComparison],
+    draw: impl Fn(&ConditionComparison) -> Option<FigureBlock> + Sync,
+    panels: usize,
+) -> Option<FigureBlock> {
+    let drawn: Vec<Option<FigureBlock>> = shown.par_iter().map(|case| draw(case)).collect();
+    drawn.into_iter().flatten().reduce(|whole, next| whole.with_panels(next, panels))
+}
+
+/// Figures of the poses of the blade, of its links over frames of a video, and an animation.
+fn blade_figures(shown: &[&ConditionComparison]) -> Vec<FigureBlock> {
+    let first =
+        |draw: fn(&ConditionComparison) -> Option<FigureBlock>| shown.iter().find_map(|case| draw(case));
+    [first(poses::figure_block), first(video_frames::block), first(animation::figure_block)]
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
 /// Figures of the correlations of the parameters, and of the deviation of the model from every target.
 fn summary_figures(job: &Job, result: &FitResult, report: &Report) -> Vec<FigureBlock> {
     let features = [report.components.as_slice(), report.features.as_slice()];
+    let pulls = PullPlot::from_comparisons(&job.title, &features, &report.held_out);
+    // a fit of as many parameters as features meets them all: its pulls say nothing
+    let fitted = if report.misfit.is_some() { 0 } else { report.parameters.len() };
+    let degrees = pulls.pulls.len().saturating_sub(fitted);
     let blocks = [
         CornerPlot::from_fit(job, result, &report.parameters).figure_block(),
-        PullPlot::from_comparisons(&job.title, &features, &report.held_out).figure_block(),
+        (degrees > 0).then(|| pulls.figure_block()).flatten(),
     ];
     blocks.into_iter().flatten().collect()
 }

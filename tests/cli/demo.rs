@@ -39,7 +39,7 @@ fn the_demo_goes_from_an_export_to_a_page_and_tells_the_truth() {
     for file in ["job.toml", "journal.jsonl", "result.json"] {
         assert!(at(fit).join(file).is_file(), "{file}");
     }
-    for file in ["index.html", "report.json", "history.svg", "spectrum-low.svg", "spectrum-high.svg"] {
+    for file in ["index.html", "report.json", "history.svg", "spectrum.svg", "stick-slip.svg"] {
         assert!(at(page).join(file).is_file(), "{file}");
     }
     assert!(fs::read_to_string(at(data).join("recording.toml")).unwrap().contains("synthetic = true"));

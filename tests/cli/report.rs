@@ -141,7 +141,7 @@ fn a_report_is_made_again_byte_for_byte_and_every_file_says_that_the_recording_i
         "history.svg",
         "paper/history-85mm.svg",
         "paper/history-170mm.svg",
-        "spectrum-low.svg",
+        "spectrum.svg",
     ] {
         assert!(files.contains(&project.path("reports/x").join(name)), "no {name} among {files:?}");
     }
@@ -320,12 +320,12 @@ fn a_result_that_was_edited_and_a_folder_that_is_taken_are_refused_and_nothing_i
 
 #[test]
 fn figures_of_an_earlier_report_go_and_nothing_else_does() {
-    let project = Project::with_fits(&[("x", JOB)]);
-    let renamed = JOB.replace("name = \"low\"", "name = \"lower\"");
-    project.quick_fit("fits/y", &renamed);
+    // a fit of more features than parameters has pulls
+    let third = "[[feature]]\nkind = \"mean-deflection\"\nwindow = \"0.341..0.345\"\n\n[search]";
+    let project = Project::with_fits(&[("x", &JOB.replace("[search]", third)), ("y", JOB)]);
     project.reported(&["fits/x", "--out", "page"]);
-    let (gone, comes) = ("page/spectrum-low.svg", "page/spectrum-lower.svg");
-    let paper = ["page/paper/spectrum-low-85mm.svg", "page/paper/spectrum-low-170mm.svg"];
+    let (gone, comes) = ("page/pulls.svg", "page/profiles.svg");
+    let paper = ["page/paper/pulls-85mm.svg", "page/paper/pulls-170mm.svg"];
     assert!(project.path(gone).is_file() && paper.iter().all(|name| project.path(name).is_file()));
     let kept = ["page/mine.svg", "page/notes.txt", "page/paper/mine-85mm.svg", "page/deep/inner.svg"];
     for name in kept {

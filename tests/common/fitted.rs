@@ -2,16 +2,16 @@
 //! user's name may stand.
 
 use super::scene;
-use plain_charts::Figure;
+use plain_charts::{Colour, Figure, ShadedSpan};
 use wiperlab::figures::corner::{self, CornerParameter, CornerPlot};
-use wiperlab::figures::cycle::{self, CycleOverSpeed, SpeedPoint, Target};
+use wiperlab::figures::cycle::{self, CycleOverSpeed, RecordedCycle, SpeedPoint, Target};
 use wiperlab::figures::evidence;
 use wiperlab::figures::friction::{self, FrictionPlot};
-use wiperlab::figures::phase_portrait::{self, PhasePortrait, PortraitPart};
 use wiperlab::figures::poses::{self, PoseSequence};
 use wiperlab::figures::profiles::{self, ParameterProfile, ProfilePlot};
 use wiperlab::figures::pulls::{self, Pull, PullPlot};
 use wiperlab::figures::residuals::{self, ResidualDiagnostics};
+use wiperlab::figures::stick_slip::{self, StickSlipPart, StickSlipSheet, TipFriction};
 use wiperlab::fit::uncertainty::ParameterVerdict;
 
 /// A parameter that is known, one that is open at an end, and one without intervals.
@@ -55,20 +55,31 @@ pub fn poses(name: &str) -> Figure {
     )
 }
 
-/// Two parts, one of them with measured states.
-pub fn portrait(name: &str) -> Figure {
-    let circle = |radius: f64| {
-        (0..200)
-            .map(|i| f64::from(i) * 0.1)
-            .map(|a| Some((1e-3 * radius * a.cos(), 0.1 * radius * a.sin())))
-            .collect::<Vec<_>>()
+/// Two parts, one of them with measured velocities.
+pub fn stick_slip(name: &str) -> Figure {
+    let angles = || (0..200).map(|i| f64::from(i) * 0.1);
+    let velocity = |scale: f64| angles().map(|a| Some((1e-3 * a, 0.1 * scale * a.sin()))).collect::<Vec<_>>();
+    let state = |a: f64| TipFriction {
+        velocity_m_per_s: 0.1 * a.sin(),
+        deflection_m: 1e-3 * a.cos(),
+        friction_n: 0.05 * a.sin().signum(),
     };
-    let part = |name: &str, measured| PortraitPart { name: name.to_owned(), measured, model: circle(1.0) };
-    let parts = vec![part(name, circle(1.1)), part("after the flip", Vec::new())];
-    phase_portrait::draw_figure(&PhasePortrait {
+    let part = |name: &str, measured| StickSlipPart {
+        name: name.to_owned(),
+        span_s: (0.0, 0.02),
+        measured,
+        model: velocity(1.0),
+        friction: angles().map(state).map(Some).collect(),
+        measured_friction: angles().step_by(9).map(state).map(Some).collect(),
+        law: vec![Some((0.0, 0.05)), Some((0.1, 0.04))],
+        sticks: vec![ShadedSpan::new("tip sticks (model)", Colour::Black, 0.003, 0.006)],
+    };
+    let parts = vec![part(name, velocity(1.1)), part("after the flip", Vec::new())];
+    stick_slip::draw_figure(&StickSlipSheet {
         title: name.to_owned(),
         note: name.to_owned(),
         synthetic: true,
+        friction_label: "friction, model".to_owned(),
         parts,
     })
 }
@@ -139,8 +150,7 @@ pub fn cycle(name: &str) -> Figure {
     cycle::draw_figure(&CycleOverSpeed {
         title: name.to_owned(),
         synthetic: true,
-        measured: points(5.0),
-        model: points(4.5),
+        recordings: vec![RecordedCycle { name: String::new(), measured: points(5.0), model: points(4.5) }],
         natural_hz: vec![("neck".to_owned(), 195.0), ("lip".to_owned(), 608.0)],
         targets: vec![Target { name: name.to_owned(), frequency_hz: 908.0, frequency_sd_hz: Some(4.0) }],
         ..CycleOverSpeed::default()
@@ -162,14 +172,14 @@ pub fn pulls(name: &str) -> Figure {
 pub fn corner(name: &str) -> Figure {
     let known = |estimate: f64| CornerParameter {
         symbol: "A".to_owned(),
-        words: "0.107 to 0.109".to_owned(),
+        words: "0.108\n0.107 to 0.109".to_owned(),
         estimate,
         stated: [Some(estimate - 0.02), Some(estimate + 0.02)],
         sd: Some(0.01),
         prior: Some((estimate, 0.02)),
         truth: Some(estimate + 0.005),
         profile: vec![(estimate - 0.02, 0.14), (estimate, 1.0), (estimate + 0.02, 0.14)],
-        optima: vec![estimate; 3],
+        optima: vec![(estimate, true), (estimate + 0.01, true), (estimate - 0.02, false)],
     };
     let open = CornerParameter { sd: None, stated: [None, Some(0.9)], symbol: name.to_owned(), ..known(0.7) };
     let row = |a: f64, b: f64| vec![Some(a), Some(b), None];

@@ -45,7 +45,7 @@ pub const FULL: [Example; 20] = [
     ("sheet of two parameters", |name| sheet(name, 2)),
     ("profiles", fitted::profiles),
     ("poses", fitted::poses),
-    ("phase portrait", fitted::portrait),
+    ("stick-slip", fitted::stick_slip),
     ("friction law", fitted::law),
 ];
 
@@ -86,7 +86,6 @@ fn full_history(name: &str) -> TimeHistory {
     };
     TimeHistory {
         title: name.to_owned(),
-        enlarged_title: name.to_owned(),
         synthetic: true,
         measured: Some(motion(1.0)),
         model: Some(motion(1.1)),
@@ -98,7 +97,7 @@ fn full_history(name: &str) -> TimeHistory {
         ],
         stick_s: vec![(0.53, 0.58), (0.6, 0.601)],
         instants: vec![("hold".to_owned(), 0.53), (name.to_owned(), 0.55), ("release".to_owned(), 0.58)],
-        zoom_s: Some((0.575, 0.61)),
+        frame_s: 2e-4,
     }
 }
 

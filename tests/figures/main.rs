@@ -22,6 +22,7 @@ mod sketch_file;
 mod small_fit;
 
 mod browser;
+mod claims;
 mod comparison;
 mod gallery;
 mod hard_reports;

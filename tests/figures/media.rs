@@ -150,12 +150,8 @@ fn a_history_shows_the_model_only_when_there_is_one() {
             time_s,
         }
     };
-    let both = TimeHistory {
-        measured: Some(motion(0.0)),
-        model: Some(motion(1e-3)),
-        zoom_s: Some((0.05, 0.1)),
-        ..TimeHistory::default()
-    };
+    let both =
+        TimeHistory { measured: Some(motion(0.0)), model: Some(motion(1e-3)), ..TimeHistory::default() };
     let model = |shown: &TimeHistory| {
         near(&rasterised(&history::draw_figure(shown).to_svg(Medium::Screen)), VERMILION)
     };

@@ -47,8 +47,11 @@ fn tokens(text: &str) -> Vec<(f64, f64)> {
         let sign = if before == Some('-') { -1.0 } else { 1.0 };
         let of_ten = rest[end..].starts_with('\u{b7}') || before == Some('\u{b7}');
         if let (Ok(value), false, false) = (word.parse::<f64>(), is_name, of_ten) {
-            let decimals = word.split_once('.').map_or(0, |(_, fraction)| fraction.len());
-            found.push((sign * value, 10.0_f64.powi(-(decimals as i32))));
+            let decimals = word.split_once('.').map_or(0, |(_, fraction)| fraction.len()) as i32;
+            // a deviation such as that of 690(10) says that the last digits before it are rounded too
+            let deviation = rest[end..].strip_prefix('(').and_then(|sd| sd.split_once(')')).map(|(sd, _)| sd);
+            let rounded = deviation.filter(|sd| sd.ends_with('0')).map_or(0, |sd| sd.len() as i32 - 1);
+            found.push((sign * value, 10.0_f64.powi(rounded - decimals)));
         }
         rest = &rest[end..];
     }
@@ -121,4 +124,5 @@ fn the_numbers_of_a_page_are_those_of_its_json_and_of_the_result() {
 fn numbers_are_read_with_sign_and_last_digit() {
     let found = tokens("\u{2212}0.05 % of 908(4), B2, 1.2\u{b7}10\u{207b}\u{2075}; 7 to 8.50.");
     assert_eq!(found, [(-0.05, 0.01), (908.0, 1.0), (7.0, 1.0), (8.5, 0.01)]);
+    assert_eq!(tokens("690(10)"), [(690.0, 10.0)]);
 }

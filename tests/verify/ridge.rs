@@ -104,8 +104,12 @@ impl Made {
 }
 
 fn spectrogram(record: &[Option<f64>], rate_hz: f64) -> Spectrogram {
-    Spectrogram::new(record, rate_hz, &SpectrogramSettings { band_hz: Some(BAND_HZ), segment_s: None })
-        .unwrap()
+    Spectrogram::new(
+        record,
+        rate_hz,
+        &SpectrogramSettings { band_hz: Some(BAND_HZ), ..SpectrogramSettings::default() },
+    )
+    .unwrap()
 }
 
 fn lengths_and_rates() -> impl Iterator<Item = (f64, f64)> {
@@ -284,7 +288,7 @@ fn a_steady_sine_reads_its_amplitude_in_every_column() {
     for gaps in [false, true] {
         let made = Made { gaps, ..Made::of(STEADY, 0.3, 5000.0) };
         let record = made.record(1);
-        let settings = SpectrogramSettings { segment_s: Some(0.04), band_hz: None };
+        let settings = SpectrogramSettings { segment_s: Some(0.04), ..SpectrogramSettings::default() };
         let found = Spectrogram::new(&record, 5000.0, &settings).unwrap();
         // 200 frames of 1500, 50 apart: 27 columns; 1024 bins of 4.88 Hz from zero to half the rate
         assert_eq!((found.time_s.len(), found.amplitude_m.len(), found.frequency_hz.len()), (27, 27, 513));
@@ -332,8 +336,9 @@ fn a_long_record_has_a_bounded_spectrogram() {
 #[test]
 fn what_cannot_be_cut_is_refused() {
     let record = Made::of(STEADY, 0.1, 5000.0).record(1);
-    let of =
-        |segment_s, band_hz| Spectrogram::new(&record, 5000.0, &SpectrogramSettings { segment_s, band_hz });
+    let of = |segment_s, band_hz| {
+        Spectrogram::new(&record, 5000.0, &SpectrogramSettings { segment_s, band_hz, overlap: None })
+    };
     for segment_s in [0.0, -1.0, 0.003, 0.2, f64::NAN, f64::INFINITY] {
         assert!(matches!(of(Some(segment_s), None), Err(SpectrumError::Segment { .. })), "{segment_s}");
     }

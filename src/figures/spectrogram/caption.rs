@@ -3,34 +3,41 @@
 use crate::compare::condition::{FrequencyComparison, group_fit_windows};
 use crate::compare::{ConditionComparison, TrackedRidge};
 use crate::figures::spectrogram::comparison::{SpectrogramComparison, SpectrogramSide, draw_comparison};
-use crate::figures::spectrogram::{SpectrogramPlot, TargetFrequency, describe_ridge_segments, fill_map};
+use crate::figures::spectrogram::{SpectrogramPlot, SpectrogramRidgePoint, TargetFrequency, fill_map};
 use crate::figures::{FigureBlock, FigureText};
-use crate::recording::channel::{Channel, InstantKind};
+use crate::model::modes::body_frequencies;
+use crate::recording::channel::Channel;
 use crate::text::{format_digits, format_milliseconds};
 use std::ops::Range;
 
 /// Ratio of the highest frequency shown to the highest frequency of the ridges.
-const RIDGE_MARGIN: f64 = 1.6;
+const RIDGE_MARGIN: f64 = 2.15;
+/// Largest ratio of the distance of the sidebands to the lowest frequency of the ridge.
+const MAX_SIDEBAND: f64 = 0.3;
 
 /// Recording or model, with its ridge and the shift from its clock to that of the recording, s.
 type ShiftedRidge<'a> = (SpectrogramSide, &'a TrackedRidge, f64);
 
-/// The figure of a condition; empty if neither recording nor model is long enough for a segment.
-pub(crate) fn figure_blocks(case: &ConditionComparison) -> Vec<FigureBlock> {
+/// The figure of a condition; `None` if neither recording nor model is long enough for a segment.
+pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     let (measured, model) = (case.ridges.measured.as_ref(), case.ridges.model.as_ref());
     let of =
         [(SpectrogramSide::Measured, measured, 0.0), (SpectrogramSide::Model, model, case.alignment.shift_s)];
     let sides: Vec<ShiftedRidge> =
         of.into_iter().filter_map(|(of, ridge, shift_s)| Some((of, ridge?, shift_s))).collect();
-    let Some((_, first, _)) = sides.first() else { return Vec::new() };
+    let (_, first, _) = sides.first()?;
     let tops = sides.iter().filter_map(|(_, ridge, _)| ridge.frequency_range_hz());
     let top_hz = tops.map(|(_, high)| high).fold(0.0, f64::max);
     let nyquist_hz = case.model.view.recording.grid().frame_rate_hz / 2.0;
     let shown_hz = (0.0, if top_hz > 0.0 { (RIDGE_MARGIN * top_hz).min(nyquist_hz) } else { nyquist_hz });
     let segment = format_milliseconds(first.spectrogram.segment_s);
     let note = format!("spectrogram of the deflection in segments of {segment}");
+    let title = figure_title(&sides);
+    let blade = body_frequencies(&case.model.scene.linkage);
+    let natural_hz = [("head", blade.head_hz), ("neck", blade.neck_hz), ("lip", blade.lip_hz)]
+        .map(|(name, hz)| (name.to_owned(), hz));
     let figure = draw_comparison(&SpectrogramComparison {
-        title: figure_title(&sides),
+        title: title.clone(),
         note: case.heading_note(&note),
         synthetic: case.is_synthetic(),
         sides: sides
@@ -40,18 +47,43 @@ pub(crate) fn figure_blocks(case: &ConditionComparison) -> Vec<FigureBlock> {
                 let plot = SpectrogramPlot {
                     quantity: Channel::Deflection.to_string(),
                     shown_hz: Some(shown_hz),
-                    over_speed: followed.over_speed.clone(),
                     targets: target_frequencies(case, side),
+                    natural_hz: natural_hz.to_vec(),
                     ..SpectrogramPlot::default()
                 };
                 // with a fast camera, most frequency bins lie above the shown frequencies
                 let bins = followed.spectrogram.frequency_hz.partition_point(|f| *f <= shown_hz.1);
                 let start_s = followed.start_s + shift_s;
-                (of, fill_map(plot, &followed.spectrogram, &followed.courses, start_s, bins))
+                let plot = fill_map(plot, &followed.spectrogram, &followed.courses, start_s, bins);
+                (of, SpectrogramPlot { related: related_lines(case, &plot.ridge), ..plot })
             })
             .collect(),
     });
-    vec![case.figure_block("spectrogram", figure_text(case, &sides), figure)]
+    let caption = format!("{title}.");
+    Some(case.figure_block("spectrogram", FigureText { caption, details: String::new() }, figure))
+}
+
+/// Twice the frequency of a ridge, and its sidebands at the distance of the slowest target frequency.
+fn related_lines(
+    case: &ConditionComparison,
+    ridge: &[SpectrogramRidgePoint],
+) -> Vec<(String, Vec<SpectrogramRidgePoint>)> {
+    let moved = |to: &dyn Fn(f64) -> f64| {
+        let point =
+            |p: &SpectrogramRidgePoint| SpectrogramRidgePoint { frequency_hz: p.frequency_hz.map(to), ..*p };
+        ridge.iter().map(point).collect::<Vec<_>>()
+    };
+    let mut found = vec![("twice the ridge".to_owned(), moved(&|hz| 2.0 * hz))];
+    let lowest_hz = ridge.iter().filter_map(|p| p.frequency_hz).reduce(f64::min);
+    let slow_hz = case.frequency_comparisons().map(|sought| sought.target.frequency_hz).reduce(f64::min);
+    let apart_hz = slow_hz.filter(|slow| lowest_hz.is_some_and(|lowest| *slow < MAX_SIDEBAND * lowest));
+    if let Some(apart_hz) = apart_hz {
+        let name = format!("sidebands at \u{b1} {} Hz", format_digits(apart_hz, 3));
+        let both =
+            [moved(&|hz| hz - apart_hz), vec![SpectrogramRidgePoint::default()], moved(&|hz| hz + apart_hz)];
+        found.push((name, both.concat()));
+    }
+    found
 }
 
 /// The target frequencies of the deflection, with their windows in the recording or in the model.
@@ -79,47 +111,6 @@ fn target_frequencies(case: &ConditionComparison, (of, _, shift_s): &ShiftedRidg
     found.map(target).collect()
 }
 
-fn figure_text(case: &ConditionComparison, sides: &[ShiftedRidge]) -> FigureText {
-    let Some((first_of, first, _)) = sides.first() else {
-        return FigureText::default();
-    };
-    let source = case.source_name();
-    let both = match (sides.len() > 1, first_of, case.recording()) {
-        (true, ..) => format!("{source} and the fitted model, in the same segments and colours"),
-        (false, SpectrogramSide::Model, Some(_)) => {
-            format!("the fitted model alone, as no segment of {source} has frames enough with a deflection")
-        }
-        _ => source,
-    };
-    let release_s = case.measured_or_model().instant_s(InstantKind::Release);
-    let released = release_s.map_or("", |_| " from the release of the tip on");
-    let mut said = vec![format!(
-        "Amplitude of the deflection over time and frequency{released} (segments of {}, trend removed): \
-         {both}.",
-        format_milliseconds(first.spectrogram.segment_s)
-    )];
-    for (of, ridge, _) in sides {
-        let name = if *of == SpectrogramSide::Measured { "the recording" } else { "the model" };
-        let drawn = describe_ridge_segments(&ridge.courses, &ridge.ridge, &ridge.spectrogram);
-        said.push(match ridge.frequency_range_hz() {
-            Some((low, high)) => {
-                let [low, high, from, to] =
-                    [low, high, ridge.band_hz.0, ridge.band_hz.1].map(|hz| format_digits(hz, 3));
-                format!(
-                    "The ridge of {name}, the strongest component between {from} and {to} Hz, is drawn {drawn} and \
-                     runs from {low} to {high} Hz."
-                )
-            }
-            None if !ridge.ridge.points.is_empty() => format!("The ridge of {name} is drawn {drawn}."),
-            None => format!("Nothing in {name} stands out long enough to be followed."),
-        });
-    }
-    if sides.iter().any(|(_, ridge, _)| ridge.frequency_range_hz().is_some()) {
-        said.push("Below: the ridges over time and over the mean speed of the tip in each segment.".into());
-    }
-    FigureText { caption: claim_sentence(case, sides), details: said.join(" ") }
-}
-
 /// Heading: the frequency ranges of the ridges.
 fn figure_title(sides: &[ShiftedRidge]) -> String {
     let found = |wanted: SpectrogramSide| {
@@ -135,26 +126,4 @@ fn figure_title(sides: &[ShiftedRidge]) -> String {
         (None, Some(model)) => format!("The ridge of the model runs {model}"),
         (None, None) => "Nothing stands out long enough to be followed".to_owned(),
     }
-}
-
-/// Caption, with the frequency ranges of the ridges.
-fn claim_sentence(case: &ConditionComparison, sides: &[ShiftedRidge]) -> String {
-    let name = |of: &SpectrogramSide| {
-        if *of == SpectrogramSide::Measured { case.source_kind() } else { "the fitted model" }
-    };
-    let one = |(of, ridge, _): &ShiftedRidge| match ridge.frequency_range_hz() {
-        Some((l, h)) => format!("{} from {} to {} Hz", name(of), format_digits(l, 3), format_digits(h, 3)),
-        None => format!("{} nowhere", name(of)),
-    };
-    let ridges: Vec<String> = sides.iter().map(one).collect();
-    let targets = sides.first().map_or_else(Vec::new, |side| target_frequencies(case, side));
-    let met = targets.iter().filter(|target| target.met).count();
-    let met = match targets.len() {
-        0 => String::new(),
-        all => format!("; {met} of {all} {} met", if all == 1 { "target is" } else { "targets are" }),
-    };
-    format!(
-        "Amplitude of the deflection over time and frequency: the strongest component can be followed in {}{met}.",
-        ridges.join(", in ")
-    )
 }
