@@ -59,7 +59,9 @@ pub struct ConditionComparison<'a> {
     pub(crate) measured_motion: Option<MotionTraces>,
     /// Measured minus one run of the aligned model, in every frame of the recording.
     pub residual: Option<MotionTraces>,
-    /// Measured minus the model that restarts at every segment of the fit; `None` without fitted traces.
+    /// The model that restarts at every segment of the fit; `None` without fitted traces.
+    pub(crate) restarted_motion: Option<MotionTraces>,
+    /// Measured minus `restarted_motion`.
     pub(crate) restarted: Option<MotionTraces>,
     /// States of the model, restarted at every segment of the fit if traces were fitted.
     pub(crate) states: ModelStates<'a>,
@@ -106,6 +108,7 @@ impl<'a> ConditionComparison<'a> {
             let residual = recording.zip(measured_motion.as_ref()).map(|(seen, motion)| {
                 motion.subtract(&MotionTraces::from_model_at_frames(seen, view, &alignment))
             });
+            let restarted_motion = recording.and_then(|seen| model.restarted_motion(seen));
             let mut case = Self {
                 job,
                 result,
@@ -115,7 +118,11 @@ impl<'a> ConditionComparison<'a> {
                 alignment,
                 same_run: later_same_runs(models, condition),
                 residual,
-                restarted: recording.and_then(|seen| model.restarted_residual(seen)),
+                restarted: restarted_motion
+                    .as_ref()
+                    .zip(measured_motion.as_ref())
+                    .map(|(restarted, motion)| motion.subtract(restarted)),
+                restarted_motion,
                 measured_motion,
                 states: ModelStates::simulate(model, &result.segments, &job.conditions[condition].name),
                 ridges: RidgePair::default(),

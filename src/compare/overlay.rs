@@ -39,13 +39,14 @@ impl ModelRun {
         motion
     }
 
-    /// Recording minus the model that restarts at every segment of the fit; `None` without fitted traces.
-    pub(crate) fn restarted_residual(&self, recording: &Recording) -> Option<MotionTraces> {
+    /// Motion of the model that restarts at every segment of the fit, in every frame of a segment and as
+    /// [`Self::measured_motion`] counts it; `None` without fitted traces.
+    pub(crate) fn restarted_motion(&self, recording: &Recording) -> Option<MotionTraces> {
         let traces = self.traces.as_ref()?;
-        let [tip_x_m, head_drop_m] =
-            [0, 1].map(|k| subtract_columns(&traces.measured[k], &traces.restarted[k]));
+        let [tip_x_m, head_drop_m] = traces.restarted.clone();
         let empty = || vec![None; tip_x_m.len()];
-        let deflection_m = if traces.own_head { tip_x_m.clone() } else { empty() };
+        let deflection_m =
+            if traces.own_head { subtract_columns(&tip_x_m, &traces.head_x_m) } else { empty() };
         let time_s = MotionTraces::from_recording(recording).time_s;
         Some(MotionTraces { time_s, head_x_m: empty(), deflection_m, tip_x_m, head_drop_m })
     }

@@ -2,7 +2,9 @@
 
 use super::condition::{ConditionComparison, TimedRecording, spectral_band};
 use crate::feature::{FeatureBand, Reading};
-use crate::recording::channel::{Channel, InstantKind, Window, WindowEnd, mean_speed_m_per_s};
+use crate::recording::channel::{
+    Channel, InstantKind, Window, WindowEnd, mean_speed_m_per_s, median_in_place,
+};
 use short_spectra::time_frequency::{
     Ridge, RidgePoint, Spectrogram, SpectrogramSettings, SpeedPoint, course, default_band_hz,
 };
@@ -131,7 +133,10 @@ fn track_ridge(
     let analysis = side.recording.analyse_samples(inside, exposure_s, &SpectrumSettings::default()).ok()?;
     let frames = frames.start + analysis.skipped_frames..frames.end;
     let top_hz = default_band_hz(frames.len(), rate_hz, None);
-    let band_hz = fastest_band(case).map_or(top_hz, |band| (band.band_hz.0, band.band_hz.1.min(top_hz.1)));
+    let band_hz = match fastest_band(case) {
+        Some(band) => (band.band_hz.0, band.band_hz.1.min(top_hz.1)),
+        None => (top_hz.0.max(LEAST_OF_STICK_RATE * usual_stick_rate_hz(case)), top_hz.1),
+    };
     let band_hz = if band_hz.0 < band_hz.1 { band_hz } else { top_hz };
     // components below the band would disturb the ridge
     let fast = remove_slow_components(&analysis, rate_hz, band_hz.0);
@@ -205,6 +210,20 @@ fn remove_slow_components(analysis: &SpectralAnalysis, rate_hz: f64, low_hz: f64
 /// Smallest allowed ratio of a frequency to the rate of the model's sticks at which the frequency counts as
 /// that of the stick-slip cycle. The swing of the head is several times slower.
 const LEAST_OF_STICK_RATE: f64 = 0.6;
+
+/// Median rate of the model's sticks, Hz: the reciprocal of the median time from the start of a stick to that
+/// of the next; 0 for fewer than [`MIN_STICKS`] sticks.
+fn usual_stick_rate_hz(case: &ConditionComparison) -> f64 {
+    let sticks = &case.states.stick_s;
+    let mut periods_s: Vec<f64> = sticks.windows(2).map(|pair| pair[1][0] - pair[0][0]).collect();
+    if sticks.len() < MIN_STICKS {
+        return 0.0;
+    }
+    median_in_place(&mut periods_s).map_or(0.0, f64::recip)
+}
+
+/// Minimum number of sticks from which their usual rate is taken.
+const MIN_STICKS: usize = 10;
 
 /// Whether a component in a segment around an instant on the clock of the model, s, is the stick-slip cycle,
 /// and not the swing of the head: the tip of the model sticks there, and at most about as often.

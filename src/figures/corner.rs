@@ -17,7 +17,7 @@ use portable_math as math;
 pub struct CornerParameter {
     /// Symbol in the equations.
     pub symbol: String,
-    /// The estimate with its unit, and on a second line the 95 % interval that the page states.
+    /// The estimate with its unit, and in brackets the 95 % interval that the page states.
     pub words: String,
     /// Estimate.
     pub estimate: f64,
@@ -128,7 +128,7 @@ fn corner_parameter(
         ends.iter().map(|end| (bounds.unit_coordinate(*end) - estimate).abs()).fold(0.0, f64::max)
     });
     let (name, factor) = choose_prefix(line.map_or("", |line| line.unit.as_str()), [found.estimate]);
-    let number = |v: f64| format_digits(v * factor, 4);
+    let number = |v: f64| format_digits(v * factor, 3);
     let ends = format_interval(found.lower_95, found.upper_95, number);
     let likelihood = |cost: f64| math::exp(-0.5 * (cost - result.cost).max(0.0));
     let optimum = |end: &LocalOptimum| {
@@ -137,7 +137,7 @@ fn corner_parameter(
     };
     Some(CornerParameter {
         symbol: parameter_symbol(&free.name),
-        words: format!("{} {name}\n{ends}", number(found.estimate)).replace(" \n", "\n"),
+        words: format!("{} {name} ({ends})", number(found.estimate)).replace("  ", " "),
         estimate,
         stated: [found.lower_95, found.upper_95].map(|end| end.map(|v| bounds.unit_coordinate(v))),
         sd: half.map(|half| half / Z_95).filter(|sd| *sd > 0.0),

@@ -166,14 +166,14 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     let residual = case.judged_residual()?;
     let (channel, noise_m) = case.judged_channel()?;
     let measured = case.measured_motion.as_ref()?;
-    let restarted = case.restarted.as_ref().map(|restarted| measured.subtract(restarted));
+    let restarted = case.restarted_motion.as_ref();
     let single = MotionTraces::from_model(&case.model.view.recording, &case.alignment);
     let frame_s = 1.0 / case.measured_or_model().recording.grid().frame_rate_hz;
     let whole_s = (*residual.time_s.first()?, *residual.time_s.last()?);
     let drift = case.drift_cycles().map(|cycles| format!(", {}", describe_drift(cycles)));
     let part = |name: String, span_s: (f64, f64)| {
         let is_single = restarted.is_none() || name == SINGLE_RUN;
-        let (residual, model) = match &restarted {
+        let (residual, model) = match restarted {
             Some(model) if !is_single => (residual, model),
             _ => (case.residual.as_ref()?, &single),
         };

@@ -125,7 +125,7 @@ fn friction_series(part: &StickSlipPart, label: &str, over: fn(&TipFriction) -> 
     let point =
         |state: &Option<TipFriction>| state.map(|state| (over(&state) * MILLI, state.friction_n * MILLI));
     [
-        Series::new(label, Colour::Vermilion, Mark::Line, part.friction.iter().map(point)),
+        Series::new(label, Colour::Vermilion, Mark::Thin, part.friction.iter().map(point)),
         Series::new(
             "friction, measured",
             Colour::Black,
