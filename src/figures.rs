@@ -52,7 +52,10 @@ impl FigureBlock {
     /// This figure with the first `panels` panels of another one below its own.
     pub(crate) fn with_panels(mut self, other: Self, panels: usize) -> Self {
         if let (Drawing::Chart(whole), Drawing::Chart(next)) = (&mut self.drawing, other.drawing) {
-            whole.panels.extend(next.panels.into_iter().take(panels));
+            let mut further: Vec<chart::Panel> = next.panels.into_iter().take(panels).collect();
+            // what an outline points to is not among these panels
+            further.iter_mut().for_each(|panel| panel.shaded_spans.retain(|span| !span.outlined));
+            whole.panels.extend(further);
         }
         self
     }

@@ -210,6 +210,13 @@ impl<'a> ConditionComparison<'a> {
         Some((channel, self.noise_m(channel)?))
     }
 
+    /// The channel in which stick and slip are followed: the deflection, or the position of the tip in a
+    /// recording without a head.
+    pub(crate) fn cycle_channel(&self) -> Channel {
+        let is_tracked = |motion: &MotionTraces| motion.deflection_m.iter().any(Option::is_some);
+        if self.measured_motion.as_ref().is_none_or(is_tracked) { Channel::Deflection } else { Channel::TipX }
+    }
+
     /// Cycles of stick and slip by which one run of the model gets ahead of the recording; `None` if they
     /// show no common cycle.
     pub(crate) fn drift_cycles(&self) -> Option<f64> {
@@ -218,8 +225,8 @@ impl<'a> ConditionComparison<'a> {
         let recording = self.recording()?;
         let view = &self.model.view.recording;
         let model = MotionTraces::from_model_at_frames(recording, view, &self.alignment);
-        let deflections = [measured, &model].map(|motion| &motion.deflection_m[..]);
-        drift_cycles(deflections, recording.grid().frame_rate_hz, 0.5 * (low_hz + high_hz))
+        let columns = [measured, &model].map(|motion| motion.column(self.cycle_channel()));
+        drift_cycles(columns, recording.grid().frame_rate_hz, 0.5 * (low_hz + high_hz))
     }
 
     /// Exposure time of a frame, s; `None` if unknown.

@@ -1,7 +1,8 @@
-//! Spectrograms of the deflection of recording and model, with the ridges that follow the stick-slip cycle.
+//! Spectrograms of recording and model, with the ridges that follow the stick-slip cycle.
 
 use super::condition::{ConditionComparison, TimedRecording, spectral_band};
 use crate::feature::{FeatureBand, Reading};
+use crate::model::modes::body_frequencies;
 use crate::recording::channel::{
     Channel, InstantKind, Window, WindowEnd, mean_speed_m_per_s, median_in_place,
 };
@@ -34,7 +35,7 @@ pub struct RidgePair {
     pub model: Option<TrackedRidge>,
 }
 
-/// Spectrogram of a deflection, with its strongest component as a function of time.
+/// Spectrogram of a channel, with its strongest component as a function of time.
 #[derive(Debug, Clone)]
 pub struct TrackedRidge {
     /// Origin of the times of `spectrogram` and `ridge`, s.
@@ -128,14 +129,17 @@ fn track_ridge(
     shift_s: f64,
 ) -> Option<TrackedRidge> {
     let rate_hz = side.recording.grid().frame_rate_hz;
-    let samples = side.samples(Channel::Deflection);
+    let samples = side.samples(case.cycle_channel());
     let (inside, exposure_s) = (samples.get(frames.clone())?, case.exposure_s());
     let analysis = side.recording.analyse_samples(inside, exposure_s, &SpectrumSettings::default()).ok()?;
     let frames = frames.start + analysis.skipped_frames..frames.end;
     let top_hz = default_band_hz(frames.len(), rate_hz, None);
     let band_hz = match fastest_band(case) {
         Some(band) => (band.band_hz.0, band.band_hz.1.min(top_hz.1)),
-        None => (top_hz.0.max(LEAST_OF_STICK_RATE * usual_stick_rate_hz(case)), top_hz.1),
+        None => (
+            top_hz.0.max(LEAST_OF_STICK_RATE * usual_stick_rate_hz(case)).max(least_cycle_hz(case)),
+            top_hz.1,
+        ),
     };
     let band_hz = if band_hz.0 < band_hz.1 { band_hz } else { top_hz };
     // components below the band would disturb the ridge
@@ -225,12 +229,22 @@ fn usual_stick_rate_hz(case: &ConditionComparison) -> f64 {
 /// Minimum number of sticks from which their usual rate is taken.
 const MIN_STICKS: usize = 10;
 
+/// Smallest allowed ratio of the frequency of a stick-slip cycle to the natural frequency of the neck. The
+/// swing of the head on the neck has a third of it.
+const LEAST_OF_NECK: f64 = 0.5;
+
+/// Frequency below which a component is the swing of the head, whatever the sticks of the model are, Hz.
+fn least_cycle_hz(case: &ConditionComparison) -> f64 {
+    LEAST_OF_NECK * body_frequencies(&case.model.scene.linkage).neck_hz
+}
+
 /// Whether a component in a segment around an instant on the clock of the model, s, is the stick-slip cycle,
 /// and not the swing of the head: the tip of the model sticks there, and at most about as often.
 fn is_stick_slip_cycle(case: &ConditionComparison, frequency_hz: f64, time_s: f64, segment_s: f64) -> bool {
     let within = |start_s: f64| (start_s - time_s).abs() <= 0.5 * segment_s;
     let sticks = case.states.stick_s.iter().filter(|[start_s, _]| within(*start_s)).count();
-    sticks > 0 && frequency_hz >= LEAST_OF_STICK_RATE * sticks as f64 / segment_s
+    let least_hz = (LEAST_OF_STICK_RATE * sticks as f64 / segment_s).max(least_cycle_hz(case));
+    sticks > 0 && frequency_hz >= least_hz
 }
 
 /// Points of the stick-slip cycle, each with the mean speed of the tip in its segment.

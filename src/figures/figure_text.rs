@@ -48,11 +48,11 @@ impl ConditionComparison<'_> {
     }
 
     /// Builds the block of a figure that shows only the model. Conditions with the same run share this
-    /// figure, so its details name the condition.
+    /// figure, so its caption names the condition.
     pub(crate) fn model_figure_block(&self, name: &str, words: FigureText, drawing: Drawing) -> FigureBlock {
-        let of = self.distinct_name().map_or_else(String::new, |name| format!("{name}: "));
-        let details = format!("{of}{}{}", words.details, self.sharing_note());
-        self.drawing_block(name, FigureText { details, ..words }, drawing)
+        let caption = self.name_condition(&words.caption);
+        let details = format!("{}{}", words.details, self.sharing_note()).trim_start().to_owned();
+        self.drawing_block(name, FigureText { caption, details }, drawing)
     }
 
     fn drawing_block(

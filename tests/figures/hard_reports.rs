@@ -251,11 +251,11 @@ fn figures_of_two_conditions_tell_which_they_are_of() {
     let cycles = &chart(&report, "cycle.svg").panels[0].series;
     assert!(["first", "second"].iter().all(|name| cycles.iter().any(|s| s.label.starts_with(name))));
     for figure in ["poses.svg", "animation.svg"] {
-        let details = &block(&report, figure).details;
+        let FigureBlock { caption, details, .. } = block(&report, figure);
         assert!(
-            (details.starts_with("first: ") || details.starts_with("second: "))
+            (caption.starts_with("first: ") || caption.starts_with("second: "))
                 && !details.contains("is the same"),
-            "{figure}: {details}"
+            "{figure}: {caption} {details}"
         );
     }
 }

@@ -6,7 +6,6 @@ use crate::figures::spectrogram::comparison::{SpectrogramComparison, Spectrogram
 use crate::figures::spectrogram::{SpectrogramPlot, SpectrogramRidgePoint, TargetFrequency, fill_map};
 use crate::figures::{FigureBlock, FigureText};
 use crate::model::modes::body_frequencies;
-use crate::recording::channel::Channel;
 use crate::text::{format_digits, format_milliseconds};
 use std::ops::Range;
 
@@ -31,7 +30,8 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     let nyquist_hz = case.model.view.recording.grid().frame_rate_hz / 2.0;
     let shown_hz = (0.0, if top_hz > 0.0 { (RIDGE_MARGIN * top_hz).min(nyquist_hz) } else { nyquist_hz });
     let segment = format_milliseconds(first.spectrogram.segment_s);
-    let note = format!("spectrogram of the deflection in segments of {segment}");
+    let channel = case.cycle_channel();
+    let note = format!("spectrogram of the {} in segments of {segment}", channel.label());
     let title = figure_title(&sides);
     let blade = body_frequencies(&case.model.scene.linkage);
     let natural_hz = [("head", blade.head_hz), ("neck", blade.neck_hz), ("lip", blade.lip_hz)]
@@ -45,7 +45,7 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
             .map(|side| {
                 let (of, followed, shift_s) = *side;
                 let plot = SpectrogramPlot {
-                    quantity: Channel::Deflection.to_string(),
+                    quantity: channel.to_string(),
                     shown_hz: Some(shown_hz),
                     targets: target_frequencies(case, side),
                     natural_hz: natural_hz.to_vec(),
@@ -86,7 +86,7 @@ fn related_lines(
     found
 }
 
-/// The target frequencies of the deflection, with their windows in the recording or in the model.
+/// The target frequencies of the followed channel, with their windows in the recording or in the model.
 fn target_frequencies(case: &ConditionComparison, (of, _, shift_s): &ShiftedRidge) -> Vec<TargetFrequency> {
     let side = match of {
         SpectrogramSide::Measured => case.measured_side(),
@@ -95,7 +95,7 @@ fn target_frequencies(case: &ConditionComparison, (of, _, shift_s): &ShiftedRidg
     let Some(side) = side else { return Vec::new() };
     let grid = side.recording.grid();
     let windows = group_fit_windows(case.job, case.condition);
-    let own = windows.iter().filter(|window| window.channel == Channel::Deflection);
+    let own = windows.iter().filter(|window| window.channel == case.cycle_channel());
     let found = own.flat_map(|window| {
         let frames = side.window_frames(&window.window);
         let sought = window.frequency_comparisons(case.result).into_iter();

@@ -5,7 +5,6 @@ use crate::compare::{ConditionComparison, TimedRecording, release_window};
 use crate::figures::analysis::compare_spectra;
 use crate::figures::spectrum::{SpectraPlot, draw_figure, draw_panel, strongest_claim};
 use crate::figures::{FigureBlock, FigureText};
-use crate::recording::channel::Channel;
 use crate::text::{capitalise, format_digits, format_percent, format_with_sd};
 use plain_charts::{Figure, Panel};
 use short_spectra::{SpectralAnalysis, SpectrumSettings};
@@ -22,14 +21,14 @@ const MOST_WINDOWS: usize = 4;
 const PANEL_HEIGHT_MM: f64 = 48.0;
 
 /// The spectra of recording and model in the windows of the job, one panel each. Without such a window, those
-/// of the deflection after the release of the tip. `None` if no window can be analysed.
+/// of the motion after the release of the tip. `None` if no window can be analysed.
 pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     let mut windows = group_fit_windows(case.job, case.condition);
     windows.retain(|window| window.band.is_some());
     windows.truncate(MOST_WINDOWS);
     if windows.is_empty() {
         let window = release_window(&case.measured_or_model());
-        windows.push(FitWindow { channel: Channel::Deflection, window, band: None, targets: Vec::new() });
+        windows.push(FitWindow { channel: case.cycle_channel(), window, band: None, targets: Vec::new() });
     }
     // long windows need much memory, so they are analysed one after the other
     let found: Vec<_> = windows.iter().filter_map(|window| compare_window(case, window)).collect();
