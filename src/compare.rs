@@ -14,7 +14,7 @@ pub mod summary;
 pub mod tables;
 
 pub use condition::{ConditionComparison, FittedRecording, TimedRecording};
-pub(crate) use friction::{FrictionPoint, MeasuredFriction};
+pub(crate) use friction::FrictionPoint;
 pub(crate) use model_run::RunSummary;
 pub use model_run::{ModelRun, run_conditions};
 pub(crate) use ridge::release_window;

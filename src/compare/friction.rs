@@ -1,9 +1,7 @@
 //! Friction measured from the deflection of the blade in a recording.
 //!
 //! A blade whose links turn slowly is in equilibrium, so that the deflection `tip_x - head_x` determines both
-//! angles, the normal force and the coefficient of friction. During stick-slip, inertia averages out over
-//! whole cycles, so the mean deflection gives a mean coefficient. This mean is not a value of the friction
-//! law, so it is compared with the mean coefficient of the model.
+//! angles, the normal force and the coefficient of friction.
 
 use super::condition::{ConditionComparison, TimedRecording};
 use crate::fit::job::Job;
@@ -23,25 +21,10 @@ pub(crate) struct FrictionPoint {
     pub coefficient: f64,
 }
 
-/// Coefficients of friction from a recording.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct MeasuredFriction {
-    /// Coefficients during steady sliding of the tip.
-    pub steady_sliding: Vec<FrictionPoint>,
-    /// Mean coefficients over stick-slip cycles.
-    pub over_cycles: Vec<FrictionPoint>,
-    /// Mean coefficients of the model over stick-slip cycles.
-    pub model_over_cycles: Vec<FrictionPoint>,
-}
-
 /// Length of a block of steady sliding, s.
 const STEADY_BLOCK_S: f64 = 5e-3;
 /// Minimum number of frames in a block.
 const MIN_BLOCK_FRAMES: usize = 8;
-/// Smallest allowed length of a block of stick-slip cycles, s: a dozen cycles of the fast frequency.
-const CYCLE_BLOCK_S: f64 = 0.02;
-/// Length of a block of stick-slip cycles, in cycles of the slowest target frequency.
-const SLOW_CYCLES: f64 = 2.0;
 /// The tip counts as sliding steadily if the scatter of its positions about a parabola, divided by the
 /// standard deviation of the noise, is at most this value.
 const MAX_SCATTER_OVER_NOISE: f64 = 1.2;
@@ -51,51 +34,26 @@ const MAX_SPEED_CHANGE: f64 = 0.4;
 /// The tip counts as moving if its speed exceeds this number of standard deviations of the speed that would
 /// be measured for a tip at rest.
 const MIN_SPEED_SD: f64 = 5.0;
-/// Maximum number of points in each list of [`MeasuredFriction`].
+/// Maximum number of measured points.
 const MAX_POINTS: usize = 60;
 
-impl MeasuredFriction {
-    /// Measures coefficients of friction in the recording of a condition; finds none if tip or head was not
-    /// tracked.
-    pub(crate) fn measure(case: &ConditionComparison) -> Self {
-        let Some(side) = case.measured_side() else { return Self::default() };
-        let mut deflections = static_deflections(&case.model.scene.linkage);
-        deflections.iter_mut().for_each(|(_, deflection_m)| *deflection_m += case.alignment.tip_m);
-        let slowest_hz =
-            case.frequency_comparisons().map(|sought| sought.target.frequency_hz).reduce(f64::min);
-        let cycles_s = slowest_hz.map_or(CYCLE_BLOCK_S, |hz| (SLOW_CYCLES / hz).max(CYCLE_BLOCK_S));
-        let noise_m = case.noise_m(Channel::TipX).unwrap_or(0.0);
-        let evenly = one_way_blocks(&side, STEADY_BLOCK_S, noise_m);
-        let cycles = one_way_blocks(&side, cycles_s, noise_m);
-        let mut model = one_way_blocks(&case.model_side(), cycles_s, noise_m);
-        for block in &mut model {
-            block.start_s += case.alignment.shift_s;
-            block.deflection_m += case.alignment.tip_m;
-        }
-        let grid = side.recording.grid();
-        let shown = grid.start_s..=grid.time_s(grid.frames);
-        let points = |blocks: &[FrictionBlock], even: bool| {
-            let wanted = blocks.iter().filter(|b| b.is_even == even && shown.contains(&b.start_s));
-            let found: Vec<FrictionPoint> = wanted.filter_map(|b| b.friction_point(&deflections)).collect();
-            let every = found.len().div_ceil(MAX_POINTS).max(1);
-            found.into_iter().step_by(every).collect()
-        };
-        Self {
-            steady_sliding: points(&evenly, true),
-            over_cycles: points(&cycles, false),
-            model_over_cycles: points(&model, false),
-        }
-    }
+/// Coefficients of friction during steady sliding of the recorded tip; none if tip or head was not tracked.
+pub(crate) fn measure_steady_friction(case: &ConditionComparison) -> Vec<FrictionPoint> {
+    let Some(side) = case.measured_side() else { return Vec::new() };
+    let mut deflections = static_deflections(&case.model.scene.linkage);
+    deflections.iter_mut().for_each(|(_, deflection_m)| *deflection_m += case.alignment.tip_m);
+    let blocks = steady_blocks(&side, case.noise_m(Channel::TipX).unwrap_or(0.0));
+    let found: Vec<FrictionPoint> = blocks.iter().filter_map(|b| b.friction_point(&deflections)).collect();
+    let every = found.len().div_ceil(MAX_POINTS).max(1);
+    found.into_iter().step_by(every).collect()
 }
 
-/// A block of frames in which the tip moves in one direction.
+/// A block of frames in which the tip slides steadily in one direction.
 #[derive(Debug, Clone, Copy)]
 struct FrictionBlock {
-    start_s: f64,
     /// Mean velocity of the tip, m/s.
     velocity_m_per_s: f64,
     deflection_m: f64,
-    is_even: bool,
 }
 
 impl FrictionBlock {
@@ -111,31 +69,28 @@ impl FrictionBlock {
     }
 }
 
-/// Divides a recording into blocks of `length_s`, and returns those in which the tip moves in one direction
-/// at nearly constant speed.
-fn one_way_blocks(side: &TimedRecording, length_s: f64, noise_m: f64) -> Vec<FrictionBlock> {
+/// Divides a recording into blocks, and returns those in which the tip slides steadily in one direction.
+fn steady_blocks(side: &TimedRecording, noise_m: f64) -> Vec<FrictionBlock> {
     let grid = side.recording.grid();
-    let frames = ((length_s * grid.frame_rate_hz).round() as usize).max(MIN_BLOCK_FRAMES);
+    let frames = ((STEADY_BLOCK_S * grid.frame_rate_hz).round() as usize).max(MIN_BLOCK_FRAMES);
     let (tip, deflection) = (side.samples(Channel::TipX), side.samples(Channel::Deflection));
-    let block = |i: usize, tip: &[Option<f64>], deflection: &[Option<f64>]| {
+    let block = |(tip, deflection): (&[Option<f64>], &[Option<f64>])| {
         let path = TipParabola::fit(tip, 1.0 / grid.frame_rate_hz)?;
         let present: Vec<f64> = deflection.iter().flatten().copied().collect();
         if present.len() < MIN_BLOCK_FRAMES {
             return None;
         }
-        let least = MIN_SPEED_SD * noise_m / length_s;
-        let changes = path.curvature_m_per_s2.abs() * length_s;
-        let moves =
-            path.velocity_m_per_s.abs() > least && changes < MAX_SPEED_CHANGE * path.velocity_m_per_s.abs();
-        moves.then(|| FrictionBlock {
-            start_s: grid.time_s(i * frames),
+        let least = MIN_SPEED_SD * noise_m / STEADY_BLOCK_S;
+        let changes = path.curvature_m_per_s2.abs() * STEADY_BLOCK_S;
+        let is_steady = path.velocity_m_per_s.abs() > least
+            && changes < MAX_SPEED_CHANGE * path.velocity_m_per_s.abs()
+            && path.scatter_m <= MAX_SCATTER_OVER_NOISE * noise_m;
+        is_steady.then(|| FrictionBlock {
             velocity_m_per_s: path.velocity_m_per_s,
             deflection_m: present.iter().sum::<f64>() / present.len() as f64,
-            is_even: path.scatter_m <= MAX_SCATTER_OVER_NOISE * noise_m,
         })
     };
-    let pairs = tip.chunks(frames).zip(deflection.chunks(frames)).enumerate();
-    pairs.filter_map(|(i, (tip, deflection))| block(i, tip, deflection)).collect()
+    tip.chunks(frames).zip(deflection.chunks(frames)).filter_map(block).collect()
 }
 
 /// Parabola fitted to the positions of the tip in a block.
@@ -257,10 +212,8 @@ mod tests {
             let pose = steady_slip_pose(&linkage, velocity_m_per_s).unwrap();
             let d = crate::model::LinkDirections::from_pose(&pose);
             let block = FrictionBlock {
-                start_s: 0.0,
                 velocity_m_per_s,
                 deflection_m: linkage.l1_m * d.sin_theta + linkage.l2_m * d.sin_phi,
-                is_even: true,
             };
             let found = block.friction_point(&deflections).unwrap();
             let law = linkage.friction.dynamic_coefficient(velocity_m_per_s.abs());

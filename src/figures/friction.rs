@@ -2,8 +2,10 @@
 //! fraction of slip time at each speed.
 
 use super::{FigureBlock, FigureText};
-use crate::compare::friction::{COEFFICIENTS, LawCoefficient, friction_half_95, is_fitted};
-use crate::compare::{ConditionComparison, FrictionPoint, MeasuredFriction};
+use crate::compare::friction::{
+    COEFFICIENTS, LawCoefficient, friction_half_95, is_fitted, measure_steady_friction,
+};
+use crate::compare::{ConditionComparison, FrictionPoint};
 use crate::figures::full_figure;
 use crate::model::friction::FrictionLaw;
 use crate::simulate::ModelSample;
@@ -43,10 +45,6 @@ pub struct FrictionPlot {
     pub truth: Vec<(f64, f64)>,
     /// Speeds and coefficients measured while the recorded tip slides steadily.
     pub even: Vec<(f64, f64)>,
-    /// Speeds and coefficients, averaged over stick-slip cycles of the recording.
-    pub over_cycles: Vec<(f64, f64)>,
-    /// Speeds and coefficients, averaged over stick-slip cycles of the model.
-    pub of_model: Vec<(f64, f64)>,
     /// Speed bins: lower edge, m/s, upper edge, m/s, and fraction of the slip time that the tip spends in the
     /// bin.
     pub shares: Vec<(f64, f64, f64)>,
@@ -117,8 +115,6 @@ fn law_series(law: &FrictionPlot) -> Vec<Series> {
         series("law", Colour::Grey, Mark::ThinDashed, &law.curve),
         series("law at speeds of the run", Colour::Vermilion, Mark::Thick, &visited),
         series("synthetic truth", Colour::Green, Mark::Dashed, &law.truth),
-        series("model, mean over cycles", Colour::Vermilion, Mark::Crosses, &law.of_model),
-        series("measured, mean over cycles", Colour::Black, Mark::Circles, &law.over_cycles),
         Series { points: apart, ..even },
     ];
     drawn.into_iter().filter(|s| !s.points.is_empty()).collect()
@@ -134,7 +130,7 @@ fn coefficient_axis(law: &FrictionPlot) -> ChartAxis {
         return axis;
     };
     let band = law.interval_95.iter().flat_map(|(_, low, high)| [*low, *high]);
-    let points = law.even.iter().chain(&law.over_cycles).chain(&law.of_model).map(|p| p.1);
+    let points = law.even.iter().map(|p| p.1);
     let near = |v: &f64| (v - mean).abs() <= FAR * mean;
     let all = || own().chain(band.clone().chain(points.clone()).filter(near));
     let (Some(low), Some(high)) = (all().reduce(f64::min), all().reduce(f64::max)) else { return axis };
@@ -167,8 +163,7 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
             .map(|(v, coefficient)| (v, coefficient - half(v), coefficient + half(v)))
             .collect()
     };
-    let measured = MeasuredFriction::measure(case);
-    let points = |of: &[FrictionPoint]| of.iter().map(|p| (p.speed_m_per_s, p.coefficient)).collect();
+    let measured = measure_steady_friction(case);
     let shown = FrictionPlot {
         title: claim_sentence(&law, fastest.0),
         note: case.heading_note("model at the estimates"),
@@ -177,9 +172,7 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
         visited: Some(visited),
         interval_95: half.as_deref().map_or_else(Vec::new, band),
         truth: true_law(case).map_or_else(Vec::new, curve),
-        even: points(&measured.steady_sliding),
-        over_cycles: points(&measured.over_cycles),
-        of_model: points(&measured.model_over_cycles),
+        even: measured.iter().map(|p| (p.speed_m_per_s, p.coefficient)).collect(),
         shares: slip_time_shares(&slips, top),
         head: Some(mean_head_speed(case)),
     };
@@ -248,9 +241,9 @@ fn figure_text(
     law: &FrictionLaw,
     fastest: f64,
     half: Option<&(dyn Fn(f64) -> f64 + '_)>,
-    measured: &MeasuredFriction,
+    measured: &[FrictionPoint],
 ) -> FigureText {
-    let even = largest_deviation(law, &measured.steady_sliding).map_or_else(String::new, |(count, off)| {
+    let even = largest_deviation(law, measured).map_or_else(String::new, |(count, off)| {
         let points = pluralise("point", count);
         format!(
             "; {count} {points} measured where the tip slides evenly lie within {} of it",
