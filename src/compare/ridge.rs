@@ -56,19 +56,13 @@ pub struct TrackedRidge {
 impl RidgePair {
     pub(super) fn track(case: &ConditionComparison) -> Self {
         let track = |side: TimedRecording<'_>| {
-            track_ridge(
-                case,
-                &side,
-                side.window_frames(&release_window(&side))?,
-                None,
-                case.alignment.shift_s,
-            )
+            track_ridge(case, &side, side.window_frames(&release_window(&side))?, None, true)
         };
         let has_segments = |ridge: &TrackedRidge| ridge.spectrogram.amplitude_m.iter().any(Option::is_some);
         let measured = case.measured_side().and_then(track).filter(has_segments);
         let (segment_s, side) = (measured.as_ref().map(|m| m.spectrogram.segment_s), case.model_side());
         let model =
-            model_frames(case, &side).and_then(|frames| track_ridge(case, &side, frames, segment_s, 0.0));
+            model_frames(case, &side).and_then(|frames| track_ridge(case, &side, frames, segment_s, false));
         Self { measured, model }
     }
 }
@@ -126,7 +120,7 @@ fn track_ridge(
     side: &TimedRecording,
     frames: Range<usize>,
     segment_s: Option<f64>,
-    shift_s: f64,
+    is_measured: bool,
 ) -> Option<TrackedRidge> {
     let rate_hz = side.recording.grid().frame_rate_hz;
     let samples = side.samples(case.cycle_channel());
@@ -157,8 +151,12 @@ fn track_ridge(
         point.frequency_sd_hz = side.recording.add_clock_sd(point.frequency_hz, point.frequency_sd_hz);
     }
     let start_s = side.recording.grid().time_s(frames.start);
+    let shift_s = if is_measured { case.alignment.shift_s } else { 0.0 };
+    // a wrong model may slide where the recorded tip sticks
     let is_cycle = |p: &&RidgePoint| {
-        is_stick_slip_cycle(case, p.frequency_hz, start_s + p.time_s - shift_s, ridge.segment_s)
+        let sticks = count_sticks(case, start_s + p.time_s - shift_s, ridge.segment_s);
+        let least_hz = (LEAST_OF_STICK_RATE * sticks as f64 / ridge.segment_s).max(least_cycle_hz(case));
+        (is_measured || sticks > 0) && p.frequency_hz >= least_hz
     };
     let cycle: Vec<RidgePoint> = courses.iter().flatten().filter(is_cycle).copied().collect();
     let over_speed = ridge_over_speed(side, frames.start, &cycle, ridge.segment_s);
@@ -238,13 +236,10 @@ fn least_cycle_hz(case: &ConditionComparison) -> f64 {
     LEAST_OF_NECK * body_frequencies(&case.model.scene.linkage).neck_hz
 }
 
-/// Whether a component in a segment around an instant on the clock of the model, s, is the stick-slip cycle,
-/// and not the swing of the head: the tip of the model sticks there, and at most about as often.
-fn is_stick_slip_cycle(case: &ConditionComparison, frequency_hz: f64, time_s: f64, segment_s: f64) -> bool {
+/// Number of sticks of the model in a segment around an instant on its clock, s.
+fn count_sticks(case: &ConditionComparison, time_s: f64, segment_s: f64) -> usize {
     let within = |start_s: f64| (start_s - time_s).abs() <= 0.5 * segment_s;
-    let sticks = case.states.stick_s.iter().filter(|[start_s, _]| within(*start_s)).count();
-    let least_hz = (LEAST_OF_STICK_RATE * sticks as f64 / segment_s).max(least_cycle_hz(case));
-    sticks > 0 && frequency_hz >= least_hz
+    case.states.stick_s.iter().filter(|[start_s, _]| within(*start_s)).count()
 }
 
 /// Points of the stick-slip cycle, each with the mean speed of the tip in its segment.

@@ -206,7 +206,9 @@ fn claim_sentence(shown: &CycleOverSpeed, points: &[SpeedPoint]) -> Option<Strin
     let (low, high) = (hz().reduce(f64::min)?, hz().reduce(f64::max)?);
     let [low_hz, high_hz] = [low, high].map(|hz| format_digits(hz, 3));
     let rise = frequency_rise_hz(points) / (high - low);
-    Some(if high - low < CONSTANT_TOLERANCE * (high + low) / 2.0 {
+    Some(if points.len() == 1 {
+        format!("{whose} has {low_hz} Hz in the only segment that shows it")
+    } else if high - low < CONSTANT_TOLERANCE * (high + low) / 2.0 {
         format!("{whose} stays between {low_hz} and {high_hz} Hz whatever the speed of the tip")
     } else if rise > MIN_SPEED_TREND {
         format!("{whose} rises from {low_hz} to {high_hz} Hz as the tip speeds up")
