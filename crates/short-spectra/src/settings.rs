@@ -19,6 +19,9 @@ pub struct SpectrumSettings {
     /// Fastest oscillation that the motion may contain, Hz; possible aliases of a component are listed up to
     /// this frequency.
     pub fastest_hz: f64,
+    /// Whether oscillations that begin late or end soon, and pairs of lines closer than a resolution, are
+    /// searched for after the steady ones. This pass takes most of the time.
+    pub second_pass: bool,
 }
 
 impl Default for SpectrumSettings {
@@ -29,6 +32,7 @@ impl Default for SpectrumSettings {
             band_hz: None,
             max_components: MAX_COMPONENTS,
             fastest_hz: FASTEST_HZ,
+            second_pass: true,
         }
     }
 }
