@@ -1,4 +1,4 @@
-//! Fit jobs for Python, with the posterior density of their unknown parameters.
+//! Fit jobs for Python, with the posterior density of their unknown parameters and the words of their results.
 
 use crate::errors;
 use crate::workers;
@@ -8,12 +8,21 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use wiperlab::cli::read;
 use wiperlab::fit::posterior::Posterior;
+use wiperlab::fit::result::FitResult;
 
 /// A fit job with its scenes and recordings.
 #[pyclass(module = "wiperlab", frozen, subclass, name = "Job")]
 pub struct PyJob {
     posterior: Arc<Posterior>,
     path: PathBuf,
+}
+
+/// The verdict of a `result.json`, of which `text` is the contents, in words: the first sentence, and the
+/// reasons that it leaves out. `file` is its name in error messages.
+#[pyfunction]
+pub fn describe_verdict(py: Python<'_>, file: &str, text: &str) -> PyResult<(String, Vec<String>)> {
+    let result = FitResult::parse(file, text).map_err(|error| errors::input_error(py, error))?;
+    Ok(result.describe_verdict())
 }
 
 type PointArray<'py> = PyReadonlyArray1<'py, f64>;

@@ -28,6 +28,7 @@ fn _wiperlab(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<scene::PyScene>()?;
     module.add_class::<recording::PyRecording>()?;
     module.add_class::<job::PyJob>()?;
+    module.add_function(wrap_pyfunction!(job::describe_verdict, module)?)?;
     module.add_function(wrap_pyfunction!(scene::simulate_scene, module)?)?;
     module.add_function(wrap_pyfunction!(many::simulate_points, module)?)?;
     module.add_function(wrap_pyfunction!(recording::analyse, module)?)?;

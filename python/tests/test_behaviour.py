@@ -193,6 +193,15 @@ def test_the_program_comes_along(tmp_path: Path) -> None:
     assert wl.Recording.load(tmp_path / "run").frame_rate_hz == 5000.0
 
 
+def test_a_notebook_shows_the_verdict_of_the_page() -> None:
+    fit = Path(__file__).parents[2] / "fits"
+    explained = wl.FitResult.load(fit / "actual-blade-twin")
+    assert explained.explained and explained.verdict[0].startswith("The model explains the recording")
+    assert explained.verdict[0] in explained._repr_html_().replace("&#x27;", "'")
+    published = wl.FitResult.load(fit / "published-simulation")
+    assert published.verdict == ["The model meets all 3 targets"] and isinstance(published.findings, list)
+
+
 def test_what_a_notebook_shows_is_escaped(recording: wl.Recording) -> None:
     name = "<script>alert(1)</script>"
     named = wl.Recording.from_arrays(recording.columns, recording.frame_rate_hz, name=name, synthetic=True)

@@ -47,19 +47,20 @@ pub(crate) fn advise_measurements(
     }
     let candidates = candidate_features(job, model, &probed.centre.values);
     let rows = candidate_sensitivities(&candidates, job, model, probed);
-    let names = combinations.iter().filter(|c| !c.determined).map(ParameterCombination::describe);
+    let names = combinations.iter().filter(|c| !c.determined).map(ParameterCombination::describe_in_words);
     let mut sentences: Vec<String> = Vec::new();
     for (direction, name) in open.into_iter().zip(names) {
         let moved = |row: &Vec<f64>| row.iter().zip(direction).map(|(r, d)| r * d).sum::<f64>().abs();
         let moves = candidates.iter().zip(&rows).map(|(candidate, row)| (candidate, moved(row)));
         sentences.push(match moves.max_by(|a, b| a.1.total_cmp(&b.1)) {
             Some((candidate, moved)) if moved > MIN_INFORMATIVE => format!(
-                "to determine {name}: measure {} to {:.0} %, which moves by {moved:.0} of its standard deviations across the box",
+                "to determine {name}, measure {} to {:.0} %",
                 candidate.description,
                 100.0 * candidate.sd_relative
             ),
             _ => format!(
-                "no feature of these conditions that was tried moves along {name}: measure at another speed or preload, as another [[recording]]"
+                "to determine {name}, film the blade at another speed or preload: nothing else that was tried in \
+                 these conditions depends on it"
             ),
         });
     }
@@ -137,7 +138,10 @@ fn quasi_static_readings(fastest_m_per_s: Option<f64>) -> Vec<(Reading, String)>
         for speed_m_per_s in SPEED_SHARES.iter().filter_map(|share| Some(share * fastest_m_per_s?)) {
             let reading =
                 Reading::DeflectionAtSpeed { window, speed_m_per_s, width_relative: WIDTH_RELATIVE };
-            found.push((reading, format!("the mean deflection at a head speed of {speed_m_per_s:.2} m/s {part} the flip (deflection-at-speed)")));
+            found.push((
+                reading,
+                format!("the mean deflection at a head speed of {speed_m_per_s:.2} m/s {part} the flip"),
+            ));
         }
     }
     found
@@ -156,14 +160,14 @@ fn spectral_readings(aims: &[FitTarget], condition: usize) -> Vec<(Reading, Stri
     let of = |(band, name): (&FeatureBand, &str)| {
         let mut found = vec![
             (Reading::Rms(band.clone()), format!("the rms in the band of `{name}`")),
-            (Reading::DampingRatio(band.clone()), format!("the damping of `{name}` (damping-ratio)")),
+            (Reading::DampingRatio(band.clone()), format!("the damping of `{name}`")),
         ];
         if band.channel == Channel::Deflection {
             let end = |end: CycleRangeEnd, word: &str| {
                 let reading = Reading::CycleFrequency { band: band.clone(), segment_s: SEGMENT_S, end };
-                (reading, format!("the {word} frequency over which `{name}` runs (cycle-frequency-{word})"))
+                (reading, format!("the {word} frequency of `{name}`"))
             };
-            found.extend([end(CycleRangeEnd::Low, "low"), end(CycleRangeEnd::High, "high")]);
+            found.extend([end(CycleRangeEnd::Low, "lowest"), end(CycleRangeEnd::High, "highest")]);
         }
         found
     };

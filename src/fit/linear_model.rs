@@ -12,6 +12,7 @@ use super::job::FreeParameter;
 use super::objective::{LOSS_KNEE, Objective, prior_residuals, residual, total_sd};
 use super::target_value::TargetValue;
 use crate::feature::ValueComparison;
+use crate::model::parameters::describe_parameters;
 use nalgebra::{DMatrix, DVector};
 use portable_math as math;
 use serde::{Deserialize, Serialize};
@@ -239,6 +240,8 @@ pub(crate) const ROUNDING_SHARE: f64 = 1e-9;
 pub(crate) const OPEN_SHARE: f64 = 0.01;
 /// Exponents below this fraction of the largest exponent of a combination are left out.
 const MIN_NAMED_EXPONENT: f64 = 0.05;
+/// Exponents below this fraction of the largest exponent are left out of a sentence.
+const MIN_SPOKEN_EXPONENT: f64 = 0.2;
 
 /// Singular directions of a Jacobian in the space of the parameters.
 #[derive(Debug, Clone)]
@@ -270,6 +273,22 @@ impl ParameterCombination {
             if (e - 1.0).abs() < 0.005 { name.clone() } else { format!("{name}^{e:.2}") }
         };
         factors.into_iter().map(factor).collect::<Vec<_>>().join(" ")
+    }
+
+    /// The parameters of the product in words; those with a small exponent are left out.
+    pub(crate) fn describe_in_words(&self) -> String {
+        let named: Vec<(&str, f64)> = self.exponents.iter().map(|(name, e)| (name.as_str(), *e)).collect();
+        let mut named: Vec<_> = named.into_iter().filter(|(_, e)| e.abs() >= MIN_SPOKEN_EXPONENT).collect();
+        named.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let is_plain = |e: f64| (e.abs() - 1.0).abs() < MIN_SPOKEN_EXPONENT;
+        let words = |name| describe_parameters([name]);
+        match named[..] {
+            [(a, x), (b, y)] if is_plain(x) && is_plain(y) && y < 0.0 => {
+                format!("the ratio of {} to {}", words(a), words(b))
+            }
+            [(a, _)] => words(a),
+            _ => format!("the combination of {}", describe_parameters(named.iter().map(|(name, _)| *name))),
+        }
     }
 }
 

@@ -8,7 +8,7 @@
 
 use super::result::NuisanceResult;
 use crate::checkpoint::or_infinite;
-use crate::text::format_trimmed;
+use crate::text::{format_digits, format_length, format_trimmed};
 use portable_math as math;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -26,8 +26,11 @@ const Z_95: f64 = 1.96;
 /// Largest allowed distance of a nuisance parameter from the mean of its prior, in standard deviations of the
 /// prior. With twenty nuisance parameters, one in a hundred fits of a right model exceeds this limit.
 const MAX_PRIOR_DISTANCE_SD: f64 = 3.5;
+/// Ratio of residual to noise above which the first sentence on a model that does not explain a recording
+/// states this ratio; below it, a reason says more.
+const MIN_STATED_RATIO: f64 = 1.1;
 /// Number of significant digits of a ratio in a sentence.
-const DIGITS: usize = 3;
+const DIGITS: usize = 4;
 
 /// How well the model explains the traces.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -125,23 +128,45 @@ impl TraceMisfit {
         Self { explained: reasons.is_empty(), reasons, channels, stages }
     }
 
-    /// The first sentence of a report on a fit; `ended` says whether its search came to its end.
-    pub(crate) fn headline(&self, ended: bool) -> String {
-        let chi2 = self.stages.last().map_or(f64::NAN, |stage| stage.chi2_per_dof);
+    /// The verdict in words: the first sentence, without a full stop, and the reasons that it leaves out.
+    /// `ended` says whether the search came to its end.
+    pub(crate) fn describe_verdict(&self, ended: bool) -> (String, Vec<String>) {
         if !ended {
-            let chi2 = format_trimmed(chi2, DIGITS);
-            return format!(
-                "The search has not ended (chi2 per degree of freedom {chi2} so far), so nothing is said about the \
-                 model; go on with --resume"
-            );
+            let words = "The search has not ended, so nothing is said about the model; go on with --resume";
+            return (words.to_owned(), Vec::new());
         }
+        let ratio = |c: &&ChannelMisfit| c.residual_rms_m / c.noise_m;
+        let mut compared = self.channels.iter().filter(|c| c.frames > 0);
+        let words = |c: &ChannelMisfit| {
+            (c.describe_point().to_owned(), format_length(c.residual_rms_m), format_length(c.noise_m))
+        };
         if self.explained {
-            let chi2 = format_trimmed(chi2, DIGITS);
-            return format!(
-                "The model explains the recording to within its noise (chi2 per degree of freedom {chi2})"
-            );
+            let left = compared.next().map(words).map_or_else(String::new, |(point, residual, noise)| {
+                format!(": {residual} rms is left of the {point}, and its noise is {noise}")
+            });
+            return (format!("The model explains the recording to within its noise{left}"), Vec::new());
         }
-        unexplained_headline(&self.reasons)
+        match compared.max_by(|a, b| ratio(a).total_cmp(&ratio(b))).filter(|c| ratio(c) > MIN_STATED_RATIO) {
+            Some(worst) => {
+                let ((point, residual, noise), times) = (words(worst), format_digits(ratio(&worst), 2));
+                let missed =
+                    format!("it misses the {point} by {residual} rms, {times} times the noise of {noise}");
+                (unexplained_headline(&[missed]), self.reasons.clone())
+            }
+            None => (unexplained_headline(&self.reasons), Vec::new()),
+        }
+    }
+}
+
+impl ChannelMisfit {
+    /// The point of the blade that the channel shows.
+    fn describe_point(&self) -> &str {
+        match self.channel.as_str() {
+            "tip-x" => "tip",
+            "head-x" => "head",
+            "head-drop" => "head\u{2019}s drop",
+            other => other,
+        }
     }
 }
 
@@ -194,12 +219,12 @@ fn bad_segments(stages: &[StageMisfit]) -> Option<String> {
 fn misfit_above_noise(stages: &[StageMisfit]) -> Option<String> {
     let last = stages.last()?;
     let most = 1.0 + Z_95 * math::hypot(2.0 * NOISE_SD_RELATIVE, last.chi2_sd());
-    let (found, most_words) = (format_trimmed(last.chi2_per_dof, DIGITS), format_trimmed(most, DIGITS));
+    let [found, most_words] = [last.chi2_per_dof, most].map(ratio_text);
     if !last.chi2_per_dof.is_finite() {
         return (last.segments > 0).then(|| "the model cannot run through some segments".to_owned());
     }
     (last.chi2_per_dof > most).then(|| {
-        format!("chi2 per degree of freedom is {found}, and the noise's own uncertainty allows {most_words}")
+        format!("the residual is {found} times the noise, and noise alone leaves at most {most_words} times")
     })
 }
 
@@ -211,13 +236,18 @@ fn misfit_growth(stages: &[StageMisfit]) -> Option<String> {
     let grows = last.chi2_per_dof.is_finite() && last.chi2_per_dof > most;
     grows.then(|| {
         format!(
-            "chi2 per degree of freedom grows with the segments, from {} at {} ms to {} at {} ms",
-            format_trimmed(first.chi2_per_dof, DIGITS),
-            format_trimmed(1e3 * first.segment_s, DIGITS),
-            format_trimmed(last.chi2_per_dof, DIGITS),
-            format_trimmed(1e3 * last.segment_s, DIGITS),
+            "the residual grows from {} to {} times the noise while the segments grow from {} to {} ms",
+            ratio_text(first.chi2_per_dof),
+            ratio_text(last.chi2_per_dof),
+            format_trimmed(1e3 * first.segment_s, 3),
+            format_trimmed(1e3 * last.segment_s, 3),
         )
     })
+}
+
+/// Ratio of residual to noise for a chi2 per degree of freedom.
+fn ratio_text(chi2_per_dof: f64) -> String {
+    format_trimmed(chi2_per_dof.sqrt(), DIGITS)
 }
 
 /// Evidence against the model: a constant or a camera error is far from the mean of its prior, because a
@@ -225,12 +255,8 @@ fn misfit_growth(stages: &[StageMisfit]) -> Option<String> {
 fn far_from_prior(found: &NuisanceResult) -> Option<String> {
     let apart = (found.estimate - found.prior?) / found.prior_sd?;
     (apart.abs() > MAX_PRIOR_DISTANCE_SD).then(|| {
-        let of = found.recording.as_ref().map_or(String::new(), |recording| format!(" of `{recording}`"));
-        format!(
-            "`{}`{of} lies {} prior deviations from where the job has it",
-            found.name,
-            format_trimmed(apart.abs(), 2)
-        )
+        let (what, sds) = (found.describe(), format_trimmed(apart.abs(), 2));
+        format!("the {what} lies {sds} standard deviations from what was known beforehand")
     })
 }
 
@@ -318,25 +344,43 @@ mod tests {
         assert!(found(-0.012).is_empty());
         assert_eq!(
             found(-0.0182),
-            ["`scale_relative` of `a` lies 3.6 prior deviations from where the job has it"]
+            ["the scale of the camera of `a` lies 3.6 standard deviations from what was known beforehand"]
         );
     }
 
     #[test]
     fn the_first_sentence_says_it() {
-        let said = |chi2, bad| TraceMisfit::judge(Vec::new(), stages(chi2, bad, 5000), &[]).headline(true);
-        assert_eq!(
-            said([1.0, 1.0, 0.98], 0),
-            "The model explains the recording to within its noise (chi2 per degree of freedom 0.98)"
-        );
+        let said =
+            |chi2, bad| TraceMisfit::judge(Vec::new(), stages(chi2, bad, 5000), &[]).describe_verdict(true).0;
+        assert_eq!(said([1.0, 1.0, 0.98], 0), "The model explains the recording to within its noise");
         assert_eq!(
             said([1.0, 1.0, 1.0], 1),
             "The model does not explain the recording: 1 of 40 segments fit worse than noise ever does"
         );
         assert_eq!(
             said([1.0, 1.0, 1.3], 0),
-            "The model does not explain the recording: chi2 per degree of freedom is 1.3, and the noise's own \
-             uncertainty allows 1.16; chi2 per degree of freedom grows with the segments, from 1 at 4 ms to 1.3 at 16 ms"
+            "The model does not explain the recording: the residual is 1.14 times the noise, and noise alone \
+             leaves at most 1.078 times; the residual grows from 1 to 1.14 times the noise while the segments grow \
+             from 4 to 16 ms"
         );
+    }
+
+    #[test]
+    fn a_ratio_near_one_is_no_misfit_that_is_stated() {
+        let verdict = |residual_rms_m| {
+            let channel = ChannelMisfit {
+                channel: "tip-x".to_owned(),
+                frames: 400,
+                residual_rms_m,
+                noise_m: 2e-6,
+                ..ChannelMisfit::default()
+            };
+            TraceMisfit::judge(vec![channel], stages([1.0, 1.0, 1.0], 1, 5000), &[]).describe_verdict(true)
+        };
+        let reason = "1 of 40 segments fit worse than noise ever does";
+        let missed = "it misses the tip by 8.0 \u{b5}m rms, 4.0 times the noise of 2.0 \u{b5}m";
+        let whole = |why| format!("The model does not explain the recording: {why}");
+        assert_eq!(verdict(2.05e-6), (whole(reason), Vec::new()));
+        assert_eq!(verdict(8e-6), (whole(missed), vec![reason.to_owned()]));
     }
 }

@@ -7,10 +7,11 @@ use super::evaluation::FailureReason;
 use super::identifiability::Identifiability;
 use super::job::{FreeParameter, Job};
 use super::linear_model::ParameterCombination;
-use super::misfit::{TraceMisfit, far_from_priors};
+use super::misfit::{TraceMisfit, far_from_priors, unexplained_headline};
 use super::uncertainty::ParameterVerdict;
 use crate::model::Pose;
-use crate::text::text_sha256;
+use crate::model::parameters::describe_parameters;
+use crate::text::{pluralise, text_sha256};
 pub(super) use assembly::{FitFindings, ModelledTargets, camera_nuisance_results, predicted_feature_result};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -73,6 +74,14 @@ pub struct ParameterResult {
     /// that do not follow from the other numbers of the result are listed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub reasons: Vec<String>,
+}
+
+impl NuisanceResult {
+    /// The quantity in words, with its recording if it has one.
+    pub(crate) fn describe(&self) -> String {
+        let of = self.recording.as_ref().map_or(String::new(), |recording| format!(" of `{recording}`"));
+        format!("{}{of}", describe_parameters([self.name.as_str()]))
+    }
 }
 
 impl ParameterResult {
@@ -380,6 +389,20 @@ impl FitResult {
         self.components.iter().all(|component| component.pass)
     }
 
+    /// The verdict in words: the first sentence, without a full stop, and the reasons that it leaves out.
+    #[must_use]
+    pub fn describe_verdict(&self) -> (String, Vec<String>) {
+        let far = far_from_priors(&self.nuisances);
+        match &self.misfit {
+            Some(misfit) => misfit.describe_verdict(self.status.has_ended()),
+            None if far.is_empty() => {
+                let met = self.components.iter().map(|c| c.pass).chain(self.features.iter().map(|f| f.pass));
+                (describe_met_targets(met), Vec::new())
+            }
+            None => (unexplained_headline(&far), Vec::new()),
+        }
+    }
+
     /// Whether the model explains the recordings. In a fit of features, a camera that is far from its prior
     /// is evidence against the model.
     #[must_use]
@@ -388,6 +411,17 @@ impl FitResult {
             Some(misfit) => misfit.explained,
             None => far_from_priors(&self.nuisances).is_empty(),
         }
+    }
+}
+
+/// Sentence on the number of targets that the model meets, without a full stop: "The model meets all 3 targets".
+pub(crate) fn describe_met_targets(met: impl IntoIterator<Item = bool>) -> String {
+    let met: Vec<bool> = met.into_iter().collect();
+    let (count, all) = (met.iter().filter(|met| **met).count(), met.len());
+    match (count, all) {
+        (1, 1) => "The model meets its one target".to_owned(),
+        (count, all) if count == all => format!("The model meets all {all} targets"),
+        _ => format!("The model meets {count} of {all} {}", pluralise("target", all)),
     }
 }
 

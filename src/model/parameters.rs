@@ -6,6 +6,7 @@
 
 use super::shoulder::Shoulder;
 use super::{Linkage, Spring};
+use crate::text::join_with_and;
 use ParameterRange::{NotNegative, Positive, Within};
 use portable_math as math;
 use std::f64::consts::TAU;
@@ -146,7 +147,7 @@ table! {
     "blade.preload_force_n" "k0 hd" "N" Preload None, NotNegative, Log, "force of the tip on the glass when upright";
     "shoulder.contact_angle_rad" "theta_s" "rad" ShoulderAngle None, Within(0.0, RIGHT_ANGLE), Linear, "neck angle at which it meets the shoulder";
     "shoulder.stiffness_n_m_per_rad" "ks" "N m/rad" ShoulderStiffness None, Positive, Log, "stiffness that the shoulder adds to the neck";
-    "shoulder.stiffness_ratio" "ks/k1" "1" ShoulderStiffness None, Positive, Log, "stiffness that the shoulder adds, over the neck's";
+    "shoulder.stiffness_ratio" "ks/k1" "1" ShoulderStiffness None, Positive, Log, "ratio of the stiffness that the shoulder adds to the neck's";
     "shoulder.damping_n_m_s_per_rad" "cs" "N m s/rad" ShoulderDamping Some(0.0), NotNegative, Log, "damping that the shoulder adds";
     "shoulder.damping_ratio" "zs" "1" ShoulderDamping Some(0.0), NotNegative, Log, "damping ratio of the shoulder, cs/(2 sqrt(ks m_theta))";
     "friction.a" "A" "1" FrictionA None, NotNegative, Linear, "part of the friction coefficient that falls with speed";
@@ -168,6 +169,33 @@ pub fn find_parameter(name: &str) -> Option<&'static ModelParameter> {
 pub fn parameter_names() -> Vec<&'static str> {
     PARAMETERS.iter().map(|p| p.name).collect()
 }
+
+/// Parameters and camera errors in words, such as "natural frequency of the lip, A and C of the friction
+/// law". A name that is neither stands as it is.
+pub(crate) fn describe_parameters<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
+    let (of_law, others): (Vec<&str>, Vec<&str>) =
+        names.into_iter().partition(|name| name.starts_with("friction.") && find_parameter(name).is_some());
+    let camera = |name| CAMERA_ERRORS.iter().find(|(key, _)| *key == name).map(|(_, words)| *words);
+    let meaning = |name| find_parameter(name).and_then(|row| row.meaning.split(',').next()).or(camera(name));
+    let mut words: Vec<String> = others.iter().map(|name| meaning(name).unwrap_or(name).to_owned()).collect();
+    words.extend(of_law.iter().filter_map(|name| find_parameter(name)).map(|row| row.symbol.to_owned()));
+    let law = if of_law.is_empty() { "" } else { " of the friction law" };
+    join_with_and(&words) + law
+}
+
+/// Errors of a camera that a fit estimates, each with its meaning.
+const CAMERA_ERRORS: [(&str, &str); 10] = [
+    ("tilt_rad", "tilt of the camera"),
+    ("scale_relative", "scale of the camera"),
+    ("offset_x_m", "offset of the camera along the sweep"),
+    ("offset_drop_m", "offset of the camera in height"),
+    ("drift_x_m_per_s", "drift of the tracked point along the sweep"),
+    ("drift_drop_m_per_s", "drift of the tracked point in height"),
+    ("curvature_per_m", "curvature of the glass"),
+    ("tip_along_lip_m", "distance of the tracked point along the lip"),
+    ("tip_across_lip_m", "distance of the tracked point across the lip"),
+    ("clock_s", "clock of the camera"),
+];
 
 /// Natural frequency `sqrt(stiffness / inertia) / (2 pi)`, Hz.
 pub(crate) fn natural_frequency_hz(stiffness: f64, inertia: f64) -> f64 {

@@ -1,41 +1,65 @@
-//! Comparison of several fits: the components that each of them meets, and the agreement of their parameters.
+//! Comparison of several fits: what each of them explains, and the agreement of their parameters.
 
 mod intervals;
 mod page;
-mod spectra;
-mod verdict;
 
-use super::Report;
 use super::json::{FORMAT, FigureEntry, ReportDocument};
-use super::rich_text::Statement;
+use super::rich_text::{Sentence, Statement};
 use super::verdict::ReportVerdict;
-use crate::compare::{FittedRecording, ModelRun, ParameterLine};
+use super::{Report, summary};
+use crate::compare::ParameterLine;
 use crate::figures::FigureBlock;
-use crate::fit::job::Job;
 use crate::fit::uncertainty::ParameterVerdict;
-use crate::text;
+use crate::model::parameters::describe_parameters;
+use crate::text::{join_with_and, pluralise, truncate_text};
 pub(crate) use page::render_page;
 use serde::Serialize;
 
-/// Compares fits, in the order given.
+/// Compares fits, each with the name of its folder, in the order given.
 #[must_use]
-pub fn compare_fits(fits: &[ComparisonInput]) -> FitComparison {
-    let entry = |fit: &ComparisonInput| ComparedFit {
-        name: fit.name.to_owned(),
-        report: Report { figures: Vec::new(), ..fit.report.clone() },
-        verdict: ReportVerdict::from_report(fit.report),
+pub fn compare_fits(fits: Vec<(String, Report)>) -> FitComparison {
+    let entry = |(name, report)| {
+        let verdict = ReportVerdict::from_report(&report);
+        ComparedFit { name, verdict, report: Report { figures: Vec::new(), ..report } }
     };
-    let entries: Vec<ComparedFit> = fits.iter().map(entry).collect();
-    let parameters = shared_parameters(&entries);
-    let names: Vec<String> = fits.iter().map(|fit| fit.name.to_owned()).collect();
+    let fits: Vec<ComparedFit> = fits.into_iter().map(entry).collect();
+    let parameters = shared_parameters(&fits);
+    let names: Vec<String> = fits.iter().map(|fit| fit.name.clone()).collect();
     FitComparison {
-        title: format!("Comparison of {}", text::join_with_and(&names)),
-        figures: [intervals::interval_figures(&entries, &parameters), spectra::spectra_figures(fits)]
-            .concat(),
-        statements: verdict::comparison_statements(&entries, &parameters),
-        fits: entries,
+        title: format!("Comparison of {}", join_with_and(&names)),
+        figure: intervals::interval_figure(&fits, &parameters),
+        statements: comparison_statements(&fits, &parameters),
+        fits,
         parameters,
     }
+}
+
+fn comparison_statements(fits: &[ComparedFit], parameters: &[SharedParameter]) -> Vec<Statement> {
+    let passing = fits.iter().filter(|fit| fit.verdict.passes()).count();
+    let words = format!("{passing} of {} fits explain what they were fitted to", fits.len());
+    let line = |fit: &ComparedFit| {
+        let headline = summary::report_headline(&fit.report).statement;
+        Sentence::default().with_name(&fit.name).with_words(": ").with_sentence(headline)
+    };
+    let all = Statement::with_details(words, fits.iter().map(line).collect(), Some(passing == fits.len()));
+    let count =
+        |p: &SharedParameter, relation| p.pairs.iter().filter(|pair| pair.relation == relation).count();
+    let total = |relation| parameters.iter().map(|p| count(p, relation)).sum::<usize>();
+    let apart = total(IntervalRelation::Disjoint);
+    let comparable = apart + total(IntervalRelation::Overlap);
+    let detail = |p: &SharedParameter| {
+        let pairs = count(p, IntervalRelation::Disjoint);
+        let words = format!(", in {pairs} {}", pluralise("pair", pairs));
+        (pairs > 0)
+            .then(|| Sentence::default().with_name(&describe_parameters([p.name.as_str()])).with_words(words))
+    };
+    let words = match comparable {
+        0 => "No two of the fits determine the same parameter".to_owned(),
+        _ => format!(
+            "95 % intervals do not overlap in {apart} of {comparable} pairs of estimates that can be compared"
+        ),
+    };
+    vec![all, Statement::with_details(words, parameters.iter().filter_map(detail).collect(), None)]
 }
 
 /// The comparison as JSON, with the verdict of the page and without the drawings.
@@ -76,24 +100,9 @@ pub(crate) fn comparison_json(several: &FitComparison) -> Result<String, serde_j
         statements: &several.statements,
         parameters: &several.parameters,
         fits: several.fits.iter().map(document).collect(),
-        figures: several.figures.iter().map(|figure| FigureEntry::new(figure, None)).collect(),
+        figures: several.figure.iter().map(|figure| FigureEntry::new(figure, None)).collect(),
     };
     serde_json::to_string_pretty(&file).map(|text| text + "\n")
-}
-
-/// A fit as input of a comparison.
-#[derive(Debug, Clone, Copy)]
-pub struct ComparisonInput<'a> {
-    /// Name of the folder of the fit.
-    pub name: &'a str,
-    /// The report of the fit.
-    pub report: &'a Report,
-    /// The job of the fit.
-    pub job: &'a Job,
-    /// The recordings of the fit, which belong to its first conditions.
-    pub measured: &'a [FittedRecording<'a>],
-    /// The best model of the fit: its run in each condition.
-    pub best: &'a [ModelRun],
 }
 
 /// A comparison of fits.
@@ -105,8 +114,8 @@ pub struct FitComparison {
     pub fits: Vec<ComparedFit>,
     /// Every parameter that is free in any of the fits.
     pub parameters: Vec<SharedParameter>,
-    /// Figures in the order of the page.
-    pub figures: Vec<FigureBlock>,
+    /// The estimates with their intervals; `None` if no two fits share a parameter.
+    pub figure: Option<FigureBlock>,
     /// Results of the comparison, in words.
     pub statements: Vec<Statement>,
 }
@@ -138,7 +147,7 @@ impl FitComparison {
 pub(super) fn shorten_name(name: &str) -> String {
     /// Maximum number of letters in the legend of a figure that is one column wide.
     const MOST: usize = 24;
-    text::truncate_text(name, MOST)
+    truncate_text(name, MOST)
 }
 
 /// A parameter with its estimates in all fits.
@@ -176,16 +185,6 @@ pub enum IntervalRelation {
     /// In one of the fits the parameter is not identified or at a bound, so that its interval does not
     /// reflect the data.
     NotComparable,
-}
-
-impl IntervalRelation {
-    pub(super) fn describe(self) -> &'static str {
-        match self {
-            Self::Disjoint => "do not overlap",
-            Self::Overlap => "overlap",
-            Self::NotComparable => "cannot be compared",
-        }
-    }
 }
 
 /// Verdicts for which the interval of a parameter reflects the data; an open end then extends to infinity.

@@ -1,6 +1,7 @@
 "use strict";
-// What a reader can do with the figures of the page: a cursor that all plots over one clock share, values
-// under it, a part of the time enlarged, the animation paused and moved. Nothing is fetched or kept.
+// What a reader can do with the figures of the page: a cursor that all plots over one clock share and that
+// steps from frame to frame, the values of that frame, a part of the time enlarged with the heights that it
+// has, the animation paused and moved. Nothing is fetched or kept.
 (() => {
   const SVG = (document.querySelector("svg") ?? document.documentElement).namespaceURI;
   const set = (element, attributes) => {
@@ -12,30 +13,38 @@
   const numbers = text => text.split(" ").map(Number);
   const within = (x, low, high) => Math.min(Math.max(x, low), high);
 
-  // ---- Plots: the groups of the figures that lie over a clock
+  // ---- Plots: the groups of the figures that lie over time or frequency
 
   const plots = [...document.querySelectorAll("g.plot")].map((group, index) => {
     const [left, top, right, bottom] = numbers(group.dataset.area);
     const [low, high, scale] = group.dataset.y.split(" ");
+    const [from, to, along] = group.dataset.x.split(" ");
     const svg = group.ownerSVGElement;
     const figure = svg.closest("figure");
-    const whole = numbers(group.dataset.x);
+    const whole = [Number(from), Number(to)], y = { low: Number(low), high: Number(high), log: scale === "log" };
     return {
       group, svg, figure, index, left, top, right, bottom, whole, shown: whole,
-      clock: figure.dataset.clock ?? figure.id,
-      y: { low: Number(low), high: Number(high), log: scale === "log" },
+      timed: along === "time", log: along === "log",
+      // (plots over frequency have a cursor for each figure)
+      clock: along === "time" ? figure.dataset.clock ?? figure.id : `${figure.id} frequency`,
+      y, tall: y,
       label: group.dataset.label,
     };
   });
   const of = clock => plots.filter(plot => plot.clock === clock);
-  const place = (plot, time, [from, to] = plot.shown) =>
-    plot.left + (plot.right - plot.left) * (time - from) / (to - from);
-  const timeAt = (plot, x, [from, to] = plot.shown) =>
-    from + (to - from) * (x - plot.left) / (plot.right - plot.left);
+  const place = (plot, time, [from, to] = plot.shown) => {
+    const share = plot.log ? Math.log(time / from) / Math.log(to / from) : (time - from) / (to - from);
+    return plot.left + (plot.right - plot.left) * share;
+  };
+  const timeAt = (plot, x, [from, to] = plot.shown) => {
+    const share = (x - plot.left) / (plot.right - plot.left);
+    return plot.log ? from * (to / from) ** share : from + (to - from) * share;
+  };
   const valueAt = ({ top, bottom, y }, at) => {
     const share = (bottom - at) / (bottom - top);
     return y.log ? y.low * (y.high / y.low) ** share : y.low + (y.high - y.low) * share;
   };
+  const heightOf = ({ top, bottom, tall }, value) => bottom - (bottom - top) * (value - tall.low) / (tall.high - tall.low);
   const decimals = span => within(3 - Math.floor(Math.log10(span)), 0, 9);
 
   // ---- Paths: `M x y`, then steps `l dx dy ...`, `h dx`, `v dy`, `z`
@@ -61,8 +70,9 @@
     }
     return pieces;
   };
-  const written = (pieces, moved) => pieces.map(({ points, closed, dot }) => {
-    const [[x, y], ...rest] = points.map(([x, y]) => [Math.round(10 * moved(x)) / 10, y]);
+  const tenth = x => Math.round(10 * x) / 10;
+  const written = (pieces, moved, raised) => pieces.map(({ points, closed, dot }) => {
+    const [[x, y], ...rest] = points.map(([x, y]) => [tenth(moved(x)), tenth(raised(y))]);
     return dot ? `M${x} ${y}h0` : `M${x} ${y}` + rest.map(p => `L${p[0]} ${p[1]}`).join("") + (closed ? "z" : "");
   }).join("");
   const parsed = new Map();
@@ -76,21 +86,35 @@
   const frames = series => {
     if (!series.dataset.grid) return undefined;
     if (series.frames) return series.frames;
-    const [start, step, zero, one] = numbers(series.dataset.grid);
+    const [start, step, digits] = numbers(series.dataset.grid);
     let before = 0;
-    const values = series.dataset.values.split(" ").map(v => v === "-" ? undefined : zero + one * (before += Number(v)));
-    return series.frames = { start, step, values };
+    const values = series.dataset.values.split(" ").map(v => v === "-" ? undefined : (before += Number(v)) / 10 ** digits);
+    return series.frames = { start, step, values, digits: Math.max(digits, 0) };
+  };
+  // The value of a frame; between two frames of the series, the value on the line between them.
+  const frameValue = ({ start, step, values }, time) => {
+    const at = (time - start) / step, before = Math.floor(at + 1e-6), part = at - before;
+    if (part < 1e-3) return values[before];
+    const [a, b] = [values[before], values[before + 1]];
+    return a === undefined || b === undefined ? undefined : a + part * (b - a);
+  };
+  // The time of the nearest frame, on the grid of the first series of a clock that holds every frame.
+  const frameTime = (clock, time) => {
+    for (const series of of(clock).flatMap(plot => [...plot.group.querySelectorAll(".series")])) {
+      const all = frames(series);
+      if (all) return all.start + all.step * within(Math.round((time - all.start) / all.step), 0, all.values.length - 1);
+    }
+    return time;
   };
   // The same as a path of a part of the time.
   const path = (plot, { start, step, values }) => {
-    const [from, to] = plot.shown, { top, bottom, y } = plot;
+    const [from, to] = plot.shown;
     const first = Math.max(Math.floor((from - start) / step) - 1, 0);
     const last = Math.min(Math.ceil((to - start) / step) + 1, values.length - 1);
     let d = "", open = false;
     for (let i = first; i <= last; i += 1) {
       if (values[i] === undefined) { open = false; continue; }
-      const x = place(plot, start + i * step), at = bottom - (bottom - top) * (values[i] - y.low) / (y.high - y.low);
-      d += `${open ? "L" : "M"}${x.toFixed(1)} ${at.toFixed(1)}`;
+      d += `${open ? "L" : "M"}${tenth(place(plot, start + i * step))} ${tenth(heightOf(plot, values[i]))}`;
       open = true;
     }
     return d;
@@ -124,10 +148,10 @@
     const said = [...plot.group.querySelectorAll(".series")].flatMap(series => {
       const all = frames(series);
       const at = all ? undefined : heightAt([...series.querySelectorAll("path")], x);
-      const value = all ? all.values[Math.round((time - all.start) / all.step)] : at && valueAt(plot, at);
+      const value = all ? frameValue(all, time) : at && valueAt(plot, at);
       if (value === undefined) return [];
       const name = series.dataset.label ? `${series.dataset.label} ` : "";
-      return [name + (plot.y.log ? value.toPrecision(3) : value.toFixed(digits)).replace("-", "\u2212")];
+      return [name + (plot.y.log ? value.toPrecision(3) : value.toFixed(all ? all.digits : digits)).replace("-", "\u2212")];
     });
     return said.length ? `${plot.label}: ${said.join(", ")}` : "";
   };
@@ -140,6 +164,7 @@
     return plot.cursor;
   };
   const point = (clock, time, figure, animations = true) => {
+    time = frameTime(clock, time);
     if (state.clock !== clock) of(state.clock).forEach(plot => plot.cursor?.setAttribute("visibility", "hidden"));
     Object.assign(state, { clock, time, figure: figure ?? state.figure });
     for (const plot of of(clock)) {
@@ -178,55 +203,90 @@
   };
   // A shape as wide as a symbol keeps its form, wider ones are stretched.
   const SYMBOL = 16;
-  const stretch = (element, moved) => {
+  const stretch = (element, moved, raised, { top, bottom }) => {
     switch (element.tagName) {
       case "path":
         pieces(element);
         original(element, "d");
-        element.setAttribute("d", written(pieces(element), moved));
+        element.setAttribute("d", written(pieces(element), moved, raised));
         break;
       case "polygon": {
         const corners = original(element, "points").trim().split(/\s+/).map(p => p.split(",").map(Number));
-        const xs = corners.map(c => c[0]), low = Math.min(...xs), high = Math.max(...xs), middle = (low + high) / 2;
-        const to = high - low <= SYMBOL ? x => moved(middle) + x - middle : moved;
-        element.setAttribute("points", corners.map(([x, y]) => `${to(x)},${y}`).join(" "));
+        const keep = (at, of) => {
+          const low = Math.min(...at), high = Math.max(...at), middle = (low + high) / 2;
+          return high - low <= SYMBOL ? x => of(middle) + x - middle : of;
+        };
+        const x = keep(corners.map(c => c[0]), moved), y = keep(corners.map(c => c[1]), raised);
+        element.setAttribute("points", corners.map(c => `${x(c[0])},${y(c[1])}`).join(" "));
         break;
       }
       case "circle":
         element.setAttribute("cx", moved(Number(original(element, "cx"))));
+        element.setAttribute("cy", raised(Number(original(element, "cy"))));
         break;
-      case "text":
+      case "text": {
+        const y = Number(original(element, "y")), to = raised(y);
         element.setAttribute("x", moved(Number(original(element, "x"))));
+        element.setAttribute("y", to > top && to < bottom ? to : y);
         break;
+      }
     }
   };
   const step = (from, to, most) => {
     const raw = (to - from) / most, power = 10 ** Math.floor(Math.log10(raw));
     return [1, 2, 5, 10].map(m => m * power).find(s => s >= raw);
   };
-  const ticks = plot => {
-    const group = plot.group.querySelector(".ticks"), [from, to] = plot.shown;
-    plot.ticks ??= [...group.childNodes];
-    if (plot.shown === plot.whole) return group.replaceChildren(...plot.ticks);
-    const by = step(from, to, plot.right - plot.left > 1200 ? 7 : 4), marks = [];
-    const label = plot.ticks.find(node => node.tagName === "text");
+  const firstTicks = new Map();
+  // Draws the ticks of an axis that is enlarged, each at the place that `at` gives, with the mark `mark`.
+  const ticks = (group, enlarged, [from, to], most, key, at, mark) => {
+    if (!firstTicks.has(group)) firstTicks.set(group, [...group.childNodes]);
+    const first = firstTicks.get(group);
+    if (!enlarged) return group.replaceChildren(...first);
+    const by = step(from, to, most), marks = [];
+    const label = first.find(node => node.tagName === "text");
+    // (the baseline of a label lies below the tick)
+    const heights = first.flatMap(node => [node, ...(node.querySelectorAll?.("path") ?? [])])
+      .filter(node => node.tagName === "path").map(node => pieces(node)[0].points[0][1]);
+    const off = key === "x" || !label ? 0 : heights.map(y => Number(label.getAttribute("y")) - y)
+      .reduce((a, b) => Math.abs(b) < Math.abs(a) ? b : a, Infinity);
     const frame = drawn("g", { stroke: "#333333", "stroke-width": 3, fill: "none" });
     for (let t = Math.ceil(from / by) * by; t <= to + by * 1e-9; t += by) {
-      const x = place(plot, t);
-      frame.append(drawn("path", { d: `M${x} ${plot.bottom}v12`, stroke: "#333333" }));
+      const place = at(t);
+      frame.append(drawn("path", { d: mark(place), stroke: "#333333" }));
       if (!label) continue;
       const text = label.cloneNode(false);
-      text.setAttribute("x", x);
+      text.setAttribute(key, place + off);
       text.textContent = `\n${t.toFixed(within(-Math.floor(Math.log10(by)), 0, 9)).replace("-", "\u2212")}\n`;
       marks.push(text);
     }
     group.replaceChildren(frame, ...marks);
   };
+  // The heights of all that is shown, with a margin; the whole axis where nothing is, and for a logarithm.
+  const shownHeights = plot => {
+    const [from, to] = plot.shown, found = [];
+    if (plot.shown === plot.whole || plot.y.log || plot.group.dataset.heat) return plot.y;
+    for (const series of plot.group.querySelectorAll(".series")) {
+      const all = frames(series);
+      if (all) {
+        const first = Math.max(Math.ceil((from - all.start) / all.step), 0);
+        found.push(...all.values.slice(first, Math.floor((to - all.start) / all.step) + 1).filter(v => v !== undefined));
+        continue;
+      }
+      const points = [...series.querySelectorAll("path")].flatMap(pieces).flatMap(piece => piece.points);
+      const left = place(plot, from, plot.whole), right = place(plot, to, plot.whole);
+      found.push(...points.filter(([x]) => x >= left && x <= right).map(([, at]) => valueAt(plot, at)));
+    }
+    const low = found.reduce((a, b) => Math.min(a, b), Infinity), high = found.reduce((a, b) => Math.max(a, b), -Infinity);
+    const margin = 0.06 * (high - low);
+    return high > low ? { ...plot.y, low: low - margin, high: high + margin } : plot.y;
+  };
   const redraw = plot => {
     const [from, to] = plot.shown, moved = x => place(plot, timeAt(plot, x, plot.whole));
+    plot.tall = shownHeights(plot);
+    const isTaller = plot.tall !== plot.y, raised = y => isTaller ? heightOf(plot, valueAt(plot, y)) : y;
     for (const group of plot.group.querySelectorAll(".within")) {
       group.setAttribute("clip-path", clip(plot));
-      group.querySelectorAll("path, polygon, circle, text").forEach(element => stretch(element, moved));
+      group.querySelectorAll("path, polygon, circle, text").forEach(element => stretch(element, moved, raised, plot));
       for (const series of plot.shown === plot.whole ? [] : group.querySelectorAll(".series")) {
         const all = frames(series), [line, ...rest] = series.querySelectorAll("path");
         if (!all || !line) continue;
@@ -246,10 +306,13 @@
         box.append(cells);
       }
     }
-    ticks(plot);
+    ticks(plot.group.querySelector(".ticks"), plot.shown !== plot.whole, plot.shown,
+      plot.right - plot.left > 1200 ? 7 : 4, "x", t => place(plot, t), x => `M${x} ${plot.bottom}v12`);
+    ticks(plot.group.querySelector(".y-ticks"), isTaller, [plot.tall.low, plot.tall.high],
+      plot.bottom - plot.top > 300 ? 5 : 3, "y", v => heightOf(plot, v), y => `M${plot.left - 12} ${y}h12`);
   };
   const zoom = (clock, part) => {
-    for (const plot of of(clock)) {
+    for (const plot of of(clock).filter(plot => plot.timed)) {
       const [from, to] = part ? [Math.max(part[0], plot.whole[0]), Math.min(part[1], plot.whole[1])] : plot.whole;
       if (part && !(to > from)) continue;
       const shown = from <= plot.whole[0] && to >= plot.whole[1] ? plot.whole : [from, to];
@@ -283,7 +346,7 @@
     svg.classList.add("live");
     svg.addEventListener("pointerdown", event => {
       const { at, plot } = under(event);
-      if (!plot || event.button !== 0) return;
+      if (!plot?.timed || event.button !== 0) return;
       drag = { plot, from: at.x, box: drawn("rect", { class: "chosen", y: plot.top, height: plot.bottom - plot.top, width: 0 }) };
       plot.group.append(drag.box);
       svg.setPointerCapture(event.pointerId);
@@ -414,7 +477,8 @@
     // (of a quantity that is shown twice, the whole is read, which holds every frame)
     const shown = here.filter(plot => !here.some(other => other.label === plot.label && width(other) > width(plot)));
     const read = shown.map(plot => values(plot, time)).filter(Boolean).join("; ");
-    const instant = `${time.toFixed(decimals(to - from))} s`.replace("-", "\u2212");
+    const unit = of(clock)[0].timed ? "s" : "Hz";
+    const instant = `${time.toFixed(decimals(to - from))} ${unit}`.replace("-", "\u2212");
     bar.slider.setAttribute("aria-valuetext", instant);
     bar.said.textContent = read ? `${instant}: ${read}` : instant;
   };

@@ -23,20 +23,10 @@ impl Report {
     }
 }
 
-/// Maximum size of a page with additional figures for telephones, in bytes.
-const MOST_BYTES: usize = 1_000_000;
-
-/// The page; the same report always gives the same bytes. If it would be too large, the additional figures
-/// for telephones are left out, and telephones show the wide figures at a smaller size.
+/// The page; the same report always gives the same bytes.
 pub(crate) fn render_page(report: &Report) -> String {
-    let whole = assemble_page(report, true);
-    if whole.len() <= MOST_BYTES { whole } else { assemble_page(report, false) }
-}
-
-/// The page; if `narrow`, it also contains figures for narrow screens.
-fn assemble_page(report: &Report, narrow: bool) -> String {
     let verdict = ReportVerdict::from_report(report);
-    let (first, evidence) = evidence_html(report, narrow);
+    let (first, evidence) = evidence_html(report);
     let open = |id, heading, html: String| PageSection { id, heading, html, folded: false };
     let folded = |id, heading, html: String| PageSection { id, heading, html, folded: true };
     let answer = [summary_html(report), first, agreement::components_table(&report.components)].concat();
@@ -95,17 +85,17 @@ fn figures_of_subject(report: &Report, subject: FigureSubject) -> (Vec<&FigureBl
 }
 
 /// HTML of the first figure of the evidence, which is part of the answer, and HTML of the other figures.
-fn evidence_html(report: &Report, narrow: bool) -> (String, String) {
+fn evidence_html(report: &Report) -> (String, String) {
     let (all, before) = figures_of_subject(report, FigureSubject::Evidence);
     let (first, rest) = all.split_at(all.len().min(1));
-    let html = |part: &[&FigureBlock], before| figures_html(part.iter().copied(), before, narrow);
+    let html = |part: &[&FigureBlock], before| figures_html(part.iter().copied(), before);
     (html(first, before), html(rest, before + first.len()))
 }
 
 /// HTML of the figures of a subject.
 fn subject_figures_html(report: &Report, subject: FigureSubject) -> String {
     let (all, before) = figures_of_subject(report, subject);
-    figures_html(all, before, false)
+    figures_html(all, before)
 }
 
 pub(super) fn summary_html(report: &Report) -> String {

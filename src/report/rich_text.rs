@@ -37,12 +37,10 @@ impl Sentence {
         self
     }
 
-    /// Appends names, separated by commas.
-    pub(crate) fn with_names<'a>(self, names: impl IntoIterator<Item = &'a str>) -> Self {
-        let joined = |sentence: Self, (i, name): (usize, &str)| {
-            if i == 0 { sentence.with_name(name) } else { sentence.with_words(", ").with_name(name) }
-        };
-        names.into_iter().enumerate().fold(self, joined)
+    /// Appends another sentence.
+    pub(crate) fn with_sentence(mut self, other: Self) -> Self {
+        self.0.extend(other.0);
+        self
     }
 
     /// The sentence as text without markup.
@@ -101,12 +99,13 @@ impl Statement {
 
     /// The statement and its details as one line of text.
     pub(crate) fn plain_text(&self) -> String {
-        let details: Vec<String> = self.details.iter().map(Sentence::plain_text).collect();
+        let plain = |sentence: &Sentence| sentence.plain_text().trim_end_matches('.').to_owned();
+        let details = self.details.iter().map(plain).collect::<Vec<_>>().join("; ");
         let statement = self.statement.plain_text();
-        if details.is_empty() {
-            statement
-        } else {
-            format!("{}: {}.", statement.trim_end_matches('.'), details.join("; "))
+        match (details.is_empty(), statement.ends_with('.')) {
+            (true, _) => statement,
+            (false, true) => format!("{statement} {details}."),
+            (false, false) => format!("{statement}: {details}."),
         }
     }
 }
@@ -117,14 +116,13 @@ mod tests {
 
     #[test]
     fn a_statement_is_one_line_with_its_details() {
-        let names = Sentence::new("open: ").with_names(["a\u{202e}", "b"]);
-        assert_eq!(names.0.len(), 4);
+        let name = Sentence::new("open: ").with_name("a\u{202e}");
         let statement = Statement {
             statement: Sentence::new("One is met."),
-            details: vec![names, Sentence::new("x")],
+            details: vec![name, Sentence::new("x")],
             ..Statement::default()
         };
-        assert_eq!(statement.plain_text(), "One is met: open: a, b; x.");
+        assert_eq!(statement.plain_text(), "One is met. open: a; x.");
         assert_eq!(Statement::new(Sentence::new("Nothing.")).plain_text(), "Nothing.");
     }
 }

@@ -8,11 +8,10 @@ use crate::compare::summary::{ResidualSummary, describe_drift};
 use crate::compare::{ComparisonSummary, ParameterLine, TargetComparison};
 use crate::figures::evidence::NOTHING_LEFT;
 use crate::figures::friction::FrictionLine;
-use crate::fit::misfit::{ChannelMisfit, TraceMisfit, WorstSegment, far_from_priors};
-use crate::model::parameters;
-use crate::text::{
-    capitalise, format_decimals, format_digits, format_length, format_speed, join_with_and, pluralise,
-};
+use crate::fit::misfit::{TraceMisfit, WorstSegment, far_from_priors, unexplained_headline};
+use crate::fit::result::describe_met_targets;
+use crate::model::parameters::{self, describe_parameters};
+use crate::text::{capitalise, format_decimals, format_digits, format_length, format_speed, pluralise};
 use serde::Serialize;
 
 /// Ratio of the residual of a run to the noise above which the run deviates visibly from the recording.
@@ -96,7 +95,7 @@ fn blade_quantities(report: &Report) -> Vec<SummaryQuantity> {
     let parameter = |p: &ParameterLine| {
         let row = parameters::find_parameter(&p.name)?;
         Some(SummaryQuantity {
-            name: row.meaning.to_owned(),
+            name: describe_parameters([row.name]),
             keys: vec![row.name],
             unit: p.unit.clone(),
             value: p.estimate,
@@ -110,43 +109,30 @@ fn blade_quantities(report: &Report) -> Vec<SummaryQuantity> {
     report.friction.iter().map(friction).chain(others).collect()
 }
 
+/// Whether the model explains the measurements, with the reasons.
 pub(in crate::report) fn report_headline(report: &Report) -> Statement {
+    let far = far_from_priors(&report.nuisances);
     match (&report.misfit, report.recordings.is_empty()) {
         (Some(misfit), _) => trace_headline(report, misfit),
+        (None, _) if !far.is_empty() => {
+            let details = missed_target_sentences(report);
+            Statement::with_details(format!("{}.", unexplained_headline(&far)), details, Some(false))
+        }
         (None, false) => feature_headline(report),
         (None, true) => published_headline(report),
     }
 }
 
-/// The channel with the largest ratio of residual to noise.
-fn worst_channel(misfit: &TraceMisfit) -> Option<&ChannelMisfit> {
-    let ratio = |c: &&ChannelMisfit| c.residual_rms_m / c.noise_m;
-    misfit.channels.iter().filter(|c| c.frames > 0).max_by(|a, b| ratio(a).total_cmp(&ratio(b)))
-}
-
 fn trace_headline(report: &Report, misfit: &TraceMisfit) -> Statement {
-    if !report.search.has_ended() {
-        return Statement::new(format!("{}.", misfit.headline(false)));
+    let ended = report.search.has_ended();
+    let (words, reasons) = misfit.describe_verdict(ended);
+    if !ended {
+        return Statement::new(format!("{words}."));
     }
-    let shown = if misfit.explained { misfit.channels.first() } else { worst_channel(misfit) };
-    let left = shown.map_or_else(String::new, |c| {
-        let (point, ratio) = (channel_point_name(&c.channel), format_digits(c.residual_rms_m / c.noise_m, 2));
-        let (residual, noise) = (format_length(c.residual_rms_m), format_length(c.noise_m));
-        match misfit.explained {
-            true => {
-                format!(": what is left of the {point} is {residual} rms, and the noise of the recording is {noise}")
-            }
-            false => format!(": it misses the {point} by {residual} rms, {ratio} times the noise of {noise}"),
-        }
-    });
-    let doubt = "What was fitted need not be the blade\u{2019}s.";
-    let words = match misfit.explained {
-        true => format!("The model explains the recording{left}."),
-        false => format!("The model does not explain the recording{left}. {doubt}"),
-    };
-    let why = misfit.reasons.iter().map(|reason| Sentence::new(capitalise(reason)));
+    let doubt = if misfit.explained { "" } else { " What was fitted need not be the blade\u{2019}s." };
+    let why = reasons.iter().map(|reason| Sentence::new(format!("{}.", capitalise(reason))));
     let details = why.chain(missed_target_sentences(report)).chain(single_run_sentence(report)).collect();
-    Statement::with_details(words, details, Some(misfit.explained))
+    Statement::with_details(format!("{words}.{doubt}"), details, Some(misfit.explained))
 }
 
 /// Sentence on the residual of a single run of the model over the whole recording; the fit itself uses
@@ -166,16 +152,6 @@ fn single_run_sentence(report: &Report) -> Option<Sentence> {
     Some(of.with_words(format!(
         " once from its start, the model lies {rms} rms off the {channel}, {ratio} times the noise{why}"
     )))
-}
-
-/// Name of the point of the blade to which a channel belongs.
-fn channel_point_name(channel: &str) -> &str {
-    match channel {
-        "tip-x" => "tip",
-        "head-x" => "head",
-        "head-drop" => "head\u{2019}s drop",
-        other => other,
-    }
 }
 
 /// Index of the condition with the largest ratio of residual to noise in a single run of the model, and that
@@ -200,15 +176,10 @@ fn fitted_targets(report: &Report) -> impl Iterator<Item = &TargetComparison> {
     report.components.iter().chain(&report.features)
 }
 
-/// Whether all targets are met, and their count in words: "all 3 targets", "2 of 3 targets".
+/// Whether all targets are met, and the sentence on their number.
 fn count_met_targets(report: &Report) -> (bool, String) {
-    let (met, all) = (fitted_targets(report).filter(|c| c.pass).count(), fitted_targets(report).count());
-    let count = match (met, all) {
-        (1, 1) => "its one target".to_owned(),
-        (met, all) if met == all => format!("all {all} targets"),
-        _ => format!("{met} of {all} {}", pluralise("target", all)),
-    };
-    (met == all, count)
+    let met = || fitted_targets(report).map(|c| c.pass);
+    (met().all(|met| met), describe_met_targets(met()))
 }
 
 /// Sentences on the missed targets. After them come sentences on met targets from which the model deviates by
@@ -225,7 +196,7 @@ fn missed_target_sentences(report: &Report) -> Vec<Sentence> {
 }
 
 fn feature_headline(report: &Report) -> Statement {
-    let (all_met, count) = count_met_targets(report);
+    let (all_met, met) = count_met_targets(report);
     let (followed, good) = match farthest_residual(report) {
         Some((_, r)) => {
             let (channel, ratio) = (r.channel, r.rms_over_noise.unwrap_or(f64::INFINITY));
@@ -243,12 +214,12 @@ fn feature_headline(report: &Report) -> Statement {
         }
         None => (String::new(), Some(all_met)),
     };
-    let words = format!("The model meets {count}{followed}.");
+    let words = format!("{met}{followed}.");
     Statement::with_details(words, missed_target_sentences(report), good)
 }
 
 fn published_headline(report: &Report) -> Statement {
-    let (all_met, count) = count_met_targets(report);
+    let (all_met, met) = count_met_targets(report);
     let open = report.parameters.iter().filter(|p| !p.is_identified()).count();
     let all = report.parameters.len();
     let (open, good) = match (all_met, open) {
@@ -256,18 +227,14 @@ fn published_headline(report: &Report) -> Statement {
         (true, open) => (format!(", which leave {open} of {all} {} open", pluralise("parameter", all)), None),
         (false, _) => (String::new(), Some(false)),
     };
-    let words =
-        format!("The model meets {count} from publications or assumptions{open}. No recording was compared.");
+    let words = format!("{met} from publications or assumptions{open}. No recording was compared.");
     Statement::with_details(words, missed_target_sentences(report), good)
 }
 
-fn certainty_sentence(report: &Report) -> Sentence {
+pub(in crate::report) fn certainty_sentence(report: &Report) -> Sentence {
     let all = report.parameters.len();
     let (known, open): (Vec<_>, Vec<_>) = report.parameters.iter().partition(|p| p.is_identified());
-    let name = |p: &&ParameterLine| {
-        parameters::find_parameter(&p.name).map_or_else(|| p.name.clone(), |row| row.symbol.to_owned())
-    };
-    let open_names = join_with_and(&open.iter().map(name).collect::<Vec<_>>());
+    let open_names = describe_parameters(open.iter().map(|p| p.name.as_str()));
     if all == 0 {
         return Sentence::new("No parameter was fitted.");
     }
@@ -285,7 +252,7 @@ fn certainty_sentence(report: &Report) -> Sentence {
         (1, 1) => "The data determine the one parameter that was fitted.".to_owned(),
         (n, all) if n == all => format!("The data determine all {all} fitted parameters."),
         (0, 1) => format!("The data do not determine {open_names}: {why}."),
-        (0, _) => format!("The data determine none of {open_names} alone: {why}."),
+        (0, all) => format!("The data determine none of the {all} fitted parameters alone: {why}."),
         (n, all) => {
             format!("The data determine {n} of {all} fitted parameters, and not {open_names}: {why}.")
         }
@@ -306,7 +273,7 @@ fn shared_reason<'a>(open: &[&'a ParameterLine]) -> Option<&'a str> {
 }
 
 /// Sentence on the most urgent next step.
-fn next_step_sentence(report: &Report) -> Sentence {
+pub(in crate::report) fn next_step_sentence(report: &Report) -> Sentence {
     let all_known = report.parameters.iter().all(ParameterLine::is_identified);
     if let Some(run) = report.runs.iter().find(|run| run.opposite_turn) {
         return Sentence::new("Start the scene of ")
@@ -320,7 +287,7 @@ fn next_step_sentence(report: &Report) -> Sentence {
     }
     if let Some(p) = report.parameters.iter().find(|p| is_at_bound(p)) {
         return Sentence::new("Widen the bounds of ")
-            .with_name(&p.name)
+            .with_name(&describe_parameters([p.name.as_str()]))
             .with_words(" in the job: its best value lies at one.");
     }
     if let Some(misfit) = report.misfit.as_ref().filter(|misfit| !misfit.explained) {
@@ -329,26 +296,40 @@ fn next_step_sentence(report: &Report) -> Sentence {
     if !all_known {
         return match report.advice.first() {
             Some(advice) => Sentence::new(format!("{}.", capitalise(advice).trim_end_matches('.'))),
-            None => Sentence::new(
-                "Give the fit more to tell these parameters apart: recordings at other speeds, further \
-                 features, or a prior for one that is known from elsewhere.",
-            ),
+            None => measure_alone_sentence(report),
         };
     }
     if farthest_residual(report).is_some_and(|(_, r)| r.rms_over_noise.is_some_and(|ratio| ratio > SEEN))
         && report.misfit.is_none()
     {
-        return Sentence::new(
-            "Fit the traces themselves (`[[trace]]` in the job), which use what the features leave out.",
-        );
+        return Sentence::new("Fit the traces themselves, which hold what the features leave out.");
     }
     if fitted_targets(report).any(|c| !c.pass) || report.held_out.iter().any(|c| !c.pass) {
-        return Sentence::new("Look at the targets that are missed, in the table below and in the pulls.");
+        return Sentence::new("Look at the targets that are missed, in the table below.");
     }
     if report.recordings.is_empty() {
         return Sentence::new("Film the blade and fit the recording: published numbers alone prove little.");
     }
     Sentence::new("Test the model on a recording that was not fitted, at another speed or preload.")
+}
+
+/// Sentence on how to measure the parameter with the widest interval by itself.
+fn measure_alone_sentence(report: &Report) -> Sentence {
+    let width = |p: &&ParameterLine| match (p.lower_95, p.upper_95) {
+        (Some(lower), Some(upper)) => (upper - lower) / p.estimate.abs(),
+        _ => f64::INFINITY,
+    };
+    let open = report.parameters.iter().filter(|p| !p.is_identified());
+    let widest = open.rev().max_by(|a, b| width(a).total_cmp(&width(b)));
+    match widest.and_then(|p| parameters::find_parameter(&p.name)) {
+        Some(row) => {
+            let (what, how) = (describe_parameters([row.name]), row.quantity.measurement_method());
+            Sentence::new(format!("Measure {what} by itself: {how}."))
+        }
+        None => {
+            Sentence::new("Film the blade at another speed or preload, and fit both recordings together.")
+        }
+    }
 }
 
 /// An estimate counts as being at a bound if its distance from the bound is below this fraction of the range
@@ -378,7 +359,7 @@ fn describe_unexplained(report: &Report, misfit: &TraceMisfit) -> Sentence {
         }
         None => Sentence::new(
             "Check what the fit holds fixed \u{2013} masses, dampings, preload, the drive \u{2013} or set it \
-             free within a prior (`nuisance`), and fit again.",
+             free within what is known of it, and fit again.",
         ),
     }
 }
@@ -386,7 +367,7 @@ fn describe_unexplained(report: &Report, misfit: &TraceMisfit) -> Sentence {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::misfit::StageMisfit;
+    use crate::fit::misfit::{ChannelMisfit, StageMisfit};
     use crate::fit::result::FitStatus;
     use crate::fit::uncertainty::ParameterVerdict as Knowledge;
     use crate::report::{RunSummary, SearchLine};
@@ -517,8 +498,7 @@ mod tests {
         );
         let right = report_headline(&report(StageMisfit { bad_segments: 0, ..stage }));
         assert!(
-            right.good == Some(true)
-                && right.plain_text().contains("what is left of the tip is 2.0 \u{b5}m rms")
+            right.good == Some(true) && right.plain_text().contains("2.0 \u{b5}m rms is left of the tip")
         );
     }
 
@@ -590,11 +570,17 @@ mod tests {
             ..Report::default()
         };
         assert_eq!(next_step_sentence(&open).plain_text(), "Measure the release.");
+        let alone = next_step_sentence(&Report { advice: Vec::new(), ..open }).plain_text();
+        assert!(alone.starts_with("Measure A of the friction law by itself: side force over"), "{alone}");
         assert!(next_step_sentence(&Report::default()).plain_text().starts_with("Film the blade"));
         let mut stopped = line("friction.a", Knowledge::NotIdentified);
         stopped.bounds = [0.1, 0.5];
         let stopped = Report { parameters: vec![stopped], ..Report::default() };
-        assert!(next_step_sentence(&stopped).plain_text().starts_with("Widen the bounds of friction.a"));
+        assert!(
+            next_step_sentence(&stopped)
+                .plain_text()
+                .starts_with("Widen the bounds of A of the friction law")
+        );
         let good = filmed(1.0, vec![target(100.0, 1.0, true)]);
         assert!(next_step_sentence(&good).plain_text().starts_with("Test the model on a recording"));
     }

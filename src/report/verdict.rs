@@ -4,11 +4,12 @@ use super::rich_text::{Sentence, Statement};
 use super::{Report, summary};
 use crate::compare::{ParameterLine, RunSummary, TargetComparison, TrueValue};
 use crate::figures::OPPOSED;
-use crate::fit::misfit::{ChannelMisfit, TraceMisfit, far_from_priors, unexplained_headline};
+use crate::fit::misfit::far_from_priors;
 use crate::fit::uncertainty::ParameterVerdict as Knowledge;
+use crate::model::parameters::describe_parameters;
 use crate::simulate::RunStatus;
 use crate::text::{
-    self, format_interval, format_number, format_percent, format_signed_percent, format_with_sd,
+    self, capitalise, format_interval, format_number, format_percent, format_signed_percent, format_with_sd,
     make_printable, pluralise,
 };
 use serde::Serialize;
@@ -74,74 +75,33 @@ impl ReportVerdict {
 }
 
 fn verdict_statements(report: &Report) -> Vec<Statement> {
-    let mut found: Vec<Statement> =
-        report.misfit.iter().map(|misfit| misfit_statement(report, misfit)).collect();
-    found.extend(far_camera_statement(report));
-    if report.misfit.is_none() && !report.recordings.is_empty() {
-        found.push(Statement { details: Vec::new(), ..summary::report_headline(report) });
-    }
-    found.extend(met_statement("component", "", &report.components, |_| true));
+    let mut found = Vec::new();
     let how = " within 1.96 standard deviations of the target";
+    found.extend(met_statement("component", "", &report.components, |_| true));
     found.extend(met_statement("feature", how, &report.features, |c| !c.pass));
     found.extend(met_statement("value that was held out of the fit", "", &report.held_out, |_| true));
-    if found.is_empty() {
-        found.push(Statement::new("Nothing was compared."));
-    }
-    let (known, open): (Vec<_>, Vec<_>) = report.parameters.iter().partition(|p| p.is_identified());
-    let all = report.parameters.len();
-    let noun = pluralise("parameter", all);
-    let sentences = |list: &[&ParameterLine]| list.iter().map(|p| parameter_sentence(p)).collect();
-    if !known.is_empty() {
-        let words = format!("The data determine {} of {all} {noun}", known.len());
-        found.push(Statement::with_details(words, sentences(&known), open.is_empty().then_some(true)));
-    }
-    if !open.is_empty() {
-        let verb = if open.len() == 1 { "is" } else { "are" };
-        let words = format!("{} of {all} {noun} {verb} not determined", open.len());
-        found.push(Statement::with_details(words, sentences(&open), Some(false)));
-    }
+    let all_known = report.parameters.iter().all(ParameterLine::is_identified);
+    let certainty = summary::certainty_sentence(report);
+    let each = report.parameters.iter().map(parameter_sentence).collect();
+    found.push(Statement::with_details(
+        certainty,
+        each,
+        (!report.parameters.is_empty()).then_some(all_known),
+    ));
     found.extend(truth_statement(&report.parameters));
-    if !report.advice.is_empty() {
-        let details = report.advice.iter().map(|advice| Sentence::new(make_printable(advice))).collect();
-        found.push(Statement::with_details("What to measure in addition", details, None));
-    }
-    if report.recordings.is_empty() {
-        found.push(Statement::new(
-            "Only published numbers were fitted, and those that the job assumes. There are no measured \
-             traces, so the figures show the model alone.",
-        ));
-    }
     found.extend(ending_statements(report));
     // statements that are bad news come first
     found.sort_by_key(|statement| statement.good != Some(false));
+    found.insert(0, summary::report_headline(report));
+    let next = Sentence::new("Next: ").with_sentence(summary::next_step_sentence(report));
+    let more = report
+        .advice
+        .iter()
+        .skip(1)
+        .map(|advice| Sentence::new(capitalise(&make_printable(advice))))
+        .collect();
+    found.push(Statement::with_details(next, more, None));
     found
-}
-
-/// Statement that the features are met only if the camera errors are far from the values that their priors
-/// expect.
-fn far_camera_statement(report: &Report) -> Option<Statement> {
-    let reasons = far_from_priors(&report.nuisances);
-    let is_far = report.misfit.is_none() && !reasons.is_empty();
-    is_far.then(|| Statement::new(unexplained_headline(&reasons)).with_verdict(false))
-}
-
-/// Statement on whether the model explains the traces, with the residuals of every channel.
-fn misfit_statement(report: &Report, misfit: &TraceMisfit) -> Statement {
-    let details = misfit.channels.iter().map(residual_sentence).collect();
-    let ended = report.search.has_ended();
-    Statement::with_details(misfit.headline(ended), details, ended.then_some(misfit.explained))
-}
-
-/// Sentence on the residual of a channel compared with its noise, and on the segment with the worst fit.
-fn residual_sentence(c: &ChannelMisfit) -> Sentence {
-    let worst = c.worst.first().map_or_else(String::new, |w| {
-        let [from, to, chi2] = [w.start_s, w.end_s, w.chi2_per_dof].map(format_number);
-        format!("; worst from {from} s to {to} s, with {chi2} times the variance of the noise")
-    });
-    let [residual, noise] = [c.residual_rms_m, c.noise_m].map(|metres| format_number(1e6 * metres));
-    let words =
-        format!(", {}: residuals of {residual} \u{b5}m rms, noise of {noise} \u{b5}m{worst}", c.channel);
-    Sentence::default().with_name(&c.recording).with_words(words)
 }
 
 /// Singular and plural of the nouns that are counted in statements.
@@ -202,7 +162,7 @@ fn parameter_sentence(p: &ParameterLine) -> Sentence {
         false => format!("95 % interval {range}"),
     };
     let words = format!(" = {}{unit}, {range}{why}", number(p.estimate));
-    Sentence::default().with_name(&p.name).with_words(words)
+    Sentence::default().with_name(&describe_parameters([p.name.as_str()])).with_words(words)
 }
 
 /// Statement on the number of intervals that contain the true values of synthetic data.
@@ -227,7 +187,7 @@ fn truth_statement(parameters: &[ParameterLine]) -> Option<Statement> {
     let detail = |(p, truth): &(&ParameterLine, TrueValue)| {
         let interval = format_interval(p.lower_95, p.upper_95, format_number);
         let words = format!(" is {} in truth, outside {interval}", format_number(truth.value));
-        Sentence::default().with_name(&p.name).with_words(words)
+        Sentence::default().with_name(&describe_parameters([p.name.as_str()])).with_words(words)
     };
     Some(Statement::with_details(words, outside.map(detail).collect(), Some(inside == all)))
 }
@@ -283,7 +243,7 @@ fn hard_event_statement(run: &RunSummary) -> Option<Statement> {
 mod tests {
     use super::super::SearchLine;
     use super::*;
-    use crate::fit::misfit::{StageMisfit, WorstSegment};
+    use crate::fit::misfit::{ChannelMisfit, StageMisfit, TraceMisfit, WorstSegment};
     use crate::fit::result;
 
     fn comparison(name: &str, model: Option<f64>, pass: bool) -> TargetComparison {
@@ -329,7 +289,7 @@ mod tests {
                         within the tolerance of 2 %; \
             high: model 80.00 Hz, target 100.0(5) Hz, off by \u{2212}20.00 %, beyond the tolerance of 2 %; \
             third does not appear in the model; target 100.0(5) Hz.";
-        assert_eq!(verdict.summary()[0], expected);
+        assert!(verdict.summary().contains(&expected.to_owned()), "{:?}", verdict.summary());
         assert!(
             !verdict.all_components_met
                 && verdict.all_features_met
@@ -345,22 +305,27 @@ mod tests {
         wide.truth = Some(TrueValue { value: 0.3, inside_95: wide.holds(0.3) });
         let mut known = parameter("friction.a", Knowledge::Identified, Some(0.6));
         known.truth = Some(TrueValue { value: 0.55, inside_95: known.holds(0.55) });
-        let advice = vec!["measure the release".to_owned()];
+        let advice = vec!["measure the release".to_owned(), "measure another".to_owned()];
         let verdict = ReportVerdict::from_report(&Report {
+            components: vec![comparison("low", Some(100.5), true)],
             parameters: vec![known, wide],
             advice,
             ..Report::default()
         });
         let expected = [
-            "1 of 2 parameters is not determined: friction.c = 0.5000, 95 % interval above 0.4000; only a \
+            "The model meets its one target from publications or assumptions, which leave 1 of 2 parameters open. \
+             No recording was compared.",
+            "The data determine 1 of 2 fitted parameters, and not C of the friction law: only a lower limit is \
+             known. Masses, dampings and every other constant are taken as exact. A of the friction law = 0.5000, \
+             95 % interval 0.4000 to 0.6000; C of the friction law = 0.5000, 95 % interval above 0.4000; only a \
              lower limit is known.",
-            "The value behind the synthetic data lies inside the 95 % interval of 1 of 2 parameters: \
-             friction.c is 0.3000 in truth, outside above 0.4000.",
-            "Nothing was compared.",
-            "The data determine 1 of 2 parameters: friction.a = 0.5000, 95 % interval 0.4000 to 0.6000.",
-            "What to measure in addition: measure the release.",
+            "The value behind the synthetic data lies inside the 95 % interval of 1 of 2 parameters: C of the \
+             friction law is 0.3000 in truth, outside above 0.4000.",
+            "1 of 1 component is met: low: model 100.5 Hz, target 100.0(5) Hz, off by +0.50 %, within the \
+             tolerance of 2 %.",
+            "Next: Measure the release. Measure another.",
         ];
-        assert_eq!(verdict.summary()[..5], expected);
+        assert_eq!(verdict.summary(), expected);
         assert!(!verdict.all_parameters_identified);
     }
 
@@ -384,16 +349,16 @@ mod tests {
         };
         let report = |stage| Report {
             misfit: Some(TraceMisfit::judge(vec![channel.clone()], vec![stage], &[])),
-            components: vec![comparison("low", Some(101.0), true)],
+            components: vec![comparison("low", Some(100.5), true)],
             ..Report::default()
         };
         let wrong = ReportVerdict::from_report(&report(stage.clone()));
         assert!(!wrong.model_explains_recording && wrong.all_components_met && !wrong.passes());
         assert_eq!(
             wrong.summary()[0],
-            "The model does not explain the recording: 3 of 40 segments fit worse than noise ever does: film, \
-             tip-x: residuals of 3.000 \u{b5}m rms, noise of 2.000 \u{b5}m; worst from 0.2500 s to 0.2660 s, \
-             with 9.000 times the variance of the noise."
+            "The model does not explain the recording: it misses the tip by 3.0 \u{b5}m rms, 1.5 times the noise \
+             of 2.0 \u{b5}m. What was fitted need not be the blade\u{2019}s. 3 of 40 segments fit worse than noise \
+             ever does."
         );
         assert!(ReportVerdict::from_report(&report(StageMisfit { bad_segments: 0, ..stage })).passes());
     }
@@ -419,9 +384,9 @@ mod tests {
             "{said:?}"
         );
         assert!(
-            alone
-                .iter()
-                .any(|s| s.plain_text().contains("friction.a = 0.5000, no end of a 95 % interval is known")),
+            alone.iter().any(|s| s
+                .plain_text()
+                .contains("A of the friction law = 0.5000, no end of a 95 % interval is known")),
             "{alone:?}"
         );
         let both = of(vec![known, open(9.0)]);
@@ -434,13 +399,10 @@ mod tests {
     #[test]
     fn a_head_that_turns_the_other_way_is_said_and_is_not_good() {
         let runs = vec![RunSummary { name: "r".to_owned(), opposite_turn: true, ..Default::default() }];
-        let said =
-            ReportVerdict::from_report(&Report { runs, ..Report::default() }).statements.swap_remove(0);
-        assert!(
-            said.plain_text().starts_with("In r: the recorded head turns the other way than the model's")
-                && said.good == Some(false),
-            "{said:?}"
-        );
+        let statements = ReportVerdict::from_report(&Report { runs, ..Report::default() }).statements;
+        let turned = "In r: the recorded head turns the other way than the model's";
+        let said = statements.iter().find(|s| s.plain_text().starts_with(turned)).unwrap();
+        assert_eq!(said.good, Some(false));
     }
 
     #[test]
@@ -470,10 +432,8 @@ mod tests {
         })
         .summary();
         assert!(!summary.iter().any(|line| line.starts_with("The data determine 0")), "{summary:?}");
-        assert!(
-            summary.iter().any(|line| line.starts_with("1 of 1 parameter is not determined: friction.c")),
-            "{summary:?}"
-        );
+        let said = "The data do not determine C of the friction law: other values fit as well.";
+        assert!(summary.iter().any(|line| line.starts_with(said)), "{summary:?}");
     }
 
     #[test]
@@ -481,7 +441,8 @@ mod tests {
         let held_out = vec![comparison("a", Some(100.0), true), comparison("b", Some(100.0), true)];
         let advice = vec!["measure the damping of `a\nb\u{202e}c`".to_owned()];
         let summary = ReportVerdict::from_report(&Report { held_out, advice, ..Report::default() }).summary();
-        assert!(summary[0].starts_with("2 of 2 values that were held out of the fit are met"), "{summary:?}");
+        let said = "2 of 2 values that were held out of the fit are met";
+        assert!(summary.iter().any(|line| line.starts_with(said)), "{summary:?}");
         assert!(summary.iter().all(|line| !line.contains(['\n', '\u{202e}'])), "{summary:?}");
     }
 
@@ -493,9 +454,9 @@ mod tests {
             ..SearchLine::default()
         };
         let verdict = ReportVerdict::from_report(&Report { search, ..Report::default() });
-        // (bad news comes first)
+        // (bad news comes after the headline)
         assert_eq!(
-            verdict.summary()[0],
+            verdict.summary()[1],
             "The search ended before it had converged (budget-exhausted), after 1 evaluation of the model, \
              of which none failed."
         );

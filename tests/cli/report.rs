@@ -201,7 +201,7 @@ fn several_fits_are_compared_on_one_page_that_is_made_again_byte_for_byte() {
     let stdout = project.reported(&["fits/a", "fits/b"]);
     assert!(
         stdout.contains("reports/a-and-b/index.html")
-            && stdout.contains("Every component is met in 2 of 2 fits"),
+            && stdout.contains("of 2 fits explain what they were fitted to"),
         "{stdout}"
     );
     let found: Vec<String> = tree(&project.path("reports/a-and-b"))
@@ -211,18 +211,15 @@ fn several_fits_are_compared_on_one_page_that_is_made_again_byte_for_byte() {
     let figures = |name: &str| {
         [format!("{name}.svg"), format!("paper/{name}-170mm.svg"), format!("paper/{name}-85mm.svg")]
     };
-    let mut expected = [
-        &figures("parameters")[..],
-        &figures("spectra-1")[..],
-        &[".wiperlab.json", "index.html", "report.json"].map(str::to_owned),
-    ]
-    .concat();
+    let mut expected =
+        [&figures("parameters")[..], &[".wiperlab.json", "index.html", "report.json"].map(str::to_owned)]
+            .concat();
     expected.sort();
     assert_eq!(found, expected);
     let (page, json) = (project.read("reports/a-and-b/index.html"), project.json("reports/a-and-b"));
     assert!(
         page.contains("<bdi>a</bdi>")
-            && page.contains("Another fit")
+            && page.contains("<bdi>b</bdi>")
             && page.contains("Synthetic data: no camera took")
     );
     assert!(
@@ -232,16 +229,6 @@ fn several_fits_are_compared_on_one_page_that_is_made_again_byte_for_byte() {
     assert_eq!(
         (json["parameters"].as_array().unwrap().len(), &json["parameters"][0]["pairs"][0]["fits"]),
         (2, &serde_json::json!(["a", "b"]))
-    );
-    // both share a recording, which is drawn once
-    let spectra = project.read("reports/a-and-b/spectra-1.svg");
-    assert_eq!(
-        (
-            spectra.matches("synthetic, twin").count(),
-            spectra.matches("model, a").count(),
-            spectra.matches("model, b").count()
-        ),
-        (1, 1, 1)
     );
     project.reported(&["fits/a", "fits/b", "--out", "again", "--quiet"]);
     for name in expected {

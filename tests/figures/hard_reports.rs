@@ -13,7 +13,6 @@ use wiperlab::fit::scene_model::{Instrument, ModelCondition, PlausibilityLimits,
 use wiperlab::recording::files::parse_trace_csv;
 use wiperlab::recording::{FrameGrid, Recording, Traces};
 use wiperlab::report::assembly;
-use wiperlab::report::fit_comparison::{ComparisonInput, compare_fits};
 use wiperlab::report::{FigureSubject, Report};
 use wiperlab::simulate::scene::Scene;
 use wiperlab::simulate::twin::Camera;
@@ -390,33 +389,6 @@ fn a_fast_camera_makes_no_large_figure_and_none_of_noise() {
         low.title.starts_with("head drop") && top_hz <= 5e3,
         "75 Hz is not seen on an axis to {top_hz} Hz"
     );
-}
-
-#[test]
-fn a_film_beside_a_twin_is_not_called_synthetic_with_it() {
-    let cases = [true, false].map(|synthetic| case(vec![traced(synthetic, |grid, traces| (grid, traces))]));
-    let [twin, film] = &cases;
-    let (reports, best) = (cases.each_ref().map(Case::report), cases.each_ref().map(Case::best));
-    let measured = [twin.measured(), film.measured()];
-    let fitted = |i: usize, name| ComparisonInput {
-        name,
-        report: &reports[i],
-        job: &cases[i].job,
-        measured: &measured[i],
-        best: &best[i],
-    };
-    let several = compare_fits(&[fitted(0, "twin"), fitted(1, "film")]);
-    let spectra: Vec<_> = several.figures.iter().filter(|f| f.file.starts_with("spectra")).collect();
-    assert!(!spectra.is_empty());
-    for block in spectra {
-        let Drawing::Chart(figure) = &block.drawing else { panic!("{} is no chart", block.file) };
-        assert_eq!(
-            figure.subtitle, "some recordings are synthetic: no camera took those marked so",
-            "{}",
-            block.file
-        );
-        assert_eq!(figure.panels[0].vertical_lines.len(), 1, "one target of both fits is one line");
-    }
 }
 
 #[test]

@@ -126,3 +126,48 @@ fn numbers_are_read_with_sign_and_last_digit() {
     assert_eq!(found, [(-0.05, 0.01), (908.0, 1.0), (7.0, 1.0), (8.5, 0.01)]);
     assert_eq!(tokens("690(10)"), [(690.0, 10.0)]);
 }
+
+/// The series with a label of which the page holds every frame: the unit of its last digit, and its values.
+fn sampled_series(page: &str, label: &str) -> Vec<(f64, Vec<Option<f64>>)> {
+    let series = |part: &str| {
+        let (grid, rest) = part.split_once("\" data-values=\"").unwrap();
+        let decimals: i32 = grid.rsplit(' ').next().unwrap().parse().unwrap();
+        let (digit, mut sum) = (10.0_f64.powi(-decimals), 0_i64);
+        let value = |word: &str| {
+            sum += word.parse::<i64>().ok()?;
+            Some(sum as f64 * digit)
+        };
+        (digit, rest.split_once('"').unwrap().0.split(' ').map(value).collect())
+    };
+    page.split(&format!("data-label=\"{label}\" data-grid=\"")).skip(1).map(series).collect()
+}
+
+#[test]
+fn the_cursor_shows_the_residuals_of_the_table() {
+    let project = Project::copied();
+    for fit in FITS {
+        project.run_to(&["report", &format!("fits/{fit}")], &[0]);
+        let of = |file: &str| read(&project, &format!("reports/{fit}/{file}"));
+        let comparison: Value = serde_json::from_str(&of("comparison.json")).unwrap();
+        let (page, table) = (of("index.html"), of("residuals.csv"));
+        let column =
+            table.lines().next().unwrap().split(',').position(|name| name == "deflection_m").unwrap();
+        let cell = |line: &str| line.split(',').nth(column).unwrap().parse::<f64>().ok();
+        let residual_m: Vec<Option<f64>> = table.lines().skip(1).map(cell).collect();
+        let shown = sampled_series(&page, "measured \u{2212} model");
+        let Some(noise_m) = comparison["single_run"]["deflection"]["noise_m"].as_f64() else {
+            assert!(residual_m.is_empty() && shown.is_empty(), "{fit}");
+            continue;
+        };
+        let equals = |digit: f64, shown: &Option<f64>, residual_m: &Option<f64>| match (shown, residual_m) {
+            (Some(shown), Some(m)) => (shown - m / noise_m).abs() < 0.5001 * digit,
+            (shown, m) => shown.is_none() && m.is_none(),
+        };
+        let same = |(digit, values): &&(f64, Vec<Option<f64>>)| {
+            values.len() == residual_m.len()
+                && values.iter().zip(&residual_m).all(|(v, m)| equals(*digit, v, m))
+        };
+        assert!(residual_m.iter().flatten().count() > 1000, "{fit}");
+        assert!(shown.iter().any(|series| same(&series)), "{fit}: {} series", shown.len());
+    }
+}

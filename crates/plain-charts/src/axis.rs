@@ -46,6 +46,17 @@ impl ChartAxis {
         self.label == TIME_LABEL && self.scale == AxisScale::Linear
     }
 
+    /// How the cursor of a web page moves along this axis, which is that of a time or of a frequency; `None`
+    /// for any other axis.
+    pub(super) fn cursor_scale(&self) -> Option<&'static str> {
+        match self.scale {
+            AxisScale::Linear if self.is_time() => Some("time"),
+            _ if !self.label.starts_with("frequency") => None,
+            AxisScale::Linear => Some("linear"),
+            AxisScale::Log => Some("log"),
+        }
+    }
+
     /// A logarithmic axis that fits the data.
     pub fn log(label: impl Into<String>) -> Self {
         Self { label: label.into(), scale: AxisScale::Log, ..Self::default() }

@@ -2,7 +2,7 @@
 //! `plotters`.
 
 use super::compact_svg::CompactSvg;
-use super::path::{CanvasArea, CanvasPoint};
+use super::path::{CanvasArea, CanvasPoint, remove_flat_points};
 use super::style::UNITS_PER_MM;
 use super::style::{BLACK, Rgb};
 use crate::printable::make_printable;
@@ -68,6 +68,7 @@ impl Canvas {
     pub(crate) fn draw_line(&mut self, points: &[CanvasPoint], colour: Rgb, width: u32) {
         let mut whole: Vec<_> = points.iter().map(round_point).collect();
         whole.dedup();
+        let mut whole = remove_flat_points(&whole);
         if whole.len() == 1 {
             whole.push(whole[0]);
         }

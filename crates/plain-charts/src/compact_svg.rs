@@ -184,9 +184,9 @@ impl DrawingBackend for CompactSvg {
 
     fn draw_text<S: BackendTextStyle>(&mut self, text: &str, style: &S, (x, y): BackendCoord) -> DrawResult {
         let anchor = match style.anchor().h_pos {
-            HPos::Left => "start",
-            HPos::Right => "end",
-            HPos::Center => "middle",
+            HPos::Left => "",
+            HPos::Right => " text-anchor=\"end\"",
+            HPos::Center => " text-anchor=\"middle\"",
         };
         let lowered = match style.anchor().v_pos {
             VPos::Top => "0.76em",
@@ -198,11 +198,10 @@ impl DrawingBackend for CompactSvg {
             FontTransform::Rotate270 => format!(" transform=\"rotate(270, {x}, {y})\""),
             _ => String::new(),
         };
-        let (family, size, colour) = (style.family(), style.size(), fill_attributes(style.color()));
+        let (size, colour) = (style.size(), fill_attributes(style.color()));
         self.append_element(&format!(
-            "<text x=\"{x}\" y=\"{y}\" dy=\"{lowered}\" text-anchor=\"{anchor}\" font-family=\"{}\" \
-             font-size=\"{size}\" {colour}{bold}{turned}>\n{}\n</text>\n",
-            family.as_str(),
+            "<text x=\"{x}\" y=\"{y}\" dy=\"{lowered}\"{anchor} font-size=\"{size}\" \
+             {colour}{bold}{turned}>\n{}\n</text>\n",
             quick_xml::escape::escape(text)
         ))
     }

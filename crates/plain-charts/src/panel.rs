@@ -18,6 +18,7 @@ use super::text::{WIDE_LETTER, text_width};
 use super::{contours, hatch, heat_map};
 use crate::printable::make_printable;
 use html_escape::encode_safe;
+use portable_math as math;
 use std::fmt::Write;
 
 pub(super) fn draw_heading(canvas: &mut Canvas, figure: &Figure, layout: &FigureLayout) {
@@ -228,9 +229,11 @@ fn draw_axes(canvas: &mut Canvas, placed: &PanelLayout, live: bool) {
             draw_x_tick(canvas, placed, &tick, grid && panel.x.categories.is_empty());
         }
     });
-    for tick in placed.y_ticks() {
-        draw_y_tick(canvas, placed, &tick, grid && panel.y.categories.is_empty());
-    }
+    canvas.draw_group(live.then_some(Y_TICKS_CLASS), |canvas| {
+        for tick in placed.y_ticks() {
+            draw_y_tick(canvas, placed, &tick, grid && panel.y.categories.is_empty());
+        }
+    });
     canvas.draw_line(&area.outline(), FRAME, 3);
     draw_y_label(canvas, placed);
     if placed.has_x_labels && !panel.x.label.is_empty() {
@@ -378,26 +381,28 @@ fn count_lines_in(placed: &PanelLayout, area: &CanvasArea) -> usize {
     of_series.sum()
 }
 
-// SVG attributes that the script of a web page reads: axes and series of panels with a time axis.
+// SVG attributes that the script of a web page reads: axes and series of panels over time or frequency.
 
 /// Class of the SVG group that contains everything inside the axes. The script moves the group when the ends
 /// of the axes change.
 pub(super) const WITHIN_AXES_CLASS: &str = "class=\"within\"";
-/// Class of the SVG group that contains the ticks of the time axis.
+/// Class of the SVG group that contains the ticks of the x axis.
 pub(super) const TICKS_CLASS: &str = "class=\"ticks\"";
+/// Class of the SVG group that contains the ticks of the y axis.
+pub(super) const Y_TICKS_CLASS: &str = "class=\"y-ticks\"";
 /// Class of the SVG group that contains the labels above the axes. The positions of these labels are times.
 pub(super) const OVER_AXES_CLASS: &str = "class=\"over\"";
 
-/// Attributes of the SVG group of a panel with a time axis: canvas coordinates of the edges of its axes,
-/// values at the ends of both axes, and the label of the y axis. `None` for other panels.
+/// Attributes of the SVG group of a panel over time or frequency: canvas coordinates of the edges of its
+/// axes, values at the ends of both axes with their scales, and the label of the y axis. `None` for other
+/// panels.
 pub(super) fn panel_attributes(placed: &PanelLayout) -> Option<String> {
     let (panel, area, x, y) = (placed.panel, &placed.area, &placed.x, &placed.y);
-    let timed =
-        panel.x.is_time() && !panel.bare && [x.low, x.high, y.low, y.high].iter().all(|end| end.is_finite());
+    let is_read = !panel.bare && [x.low, x.high, y.low, y.high].iter().all(|end| end.is_finite());
     let scale = if y.scale == AxisScale::Log { "log" } else { "linear" };
-    timed.then(|| {
+    panel.x.cursor_scale().filter(|_| is_read).map(|x_scale| {
         format!(
-            "class=\"plot\" data-area=\"{} {} {} {}\" data-x=\"{} {}\" data-y=\"{} {} {scale}\" \
+            "class=\"plot\" data-area=\"{} {} {} {}\" data-x=\"{} {} {x_scale}\" data-y=\"{} {} {scale}\" \
              data-label=\"{}\"{}",
             area.left,
             area.top,
@@ -421,20 +426,23 @@ pub(super) fn series_attributes(index: usize, series: &Series, placed: &PanelLay
     format!("class=\"series\" data-label=\"{label}\"{detail}")
 }
 
-/// Number of equal steps into which the range of the y axis is divided. Values are rounded to these steps,
-/// which are fine enough for an enlarged curve on a screen.
+/// Least number of steps into which the range of the y axis is divided. Values are rounded to these steps,
+/// which are a power of ten, so that a page shows them as a table would round them. They are fine enough for
+/// an enlarged curve on a screen.
 const VALUE_STEPS: f64 = 1e4;
 
-/// SVG attributes with the full data: start and step of the sampling on the x axis, offset and unit of the
-/// values, and each value as the difference from the previous one. A dash marks a missing value.
+/// SVG attributes with the full data: start and step of the sampling on the x axis, number of decimals of the
+/// values, and each value, in units of the last decimal, as the difference from the previous one. A dash
+/// marks a missing value.
 fn sample_attributes(detail: &SampledSeries, placed: &PanelLayout) -> String {
-    let (low, one) = (placed.y.low, (placed.y.high - placed.y.low) / VALUE_STEPS);
+    let decimals = math::log10(VALUE_STEPS / (placed.y.high - placed.y.low)).ceil();
+    let steps_per_one = math::powi(10.0, decimals as i32);
     let mut before = 0_i64;
     let mut values = String::new();
     for value in &detail.values {
         match value {
             Some(value) => {
-                let now = ((value - low) / one).round() as i64;
+                let now = (value * steps_per_one).round() as i64;
                 let _ = write!(values, "{} ", now - before); // (writing into a string cannot fail)
                 before = now;
             }
@@ -442,7 +450,7 @@ fn sample_attributes(detail: &SampledSeries, placed: &PanelLayout) -> String {
         }
     }
     format!(
-        " data-grid=\"{} {} {low} {one}\" data-values=\"{}\"",
+        " data-grid=\"{} {} {decimals}\" data-values=\"{}\"",
         detail.start,
         detail.step,
         values.trim_end()

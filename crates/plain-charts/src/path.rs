@@ -90,6 +90,35 @@ pub(super) fn thin_points(run: &[CanvasPoint], width: f64) -> Vec<CanvasPoint> {
     kept
 }
 
+/// Maximum number of consecutive points that [`remove_flat_points`] leaves out.
+const MOST_FLAT_POINTS: usize = 64;
+
+/// A line without the points that lie within half a canvas unit of the straight line between the points that
+/// stay, on the way from one to the next. Such points are traces of rounding, and make up most of a page.
+pub(super) fn remove_flat_points(line: &[(i32, i32)]) -> Vec<(i32, i32)> {
+    let is_flat = |from: usize, to: usize| {
+        let vector = |i: usize| (f64::from(line[i].0 - line[from].0), f64::from(line[i].1 - line[from].1));
+        let (dx, dy) = vector(to);
+        let length = dx * dx + dy * dy;
+        length > 0.0
+            && (from + 1..to).all(|i| {
+                let ((x, y), (next_x, next_y)) = (vector(i), vector(i + 1));
+                let (along, next) = (x * dx + y * dy, next_x * dx + next_y * dy);
+                let across = x * dy - y * dx;
+                4.0 * across * across <= length && 0.0 <= along && along <= next
+            })
+    };
+    let mut kept: Vec<(i32, i32)> = line.first().copied().into_iter().collect();
+    let mut from = 0;
+    while from + 1 < line.len() {
+        let last = (from + MOST_FLAT_POINTS).min(line.len() - 1);
+        let to = (from + 2..=last).take_while(|to| is_flat(from, *to)).last().unwrap_or(from + 1);
+        kept.push(line[to]);
+        from = to;
+    }
+    kept
+}
+
 /// The pieces of a run that lie inside an area; a run is a line through consecutive points.
 pub(super) fn clip_line(run: &[CanvasPoint], area: &CanvasArea) -> Vec<Vec<CanvasPoint>> {
     let mut pieces: Vec<Vec<CanvasPoint>> = Vec::new();
@@ -219,6 +248,28 @@ mod tests {
             .collect();
         let kept = thin_points(&run, 1.0);
         assert!(kept.len() <= 8 && kept.contains(&(1.4, 9.0)) && kept.contains(&(0.6, -9.0)));
+    }
+
+    #[test]
+    fn points_on_a_straight_line_go_and_corners_stay() {
+        let slope: Vec<(i32, i32)> = (0..60).map(|i| (i, (f64::from(i) * 0.3).round() as i32)).collect();
+        assert_eq!(remove_flat_points(&slope), [(0, 0), (59, 18)]);
+        assert_eq!(remove_flat_points(&[(0, 0), (9, 0), (0, 0)]), [(0, 0), (9, 0), (0, 0)]);
+        let corner = [(0, 0), (5, 0), (10, 0), (10, 7), (10, 14), (10, 3), (20, 3)];
+        assert_eq!(remove_flat_points(&corner), [(0, 0), (10, 0), (10, 14), (10, 3), (20, 3)]);
+        let wave: Vec<(i32, i32)> =
+            (0..500).map(|i| (i, (40.0 * (0.05 * f64::from(i)).sin()).round() as i32)).collect();
+        let kept = remove_flat_points(&wave);
+        assert!(kept.len() < 150, "{}", kept.len());
+        for pair in kept.windows(2) {
+            let [(x0, y0), (x1, y1)] = [pair[0], pair[1]].map(|(x, y)| (f64::from(x), f64::from(y)));
+            let inside = wave.iter().map(|&(x, y)| (f64::from(x), f64::from(y)));
+            for (x, y) in inside.filter(|(x, _)| (x0..=x1).contains(x)) {
+                let off =
+                    (y - y0 - (y1 - y0) * (x - x0) / (x1 - x0)) / (1.0_f64).hypot((y1 - y0) / (x1 - x0));
+                assert!(off.abs() <= 0.5 + 1e-12, "{x}: {off}");
+            }
+        }
     }
 
     #[test]

@@ -116,7 +116,8 @@ fn render_svg(figure: &Figure, [title, name]: [&str; 2], style: &str, marked: bo
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" aria-label=\"{name}\" width=\"{:.2}mm\" \
          height=\"{:.2}mm\" viewBox=\"0 0 {width} {height}\" \
-         stroke-linejoin=\"round\">\n<title>{title}</title>\n<desc>{}</desc>\n{style}{ground}{drawn}</svg>\n",
+         stroke-linejoin=\"round\" font-family=\"sans-serif\">\n<title>{title}</title>\n<desc>{}</desc>\n\
+         {style}{ground}{drawn}</svg>\n",
         f64::from(width) / UNITS_PER_MM,
         f64::from(height) / UNITS_PER_MM,
         description.trim(),

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import tables
 from ._wiperlab import Job as NativeJob
+from ._wiperlab import describe_verdict
 from .errors import InputError, MissingFileError
 from .figure import Figure
 from .paths import existing
@@ -156,6 +157,24 @@ class FitResult(Mapping[str, Any]):
         return str(self["status"])
 
     @property
+    def explained(self) -> bool | None:
+        """Whether the model explains the recordings; None if the search did not end."""
+        explained: bool | None = self["explained"]
+        return explained
+
+    @property
+    def findings(self) -> list[dict[str, Any]]:
+        """Findings on the fit, the gravest first."""
+        return list(self.get("findings", []))
+
+    @property
+    def verdict(self) -> list[str]:
+        """The verdict in the words of the program and of the page: the first sentence, then its reasons."""
+        path = self.folder / "result.json"
+        first, reasons = describe_verdict(str(path), path.read_text(encoding="utf-8"))
+        return [first, *reasons]
+
+    @property
     def parameters(self) -> dict[str, dict[str, Any]]:
         """Estimate, interval and verdict of each parameter."""
         return dict(self["parameters"])
@@ -178,7 +197,7 @@ class FitResult(Mapping[str, Any]):
     def _repr_html_(self) -> str:
         keys = ["estimate", "lower_95", "upper_95", "verdict"]
         rows = [[name, *(parameter.get(key) for key in keys)] for name, parameter in self.parameters.items()]
-        return tables.html(f"Fit, {self.status}", ["parameter", *keys], rows)
+        return tables.html(". ".join([*self.verdict, f"Search {self.status}"]), ["parameter", *keys], rows)
 
 
 class Report:

@@ -2,7 +2,7 @@
 
 use super::CompletedFit;
 use crate::fit::linear_model::ParameterCombination;
-use crate::fit::misfit::{ChannelMisfit, TraceMisfit, far_from_priors, unexplained_headline};
+use crate::fit::misfit::{ChannelMisfit, TraceMisfit};
 use crate::fit::result::{FitResult, NuisanceResult};
 use crate::text::{self, format_digits, to_ascii};
 
@@ -12,12 +12,11 @@ const DIGITS: usize = 5;
 /// Prints misfit, features, parameters and notes.
 pub(crate) fn print_summary(solved: &CompletedFit) {
     let result = &solved.result;
+    let (headline, reasons) = result.describe_verdict();
+    print_line!("{}", to_ascii(&headline));
+    reasons.iter().for_each(|reason| print_line!("  {}", to_ascii(reason)));
     if let Some(misfit) = &result.misfit {
-        print_misfit(misfit, result.status.has_ended());
-    } else if !result.explains_recordings() {
-        print_line!("{}", to_ascii(&unexplained_headline(&far_from_priors(&result.nuisances))));
-    }
-    if result.misfit.is_some() {
+        print_misfit(misfit);
         let words = match result.constants_word() {
             "free" => "free within their priors",
             _ => "taken as exact: the intervals do not include their errors",
@@ -112,10 +111,8 @@ pub(super) fn format_value(value: f64) -> String {
 /// Maximum number of segments of a channel that are listed.
 const MOST_SEGMENTS: usize = 3;
 
-/// Prints the headline, the residuals compared with the noise, and the misfit for each length of the
-/// segments. `ended` says whether the search came to its end.
-pub(crate) fn print_misfit(misfit: &TraceMisfit, ended: bool) {
-    print_line!("{}", text::to_ascii(&misfit.headline(ended)));
+/// Prints the residuals compared with the noise, and the misfit for each length of the segments.
+fn print_misfit(misfit: &TraceMisfit) {
     print_line!("recording                channel     residual, um  noise, um  chi2/dof   neighbours");
     misfit.channels.iter().for_each(print_channel_misfit);
     print_line!("");
@@ -148,7 +145,7 @@ fn print_worst_segments(c: &ChannelMisfit) {
 }
 
 /// Prints the quantities that were estimated in addition to the parameters.
-pub(crate) fn print_nuisances(list: &[NuisanceResult]) {
+fn print_nuisances(list: &[NuisanceResult]) {
     if list.is_empty() {
         return;
     }

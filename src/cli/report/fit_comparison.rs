@@ -4,7 +4,7 @@ use super::{ReportFiles, ReportedFit, default_reports_folder};
 use crate::cli::prelude::*;
 use crate::cli::report;
 use crate::report::assembly;
-use crate::report::fit_comparison::{ComparisonInput, compare_fits, comparison_json, render_page};
+use crate::report::fit_comparison::{compare_fits, comparison_json, render_page};
 
 /// Maximum length, in bytes, of a folder name that is made from the names of fits; file systems allow longer
 /// names.
@@ -24,25 +24,14 @@ pub(crate) fn write_comparison(
     report::check_report_folder(&out, writer)?;
     let steps = progress::start_steps("report", global.quiet);
     steps.show_step("reading the fits, running and comparing their models");
-    let fits = jobs.iter().map(|job| ReportedFit::load(job)).collect::<Result<Vec<_>, _>>()?;
-    let best = fits.iter().map(ReportedFit::run_best_models).collect::<Result<Vec<_>, _>>()?;
-    let reports = fits
-        .iter()
-        .zip(&best)
-        .map(|(fit, best)| fit.build_report(assembly::build_report_without_figures, best))
-        .collect::<Result<Vec<_>, _>>()?;
-    let measured: Vec<_> = fits.iter().map(ReportedFit::measured_recordings).collect();
-    let input = |i: usize| ComparisonInput {
-        name: &fits[i].name,
-        report: &reports[i],
-        job: fits[i].problem.job(),
-        measured: &measured[i],
-        best: &best[i],
+    let report = |job: &PathBuf| {
+        let fit = ReportedFit::load(job)?;
+        let best = fit.run_best_models()?;
+        Ok((fit.name.clone(), fit.build_report(assembly::build_report_without_figures, &best)?))
     };
-    let fitted: Vec<ComparisonInput> = (0..fits.len()).map(input).collect();
-    let several = compare_fits(&fitted);
+    let several = compare_fits(jobs.iter().map(report).collect::<Outcome<_>>()?);
     let output = ReportFiles {
-        figures: several.figures.iter().collect(),
+        figures: several.figure.iter().collect(),
         json: comparison_json(&several).map_err(Failure::internal)?,
         tables: &[],
         page: render_page(&several),

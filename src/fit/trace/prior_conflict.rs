@@ -5,6 +5,7 @@
 //! move when the priors are made wider, show that a prior or the model is wrong.
 
 use super::uncertainty_run::SearchEnd;
+use crate::model::parameters::describe_parameters;
 use nalgebra::{DMatrix, DVector};
 use portable_math as math;
 
@@ -37,16 +38,16 @@ pub(super) fn prior_conflicts(end: &SearchEnd<'_>) -> Vec<String> {
     let reduced = |a: usize, b: usize| posterior[(known[a].0, known[b].0)] * known[a].2 * known[b].2;
     let removed = DMatrix::from_fn(known.len(), known.len(), |a, b| f64::from(a == b) - reduced(a, b));
     let pulls: Vec<f64> = known.iter().map(|(_, pull, _)| *pull).collect();
-    let name = |i: usize| end.model.unknowns.parameter_name(i).unwrap_or_default();
+    let name = |i: usize| describe_parameters(end.model.unknowns.parameter_name(i));
     let mut doubts = Vec::new();
     if are_jointly_improbable(&removed, &pulls) {
         let mut furthest = known.clone();
         furthest.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
         let named = furthest.iter().take(NAMED);
         let named: Vec<String> =
-            named.map(|(i, pull, _)| format!("{} by {pull:+.1} prior deviations", name(*i))).collect();
+            named.map(|(i, pull, _)| format!("{} by {pull:+.1} standard deviations", name(*i))).collect();
         doubts.push(format!(
-            "{} constants together contradict their priors, most of all {}",
+            "{} constants together contradict what was known of them, most of all {}",
             known.len(),
             named.join(", ")
         ));

@@ -164,7 +164,7 @@ fn unidentified_reason(
 fn undetermined_reason(name: &str, result: &FitResult) -> String {
     let open = result.combinations.iter().find(|c| !c.determined && c.exponents.contains_key(name));
     match (result.status, open) {
-        (FitStatus::Converged, Some(open)) => format!("the features leave {} open", open.describe()),
+        (FitStatus::Converged, Some(open)) => format!("the data leave {} open", open.describe_in_words()),
         (FitStatus::Converged, None) => "the best point is not reliable, see the reservations".to_owned(),
         (status, _) => format!("the search had not converged ({})", status.name()),
     }

@@ -4,15 +4,18 @@
 use super::{ComparedFit, IntervalRelation, SharedParameter, shorten_name};
 use crate::compare::ParameterLine;
 use crate::figures::{Drawing, FigureBlock};
-use crate::text::{format_interval, format_number};
+use crate::model::parameters::describe_parameters;
+use crate::text::capitalise;
 use plain_charts::{
     ChartAxis, Colour, ErrorBar, FULL_WIDTH_MM, Figure, MAX_HEIGHT_MM, Mark, MarkerShape, Medium, Panel,
     Series,
 };
 use portable_math as math;
 
-const ROW_MM: f64 = 5.5;
-const LEAST_HEIGHT_MM: f64 = 16.0;
+/// Heights of a row, mm; the first with which the figure fits a journal page is taken, or else the last.
+const ROW_MM: [f64; 4] = [5.5, 4.5, 3.7, 3.0];
+/// Least height of a panel, in rows.
+const LEAST_ROWS: usize = 3;
 /// Margin of the axis beyond the lowest and the highest finite end of the intervals, as a fraction of the
 /// distance between these two ends.
 const ROOM: f64 = 0.12;
@@ -22,38 +25,36 @@ const ALONE: f64 = 0.1;
 /// this.
 const WIDE: f64 = 30.0;
 
-/// The figures; none if no parameter is shared. The parameters are divided among as few figures as possible,
-/// each of which fits into a journal column.
-pub(super) fn interval_figures(entries: &[ComparedFit], parameters: &[SharedParameter]) -> Vec<FigureBlock> {
+/// The figure; `None` if no parameter is shared.
+pub(super) fn interval_figure(
+    entries: &[ComparedFit],
+    parameters: &[SharedParameter],
+) -> Option<FigureBlock> {
     let shared: Vec<&SharedParameter> = parameters.iter().filter(|p| !p.pairs.is_empty()).collect();
-    let fits = |figures: &[Figure]| figures.iter().all(|f| f.height_mm(Medium::Column) <= MAX_HEIGHT_MM);
-    let parted = |parts: usize| shared.chunks(shared.len().div_ceil(parts));
-    let drawn = |parts: usize| parted(parts).map(|part| draw_figure(entries, part)).collect::<Vec<Figure>>();
-    // even a single parameter may make a figure too high
-    let Some(parts) = (1..=shared.len()).find(|parts| fits(&drawn(*parts)) || *parts == shared.len()) else {
-        return Vec::new();
-    };
-    let block = |(i, (figure, part)): (usize, (Figure, &[&SharedParameter]))| FigureBlock {
+    let mut drawn = ROW_MM.iter().map(|row_mm| draw_figure(entries, &shared, *row_mm));
+    let fits = |figure: &Figure| figure.height_mm(Medium::Column) <= MAX_HEIGHT_MM;
+    let figure = drawn.clone().find(fits).or(drawn.next_back())?;
+    let what = "Estimates and 95 % intervals of the parameters that at least two of the fits share";
+    (!shared.is_empty()).then(|| FigureBlock {
         condition: None,
-        file: if parts == 1 { "parameters.svg".to_owned() } else { format!("parameters-{}.svg", i + 1) },
-        caption: figure_caption(part),
-        details: figure_details(part),
+        file: "parameters.svg".to_owned(),
+        caption: format!("{what}: {}.", claim_sentence(&shared)),
+        details: figure_details(&shared),
         drawing: Drawing::Chart(figure),
-    };
-    drawn(parts).into_iter().zip(parted(parts)).enumerate().map(block).collect()
+    })
 }
 
-fn draw_figure(entries: &[ComparedFit], parameters: &[&SharedParameter]) -> Figure {
+fn draw_figure(entries: &[ComparedFit], parameters: &[&SharedParameter], row_mm: f64) -> Figure {
     let description =
         "A panel a parameter, a row a fit: estimate and 95 % interval; an open end reaches the frame.";
     Figure {
-        title: claim_sentence(parameters),
+        title: capitalise(&claim_sentence(parameters)),
         subtitle: describe_sources(entries),
         watermarked: entries.iter().any(|e| e.verdict.synthetic),
         description: description.to_owned(),
         width_mm: FULL_WIDTH_MM,
         columns: 2,
-        panels: parameters.iter().map(|p| draw_panel(entries, p)).collect(),
+        panels: parameters.iter().map(|p| draw_panel(entries, p, row_mm)).collect(),
     }
 }
 
@@ -80,18 +81,9 @@ fn count_pairs(parameters: &[&SharedParameter]) -> (usize, usize) {
 /// The main result with its number.
 fn claim_sentence(parameters: &[&SharedParameter]) -> String {
     match count_pairs(parameters) {
-        (0, _) => "No two of the 95 % intervals can be compared".to_owned(),
+        (0, _) => "no two of the 95 % intervals can be compared".to_owned(),
         (all, apart) => format!("{} of {all} comparable pairs of 95 % intervals overlap", all - apart),
     }
-}
-
-fn figure_caption(parameters: &[&SharedParameter]) -> String {
-    let (comparable, apart) = count_pairs(parameters);
-    let overlaps = match comparable {
-        0 => "no two of the intervals can be compared".to_owned(),
-        _ => format!("{apart} of {comparable} pairs of intervals that can be compared do not overlap"),
-    };
-    format!("Estimates and 95 % intervals of the parameters that at least two of the fits share: {overlaps}.")
 }
 
 fn figure_details(parameters: &[&SharedParameter]) -> String {
@@ -112,7 +104,7 @@ const LOOKS: [(&str, Colour, Mark, bool); 2] = [
     ("not identified, or a limit", Colour::Vermilion, Mark::Hollow(MarkerShape::Diamond), false),
 ];
 
-fn draw_panel(entries: &[ComparedFit], parameter: &SharedParameter) -> Panel {
+fn draw_panel(entries: &[ComparedFit], parameter: &SharedParameter, row_mm: f64) -> Panel {
     // the first fit is at the top, and an axis counts from the bottom
     let lines = entries.iter().zip(&parameter.lines).rev();
     let having: Vec<(&ComparedFit, &ParameterLine)> =
@@ -143,10 +135,10 @@ fn draw_panel(entries: &[ComparedFit], parameter: &SharedParameter) -> Panel {
         ..Series::default()
     };
     Panel {
-        title: parameter.name.clone(),
+        title: shorten_name(&capitalise(&describe_parameters([parameter.name.as_str()]))),
         x: x.with_range(low, high),
         y: ChartAxis::categorical("", having.iter().map(|(entry, _)| entry.name.clone())),
-        height_mm: (having.len() as f64 * ROW_MM).max(LEAST_HEIGHT_MM),
+        height_mm: having.len().max(LEAST_ROWS) as f64 * row_mm,
         series: LOOKS.iter().flat_map(series).chain(Some(truth).filter(|t| !t.points.is_empty())).collect(),
         ..Panel::default()
     }
@@ -176,9 +168,4 @@ fn axis_range(having: &[(&ComparedFit, &ParameterLine)]) -> (bool, f64, f64) {
     }
     let room = if high > low { ROOM * (high - low) } else { (ALONE * high.abs()).max(f64::MIN_POSITIVE) };
     (false, low - room, high + room)
-}
-
-/// An estimate and its interval as text, for the tables next to the figure.
-pub(super) fn estimate_text(line: &ParameterLine) -> [String; 2] {
-    [format_number(line.estimate), format_interval(line.lower_95, line.upper_95, format_number)]
 }

@@ -1,34 +1,26 @@
-//! The page of a comparison of fits.
+//! The page of a comparison of fits: one table with a column for each fit, and one figure.
 
-use super::intervals::estimate_text;
-use super::{ComparedFit, FitComparison, IntervalPair, SharedParameter};
+use super::{ComparedFit, FitComparison};
 use crate::compare::{ParameterLine, TargetComparison};
-use crate::report::page::html::CellStyle::{Bad, Good, Prose, Words};
+use crate::report::page::html::CellStyle::{Bad, Good, Name, Words};
 use crate::report::page::html::*;
-use crate::report::page::{agreement, data_banner, provenance_html};
-use crate::text::{DASH, format_number, format_or_dash};
+use crate::report::page::{data_banner, provenance_html};
+use crate::report::summary::report_headline;
+use crate::text::{self, DASH, format_interval, format_number, format_or_dash, format_with_sd};
 
 /// The page; the same comparison always gives the same bytes.
 pub(crate) fn render_page(several: &FitComparison) -> String {
-    let section = |id, heading, html: String| PageSection { id, heading, html, folded: false };
-    let compared = |caption: &str, of: fn(&ComparedFit) -> &Vec<TargetComparison>| {
-        agreement::fits_table(caption, &merge_comparisons(several, of))
-    };
+    let section = |id, heading, html: String, folded| PageSection { id, heading, html, folded };
     let statements = statements_html(&several.statements);
-    let components = compared("Components: target against model, by fit", |e| &e.report.components);
-    let features = compared("Features: target against model, by fit", |e| &e.report.features);
-    let held_out = compared("Held-out values, by fit", |e| &e.report.held_out);
+    let reservations = section_per_fit(several, |e| sentence_list(&e.report.notes));
     let provenance = section_per_fit(several, |e| provenance_html(&e.report.provenance));
+    let figure = figures_html(&several.figure, 0);
     let sections = [
-        section("verdict", "Verdict", format!("<div class=\"verdict\">\n{statements}</div>\n")),
-        section("fits", "Fits", fits_table(&several.fits)),
-        section("parameters", "Parameters", parameters_table(several)),
-        section("figures", "Figures", figures_html(&several.figures, 0, true)),
-        section("components", "Components", components),
-        section("features", "Features", features),
-        section("held-out", "Held-out predictions", held_out),
-        section("reservations", "Reservations", section_per_fit(several, |e| sentence_list(&e.report.notes))),
-        section("provenance", "Provenance", provenance),
+        section("verdict", "Verdict", format!("<div class=\"verdict\">\n{statements}</div>\n"), false),
+        section("fits", "Fits", comparison_table(several), false),
+        section("figure", "Parameters", figure, false),
+        section("reservations", "Reservations", reservations, true),
+        section("provenance", "Provenance", provenance, true),
     ];
     render_document(&several.title, &several.fits.iter().map(data_lead).collect::<String>(), &sections)
 }
@@ -39,92 +31,91 @@ fn data_lead(entry: &ComparedFit) -> String {
     data_banner(&entry.report).replacen("role=\"note\">", &named, 1)
 }
 
-/// Table of the fits.
-fn fits_table(entries: &[ComparedFit]) -> String {
-    let row = |e: &ComparedFit| -> Vec<HtmlCell> {
-        let share = |met: usize, of: usize| (format!("{met} of {of}"), if met == of { Good } else { Bad });
-        let of = |list: &[TargetComparison]| share(list.iter().filter(|c| c.pass).count(), list.len());
-        let known = e.report.parameters.iter().filter(|p| p.is_identified()).count();
-        let source = |synthetic| if synthetic { " (synthetic)" } else { "" };
-        let recordings = e.report.recordings.iter();
-        let data: Vec<String> = recordings.map(|r| isolate_name(&r.name) + source(r.synthetic)).collect();
-        let data = if data.is_empty() { "published numbers".to_owned() } else { data.join(", ") };
-        let status = format_or_dash(e.report.search.status, |status| escape_text(status.name()));
-        vec![
-            (isolate_name(&e.name), Words),
-            (isolate_name(&e.report.title), Prose),
-            (data, Words),
-            of(&e.report.components),
-            of(&e.report.features),
-            share(known, e.report.parameters.len()),
-            (status, if e.verdict.search_converged { Good } else { Bad }),
-        ]
-    };
-    let head = [
-        (Words, "fit"),
-        (Prose, "title"),
-        (Words, "data|components met|features met|parameters determined|search"),
+/// The table: verdict, data and search, then every target and every parameter.
+fn comparison_table(several: &FitComparison) -> String {
+    let fits = &several.fits;
+    let names = fits.iter().map(|fit| (isolate_name(&fit.name), Name));
+    let head = column_heads(&[(Words, "")]).into_iter().chain(names).collect();
+    let row = |first: String, cells: Vec<HtmlCell>| std::iter::once((first, Words)).chain(cells).collect();
+    let mut rows: Vec<Vec<HtmlCell>> = vec![
+        row("verdict".to_owned(), fits.iter().map(verdict_cell).collect()),
+        row("data".to_owned(), fits.iter().map(data_cell).collect()),
+        row("search".to_owned(), fits.iter().map(search_cell).collect()),
     ];
-    render_table("The fits", column_heads(&head), entries.iter().map(row).collect())
-}
-
-/// Table of the parameters, with one column for each fit.
-fn parameters_table(several: &FitComparison) -> String {
-    let cell = |line: &Option<ParameterLine>| -> HtmlCell {
-        let Some(line) = line else { return ("not free".to_owned(), Words) };
-        let [estimate, interval] = estimate_text(line);
-        let place = |inside: bool| if inside { " inside" } else { " outside" };
-        let placed = |inside| if line.is_bounded() { place(inside) } else { "" };
-        let truth = line.truth.map_or_else(String::new, |t| {
-            format!("<br>truth {}{}", format_number(t.value), placed(t.inside_95))
-        });
-        let class = if line.is_identified() { "good" } else { "bad" };
-        let verdict = escape_text(line.verdict.name());
-        (format!("{estimate}<br>{interval}<br><span class=\"{class}\">{verdict}</span>{truth}"), Words)
-    };
-    let pairs = |p: &SharedParameter| -> HtmlCell {
-        let describe = |IntervalPair { fits, relation }: &IntervalPair| {
-            format!("{} and {} {}", isolate_name(&fits[0]), isolate_name(&fits[1]), relation.describe())
-        };
-        let said: Vec<String> = p.pairs.iter().map(describe).collect();
-        (if said.is_empty() { DASH.to_owned() } else { said.join("<br>") }, Prose)
-    };
-    let row = |p: &SharedParameter| -> Vec<HtmlCell> {
-        let named =
-            [(breakable_key(&p.name), Words), (escape_text(&p.symbol), Words), (escape_text(&p.unit), Words)];
-        named.into_iter().chain(p.lines.iter().map(cell)).chain([pairs(p)]).collect()
-    };
-    if several.parameters.is_empty() {
-        return String::new();
-    }
-    let head = [(Words, "parameter|symbol|unit")];
-    let fits = several.fits.iter().map(|fit| (isolate_name(&fit.name), Words));
-    let head =
-        column_heads(&head).into_iter().chain(fits).chain([("95 % intervals".to_owned(), Prose)]).collect();
-    let words = "Estimate, 95 % interval and verdict of each fit. Intervals that do not overlap differ by \
-                 more than their own uncertainty; that they overlap does not show \
-                 that the values are equal. A parameter that is not identified, or lies at a bound, is not \
-                 compared.";
-    reading_hint(words)
-        + &render_table("Parameters, by fit", head, several.parameters.iter().map(row).collect())
-}
-
-/// Rows of all fits, grouped by target; the condition of a row begins with the name of its fit.
-fn merge_comparisons(
-    several: &FitComparison,
-    of: impl Fn(&ComparedFit) -> &Vec<TargetComparison>,
-) -> Vec<TargetComparison> {
-    let mut lines: Vec<TargetComparison> = Vec::new();
-    for entry in &several.fits {
-        for line in of(entry) {
-            let name = &entry.name;
-            let condition =
-                line.condition.as_ref().map_or_else(|| name.clone(), |of| format!("{name}: {of}"));
-            let at = lines.iter().rposition(|l| l.name == line.name).map_or(lines.len(), |at| at + 1);
-            lines.insert(at, TargetComparison { condition: Some(condition), ..line.clone() });
+    let mut targets: Vec<(&str, Option<&str>)> = Vec::new();
+    for key in fits.iter().flat_map(fit_targets).map(target_key) {
+        if !targets.contains(&key) {
+            targets.push(key);
         }
     }
-    lines
+    for key in targets {
+        let condition = key.1.map_or_else(String::new, |of| format!(" ({})", isolate_name(of)));
+        let found = |fit| fit_targets(fit).find(|c| target_key(c) == key);
+        let cells = fits.iter().map(|fit| found(fit).map_or_else(empty_cell, target_cell)).collect();
+        rows.push(row(isolate_name(key.0) + &condition, cells));
+    }
+    for p in &several.parameters {
+        let cells =
+            p.lines.iter().map(|line| line.as_ref().map_or_else(empty_cell, parameter_cell)).collect();
+        rows.push(row(parameter_html(&p.name), cells));
+    }
+    let words = "An interval does not include errors in the numbers of a scene that were not fitted: where \
+                 scenes differ, so may the estimates. That intervals overlap does not show that the values \
+                 are equal.";
+    render_table("The fits side by side", head, rows) + &reading_hint(words)
+}
+
+/// All targets of a fit, fitted or held out.
+fn fit_targets(fit: &ComparedFit) -> impl Iterator<Item = &TargetComparison> {
+    fit.report.components.iter().chain(&fit.report.features).chain(&fit.report.held_out)
+}
+
+/// Name and condition, which a target has in common with those of other fits.
+fn target_key(target: &TargetComparison) -> (&str, Option<&str>) {
+    (&target.name, target.condition.as_deref())
+}
+
+fn empty_cell() -> HtmlCell {
+    (DASH.to_owned(), Words)
+}
+
+fn verdict_cell(fit: &ComparedFit) -> HtmlCell {
+    let style = if fit.verdict.passes() { Good } else { Bad };
+    (sentence_html(&report_headline(&fit.report).statement), style)
+}
+
+fn data_cell(fit: &ComparedFit) -> HtmlCell {
+    let source = |synthetic| if synthetic { " (synthetic)" } else { "" };
+    let recordings = fit.report.recordings.iter();
+    let data: Vec<String> = recordings.map(|r| isolate_name(&r.name) + source(r.synthetic)).collect();
+    (if data.is_empty() { "published numbers".to_owned() } else { data.join(", ") }, Words)
+}
+
+fn search_cell(fit: &ComparedFit) -> HtmlCell {
+    let status = format_or_dash(fit.report.search.status, |status| escape_text(status.name()));
+    (status, if fit.verdict.search_converged { Good } else { Bad })
+}
+
+fn target_cell(c: &TargetComparison) -> HtmlCell {
+    let (unit, factor) = text::choose_prefix(&c.unit, [c.target]);
+    let target = format_with_sd(c.target * factor, c.target_sd.map(|sd| sd * factor));
+    let model = format_or_dash(c.model, |model| format_number(model * factor));
+    let html = format!("model {model} {}<br>target {target}", escape_text(&unit));
+    (html, if c.pass { Good } else { Bad })
+}
+
+fn parameter_cell(p: &ParameterLine) -> HtmlCell {
+    let (unit, factor) = text::choose_prefix(&p.unit, [p.estimate]);
+    let number = |value: f64| format_number(value * factor);
+    let truth = p.truth.map_or_else(String::new, |truth| format!("<br>truth {}", number(truth.value)));
+    let html = format!(
+        "{} {}<br>{}<br>{}{truth}",
+        number(p.estimate),
+        escape_text(&unit),
+        format_interval(p.lower_95, p.upper_95, number),
+        escape_text(p.verdict.name())
+    );
+    (html, if p.is_identified() { Good } else { Bad })
 }
 
 /// The section of each fit, under its name.

@@ -52,7 +52,7 @@ fn intervals_are_apart_only_where_both_ends_are_known() {
 }
 
 #[test]
-fn the_verdict_says_which_intervals_do_not_overlap_and_no_more() {
+fn the_verdict_says_in_how_many_pairs_the_intervals_do_not_overlap() {
     let entries = [
         entry("a", report(vec![line(Knowledge::Identified, Some(0.1), Some(0.2))], true)),
         entry("b", report(vec![line(Knowledge::Identified, Some(0.3), Some(0.4))], false)),
@@ -64,49 +64,26 @@ fn the_verdict_says_which_intervals_do_not_overlap_and_no_more() {
         (parameters.len(), parameters[0].pairs.len(), parameters[0].lines.iter().flatten().count()),
         (1, 3, 3)
     );
-    let lines: Vec<String> =
-        verdict::comparison_statements(&entries, &parameters).iter().map(Statement::plain_text).collect();
+    let said = |entries: &[ComparedFit]| -> Vec<String> {
+        comparison_statements(entries, &shared_parameters(entries))
+            .iter()
+            .map(Statement::plain_text)
+            .collect()
+    };
+    let lines = said(&entries);
     assert!(
-        lines[0].starts_with(
-            "Every component is met in 3 of 4 fits: a: 1 of 1 component met, 1 of 1 parameter determined"
-        ),
-        "{}",
         lines[0]
-    );
-    assert!(
-        lines[0].contains(
-            "b: 0 of 1 component met, 1 of 1 parameter determined, search not converged; missed: low"
-        ),
+            .starts_with("3 of 4 fits explain what they were fitted to: a: The model meets its one target")
+            && lines[0].contains("b: The model meets 0 of 1 target"),
         "{}",
         lines[0]
     );
     assert_eq!(
         lines[1],
-        "95 % intervals do not overlap in 1 of 1 pairs of estimates that can be compared: friction.c: a, b."
+        "95 % intervals do not overlap in 1 of 1 pairs of estimates that can be compared: C of the friction \
+         law, in 1 pair."
     );
-    assert!(
-        lines[2].starts_with("2 of 3 pairs of estimates cannot be compared")
-            && !lines.iter().any(|l| l.starts_with("They overlap")),
-        "{lines:?}"
-    );
-}
-
-#[test]
-fn of_many_pairs_the_number_is_told_and_none_is_compared_where_nothing_is_known() {
-    let entries: Vec<ComparedFit> = (0..8)
-        .map(|k| entry(&format!("fit {k}"), report(vec![line(Knowledge::AtBound, Some(0.3), None)], true)))
-        .collect();
-    let lines: Vec<String> = verdict::comparison_statements(&entries, &shared_parameters(&entries))
-        .iter()
-        .map(Statement::plain_text)
-        .collect();
-    assert!(
-        lines[1].starts_with("28 of 28 pairs of estimates cannot be compared")
-            && lines[1].ends_with("friction.c: 28 pairs."),
-        "{}",
-        lines[1]
-    );
-    assert!(!lines.iter().any(|l| l.contains("do not overlap")), "{lines:?}");
+    assert_eq!(said(&entries[2..])[1], "No two of the fits determine the same parameter");
 }
 
 #[test]
@@ -115,7 +92,7 @@ fn an_open_end_reaches_the_frame_and_the_first_fit_stands_at_the_top() {
         entry("first", report(vec![line(Knowledge::OpenAbove, Some(0.4), None)], true)),
         entry("second", report(vec![line(Knowledge::Identified, Some(0.3), Some(0.6))], true)),
     ];
-    let block = intervals::interval_figures(&entries, &shared_parameters(&entries)).remove(0);
+    let block = intervals::interval_figure(&entries, &shared_parameters(&entries)).unwrap();
     let crate::figures::Drawing::Chart(figure) = &block.drawing else { panic!("a chart") };
     let panel = &figure.panels[0];
     assert_eq!(panel.y.categories, [(0.0, "second".to_owned()), (1.0, "first".to_owned())]);
@@ -126,42 +103,28 @@ fn an_open_end_reaches_the_frame_and_the_first_fit_stands_at_the_top() {
         matches!(open.error_bars[0], plain_charts::ErrorBar::Horizontal { y: 1.0, from: 0.4, to } if to > high),
         "{open:?}"
     );
-    assert!(block.caption.contains("0 of 1 pairs"), "{}", block.caption);
-    assert!(intervals::interval_figures(&entries[..1], &shared_parameters(&entries[..1])).is_empty());
+    assert!(block.caption.contains("1 of 1 comparable pairs"), "{}", block.caption);
+    assert!(intervals::interval_figure(&entries[..1], &shared_parameters(&entries[..1])).is_none());
 }
 
 #[test]
-fn parameters_of_eight_fits_are_parted_into_figures_that_fit_a_column() {
-    let named = |name: &str| ParameterLine {
-        name: name.to_owned(),
+fn the_figure_of_eight_fits_fits_a_page() {
+    let named = |name: &&str| ParameterLine {
+        name: (*name).to_owned(),
         ..line(Knowledge::Identified, Some(0.4), Some(0.6))
     };
-    let names = ["a", "b", "c", "d", "e", "f", "g", "h"];
-    let entries: Vec<ComparedFit> =
-        (0..8).map(|i| entry(&format!("fit {i}"), report(names.map(named).to_vec(), true))).collect();
-    let blocks = intervals::interval_figures(&entries, &shared_parameters(&entries));
-    let charts: Vec<_> = blocks
-        .iter()
-        .map(|block| match &block.drawing {
-            crate::figures::Drawing::Chart(figure) => figure,
-            crate::figures::Drawing::Moving(_) => panic!("a chart"),
-        })
-        .collect();
-    assert!(charts.iter().all(|figure| figure.height_mm(Medium::Column) <= MAX_HEIGHT_MM));
-    assert_eq!(
-        charts.iter().flat_map(|figure| &figure.panels).map(|panel| panel.title.as_str()).collect::<Vec<_>>(),
-        names
-    );
-    assert_eq!(
-        blocks.iter().map(|block| block.file.as_str()).collect::<Vec<_>>(),
-        ["parameters-1.svg", "parameters-2.svg"]
-    );
+    let names = ["a", "b", "c", "d", "e"];
+    let of = |i: usize| entry(&format!("fit {i}"), report(names.iter().map(named).collect(), true));
+    let entries: Vec<ComparedFit> = (0..8).map(of).collect();
+    let block = intervals::interval_figure(&entries, &shared_parameters(&entries)).unwrap();
+    let crate::figures::Drawing::Chart(figure) = &block.drawing else { panic!("a chart") };
+    assert!(figure.height_mm(Medium::Column) <= MAX_HEIGHT_MM, "{}", figure.height_mm(Medium::Column));
+    assert_eq!(figure.panels.len(), names.len());
     // 28 pairs of eight fits for each parameter
-    let pairs: Vec<usize> = charts.iter().map(|figure| 28 * figure.panels.len()).collect();
     assert!(
-        blocks.iter().zip(pairs).all(|(block, pairs)| block.caption.contains(&format!("0 of {pairs} pairs"))),
-        "{:?}",
-        blocks[0].caption
+        block.caption.contains("140 of 140 comparable pairs of 95 % intervals overlap"),
+        "{}",
+        block.caption
     );
 }
 
@@ -175,8 +138,8 @@ fn page_and_json_of_hostile_names_are_text_and_say_the_same() {
     let parameters = shared_parameters(&entries);
     let several = FitComparison {
         title: hostile.to_owned(),
-        figures: Vec::new(),
-        statements: verdict::comparison_statements(&entries, &parameters),
+        figure: None,
+        statements: comparison_statements(&entries, &parameters),
         fits: entries,
         parameters,
     };

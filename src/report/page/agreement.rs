@@ -14,40 +14,28 @@ pub(super) fn components_table(list: &[TargetComparison]) -> String {
     let words = "Frequencies that the model has to meet. A component is met if it lies within the tolerance; \
                  relative error is model / target \u{2212} 1. The standard deviation of a target stands in units \
                  of the last digit: 78.40(3) is 78.40 with 0.03. A target from the job is published or assumed.";
-    comparison_table("Components: target against model", words, ["component", "condition"], list)
+    comparison_table("Components: target against model", words, "component", list)
 }
 
 pub(super) fn features_table(list: &[TargetComparison]) -> String {
     let words = "Everything else that was fitted. A feature is met if the model lies within the 95 % interval \
                  of the target, 1.96 standard deviations either side. A target from the job is published or \
                  assumed.";
-    comparison_table("Features: target against model", words, ["feature", "condition"], list)
+    comparison_table("Features: target against model", words, "feature", list)
 }
 
 pub(super) fn held_out_table(list: &[TargetComparison]) -> String {
     let words = "Not fitted, but predicted by the model at the estimates and then compared with the target.";
-    comparison_table("Held-out values: target against prediction", words, ["value", "condition"], list)
+    comparison_table("Held-out values: target against prediction", words, "value", list)
 }
 
-/// Table of the values of several fits; the condition of a row begins with the name of its fit.
-pub(in crate::report) fn fits_table(caption: &str, list: &[TargetComparison]) -> String {
-    let words =
-        "Relative error is model / target \u{2212} 1; what counts as met is as on the page of each fit.";
-    comparison_table(caption, words, ["name", "fit"], list)
-}
-
-fn comparison_table(
-    caption: &str,
-    words: &str,
-    [kind, condition]: [&str; 2],
-    list: &[TargetComparison],
-) -> String {
+fn comparison_table(caption: &str, words: &str, kind: &str, list: &[TargetComparison]) -> String {
     if list.is_empty() {
         return String::new();
     }
     let several = list.iter().any(|c| c.condition.is_some());
     let mut head = vec![(Words, kind)];
-    head.extend(several.then_some((Words, condition)));
+    head.extend(several.then_some((Words, "condition")));
     head.extend([
         (Words, "unit"),
         (Number, "target"),

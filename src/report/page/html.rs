@@ -1,11 +1,10 @@
 //! HTML parts of a page: escaped text, tables, figures, sections, the document.
 
-use crate::figures::{Drawing, FigureBlock};
+use crate::figures::FigureBlock;
 use crate::model::parameters;
 use crate::report::rich_text::{Sentence, SentencePart, Statement};
 use crate::text::{capitalise, make_printable};
 use html_escape::encode_safe;
-use plain_charts::Medium;
 
 /// A text, escaped for HTML.
 pub(in crate::report) fn escape_text(raw: &str) -> String {
@@ -179,16 +178,13 @@ pub(in crate::report) fn reading_hint(words: &str) -> String {
     format!("<p class=\"about\">{}</p>\n", escape_text(words))
 }
 
-/// Figures with their captions, numbered from `before` + 1; if `narrow`, each also in a version for
-/// telephones.
+/// Figures with their captions, numbered from `before` + 1.
 pub(in crate::report) fn figures_html<'a>(
     blocks: impl IntoIterator<Item = &'a FigureBlock>,
     before: usize,
-    narrow: bool,
 ) -> String {
     let one = |(index, f): (usize, &FigureBlock)| {
-        let (number, caption, drawn) =
-            (before + index + 1, prose_html(&f.caption), responsive_figure(f, narrow));
+        let (number, caption, drawn) = (before + index + 1, prose_html(&f.caption), f.drawing.on_screen());
         let clock = f.condition.map_or_else(String::new, |clock| format!(" data-clock=\"{clock}\""));
         format!(
             "<figure id=\"figure-{number}\"{clock} aria-labelledby=\"caption-{number}\">\n<div \
@@ -198,18 +194,6 @@ pub(in crate::report) fn figures_html<'a>(
         )
     };
     blocks.into_iter().enumerate().map(one).collect()
-}
-
-/// A figure for wide screens and, if `narrow`, also for narrow ones, unless the figure is animated.
-fn responsive_figure(block: &FigureBlock, narrow: bool) -> String {
-    let wide = block.drawing.on_screen();
-    match &block.drawing {
-        Drawing::Chart(figure) if narrow => {
-            let column = figure.to_svg(Medium::Column);
-            format!("<div class=\"broad\">{wide}</div><div class=\"narrow\">{column}</div>")
-        }
-        _ => wide,
-    }
 }
 
 /// The details of a figure, folded, with one paragraph per line; empty if there are none.
@@ -246,12 +230,27 @@ impl PageSection {
     }
 }
 
+/// The HTML without the style sheets of figures that an earlier figure has too: one counts for the whole page.
+fn remove_repeated_styles(html: &str) -> String {
+    let mut seen: Vec<&str> = Vec::new();
+    let mut kept = String::new();
+    for part in html.split_inclusive("</style>\n") {
+        let (before, style) = part.split_at(part.find("<style>").unwrap_or(part.len()));
+        kept.push_str(before);
+        if !seen.contains(&style) {
+            kept.push_str(style);
+            seen.push(style);
+        }
+    }
+    kept
+}
+
 /// The whole document; sections without contents are left out.
 pub(in crate::report) fn render_document(title: &str, lead: &str, sections: &[PageSection]) -> String {
     let shown: Vec<&PageSection> = sections.iter().filter(|s| !s.html.is_empty()).collect();
     let links: String =
         shown.iter().map(|s| format!("<li><a href=\"#{}\">{}</a></li>\n", s.id, s.heading)).collect();
-    let body: String = shown.iter().map(|s| s.render()).collect();
+    let body: String = remove_repeated_styles(&shown.iter().map(|s| s.render()).collect::<String>());
     let first = shown.first().map_or("", |s| s.id);
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \

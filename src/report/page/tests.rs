@@ -192,7 +192,7 @@ fn the_page_stands_alone_and_leads_with_the_answer() {
     let order = ["class=\"headline", "<strong>Next:", "<table", "class=\"verdict\""].map(at);
     assert!(order.is_sorted(), "{order:?}");
     assert!(
-        html.contains("Only published numbers were fitted")
+        html.contains("No recording was compared.")
             && html.contains("no recording: the traces shown are the model")
     );
     assert_eq!(html, render_page(&report));

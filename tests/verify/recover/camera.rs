@@ -182,8 +182,8 @@ fn a_camera_that_is_held_bends_the_parameters() {
 fn an_offset_that_nobody_would_believe_speaks_against_the_model() {
     let result = found(JOB, 4.5e-3, 0.0);
     assert!(!result.explains_recordings());
-    let said =
-        "The model does not explain the recording: `offset_x_m` of `recording 1` lies 4.5 prior deviations";
+    let said = "The model does not explain the recording: the offset of the camera along the sweep of `recording 1` \
+         lies 4.5 standard deviations";
     assert!(result.notes[0].starts_with(said), "{:?}", result.notes);
     for p in result.parameters.values() {
         assert!(p.verdict == ParameterVerdict::NotIdentified && p.reasons[0].starts_with(said), "{p:?}");
