@@ -54,7 +54,7 @@ fn names_of_several_fits_are_isolated_text() {
     });
     let (code, _, stderr) = project.run(&["report", &fits[0], &fits[1], "--out", "both"]);
     assert_eq!(code, 0, "{stderr}");
-    let page = page_of_text(&project, "both", 6);
+    let page = page_of_text(&project, "both", 3);
     for shown in [turned, "&lt;b&gt;&#x27;x&#x27;"] {
         assert!(page.contains(&format!("<bdi>{shown}</bdi>")), "{shown}");
     }

@@ -38,6 +38,7 @@ fn comparison_table(several: &FitComparison) -> String {
     let head = column_heads(&[(Words, "")]).into_iter().chain(names).collect();
     let row = |first: String, cells: Vec<HtmlCell>| std::iter::once((first, Words)).chain(cells).collect();
     let mut rows: Vec<Vec<HtmlCell>> = vec![
+        row("title".to_owned(), fits.iter().map(|fit| (isolate_name(&fit.report.title), Name)).collect()),
         row("verdict".to_owned(), fits.iter().map(verdict_cell).collect()),
         row("data".to_owned(), fits.iter().map(data_cell).collect()),
         row("search".to_owned(), fits.iter().map(search_cell).collect()),
