@@ -296,15 +296,10 @@
     }
     const over = plot.group.querySelector(".over");
     if (over) over.style.display = plot.shown === plot.whole ? "" : "none";
-    const cells = plot.cells;
-    if (cells) {
-      const factor = (plot.whole[1] - plot.whole[0]) / (to - from);
-      cells.setAttribute("transform", `matrix(${factor} 0 0 1 ${place(plot, plot.whole[0]) - factor * plot.left} 0)`);
-      if (cells.parentNode.tagName !== "g") {
-        const box = drawn("g", { "clip-path": clip(plot) });
-        cells.replaceWith(box);
-        box.append(cells);
-      }
+    // (the picture of a heat map is clipped by the element that holds it)
+    if (plot.picture) {
+      const left = place(plot, plot.whole[0]);
+      set(plot.picture, { x: left - plot.left, width: place(plot, plot.whole[1]) - left });
     }
     ticks(plot.group.querySelector(".ticks"), plot.shown !== plot.whole, plot.shown,
       plot.right - plot.left > 1200 ? 7 : 4, "x", t => place(plot, t), x => `M${x} ${plot.bottom}v12`);
@@ -485,9 +480,10 @@
 
   if (plots.length) {
     for (const svg of new Set(plots.map(plot => plot.svg))) {
-      const own = plots.filter(plot => plot.svg === svg && plot.group.dataset.heat);
-      const cells = svg.querySelectorAll("g.cells");
-      if (own.length === cells.length) own.forEach((plot, i) => { plot.cells = cells[i]; });
+      for (const plot of plots.filter(plot => plot.svg === svg && plot.group.dataset.heat)) {
+        const holds = box => Math.abs(box.getAttribute("x") - plot.left) < 1 && Math.abs(box.getAttribute("y") - plot.top) < 1;
+        plot.picture = [...svg.querySelectorAll("svg")].find(holds)?.querySelector("image");
+      }
       listen(svg);
     }
     document.body.append(bar.box);
