@@ -15,6 +15,7 @@ pub mod bounds;
 pub mod camera_calibration;
 pub mod checkpoint;
 pub(crate) mod context;
+pub mod diagnosis;
 pub mod evaluation;
 mod fitted_model;
 pub mod identifiability;

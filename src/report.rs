@@ -12,6 +12,7 @@ mod view_model;
 use crate::compare::{ComparisonSummary, ComparisonTable, ParameterLine, RunSummary, TargetComparison};
 use crate::figures::FigureBlock;
 use crate::figures::friction::FrictionLine;
+use crate::fit::diagnosis::FitFinding;
 use crate::fit::misfit::TraceMisfit;
 use crate::fit::result::NuisanceResult;
 use serde::Serialize;
@@ -29,6 +30,8 @@ pub struct Report {
     pub search: SearchLine,
     /// Misfit of the model to the traces; `None` in a fit to features only.
     pub misfit: Option<TraceMisfit>,
+    /// Why the model does not explain the traces, and what would explain them.
+    pub findings: Vec<FitFinding>,
     /// Estimated errors of the cameras, and estimates of constants of the scene that the job also fits.
     pub nuisances: Vec<NuisanceResult>,
     /// The recordings; empty if only published numbers were fitted.

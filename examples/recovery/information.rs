@@ -34,7 +34,8 @@ pub fn descend_from(problem: &Problem, truth: &Scene) -> Option<(TraceModel, Ite
             *coordinate = value.ln().clamp(unknown.range[0], unknown.range[1]);
         }
     }
-    let settings = TraceSearchSettings { segment_s: problem.segment_s().to_vec(), twins: 0 };
+    let settings =
+        TraceSearchSettings { segment_s: problem.segment_s().to_vec(), twins: 0, max_segments: None };
     let mut at = first_iterate(&model, &settings, &point)?;
     while let Some(next) = next_iterate(&model, &settings, &at) {
         at = next;

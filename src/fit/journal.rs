@@ -240,6 +240,19 @@ impl<'a> Journal<'a> {
         }
     }
 
+    /// Reports what the fit does after its last evaluation.
+    ///
+    /// # Errors
+    /// [`StopReason`] if the fit is to end.
+    pub(crate) fn announce(&mut self, activity: String) -> Result<(), StopReason> {
+        let (evaluations, replayed) = (self.made, self.replayed);
+        let progress = FitProgress { evaluations, replayed, journaled: evaluations, activity };
+        if self.stop.is_none() && (self.on_progress)(&progress).is_break() {
+            self.stop = Some(StopReason::Interrupted);
+        }
+        self.stop.clone().map_or(Ok(()), Err)
+    }
+
     /// Number of evaluations of this run, including those from the journal.
     pub(crate) fn count_evaluations(&self) -> usize {
         self.made

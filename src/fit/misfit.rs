@@ -128,6 +128,11 @@ impl TraceMisfit {
         Self { explained: reasons.is_empty(), reasons, channels, stages }
     }
 
+    /// Whether any segment could be started; otherwise the parameters have no estimates.
+    pub(crate) fn has_segments(&self) -> bool {
+        any_segment(&self.stages)
+    }
+
     /// The verdict in words: the first sentence, without a full stop, and the reasons that it leaves out.
     /// `ended` says whether the search came to its end.
     pub(crate) fn describe_verdict(&self, ended: bool) -> (String, Vec<String>) {
@@ -182,8 +187,11 @@ pub(crate) fn far_from_priors(nuisances: &[NuisanceResult]) -> Vec<String> {
 
 /// Evidence against the model: no segment was compared.
 fn no_segment_compared(stages: &[StageMisfit]) -> Option<String> {
-    let compared = stages.last().is_some_and(|stage| stage.segments > 0);
-    (!compared).then(|| "no segment of it could be started".to_owned())
+    (!any_segment(stages)).then(|| "no segment of it could be started".to_owned())
+}
+
+fn any_segment(stages: &[StageMisfit]) -> bool {
+    stages.last().is_some_and(|stage| stage.segments > 0)
 }
 
 /// Evidence against the model: a channel has no compared frames, although some segments fit.

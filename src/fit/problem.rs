@@ -75,13 +75,14 @@ pub enum ProblemError {
 }
 
 /// A checked job with its scenes and recordings, ready to be fitted.
+#[derive(Clone)]
 pub struct Problem {
-    job: Job,
-    model: SceneModel,
-    recordings: Vec<Option<Recording>>,
-    traces: Vec<TraceData>,
-    segment_s: Vec<f64>,
-    constants: Vec<FreedConstant>,
+    pub(super) job: Job,
+    pub(super) model: SceneModel,
+    pub(super) recordings: Vec<Option<Recording>>,
+    pub(super) traces: Vec<TraceData>,
+    pub(super) segment_s: Vec<f64>,
+    pub(super) constants: Vec<FreedConstant>,
     fingerprint: String,
 }
 

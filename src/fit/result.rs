@@ -3,6 +3,7 @@
 mod assembly;
 mod validation;
 
+use super::diagnosis::FitFinding;
 use super::evaluation::FailureReason;
 use super::identifiability::Identifiability;
 use super::job::{FreeParameter, Job};
@@ -276,6 +277,10 @@ pub struct FitResult {
     /// How well the model explains the traces; `None` in a fit of features.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub misfit: Option<TraceMisfit>,
+    /// Why the model does not explain the traces, and what would explain them; empty if it does explain
+    /// them, and in a fit of features.
+    #[serde(default)]
+    pub findings: Vec<FitFinding>,
     /// Results of the parameters, by key in the scene file preceded by its table.
     pub parameters: BTreeMap<String, ParameterResult>,
     /// Estimated calibration errors of cameras and freed constants.
@@ -383,6 +388,11 @@ impl FitResult {
         if self.nuisances.iter().any(|nuisance| nuisance.recording.is_none()) { "free" } else { "held" }
     }
 
+    /// Whether the estimates rest on data: in a trace fit, whether any segment could be started.
+    pub(crate) fn has_estimates(&self) -> bool {
+        self.misfit.as_ref().is_none_or(TraceMisfit::has_segments)
+    }
+
     /// Whether every component is within its tolerance.
     #[must_use]
     pub fn components_pass(&self) -> bool {
@@ -487,6 +497,7 @@ mod tests {
             title: "t".to_owned(),
             status: FitStatus::BudgetExhausted,
             misfit: None,
+            findings: vec![],
             nuisances: vec![],
             segments: vec![],
             parameters: parameters.into_iter().map(|(name, p)| (name.to_owned(), p)).collect(),

@@ -65,6 +65,7 @@ pub struct PlausibilityLimits {
 }
 
 /// A model of scenes in which a fit changes named parameters.
+#[derive(Clone)]
 pub struct SceneModel {
     conditions: Vec<ModelCondition>,
     names: Vec<String>,
@@ -96,6 +97,10 @@ impl SceneModel {
 
     pub(crate) fn conditions(&self) -> &[ModelCondition] {
         &self.conditions
+    }
+
+    pub(super) fn conditions_mut(&mut self) -> &mut [ModelCondition] {
+        &mut self.conditions
     }
 
     /// The scene of a condition with the given values of the free parameters.

@@ -3,6 +3,7 @@
 use super::FitError;
 use super::checkpoint::FitHeader;
 use super::context::FitContext;
+use super::diagnosis::diagnose_misfit;
 use super::identifiability::Identifiability;
 use super::job::{FreeParameter, TraceChannel};
 use super::journal::{Journal, OnProgress, StopReason};
@@ -50,11 +51,27 @@ impl Problem {
         if journal.evaluation_limit() == 0 {
             return Err(FitError::NoEvaluation { allowed: 0 });
         }
-        let settings = TraceSearchSettings { segment_s, twins: self.job().intervals.bootstrap };
+        let settings =
+            TraceSearchSettings { segment_s, twins: self.job().intervals.bootstrap, max_segments: None };
         let searched = search_trace(&model, &settings, seed, &mut journal);
         journal.check_sound()?;
-        let found = TraceFindings { problem: self, model: &model, searched: &searched, journal: &journal };
+        let found = TraceFindings {
+            problem: self,
+            model: &model,
+            searched: &searched,
+            stop: journal.stop_reason(),
+            evaluations: journal.count_evaluations(),
+        };
         let mut result = found.into_result().ok_or_else(|| cannot_be_fitted(NO_SEGMENT_STARTED))?;
+        if let Some(misfit) = result.misfit.as_ref().filter(|misfit| !misfit.explained)
+            && result.status.has_ended()
+        {
+            let best = &searched.descents[searched.best];
+            match diagnose_misfit(self, &model, best, misfit, &mut journal) {
+                Some(findings) => result.findings = findings,
+                None => result.status = FitStatus::Interrupted,
+            }
+        }
         if result.status != FitStatus::Interrupted {
             let (shown, held_out) = self.compare_with_targets(&result, targets)?;
             (result.components, result.features, result.held_out) =
@@ -87,15 +104,29 @@ const WORST_SEGMENTS: usize = 5;
 const ONE_LENGTH_NOTE: &str = "segments of one length alone were fitted, and whether longer ones agree is not known: give \
                           `segment_s` two lengths at least";
 
+/// Judges the end of a descent whose uncertainty is not known; `None` if it has no iterate.
+pub(super) fn judge_descent(
+    problem: &Problem,
+    model: &TraceModel,
+    descent: &TraceDescent,
+) -> Option<TraceMisfit> {
+    let end = descent.last_iterate()?;
+    let searched = TraceSearchOutcome { descents: vec![descent.clone()], ..TraceSearchOutcome::default() };
+    let found = TraceFindings { problem, model, searched: &searched, stop: None, evaluations: 0 };
+    Some(found.trace_misfit(descent, end, &found.nuisance_results(end)))
+}
+
 /// The outcome of a trace search, with the problem and the model.
-struct TraceFindings<'a, 'l> {
+struct TraceFindings<'a> {
     problem: &'a Problem,
     model: &'a TraceModel,
     searched: &'a TraceSearchOutcome,
-    journal: &'a Journal<'l>,
+    stop: Option<&'a StopReason>,
+    /// Number of evaluations, including those from the journal.
+    evaluations: usize,
 }
 
-impl TraceFindings<'_, '_> {
+impl TraceFindings<'_> {
     /// The result without the comparison of runs over whole recordings; `None` if no start has an iterate.
     fn into_result(self) -> Option<FitResult> {
         let job = self.problem.job();
@@ -115,6 +146,7 @@ impl TraceFindings<'_, '_> {
             nuisances,
             segments: self.fitted_segments(end),
             misfit: Some(misfit),
+            findings: Vec::new(),
             components: Vec::new(),
             features: Vec::new(),
             held_out: Vec::new(),
@@ -128,10 +160,7 @@ impl TraceFindings<'_, '_> {
             gate: Identifiability::default(),
             waterfall: self.sorted_optima(),
             sensitivities: BTreeMap::new(),
-            evaluations: EvaluationCounts {
-                total: self.journal.count_evaluations(),
-                ..EvaluationCounts::default()
-            },
+            evaluations: EvaluationCounts { total: self.evaluations, ..EvaluationCounts::default() },
             synthetic: self.problem.recordings().iter().flatten().any(Recording::is_synthetic),
             notes: self.collect_notes(end),
             seed: job.search.seed,
@@ -144,7 +173,7 @@ impl TraceFindings<'_, '_> {
         let is_at_end = best.stages.len() >= self.problem.segment_s().len()
             || best.last_iterate().is_some_and(Iterate::is_junk);
         let is_complete = self.searched.assessment.is_some() && is_at_end;
-        match self.journal.stop_reason() {
+        match self.stop {
             _ if !self.searched.stopped && is_complete => FitStatus::Converged,
             _ if !self.searched.stopped => FitStatus::Failed,
             None | Some(StopReason::Budget) => FitStatus::BudgetExhausted,

@@ -87,10 +87,11 @@ fn fill_report_sections(
     cases: &[ConditionComparison],
     result: &FitResult,
 ) -> Report {
-    Report {
+    let report = Report {
         title: job.title.clone(),
         search: search_line(result),
         misfit: result.misfit.clone(),
+        findings: result.findings.clone(),
         nuisances: result.nuisances.clone(),
         recordings: measured.iter().map(tables::recording_line).collect(),
         components: tables::component_lines(job, measured, result),
@@ -106,7 +107,12 @@ fn fill_report_sections(
         comparison: cases.iter().map(ComparisonSummary::summarize).collect(),
         notes: fit_notes(measured, result),
         ..Report::default()
+    };
+    if result.has_estimates() {
+        return report;
     }
+    // (without a segment, the values of the parameters are those at which the search started)
+    Report { parameters: Vec::new(), nuisances: Vec::new(), friction: Vec::new(), ..report }
 }
 
 /// Draws a figure of one or several conditions, the one that tells most first.

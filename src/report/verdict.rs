@@ -93,6 +93,9 @@ fn verdict_statements(report: &Report) -> Vec<Statement> {
     // statements that are bad news come first
     found.sort_by_key(|statement| statement.good != Some(false));
     found.insert(0, summary::report_headline(report));
+    if let Some(diagnosis) = diagnosis_statement(report) {
+        found.insert(1, diagnosis);
+    }
     let next = Sentence::new("Next: ").with_sentence(summary::next_step_sentence(report));
     let more = report
         .advice
@@ -102,6 +105,15 @@ fn verdict_statements(report: &Report) -> Vec<Statement> {
         .collect();
     found.push(Statement::with_details(next, more, None));
     found
+}
+
+/// Statement with what would explain the traces, if the fit found anything.
+fn diagnosis_statement(report: &Report) -> Option<Statement> {
+    let added = report.findings.iter().filter(|finding| finding.adds_to_misfit());
+    let details: Vec<Sentence> =
+        added.map(|finding| Sentence::new(make_printable(&finding.sentence))).collect();
+    (!details.is_empty())
+        .then(|| Statement::with_details("What may explain the recording", details, Some(false)))
 }
 
 /// Singular and plural of the nouns that are counted in statements.

@@ -170,6 +170,17 @@ impl Scene {
         Ok(scene)
     }
 
+    /// The same scene with a shoulder that the neck meets at an angle, rad, and that adds `stiffness_ratio`
+    /// times the stiffness of the neck.
+    ///
+    /// # Errors
+    /// [`SceneError::Key`] for a value out of range.
+    pub(crate) fn with_shoulder(&self, angle_rad: f64, stiffness_ratio: f64) -> Result<Self, SceneError> {
+        let scene = Self { has_shoulder: true, ..self.clone() };
+        let scene = scene.with_parameter("shoulder.contact_angle_rad", angle_rad)?;
+        scene.with_parameter("shoulder.stiffness_ratio", stiffness_ratio)
+    }
+
     /// The same scene, driven by the head of a recording. The run covers the tracked time except for its
     /// uncertain ends; a start in steady slip waits until the head moves.
     ///

@@ -32,6 +32,7 @@ mod clock;
 mod compliance;
 mod conditioning;
 mod cycles;
+mod diagnosis;
 mod drive;
 mod equations;
 mod features;

@@ -164,7 +164,7 @@ class FitResult(Mapping[str, Any]):
 
     @property
     def findings(self) -> list[dict[str, Any]]:
-        """Findings on the fit, the gravest first."""
+        """Why the model does not explain the recordings, and what would explain them."""
         return list(self.get("findings", []))
 
     @property

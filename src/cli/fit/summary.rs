@@ -16,6 +16,8 @@ pub(crate) fn print_summary(solved: &CompletedFit) {
     print_line!("{}", to_ascii(&headline));
     reasons.iter().for_each(|reason| print_line!("  {}", to_ascii(reason)));
     if let Some(misfit) = &result.misfit {
+        let added = result.findings.iter().filter(|finding| finding.adds_to_misfit());
+        added.for_each(|finding| print_line!("{}", to_ascii(&finding.sentence)));
         print_misfit(misfit);
         let words = match result.constants_word() {
             "free" => "free within their priors",
@@ -25,6 +27,14 @@ pub(crate) fn print_summary(solved: &CompletedFit) {
     }
     print_line!("{}: {}; cost {:.4}", result.status.name(), describe_evaluations(solved), result.cost);
     print_features(result);
+    if result.has_estimates() {
+        print_parameters(result);
+        print_nuisances(&result.nuisances);
+    }
+    print_notes(result);
+}
+
+fn print_parameters(result: &FitResult) {
     print_line!("");
     print_line!("parameter                               estimate  95 % interval             verdict");
     for (name, p) in &result.parameters {
@@ -32,8 +42,6 @@ pub(crate) fn print_summary(solved: &CompletedFit) {
         print_line!("{name:<36} {:>11}  {interval:<25} {}", format_value(p.estimate), p.verdict.name());
         p.reasons.iter().for_each(|why| print_line!("  {why}"));
     }
-    print_nuisances(&result.nuisances);
-    print_notes(result);
 }
 
 /// Sentence such as `1,234 evaluations of the model in 12.3 s (100/s)`.

@@ -47,6 +47,7 @@ impl FitFindings<'_> {
             title: self.job.title.clone(),
             status: self.status,
             misfit: None,
+            findings: Vec::new(),
             nuisances: camera_nuisance_results(self.job, &found.cameras),
             segments: Vec::new(),
             parameters: map_names(&names, found.intervals.iter().cloned()),

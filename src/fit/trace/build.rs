@@ -25,7 +25,8 @@ use std::sync::Arc;
 /// The segments of the last stage at the coordinates `point`, with starting states that minimise chi2; `None`
 /// if a scene refuses the parameter values. The result does not depend on earlier calls.
 pub(crate) fn fit_states_at(model: &TraceModel, segment_s: &[f64], point: &[f64]) -> Option<Iterate> {
-    let last = TraceSearchSettings { segment_s: segment_s.last().copied().into_iter().collect(), twins: 0 };
+    let segment_s = segment_s.last().copied().into_iter().collect();
+    let last = TraceSearchSettings { segment_s, twins: 0, max_segments: None };
     refit_plain(model, start_stage(model, &last, (0, true), point, &[])?)
 }
 

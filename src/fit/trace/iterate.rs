@@ -11,6 +11,8 @@ pub struct TraceSearchSettings {
     pub segment_s: Vec<f64>,
     /// Number of simulated recordings of the best model (twins) that are fitted.
     pub twins: usize,
+    /// Maximum number of segments, which are spread evenly over the recordings; `None` for all.
+    pub max_segments: Option<usize>,
 }
 
 /// A segment with its starting state and its misfit.

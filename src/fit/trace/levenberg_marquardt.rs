@@ -109,7 +109,7 @@ fn rescue_segments(model: &TraceModel, before: &Iterate) -> Option<Iterate> {
 fn resegment(model: &TraceModel, settings: &TraceSearchSettings, before: &Iterate) -> Option<Iterate> {
     const MOST_REPEATS: usize = 3;
     let points = recording_models(model, &before.point)?;
-    let cut = cut_recordings(&points, settings.segment_s[before.stage], before.whole);
+    let cut = cut_stage(&points, settings, (before.stage, before.whole));
     let frames = |segment: &SegmentState| (segment.recording, segment.frames());
     if cut.iter().map(frames).eq(before.segments.iter().map(frames)) || before.repeats == MOST_REPEATS {
         return None;
@@ -125,7 +125,7 @@ fn resegment(model: &TraceModel, settings: &TraceSearchSettings, before: &Iterat
 /// The first iterate of a stage: new segments whose starting states lie on the fitted motion of the segments
 /// `before`. With `whole`, segments keep all their frames; otherwise a segment that is much longer than the
 /// length of the stage ends after that length. `None` if a scene refuses the point.
-pub(super) fn start_stage(
+pub(crate) fn start_stage(
     model: &TraceModel,
     settings: &TraceSearchSettings,
     (stage, whole): (usize, bool),
@@ -133,7 +133,7 @@ pub(super) fn start_stage(
     before: &[SegmentState],
 ) -> Option<Iterate> {
     let points = recording_models(model, point)?;
-    let mut segments = cut_recordings(&points, settings.segment_s[stage], whole);
+    let mut segments = cut_stage(&points, settings, (stage, whole));
     segments.par_iter_mut().for_each(|segment| {
         if let Some(state) = carry_state_over(&points[segment.recording], before, segment) {
             segment.start = state.into();
@@ -153,6 +153,20 @@ pub(super) fn start_stage(
         cost: f64::INFINITY,
     };
     refit(model, first, MAX_STATE_STEPS, RescuePolicy::Beyond(3.0))
+}
+
+/// Divides all recordings into the segments of a stage, of which at most the number in `settings` is kept.
+fn cut_stage(
+    points: &[RecordingModel<'_>],
+    settings: &TraceSearchSettings,
+    (stage, whole): (usize, bool),
+) -> Vec<SegmentState> {
+    let mut segments = cut_recordings(points, settings.segment_s[stage], whole);
+    if let Some(most) = settings.max_segments.filter(|most| *most < segments.len()) {
+        let count = segments.len();
+        segments = (0..most).map(|k| segments[k * count / most].clone()).collect();
+    }
+    segments
 }
 
 /// Divides all recordings into segments. Without `whole`, a segment that is much longer than `length_s` ends
@@ -225,7 +239,7 @@ fn holds_constants(model: &TraceModel, settings: &TraceSearchSettings, at: &Iter
 
 /// One outer step; with `held`, the constants keep their values. If no step of the unknowns lowers the cost,
 /// only the starting states are fitted; if this does not lower the cost either, the iterate is settled.
-pub(super) fn outer_step(model: &TraceModel, before: &Iterate, held: bool) -> Iterate {
+pub(crate) fn outer_step(model: &TraceModel, before: &Iterate, held: bool) -> Iterate {
     /// Smallest decrease of the cost after which another step is made if only the starting states were
     /// fitted: that of a step of a tenth of a standard deviation.
     const LEAST_STATE_GAIN: f64 = 1e-2;

@@ -232,7 +232,7 @@ impl TraceUnknowns {
     }
 
     /// Cost of the priors at a point: the sum of their squared residuals.
-    pub(super) fn prior_cost(&self, point: &[f64]) -> f64 {
+    pub(crate) fn prior_cost(&self, point: &[f64]) -> f64 {
         let residuals = self.0.iter().zip(point).filter_map(|(unknown, z)| unknown.prior_residual(*z));
         residuals.map(|[residual, _]| residual * residual).sum()
     }
