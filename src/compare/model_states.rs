@@ -55,7 +55,7 @@ impl<'a> ModelStates<'a> {
     }
 
     /// The states between two instants, s, one slice for each run.
-    pub(crate) fn between(&self, [from_s, to_s]: [f64; 2]) -> impl Iterator<Item = &[ModelSample]> {
+    pub(crate) fn states_between(&self, [from_s, to_s]: [f64; 2]) -> impl Iterator<Item = &[ModelSample]> {
         let part = move |run: &'_ Cow<'a, [ModelSample]>| {
             let first = run.partition_point(|s| s.time_s < from_s);
             first..run.partition_point(|s| s.time_s <= to_s)

@@ -312,7 +312,7 @@ mod tests {
         };
         let over = SpectraPlot { noise_floor: level(1e-8), leakage: level(2e-8), ..constant.clone() };
         let (constant, over) = (as_svg(&constant), as_svg(&over));
-        assert_eq!([&constant, &over].map(|f| f.matches("noise floor of the recording").count()), [1, 1]);
+        assert_eq!([&constant, &over].map(|f| f.matches("\nnoise floor of the recording\n").count()), [1, 1]);
         assert!(over.contains("leakage of the removed flip") && !constant.contains("leakage"));
         assert!(
             !constant.contains("\n0.001\n") && over.contains("\n0.001\n"),

@@ -303,7 +303,7 @@ fn build_part(
     let measured = measured.filter(|velocities| velocities.iter().any(Option::is_some));
     let (model_s, shift_s) = (model_clock_span(case, span), case.alignment.shift_s);
     let (mut model, mut friction, mut normals) = (Vec::new(), Vec::new(), Vec::new());
-    for states in case.states.between(model_s.into()) {
+    for states in case.states.states_between(model_s.into()) {
         let velocity = |s: &ModelSample| Some((s.time_s + shift_s, s.tip_velocity_m_per_s));
         match measured {
             Some(_) => model.extend(differenced_velocities(states, difference, shift_s)),

@@ -141,8 +141,10 @@ fn recording_findings(recording: &Recording) -> Vec<FitFinding> {
 fn first_failed_stage(stages: &[StageMisfit]) -> usize {
     /// Chi2 per degree of freedom of a large misfit.
     const LARGE: f64 = 1.5;
-    let fails =
-        |stage: &StageMisfit| !(stage.chi2_per_dof < LARGE) || 4 * stage.bad_segments > stage.segments;
+    let fails = |stage: &StageMisfit| {
+        let is_large = stage.chi2_per_dof.is_nan() || stage.chi2_per_dof >= LARGE;
+        is_large || 4 * stage.bad_segments > stage.segments
+    };
     stages.iter().position(fails).unwrap_or(stages.len().saturating_sub(1))
 }
 

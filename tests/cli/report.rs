@@ -308,8 +308,12 @@ fn a_result_that_was_edited_and_a_folder_that_is_taken_are_refused_and_nothing_i
 #[test]
 fn figures_of_an_earlier_report_go_and_nothing_else_does() {
     // a fit of more features than parameters has pulls
-    let third = "[[feature]]\nkind = \"mean-deflection\"\nwindow = \"0.341..0.345\"\n\n[search]";
-    let project = Project::with_fits(&[("x", &JOB.replace("[search]", third)), ("y", JOB)]);
+    let means = ["0.341..0.345", "0.4..0.41"]
+        .map(|window| format!("[[feature]]\nkind = \"mean-deflection\"\nwindow = \"{window}\"\n\n"));
+    let project = Project::with_fits(&[
+        ("x", &JOB.replace("[search]", &format!("{}[search]", means.concat()))),
+        ("y", JOB),
+    ]);
     project.reported(&["fits/x", "--out", "page"]);
     let (gone, comes) = ("page/pulls.svg", "page/profiles.svg");
     let paper = ["page/paper/pulls-85mm.svg", "page/paper/pulls-170mm.svg"];

@@ -290,7 +290,7 @@ fn takes_of_one_condition_share_the_figures_of_the_model_alone() {
     for figure in ["poses.svg", "animation.svg"] {
         let details = &block(&report, figure).details;
         assert!(
-            details.ends_with(" The model's run is the same in second, but for the clock of the recording."),
+            details.ends_with("The model's run is the same in second, but for the clock of the recording."),
             "{details}"
         );
     }

@@ -68,6 +68,7 @@ fn everywhere(t: &str) -> Report {
             failed: vec![FailureCount { reason: own(), count: 1 }],
             ..SearchLine::default()
         },
+        findings: Vec::new(),
         recordings: vec![recording(t, true)],
         components: vec![comparison()],
         features: vec![comparison()],
