@@ -1,4 +1,4 @@
-//! Fit jobs for Python, with the posterior density of their unknown parameters and the words of their results.
+//! Fit jobs for Python, with the posterior density of their unknowns and the words of their results.
 
 use crate::errors;
 use crate::workers;

@@ -230,7 +230,7 @@ impl PageSection {
     }
 }
 
-/// The HTML without the style sheets of figures that an earlier figure has too: one counts for the whole page.
+/// The HTML without the style sheets of figures that an earlier figure has too, as one counts for the page.
 fn remove_repeated_styles(html: &str) -> String {
     let mut seen: Vec<&str> = Vec::new();
     let mut kept = String::new();
