@@ -49,11 +49,12 @@ pub struct FigureBlock {
 }
 
 impl FigureBlock {
-    /// This figure with the first `panels` panels of another one below its own.
+    /// This figure, with the first `panels` panels of another figure below its own. Animations stay as they
+    /// are.
     pub(crate) fn with_panels(mut self, other: Self, panels: usize) -> Self {
         if let (Drawing::Chart(whole), Drawing::Chart(next)) = (&mut self.drawing, other.drawing) {
             let mut further: Vec<chart::Panel> = next.panels.into_iter().take(panels).collect();
-            // what an outline points to is not among these panels
+            // an outline marks the part that a later panel enlarges, and this panel is left out
             further.iter_mut().for_each(|panel| panel.shaded_spans.retain(|span| !span.outlined));
             whole.panels.extend(further);
         }

@@ -1,4 +1,5 @@
-//! Fit jobs for Python, with the posterior density of their unknowns and the words of their results.
+//! Fit jobs for Python, with the posterior density of their unknown parameters, and the verdict on their
+//! results.
 
 use crate::errors;
 use crate::workers;
@@ -17,8 +18,9 @@ pub struct PyJob {
     path: PathBuf,
 }
 
-/// The verdict of a `result.json`, of which `text` is the contents, in words: the first sentence, and the
-/// reasons that it leaves out. `file` is its name in error messages.
+/// The verdict on a fit in words: the first sentence, and the reasons that it leaves out. `text` is the
+/// contents of its `result.json`, and `file` is the name of this file in error messages. Raises an
+/// `InputError` if the text is not the result of a fit.
 #[pyfunction]
 pub fn describe_verdict(py: Python<'_>, file: &str, text: &str) -> PyResult<(String, Vec<String>)> {
     let result = FitResult::parse(file, text).map_err(|error| errors::input_error(py, error))?;

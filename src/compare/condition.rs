@@ -24,7 +24,8 @@ use std::ops::Range;
 /// tracked.
 const JUDGED: [Channel; 4] = [Channel::Deflection, Channel::TipX, Channel::HeadX, Channel::HeadDrop];
 
-/// A channel is judged if it is known in at least this fraction of the frames in which the best tracked one is.
+/// Smallest allowed ratio of the number of frames with a residual in the judged channel to the largest such
+/// number of any channel.
 const LEAST_KNOWN: f64 = 0.5;
 
 /// A fitted recording with its description and its video.

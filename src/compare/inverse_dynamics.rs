@@ -1,7 +1,8 @@
 //! Friction on the tip from a recorded motion: the equations of motion, solved for the friction force.
 //!
-//! Tip, drop and head give the pose, its rates and the acceleration of the tip. The tip accelerates by
-//! `a_free + f kappa` (see [`FrictionResponse`]), so that the friction force is `f = (a - a_free) / kappa`.
+//! The positions of tip and head and the head drop give the angles of the links, their rates and the
+//! acceleration `a` of the tip. The model gives `a = a_free + f kappa` for a friction force `f` (see
+//! [`FrictionResponse`]), so that `f = (a - a_free) / kappa`.
 
 use super::condition::ConditionComparison;
 use crate::model::shoulder::ShoulderContact;
@@ -20,32 +21,35 @@ pub struct TipFriction {
     pub velocity_m_per_s: f64,
     /// Deflection of the blade, m.
     pub deflection_m: f64,
-    /// Friction against motion in the positive direction, N: minus the force on the tip.
+    /// Friction, N: minus the force of the glass on the tip along the sweep, so that it is positive while the
+    /// tip slides in the positive direction.
     pub friction_n: f64,
 }
 
 /// Friction in the frames of a part of a recording.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct MeasuredCycle {
-    /// One entry per frame; `None` where a point is missing.
+    /// One entry for each frame that has all frames of its parabola in the part. `None` if a point of the
+    /// parabola is missing or if the links are nearly in line.
     pub states: Vec<Option<TipFriction>>,
-    /// Standard deviation of the friction by the noise of the tip, N.
+    /// Standard deviation of the friction that the noise of the tip causes, N, where it is largest.
     pub sd_n: f64,
 }
 
-/// Minimum number of frames per cycle of stick and slip: with fewer, the acceleration of the tip is lost in
-/// the smoothing or in the noise.
+/// Minimum number of frames per cycle of stick and slip. With fewer, a long parabola smooths the acceleration
+/// of the tip away, and in a short one it is lost in the noise.
 const FRAMES_PER_CYCLE: f64 = 20.0;
-/// Length of the parabola that is fitted around a frame, as a fraction of a cycle: it lowers the acceleration
-/// of an oscillation with the frequency of the cycle by 6 %.
+/// Length of the parabola that is fitted around a frame, as a fraction of a cycle; it is rounded to whole
+/// frames. It lowers the acceleration of an oscillation with the frequency of the cycle by 2 to 5 %.
 const PARABOLA_CYCLES: f64 = 0.2;
-/// Smallest absolute sine of the angle between the links at which tip and drop give the pose.
+/// Smallest allowed absolute sine of the angle between the links. With links nearly in line, errors of tip
+/// and drop have too much effect on the pose.
 const LEAST_BEND: f64 = 0.05;
-/// Number of Newton steps for the pose, from the pose of the model.
+/// Number of Newton steps for the pose. They start from the pose of the model, which is close.
 const STEPS: usize = 6;
 
-/// Friction in the frames between two instants on the clock of the recording, s. `None` without fitted traces,
-/// or with too few frames per cycle.
+/// Friction in the frames between two instants on the clock of the recording, s. `None` without fitted
+/// traces, without a measured ridge, with too few frames per cycle, or if no frame gives a friction.
 pub(crate) fn measure_cycle(case: &ConditionComparison, (from_s, to_s): (f64, f64)) -> Option<MeasuredCycle> {
     let (traces, residual) = (case.model.traces.as_ref()?, case.restarted.as_ref()?);
     let (low_hz, high_hz) = case.ridges.measured.as_ref()?.frequency_range_hz()?;
@@ -59,7 +63,8 @@ pub(crate) fn measure_cycle(case: &ConditionComparison, (from_s, to_s): (f64, f6
         case.states.states_between([from_s - shift_s, to_s - shift_s]).collect();
     let frames = residual.time_s.iter().zip(residual.tip_x_m.iter().zip(&residual.head_drop_m));
     let within = frames.filter(|(t, _)| **t >= from_s && **t <= to_s);
-    // the recorded motion is that of the model plus the residual, so that the camera needs no inversion
+    // the recorded motion is computed as that of the model plus the residual, because this needs no inverse
+    // of the camera
     let recorded = within.map(|(t, (tip, drop))| {
         let model = states.iter().find_map(|run| interpolate_state(run, t - shift_s))?;
         Some((t - shift_s, model, model.tip_x_m + (*tip)?, model.head_drop_m + (*drop)?))
@@ -83,8 +88,9 @@ pub(crate) fn measure_cycle(case: &ConditionComparison, (from_s, to_s): (f64, f6
     })
 }
 
-/// State of a run at an instant on its clock, s, between two of its states; the tip by a cubic through
-/// positions and velocities. `None` outside the run.
+/// State of a run at an instant on its clock, s: the position of the tip by cubic interpolation of positions
+/// and velocities, the head drop by linear interpolation, and all else from the state before. `None` outside
+/// the run.
 fn interpolate_state(run: &[ModelSample], time_s: f64) -> Option<ModelSample> {
     let next = run.partition_point(|s| s.time_s < time_s);
     let (a, b) = (run.get(next.checked_sub(1)?)?, run.get(next)?);
@@ -101,7 +107,8 @@ fn interpolate_state(run: &[ModelSample], time_s: f64) -> Option<ModelSample> {
 struct MovingParabola {
     half: usize,
     rate_hz: f64,
-    /// Number of frames, and sums of the squares and of the fourth powers of their distances in frames.
+    /// Number of frames, and sums of the squares and of the fourth powers of the distances of the frames from
+    /// the middle frame, in frames.
     sums: [f64; 3],
 }
 
@@ -111,7 +118,8 @@ impl MovingParabola {
         Self { half, rate_hz, sums: [(2 * half + 1) as f64, power(2), power(4)] }
     }
 
-    /// Value, first and second derivative in the middle frame, in units of the values per second.
+    /// Value, first derivative, 1/s, and second derivative, 1/s2, in the middle frame, in units of the
+    /// values. The iterator gives one value per frame.
     fn fit(&self, values: impl Iterator<Item = f64>) -> [f64; 3] {
         let [n, s2, s4] = self.sums;
         let place = |i: usize| i as f64 - self.half as f64;
@@ -134,8 +142,9 @@ impl MovingParabola {
     }
 }
 
-/// Friction on the tip, with the acceleration of the tip per newton, 1/kg. `tip` and `drop` are values, m, with
-/// their first and second derivatives; `guess` is a pose nearby. `None` for links that are nearly in line.
+/// Friction on the tip, and the acceleration of the tip per newton of friction force, 1/kg. `tip` and `drop`
+/// are the position of the tip and the head drop, m, each with its first and second time derivative; `guess`
+/// is a pose nearby. `None` for links that are nearly in line, or if the friction is not finite.
 fn solve_friction(
     linkage: &Linkage,
     head: &HeadMotion,

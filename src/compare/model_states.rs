@@ -10,11 +10,11 @@ use std::borrow::Cow;
 
 /// Time between states of a restarted model, s: fifty states per cycle of a 1 kHz oscillation.
 const STEP_S: f64 = 2e-5;
-/// Maximum number of states of all segments together, about 14 MB; in a longer recording, the time between
-/// states is longer.
+/// Maximum number of states of all segments together (14 MB); in a longer recording, the time between states
+/// is longer.
 const MAX_STATES: f64 = 1e5;
-/// Two sticks are one if the gap between them, s, is below this: a stick that a restart divides goes on in
-/// the next segment.
+/// Two sticks are joined if the gap between them, s, is below this value, because a restart divides a stick
+/// that goes on in the next segment.
 const SAME_STICK_S: f64 = 1e-9;
 
 /// States of the fitted model on the clock of the model. After a fit to traces the model restarts at every
@@ -28,8 +28,8 @@ pub(crate) struct ModelStates<'a> {
 }
 
 impl<'a> ModelStates<'a> {
-    /// The states in one condition; `segments` are those of the fit, of all recordings, and `name` is the
-    /// name of the recording.
+    /// The states in one condition. `segments` are the fitted segments of all recordings, of which those of
+    /// the recording `name` are simulated.
     pub(super) fn simulate(model: &'a ModelRun, segments: &[FittedSegment], name: &str) -> Self {
         let own = segments.iter().filter(|segment| segment.recording == name);
         let scenes: Vec<Scene> =

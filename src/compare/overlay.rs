@@ -39,8 +39,9 @@ impl ModelRun {
         motion
     }
 
-    /// Motion of the model that restarts at every segment of the fit, in every frame of a segment and as
-    /// [`Self::measured_motion`] counts it; `None` without fitted traces.
+    /// Motion of the model that restarts at every segment of the fit, with values in the fitted frames. Its
+    /// deflection is counted as in [`Self::measured_motion`], and its head position is left out. `None`
+    /// without fitted traces.
     pub(crate) fn restarted_motion(&self, recording: &Recording) -> Option<MotionTraces> {
         let traces = self.traces.as_ref()?;
         let [tip_x_m, head_drop_m] = traces.restarted.clone();

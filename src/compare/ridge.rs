@@ -125,7 +125,7 @@ fn track_ridge(
     let rate_hz = side.recording.grid().frame_rate_hz;
     let samples = side.samples(case.cycle_channel());
     let (inside, exposure_s) = (samples.get(frames.clone())?, case.exposure_s());
-    // only what is slower than the band is removed here, which needs no second pass
+    // the analysis serves only to remove components below the band, which needs no second pass
     let settings = SpectrumSettings { second_pass: false, ..SpectrumSettings::default() };
     let analysis = side.recording.analyse_samples(inside, exposure_s, &settings).ok()?;
     let frames = frames.start + analysis.skipped_frames..frames.end;
@@ -154,7 +154,7 @@ fn track_ridge(
     }
     let start_s = side.recording.grid().time_s(frames.start);
     let shift_s = if is_measured { case.alignment.shift_s } else { 0.0 };
-    // a wrong model may slide where the recorded tip sticks
+    // a measured component needs no stick of the model: a wrong model may slide where the recorded tip sticks
     let is_cycle = |p: &&RidgePoint| {
         let sticks = count_sticks(case, start_s + p.time_s - shift_s, ridge.segment_s);
         let least_hz = (LEAST_OF_STICK_RATE * sticks as f64 / ridge.segment_s).max(least_cycle_hz(case));
@@ -211,8 +211,8 @@ fn remove_slow_components(analysis: &SpectralAnalysis, rate_hz: f64, low_hz: f64
     analysis.residual_m.iter().enumerate().map(at).collect()
 }
 
-/// Smallest allowed ratio of a frequency to the rate of the model's sticks at which the frequency counts as
-/// that of the stick-slip cycle. The swing of the head is several times slower.
+/// A frequency counts as that of the stick-slip cycle if its ratio to the rate of the model's sticks is at
+/// least this. The swing of the head is several times slower.
 const LEAST_OF_STICK_RATE: f64 = 0.6;
 
 /// Median rate of the model's sticks, Hz: the reciprocal of the median time from the start of a stick to that
@@ -226,14 +226,14 @@ fn usual_stick_rate_hz(case: &ConditionComparison) -> f64 {
     median_in_place(&mut periods_s).map_or(0.0, f64::recip)
 }
 
-/// Minimum number of sticks from which their usual rate is taken.
+/// Minimum number of sticks for a median rate.
 const MIN_STICKS: usize = 10;
 
-/// Smallest allowed ratio of the frequency of a stick-slip cycle to the natural frequency of the neck. The
-/// swing of the head on the neck has a third of it.
+/// A frequency counts as that of the stick-slip cycle if its ratio to the natural frequency of the neck is at
+/// least this. For the swing of the head on the neck, this ratio is a third.
 const LEAST_OF_NECK: f64 = 0.5;
 
-/// Frequency below which a component is the swing of the head, whatever the sticks of the model are, Hz.
+/// Frequency, Hz, below which a component is the swing of the head, however often the model sticks.
 fn least_cycle_hz(case: &ConditionComparison) -> f64 {
     LEAST_OF_NECK * body_frequencies(&case.model.scene.linkage).neck_hz
 }

@@ -1,4 +1,4 @@
-//! Velocity of a tracked point from its positions: central differences, chosen for the noise.
+//! Velocity of a tracked point by central differences of its positions, over a time that suits the noise.
 
 /// Largest allowed ratio of the standard deviation of the velocity noise to the velocity range of a part.
 /// With less noise than this, neighbouring cycles remain distinct.
@@ -65,6 +65,7 @@ impl CentralDifference {
         positions_m.windows(2 * half + 1).map(middle).collect()
     }
 }
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -74,7 +75,7 @@ mod tests {
         let tip: Vec<Option<f64>> = (0..8).map(|i| (i != 4).then(|| f64::from(i * i))).collect();
         let velocities =
             |half_frames, tip: &[_]| CentralDifference { half_frames, frame_rate_hz: 10.0 }.velocities(tip);
-        // frame 4 is missing: it has no velocity, although its neighbours would give one, nor have they
+        // frame 4 is missing: its neighbours would give it a velocity, but neither it nor they have one
         assert_eq!(velocities(1, &tip), [Some(20.0), Some(40.0), None, None, None, Some(120.0)]);
         assert_eq!(velocities(2, &tip), [None, Some(60.0), None, Some(100.0)]);
         assert_eq!(velocities(1, &[Some(0.0); 2]), []);
@@ -82,8 +83,8 @@ mod tests {
 
     const FASTEST_HZ: f64 = 900.0;
 
-    /// Ratio of the velocity amplitude that a central difference gives to the true amplitude of an oscillation:
-    /// `sin(x)/x`, where `x` is pi times the frequency times the time between the two frames.
+    /// Ratio of the velocity amplitude that a central difference gives to the true amplitude of an
+    /// oscillation: `sin(x)/x`, where `x` is pi times the frequency times the time between the two frames.
     fn velocity_gain(difference: CentralDifference, frequency_hz: f64) -> f64 {
         let x = std::f64::consts::PI * frequency_hz * difference.frame_gap_s();
         x.sin() / x

@@ -31,8 +31,8 @@ pub struct CornerParameter {
     pub truth: Option<f64>,
     /// Values of the parameter, each with the ratio of its profile likelihood to the largest likelihood.
     pub profile: Vec<(f64, f64)>,
-    /// Values at which local searches ended, and whether the cost there exceeds the least cost by at most the
-    /// threshold of the 95 % interval.
+    /// Values at which local searches ended. `true` marks an end whose cost exceeds the least cost by at most
+    /// the threshold of the 95 % interval.
     pub optima: Vec<(f64, bool)>,
 }
 
@@ -303,7 +303,7 @@ fn draw_cells(shown: &CornerPlot) -> Vec<Series> {
         };
         [end(low, -HALF), end(high, HALF), None]
     });
-    // the values of these ticks stand beside the row
+    // ticks at the estimate and at the ends of its interval, whose values are in the label of the row
     let ticks = diagonal().flat_map(|(i, known)| {
         let tick = |value: Option<f64>| {
             let foot = |y: f64| upright(i, value?, y);

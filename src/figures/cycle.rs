@@ -130,7 +130,7 @@ fn level_names(lines: &[(String, f64, Colour)], (right, top): (f64, f64)) -> Vec
     named
 }
 
-/// Symbols of the recordings, in turn.
+/// Symbols of the recordings, in the order of the recordings.
 const SHAPES: [MarkerShape; 4] =
     [MarkerShape::Disc, MarkerShape::Diamond, MarkerShape::Triangle, MarkerShape::InvertedTriangle];
 
@@ -190,15 +190,16 @@ pub(crate) fn figure_block(cases: &[&ConditionComparison]) -> Option<FigureBlock
     })
 }
 
-/// The points of the recordings that show a cycle; if none does, those of the models.
+/// The points that the claim is about: those of the recordings that show a cycle or, if none does, those of
+/// the models.
 fn claimed_points(shown: &CycleOverSpeed) -> Vec<SpeedPoint> {
     let is_measured = shown.recordings.iter().any(|cycle| !cycle.measured.is_empty());
     let counts = |cycle: &&RecordedCycle| !is_measured || !cycle.measured.is_empty();
     shown.recordings.iter().filter(counts).flat_map(|cycle| cycle.points().iter().copied()).collect()
 }
 
-/// The main result: the range of the frequency, and whether it rises or falls with the speed. `None` without a
-/// point.
+/// The main result: the range of the frequency, and whether it rises or falls with the speed. `None` without
+/// a point.
 fn claim_sentence(shown: &CycleOverSpeed, points: &[SpeedPoint]) -> Option<String> {
     let is_measured = shown.recordings.iter().any(|cycle| !cycle.measured.is_empty());
     let whose = if is_measured { "The cycle" } else { "The model's cycle" };

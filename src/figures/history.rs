@@ -172,19 +172,19 @@ const MIN_STICK_GAP: f64 = 0.005;
 const STICKS_LABEL: &str = "tip sticks (model)";
 const CYCLES_LABEL: &str = "stick-slip cycles (model)";
 
-/// Minimum number of frames of a stick that has a span of its own: a camera does not show a shorter one.
+/// Minimum number of frames of a stick that has a span of its own; a camera hardly shows a shorter one.
 const MIN_STICK_FRAMES: f64 = 5.0;
 
-/// Shaded spans of the intervals of stick that lie between two instants, s: one for each stick of at least
-/// [`MIN_STICK_FRAMES`] frames that is long enough to be seen, and one for each group of shorter sticks, which
-/// shows that the tip sticks and slips. `frame_s` is the time between two frames, s; 0 for a motion without
-/// camera.
+/// Shaded spans for the sticks between two instants, s. A stick that is long enough to be seen, and has at
+/// least [`MIN_STICK_FRAMES`] frames, has a span of its own. Each group of shorter sticks has one span, which
+/// shows that the tip sticks and slips. `frame_s` is the time between two frames, s, or 0 for a motion
+/// without a camera.
 pub(crate) fn stick_spans(stick_s: &[(f64, f64)], (from, to): (f64, f64), frame_s: f64) -> Vec<ShadedSpan> {
     let shown: Vec<(f64, f64)> =
         stick_s.iter().filter(|s| s.1 > from && s.0 < to).map(|s| (s.0.max(from), s.1.min(to))).collect();
     let (seen_s, apart_s) = (MIN_STICK_GAP * (to - from), MIN_STICK_FRAMES * frame_s);
     let is_long = |s: &(f64, f64)| s.1 - s.0 > seen_s.max(apart_s);
-    // the slips between the sticks of a cycle are a few times as long as the sticks
+    // sticks of neighbouring cycles belong to one group, and the slip between them may be longer than a stick
     let gap_s = seen_s.max(2.0 * apart_s);
     let groups = shown.chunk_by(|a, b| b.0 - a.1 < gap_s && !is_long(a) && !is_long(b));
     let band = |group: &[(f64, f64)]| {

@@ -299,10 +299,11 @@ fn claim_sentence(shown: &ProfilePlot) -> String {
     format!("{count} of {all} profiles cross the 95 % threshold on both sides")
 }
 
-/// Sentence on a line that rises over the threshold on an open side; empty without one.
+/// Sentence on lines that rise over the threshold on an open side; empty if there is none.
 pub(crate) fn figure_details(shown: &ProfilePlot) -> String {
     let open = drawn_profiles(shown).iter().any(|p| is_open_but_rising(p, shown.threshold));
-    let said = "A line that rises over the threshold on an open side has reached a bound of the search.";
+    let said = "Where a line rises over the threshold on an open side, a parameter has reached a bound of the \
+                search.";
     if open { said.to_owned() } else { String::new() }
 }
 

@@ -65,7 +65,7 @@ pub struct SpectrogramPlot {
     pub shown_hz: Option<(f64, f64)>,
     /// The ridge in order of time.
     pub ridge: Vec<SpectrogramRidgePoint>,
-    /// Frequencies that are related to the ridge, by name: multiples of it, or sidebands.
+    /// Lines that follow from the ridge, such as its double or its sidebands, each with its name.
     pub related: Vec<(String, Vec<SpectrogramRidgePoint>)>,
     /// Natural frequencies of the model in Hz, each with its name.
     pub natural_hz: Vec<(String, f64)>,
@@ -152,7 +152,7 @@ fn draw_map(shown: &SpectrogramPlot) -> Panel {
     }
 }
 
-/// Natural frequencies as lines across the map.
+/// A line across the map for each natural frequency.
 fn natural_lines(shown: &SpectrogramPlot) -> impl Iterator<Item = Series> {
     let span_s = time_span(&shown.time_s).unwrap_or_default();
     let line = move |(_, hz): &(String, f64)| {

@@ -1,5 +1,5 @@
-//! Stick and slip of the tip: its velocity over time, the friction on it over its velocity on the friction law,
-//! and over the deflection.
+//! Stick and slip of the tip: its velocity over time, the friction on it over its velocity together with the
+//! friction law, and the friction over the deflection.
 
 use super::central_difference::CentralDifference;
 use super::{FigureBlock, FigureText, history};
@@ -24,11 +24,11 @@ pub struct StickSlipPart {
     pub span_s: (f64, f64),
     /// Measured velocity of the tip.
     pub measured: VelocityCurve,
-    /// Velocity of the model's tip, read like the measured one.
+    /// Velocity of the model's tip; from the same central differences as the measured one, if there is one.
     pub model: VelocityCurve,
     /// States of the model in order of time; `None` interrupts the curve.
     pub friction: Vec<Option<TipFriction>>,
-    /// Friction by the recorded motion, frame by frame; empty if it cannot be measured.
+    /// Friction computed from the recorded motion, one entry per frame; empty if it cannot be computed.
     pub measured_friction: Vec<Option<TipFriction>>,
     /// Friction law at the mean normal force of the part: velocity, m/s, and friction, N.
     pub law: Vec<Option<(f64, f64)>>,
@@ -103,7 +103,7 @@ fn draw_velocity(part: &StickSlipPart, frames: Mark) -> Panel {
     }
 }
 
-/// Friction over velocity, on the friction law.
+/// Friction over velocity, together with the friction law.
 fn draw_over_velocity(part: &StickSlipPart, label: &str) -> Panel {
     let law = part.law.iter().map(|p| p.map(|(v, friction_n)| (v * MILLI, friction_n * MILLI)));
     let law = Series::new("law at the mean normal force", Colour::Grey, Mark::Dashed, law);
@@ -138,8 +138,8 @@ fn friction_series(part: &StickSlipPart, label: &str, over: fn(&TipFriction) -> 
 /// Ends of the x axis of a part. Each part has its own limits, so that stacked panels share no axis.
 fn axis_limits(drawn: &Series) -> Option<(f64, f64)> {
     const AXIS_MARGIN: f64 = 0.05;
-    // smallest allowed margin of the axis, as a fraction of the largest absolute value; a smaller margin
-    // would be rounding error and too small for tick labels
+    // smallest allowed margin of the axis, as a fraction of the largest absolute value; tick labels could not
+    // show a smaller one
     const LEAST_SPAN: f64 = 1e-4;
     let all = drawn.points.iter().flatten().map(|(x, _)| *x).filter(|x| x.is_finite());
     let (low, high) = value_span(all);
@@ -150,12 +150,12 @@ fn axis_limits(drawn: &Series) -> Option<(f64, f64)> {
 // Parts of the figure: one after the release, and one at the top speed of the head. If the tip sticks at that
 // time, the second part is at the top speed of the tip.
 
-/// Number of cycles of the low component that are drawn; few, since its loops shift from cycle to cycle.
+/// Number of cycles of the low component that are drawn; few, since its curve shifts from cycle to cycle.
 const LOW_CYCLES: f64 = 3.0;
-/// Number of cycles of the high component that are drawn; more, since its loops repeat.
+/// Number of cycles of the high component that are drawn; more, since its curve repeats.
 const HIGH_CYCLES: f64 = 12.0;
-/// Longest duration of a part, s: some tens of cycles of the high component. A part has this duration if no
-/// frequency is known.
+/// Longest duration of a part, s: some tens of cycles of the high component. The first part has this duration
+/// if no frequency is known.
 const LONGEST_S: f64 = 0.06;
 /// Minimum number of samples of the model in the time from the middle frame of a central difference to either
 /// of its two frames. Linear interpolation between them then follows the path of the model.
@@ -196,7 +196,7 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     Some(case.figure_block("stick-slip", words, draw_figure(&shown)))
 }
 
-/// Range of the tip velocity in the drawn curve of the model, m/s.
+/// Largest minus smallest velocity of a curve, m/s; `None` for a curve without a finite velocity.
 fn velocity_range(curve: &VelocityCurve) -> Option<f64> {
     let velocities = || curve.iter().flatten().map(|(_, v)| *v).filter(|v| v.is_finite());
     velocities().reduce(f64::max).zip(velocities().reduce(f64::min)).map(|(high, low)| high - low)
@@ -271,8 +271,9 @@ fn stick_duration_s(case: &ConditionComparison, from_s: f64, length_s: f64) -> f
     case.states.stick_s.iter().map(inside_s).sum()
 }
 
-/// The central difference for the noise of the recorded tip. It is chosen by the velocity range of the model,
-/// in the part in which it is smallest; the range in a recording would include noise.
+/// The central difference that suits the noise of the recorded tip. The velocity range with which the noise
+/// is compared is that of the model, since that of a recording would include noise. Of the parts, the one
+/// with the smallest range counts.
 fn choose_difference(case: &ConditionComparison, spans: &[PortraitSpan]) -> CentralDifference {
     let rate_hz = case.measured_or_model().recording.grid().frame_rate_hz;
     let shortest = CentralDifference::of_neighbouring_frames(rate_hz);
@@ -339,8 +340,8 @@ fn tip_friction(state: &ModelSample) -> TipFriction {
     }
 }
 
-/// The friction law times a normal force, N, over the velocities of the given states. Each direction has its
-/// own branch; directions in which the tip hardly moves have none.
+/// The friction law times a normal force, N, over the velocities of the given states: velocity, m/s, and
+/// friction, N. Each direction of motion has its own branch, unless the tip hardly moves in it.
 fn law_curve(
     case: &ConditionComparison,
     states: &[Option<TipFriction>],
@@ -409,7 +410,7 @@ fn figure_text(case: &ConditionComparison, shown: &StickSlipSheet, title: &str) 
     let measured = shown.parts.iter().find_map(|part| measure_cycle(case, part.span_s));
     let details = measured.map_or_else(String::new, |cycle| {
         let sd = format_digits(MILLI * cycle.sd_n, 2);
-        format!("A measured friction has a standard deviation of {sd} mN by the noise of the tip.")
+        format!("The noise of the tip gives each measured friction a standard deviation of at most {sd} mN.")
     });
     FigureText { caption, details }
 }

@@ -240,7 +240,8 @@ pub(crate) const ROUNDING_SHARE: f64 = 1e-9;
 pub(crate) const OPEN_SHARE: f64 = 0.01;
 /// Exponents below this fraction of the largest exponent of a combination are left out.
 const MIN_NAMED_EXPONENT: f64 = 0.05;
-/// Exponents below this fraction of the largest exponent are left out of a sentence.
+/// Exponents below this fraction of the largest exponent, which is 1, are left out of a sentence. Two
+/// exponents that differ from 1 and -1 by less than this are called a ratio.
 const MIN_SPOKEN_EXPONENT: f64 = 0.2;
 
 /// Singular directions of a Jacobian in the space of the parameters.
@@ -275,7 +276,8 @@ impl ParameterCombination {
         factors.into_iter().map(factor).collect::<Vec<_>>().join(" ")
     }
 
-    /// The parameters of the product in words; those with a small exponent are left out.
+    /// The product in words: the name of one parameter, "the ratio of X to Y", or "the combination of X, Y and
+    /// Z". Parameters with a small exponent are left out.
     pub(crate) fn describe_in_words(&self) -> String {
         let named: Vec<(&str, f64)> = self.exponents.iter().map(|(name, e)| (name.as_str(), *e)).collect();
         let mut named: Vec<_> = named.into_iter().filter(|(_, e)| e.abs() >= MIN_SPOKEN_EXPONENT).collect();

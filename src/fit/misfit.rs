@@ -26,8 +26,9 @@ const Z_95: f64 = 1.96;
 /// Largest allowed distance of a nuisance parameter from the mean of its prior, in standard deviations of the
 /// prior. With twenty nuisance parameters, one in a hundred fits of a right model exceeds this limit.
 const MAX_PRIOR_DISTANCE_SD: f64 = 3.5;
-/// Ratio of residual to noise above which the first sentence on a model that does not explain a recording
-/// states this ratio; below it, a reason says more.
+/// If the model does not explain a recording, the first sentence states the ratio of residual to noise if
+/// this ratio is above this value. Otherwise it states the reasons, since a ratio near 1 would look like
+/// agreement.
 const MIN_STATED_RATIO: f64 = 1.1;
 /// Number of significant digits of a ratio in a sentence.
 const DIGITS: usize = 4;
@@ -253,7 +254,7 @@ fn misfit_growth(stages: &[StageMisfit]) -> Option<String> {
     })
 }
 
-/// Ratio of residual to noise for a chi2 per degree of freedom.
+/// Ratio of residual to noise as text: the square root of chi2 per degree of freedom.
 fn ratio_text(chi2_per_dof: f64) -> String {
     format_trimmed(chi2_per_dof.sqrt(), DIGITS)
 }

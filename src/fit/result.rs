@@ -424,8 +424,8 @@ impl FitResult {
     }
 }
 
-/// Sentence on the number of targets that the model meets, without a full stop, such as "The model meets all
-/// 3 targets".
+/// Sentence on the number of targets that the model meets, without a full stop: "The model meets all 3
+/// targets".
 pub(crate) fn describe_met_targets(met: impl IntoIterator<Item = bool>) -> String {
     let met: Vec<bool> = met.into_iter().collect();
     let (count, all) = (met.iter().filter(|met| **met).count(), met.len());

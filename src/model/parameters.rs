@@ -171,7 +171,8 @@ pub fn parameter_names() -> Vec<&'static str> {
 }
 
 /// Parameters and camera errors in words, such as "natural frequency of the lip, A and C of the friction
-/// law". A name that is neither stands as it is.
+/// law". Only the part of a meaning before its first comma is taken, so that lists stay readable. Any other
+/// name is repeated as it is.
 pub(crate) fn describe_parameters<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     let (of_law, others): (Vec<&str>, Vec<&str>) =
         names.into_iter().partition(|name| name.starts_with("friction.") && find_parameter(name).is_some());

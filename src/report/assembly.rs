@@ -115,7 +115,7 @@ fn fill_report_sections(
     Report { parameters: Vec::new(), nuisances: Vec::new(), friction: Vec::new(), ..report }
 }
 
-/// Draws a figure of one or several conditions, the one that tells most first.
+/// Draws a figure of one or several conditions, given in the order of [`shown_conditions`].
 type DrawConditions = fn(&[&ConditionComparison]) -> Option<FigureBlock>;
 
 /// Maximum number of conditions in a figure; more do not fit on a printed page.
@@ -137,7 +137,8 @@ const MEASURED: [DrawConditions; 4] = [
     |shown| join_conditions(shown, spectrum::caption::figure_block, 1),
 ];
 
-/// The conditions that figures show: `telling`, and then those in which the model leaves most.
+/// The conditions that figures show: first `telling`, then the others in descending order of residual over
+/// noise.
 fn shown_conditions<'a, 'b>(
     cases: &'b [ConditionComparison<'a>],
     comparison: &[ComparisonSummary],
@@ -158,8 +159,8 @@ fn draw_conditions(shown: &[&ConditionComparison], figures: &[DrawConditions]) -
     figures.par_iter().filter_map(|draw| draw(shown)).collect()
 }
 
-/// The figure of the first condition that has one, whole, and below it the first `panels` panels of that of
-/// each further condition.
+/// The whole figure of the first condition that has one. Below it are the first `panels` panels of the figure
+/// of each other condition.
 fn join_conditions(
     shown: &[&ConditionComparison],
     draw: impl Fn(&ConditionComparison) -> Option<FigureBlock> + Sync,
@@ -183,7 +184,7 @@ fn blade_figures(shown: &[&ConditionComparison]) -> Vec<FigureBlock> {
 fn summary_figures(job: &Job, result: &FitResult, report: &Report) -> Vec<FigureBlock> {
     let features = [report.components.as_slice(), report.features.as_slice()];
     let pulls = PullPlot::from_comparisons(&job.title, &features, &report.held_out);
-    // a fit of as many parameters as features meets them all: its pulls say nothing
+    // with as many parameters as targets, a fit meets every target, so that the pulls say nothing
     let fitted = if report.misfit.is_some() { 0 } else { report.parameters.len() };
     let degrees = pulls.pulls.len().saturating_sub(fitted);
     let blocks = [

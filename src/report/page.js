@@ -1,7 +1,7 @@
 "use strict";
-// What a reader can do with the figures of the page: a cursor that all plots over one clock share and that
-// steps from frame to frame, the values of that frame, a part of the time enlarged with the heights that it
-// has, the animation paused and moved. Nothing is fetched or kept.
+// Makes the figures of the page interactive. Plots over one clock share a cursor, which moves from frame to
+// frame and shows the values of its frame. A part of the time can be enlarged, with y axes that fit its
+// values. The animation can be paused and moved. The script fetches and stores nothing.
 (() => {
   const SVG = (document.querySelector("svg") ?? document.documentElement).namespaceURI;
   const set = (element, attributes) => {
@@ -13,7 +13,7 @@
   const numbers = text => text.split(" ").map(Number);
   const within = (x, low, high) => Math.min(Math.max(x, low), high);
 
-  // ---- Plots: the groups of the figures that lie over time or frequency
+  // ---- Plots: the SVG groups with an x axis of time or frequency
 
   const plots = [...document.querySelectorAll("g.plot")].map((group, index) => {
     const [left, top, right, bottom] = numbers(group.dataset.area);
@@ -91,14 +91,14 @@
     const values = series.dataset.values.split(" ").map(v => v === "-" ? undefined : (before += Number(v)) / 10 ** digits);
     return series.frames = { start, step, values, digits: Math.max(digits, 0) };
   };
-  // The value of a frame; between two frames of the series, the value on the line between them.
+  // The value of a series at a time; between two of its frames, by linear interpolation.
   const frameValue = ({ start, step, values }, time) => {
     const at = (time - start) / step, before = Math.floor(at + 1e-6), part = at - before;
     if (part < 1e-3) return values[before];
     const [a, b] = [values[before], values[before + 1]];
     return a === undefined || b === undefined ? undefined : a + part * (b - a);
   };
-  // The time of the nearest frame, on the grid of the first series of a clock that holds every frame.
+  // The time of the frame that is nearest, in the first series of a clock that has every frame.
   const frameTime = (clock, time) => {
     for (const series of of(clock).flatMap(plot => [...plot.group.querySelectorAll(".series")])) {
       const all = frames(series);
@@ -201,7 +201,7 @@
     }
     return `url(#${id})`;
   };
-  // A shape as wide as a symbol keeps its form, wider ones are stretched.
+  // A shape of at most the size of a symbol keeps its form; a larger one is stretched.
   const SYMBOL = 16;
   const stretch = (element, moved, raised, { top, bottom }) => {
     switch (element.tagName) {
@@ -237,7 +237,8 @@
     return [1, 2, 5, 10].map(m => m * power).find(s => s >= raw);
   };
   const firstTicks = new Map();
-  // Draws the ticks of an axis that is enlarged, each at the place that `at` gives, with the mark `mark`.
+  // Draws the ticks of an axis in an enlarged part, and the first ticks otherwise. `at` gives the position of
+  // a value, `mark` the path of a tick at this position, and `key` is the coordinate along the axis.
   const ticks = (group, enlarged, [from, to], most, key, at, mark) => {
     if (!firstTicks.has(group)) firstTicks.set(group, [...group.childNodes]);
     const first = firstTicks.get(group);
@@ -261,7 +262,8 @@
     }
     group.replaceChildren(frame, ...marks);
   };
-  // The heights of all that is shown, with a margin; the whole axis where nothing is, and for a logarithm.
+  // The y axis that fits the values in an enlarged part, with a margin. Logarithmic axes, heat maps and parts
+  // without values keep the whole axis.
   const shownHeights = plot => {
     const [from, to] = plot.shown, found = [];
     if (plot.shown === plot.whole || plot.y.log || plot.group.dataset.heat) return plot.y;

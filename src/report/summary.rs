@@ -313,7 +313,8 @@ pub(in crate::report) fn next_step_sentence(report: &Report) -> Sentence {
     Sentence::new("Test the model on a recording that was not fitted, at another speed or preload.")
 }
 
-/// Sentence on how to measure the parameter with the widest interval by itself.
+/// Sentence on how to measure one parameter by itself: of the parameters that the data do not determine, the
+/// one whose interval is widest in relation to its estimate.
 fn measure_alone_sentence(report: &Report) -> Sentence {
     let width = |p: &&ParameterLine| match (p.lower_95, p.upper_95) {
         (Some(lower), Some(upper)) => (upper - lower) / p.estimate.abs(),

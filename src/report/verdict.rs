@@ -90,7 +90,7 @@ fn verdict_statements(report: &Report) -> Vec<Statement> {
     ));
     found.extend(truth_statement(&report.parameters));
     found.extend(ending_statements(report));
-    // statements that are bad news come first
+    // bad news comes first, after the headline
     found.sort_by_key(|statement| statement.good != Some(false));
     found.insert(0, summary::report_headline(report));
     if let Some(diagnosis) = diagnosis_statement(report) {

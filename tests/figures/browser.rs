@@ -85,7 +85,7 @@ fn nothing_scrolls_sideways_on_a_telephone_a_tablet_and_a_wide_screen() {
             assert!(content <= u64::from(width), "{fit}, {width}: {content} wide");
             if width == 400 {
                 assert_eq!(browser.evaluate(TOO_WIDE), json!([]), "{fit}");
-                // letters of figures and words, CSS pixels
+                // font sizes in figures and in the text around them, CSS pixels
                 let figures = browser.evaluate(
                     "Math.min(...[...document.querySelectorAll('figure svg text')] \
                      .map(t => t.getAttribute('font-size') * t.ownerSVGElement.getScreenCTM().a))",

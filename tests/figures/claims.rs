@@ -4,7 +4,7 @@ use plain_charts::{Figure, Panel, Series};
 use wiperlab::figures::{Drawing, FigureBlock};
 use wiperlab::report::Report;
 
-/// Largest relative difference between a number in a title, of three digits, and the number drawn.
+/// Largest allowed relative difference between a number of three digits in a title and the number drawn.
 const DIGITS_3: f64 = 6e-3;
 
 /// Maximum number of figures of a report.
@@ -60,7 +60,7 @@ fn assert_cycle(block: &FigureBlock, figure: &Figure, said: &[f64]) {
     assert!(is_near(claimed[0], low) && is_near(claimed[1], high), "{}: {low} {high}", block.caption);
 }
 
-/// The title has the range of the model's velocity in the last part.
+/// The title has the range of the model's velocity in one of the parts.
 fn assert_velocities(figure: &Figure, said: &[f64]) {
     let is_velocity =
         |panel: &&Panel| panel.y.label == "tip velocity, mm/s" && panel.x.label.contains("time");

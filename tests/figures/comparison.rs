@@ -98,7 +98,7 @@ fn figure<'a>(report: &'a Report, file: &str) -> &'a FigureBlock {
     })
 }
 
-/// The figures of measurement against model; a report has others beside them.
+/// The figures that compare measurement and model; a report has further figures.
 fn of_the_motion(report: &Report) -> impl Iterator<Item = &FigureBlock> {
     const FIRST: [&str; 8] =
         ["evidence", "stick-slip", "friction", "residuals", "history", "cycle", "spectrogram", "spectrum"];
@@ -221,8 +221,8 @@ fn a_twin_is_shown_against_its_model_from_the_motion_to_the_law() {
     );
 }
 
-/// Residual and noise of the evidence are those of the verdict, in `result.json`, and those of the one run are
-/// those of `report.json`.
+/// Residual and noise of the evidence are those of the verdict, in `result.json`, and those of the one run
+/// are those of `report.json`.
 fn the_evidence_has_the_numbers_of_the_report(report: &Report) {
     let summary = &report.comparison[0];
     let line = summary.restarted.iter().find(|line| line.channel == "deflection").unwrap();

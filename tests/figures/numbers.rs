@@ -48,7 +48,7 @@ fn tokens(text: &str) -> Vec<(f64, f64)> {
         let of_ten = rest[end..].starts_with('\u{b7}') || before == Some('\u{b7}');
         if let (Ok(value), false, false) = (word.parse::<f64>(), is_name, of_ten) {
             let decimals = word.split_once('.').map_or(0, |(_, fraction)| fraction.len()) as i32;
-            // a deviation such as that of 690(10) says that the last digits before it are rounded too
+            // the standard deviation of 690(10) ends in a zero, so the last digit of 690 is rounded too
             let deviation = rest[end..].strip_prefix('(').and_then(|sd| sd.split_once(')')).map(|(sd, _)| sd);
             let rounded = deviation.filter(|sd| sd.ends_with('0')).map_or(0, |sd| sd.len() as i32 - 1);
             found.push((sign * value, 10.0_f64.powi(rounded - decimals)));
@@ -127,7 +127,8 @@ fn numbers_are_read_with_sign_and_last_digit() {
     assert_eq!(tokens("690(10)"), [(690.0, 10.0)]);
 }
 
-/// The series with a label of which the page holds every frame: the unit of its last digit, and its values.
+/// The series of a page that have a given label and values in every frame: the unit of the last digit of
+/// each, and its values.
 fn sampled_series(page: &str, label: &str) -> Vec<(f64, Vec<Option<f64>>)> {
     let series = |part: &str| {
         let (grid, rest) = part.split_once("\" data-values=\"").unwrap();

@@ -46,8 +46,8 @@ impl ChartAxis {
         self.label == TIME_LABEL && self.scale == AxisScale::Linear
     }
 
-    /// How the cursor of a web page moves along this axis, which is that of a time or of a frequency; `None`
-    /// for any other axis.
+    /// Scale by which the script of a web page moves its cursor along this axis: `"time"` for a time axis,
+    /// `"linear"` or `"log"` for a frequency axis, and `None` for any other axis, which has no cursor.
     pub(super) fn cursor_scale(&self) -> Option<&'static str> {
         match self.scale {
             AxisScale::Linear if self.is_time() => Some("time"),

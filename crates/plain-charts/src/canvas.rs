@@ -75,7 +75,8 @@ impl Canvas {
         let _ = self.back.draw_path(whole, &plotters_colour(colour).stroke_width(width));
     }
 
-    /// Draws a PNG image that fills `area` and is clipped to `within`.
+    /// Draws a PNG image that fills `area` and is clipped to `within`. If `smooth`, colours are interpolated
+    /// between pixels; otherwise every pixel keeps its colour and its edges.
     pub(crate) fn draw_png(&mut self, area: &CanvasArea, within: &CanvasArea, png: &[u8], smooth: bool) {
         self.back.append_png(area, within, png, smooth);
     }

@@ -63,7 +63,8 @@ impl CompactSvg {
         self.elements.push_str("</g>\n");
     }
 
-    /// Appends a PNG image that fills `area` and is clipped to `within`, with its bytes as base64 text.
+    /// Appends a PNG image that fills `area` and is clipped to `within`, with its bytes as base64 text. If
+    /// not `smooth`, viewers are asked not to interpolate between pixels.
     pub(crate) fn append_png(&mut self, area: &CanvasArea, within: &CanvasArea, png: &[u8], smooth: bool) {
         let rendering = if smooth { "" } else { "image-rendering=\"optimizeSpeed\" " };
         let (x, y) = (area.left - within.left, area.top - within.top);

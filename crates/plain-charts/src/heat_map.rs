@@ -97,16 +97,16 @@ pub(super) fn colour_at(heat: &HeatMap, (x, y): (AxisScale, AxisScale), at: (f64
     Some(sample_colour_map(heat.colour_map, colour_fraction(heat.value_range()?, value)))
 }
 
-// Cells as a picture.
+// The cells, drawn as an indexed PNG: a picture is much smaller than one vector shape per cell.
 
-/// Number of pixels of the picture along the x and the y axis. Cells that are finer are merged into one pixel
-/// with their largest value, so that thin lines stay visible.
+/// Width and height of the picture, pixels. A pixel that covers several cells has the largest of their
+/// values, so that thin lines stay visible.
 const PIXELS: [usize; 2] = [440, 220];
-/// Number of colours of the picture; a value that is missing has one more. With these, 12 colours to a tenth
-/// of the range, neighbouring colours are hardly told apart.
+/// Number of colours for values; one more colour marks missing values. A tenth of the range has 12 colours,
+/// so that the eye sees no steps.
 const COLOURS: u8 = 120;
 
-/// The cells within the axes as a PNG; `None` without values.
+/// The cells within the axes as a PNG of [`PIXELS`]; `None` if the map has no finite value.
 pub(super) fn encode_cells(heat: &HeatMap, x: &CanvasAxis, y: &CanvasAxis) -> Option<Vec<u8>> {
     let ends = heat.value_range()?;
     let last = f64::from(COLOURS - 1);
@@ -116,7 +116,7 @@ pub(super) fn encode_cells(heat: &HeatMap, x: &CanvasAxis, y: &CanvasAxis) -> Op
         let value = heat.max_in_block(column.as_ref()?, row.as_ref()?)?;
         Some((colour_fraction(ends, value) * last).round() as u8)
     };
-    // the y axis rises, and the rows of a picture go down
+    // the first row of a picture is at the top, the high end of the y axis
     let pixels: Vec<u8> = rows
         .iter()
         .rev()
@@ -138,8 +138,9 @@ pub(super) fn encode_cells(heat: &HeatMap, x: &CanvasAxis, y: &CanvasAxis) -> Op
     Some(bytes)
 }
 
-/// The cells under each of `count` equal steps along an axis, from its low end: those with centres in the step
-/// or, if there are none, the cell at the middle of the step.
+/// The cells that each of `count` equal steps along an axis shows, from the low end of the axis: the cells
+/// with centres in the step if there are at least two, otherwise the cell at the middle of the step. `None`
+/// for a step whose middle is outside all cells.
 fn resample_cells(middles: &[f64], axis: &CanvasAxis, count: usize) -> Vec<Option<Range<usize>>> {
     let edges = cell_edges(middles, axis.scale);
     let step = (axis.to - axis.from) / count as f64;
@@ -152,7 +153,7 @@ fn resample_cells(middles: &[f64], axis: &CanvasAxis, count: usize) -> Vec<Optio
         let [first, end] = [at, at + 1.0].map(|at| middles.partition_point(|m| *m < value(at)));
         let middle = edges.partition_point(|e| *e <= value(at + 0.5)).checked_sub(1);
         let holder = middle.filter(|cell| *cell < middles.len());
-        // wide cells have their own edges; among narrow ones the step holds several
+        // a cell wider than a step ends at its own edges, so only the middle of the step decides
         if end > first + 1 { Some(first..end) } else { holder.map(|cell| cell..cell + 1) }
     };
     (0..count).map(of).collect()

@@ -390,12 +390,13 @@ pub(super) const WITHIN_AXES_CLASS: &str = "class=\"within\"";
 pub(super) const TICKS_CLASS: &str = "class=\"ticks\"";
 /// Class of the SVG group that contains the ticks of the y axis.
 pub(super) const Y_TICKS_CLASS: &str = "class=\"y-ticks\"";
-/// Class of the SVG group that contains the labels above the axes. The positions of these labels are times.
+/// Class of the SVG group that contains the labels above the axes. The script hides these labels in an
+/// enlarged part, because their positions apply only to the whole axis.
 pub(super) const OVER_AXES_CLASS: &str = "class=\"over\"";
 
 /// Attributes of the SVG group of a panel over time or frequency: canvas coordinates of the edges of its
-/// axes, values at the ends of both axes with their scales, and the label of the y axis. `None` for other
-/// panels.
+/// axes, values at the ends of both axes, the scale of each axis, and the label of the y axis. `None` for
+/// other panels.
 pub(super) fn panel_attributes(placed: &PanelLayout) -> Option<String> {
     let (panel, area, x, y) = (placed.panel, &placed.area, &placed.x, &placed.y);
     let is_read = !panel.bare && [x.low, x.high, y.low, y.high].iter().all(|end| end.is_finite());
@@ -426,14 +427,14 @@ pub(super) fn series_attributes(index: usize, series: &Series, placed: &PanelLay
     format!("class=\"series\" data-label=\"{label}\"{detail}")
 }
 
-/// Least number of steps into which the range of the y axis is divided. Values are rounded to these steps,
-/// which are a power of ten, so that a page shows them as a table would round them. They are fine enough for
-/// an enlarged curve on a screen.
+/// Values are rounded to a step that is a power of ten, so that the cursor shows the same digits as a table.
+/// The step is the largest with at least this number of steps in the range of the y axis, which is fine
+/// enough for an enlarged curve on a screen.
 const VALUE_STEPS: f64 = 1e4;
 
-/// SVG attributes with the full data: start and step of the sampling on the x axis, number of decimals of the
-/// values, and each value, in units of the last decimal, as the difference from the previous one. A dash
-/// marks a missing value.
+/// SVG attributes with the full data. `data-grid` has the start and the step of the sampling on the x axis,
+/// and the number of decimals of the values. `data-values` has each value minus the previous one, in units of
+/// the last decimal, and a dash for a missing value.
 fn sample_attributes(detail: &SampledSeries, placed: &PanelLayout) -> String {
     let decimals = math::log10(VALUE_STEPS / (placed.y.high - placed.y.low)).ceil();
     let steps_per_one = math::powi(10.0, decimals as i32);

@@ -90,11 +90,13 @@ pub(super) fn thin_points(run: &[CanvasPoint], width: f64) -> Vec<CanvasPoint> {
     kept
 }
 
-/// Maximum number of consecutive points that [`remove_flat_points`] leaves out.
+/// Maximum number of points by which [`remove_flat_points`] advances at once, which bounds its search. At
+/// most one point less is left out between two points that stay.
 const MOST_FLAT_POINTS: usize = 64;
 
-/// A line without the points that lie within half a canvas unit of the straight line between the points that
-/// stay, on the way from one to the next. Such points are traces of rounding, and make up most of a page.
+/// A line without its flat points. A point is flat if it lies within half a canvas unit of the straight line
+/// between its neighbours that stay, and if the line does not turn back there. Flat points differ from the
+/// straight line only by rounding to canvas units, and would take most of the bytes of a page.
 pub(super) fn remove_flat_points(line: &[(i32, i32)]) -> Vec<(i32, i32)> {
     let is_flat = |from: usize, to: usize| {
         let vector = |i: usize| (f64::from(line[i].0 - line[from].0), f64::from(line[i].1 - line[from].1));

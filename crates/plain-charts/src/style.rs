@@ -227,7 +227,7 @@ pub const MAX_HEIGHT_MM: f64 = 230.0;
 /// Font size of labels, mm (7.4 pt, readable at print size).
 pub(super) const TEXT_MM: f64 = 2.6;
 pub(super) const TITLE_MM: f64 = 3.2;
-/// Font size of small labels, mm (7.0 pt: journals allow no less than 7).
+/// Font size of small labels, mm (7.0 pt, the smallest size that many journals accept).
 pub(super) const SMALL_MM: f64 = 2.47;
 pub(super) const LINE_MM: f64 = 4.0;
 pub(super) const EDGE_MM: f64 = 2.0;

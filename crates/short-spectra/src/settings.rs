@@ -19,8 +19,8 @@ pub struct SpectrumSettings {
     /// Fastest oscillation that the motion may contain, Hz; possible aliases of a component are listed up to
     /// this frequency.
     pub fastest_hz: f64,
-    /// Whether oscillations that begin late or end soon, and pairs of lines closer than a resolution, are
-    /// searched for after the steady ones. This pass takes most of the time.
+    /// Whether a second pass follows the search for steady oscillations. It searches for oscillations that
+    /// begin late or end early, and for pairs of lines closer than a resolution. It takes most of the time.
     pub second_pass: bool,
 }
 

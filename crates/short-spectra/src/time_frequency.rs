@@ -174,7 +174,12 @@ impl SegmentLayout {
         Self { frames, hop, columns: room / hop + 1, record }
     }
 
-    /// Segments of a length in seconds.
+    /// Segments of a length in seconds, with `overlap` columns per segment length.
+    ///
+    /// # Errors
+    ///
+    /// [`SpectrumError::Segment`] for a segment of fewer than [`FEWEST_FRAMES`] frames, or one longer than
+    /// the record.
     pub(super) fn from_duration(
         record: usize,
         segment_s: f64,
@@ -220,8 +225,9 @@ pub struct SpectrogramSettings {
     pub segment_s: Option<f64>,
     /// Band for which the length is chosen, Hz; `None` uses [`default_band_hz`] with no slow component.
     pub band_hz: Option<(f64, f64)>,
-    /// Number of columns per segment length, if the length is given; `None` is 4. With 10, segments overlap by
-    /// 90 %.
+    /// Number of columns per segment length: with 10, segments overlap by 90 %. `None` is 4, and 0 counts as
+    /// 1. It is ignored if `segment_s` is `None`. A spectrogram never has more than [`MOST_COLUMNS`] columns,
+    /// so segments of a long record overlap less.
     pub overlap: Option<usize>,
 }
 

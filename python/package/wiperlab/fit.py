@@ -169,7 +169,10 @@ class FitResult(Mapping[str, Any]):
 
     @property
     def verdict(self) -> list[str]:
-        """The verdict in the words of the program and of the page: the first sentence, then its reasons."""
+        """The verdict in the words of the terminal: the first sentence, then the reasons that it leaves out.
+
+        The sentences have no full stop. Raises an InputError if `result.json` is damaged.
+        """
         path = self.folder / "result.json"
         first, reasons = describe_verdict(str(path), path.read_text(encoding="utf-8"))
         return [first, *reasons]

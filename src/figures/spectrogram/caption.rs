@@ -9,9 +9,11 @@ use crate::model::modes::body_frequencies;
 use crate::text::{format_digits, format_milliseconds};
 use std::ops::Range;
 
-/// Ratio of the highest frequency shown to the highest frequency of the ridges.
+/// Ratio of the highest frequency shown to the highest frequency of the ridges. Above 2, it keeps the line at
+/// twice the ridge inside the axes.
 const RIDGE_MARGIN: f64 = 2.15;
-/// Largest ratio of the distance of the sidebands to the lowest frequency of the ridge.
+/// Sidebands are drawn if the ratio of their distance from the ridge to its lowest frequency is below this
+/// value.
 const MAX_SIDEBAND: f64 = 0.3;
 
 /// Recording or model, with its ridge and the shift from its clock to that of the recording, s.
@@ -63,7 +65,8 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     Some(case.figure_block("spectrogram", FigureText { caption, details: String::new() }, figure))
 }
 
-/// Twice the frequency of a ridge, and its sidebands at the distance of the slowest target frequency.
+/// Lines at twice the frequency of a ridge and at its sidebands, whose distance from it is the lowest target
+/// frequency. Each has its name.
 fn related_lines(
     case: &ConditionComparison,
     ridge: &[SpectrogramRidgePoint],

@@ -42,7 +42,7 @@ impl SpectrogramSide {
 #[must_use]
 pub fn draw_comparison(shown: &SpectrogramComparison) -> Figure {
     let range = shown.sides.first().and_then(|(_, s)| colour_range_db(&decibel_map(&s.amplitude_m)));
-    // panels side by side with equal time axes are compared at a glance
+    // both panels have the same time axis, so that the reader can compare them
     let spans = shown.sides.iter().filter_map(|(_, s)| time_span(&s.time_s));
     let span_s = spans.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
     let map = |(of, s): &(SpectrogramSide, SpectrogramPlot)| {

@@ -20,8 +20,8 @@ const MOST_WINDOWS: usize = 4;
 /// Height, mm, of a panel if the figure has several.
 const PANEL_HEIGHT_MM: f64 = 48.0;
 
-/// The spectra of recording and model in the windows of the job, one panel each. Without such a window, those
-/// of the motion after the release of the tip. `None` if no window can be analysed.
+/// The spectra of recording and model, with one panel for each window of the job. A job without windows has
+/// one panel with the motion after the release of the tip. `None` if no window can be analysed.
 pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     let mut windows = group_fit_windows(case.job, case.condition);
     windows.retain(|window| window.band.is_some());
@@ -58,7 +58,8 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     ))
 }
 
-/// Spectra of recording and model in a window, with the target frequencies; `None` if neither can be analysed.
+/// Spectra of recording and model in a window, with the target frequencies; `None` if neither can be
+/// analysed.
 fn compare_window(
     case: &ConditionComparison,
     window: &FitWindow,

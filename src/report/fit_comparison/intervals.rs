@@ -12,7 +12,8 @@ use plain_charts::{
 };
 use portable_math as math;
 
-/// Heights of a row, mm; the first with which the figure fits a journal page is taken, or else the last.
+/// Heights of a row that are tried, mm. The first one with which the figure fits a journal page is taken, or
+/// the last one if none does.
 const ROW_MM: [f64; 4] = [5.5, 4.5, 3.7, 3.0];
 /// Least height of a panel, in rows.
 const LEAST_ROWS: usize = 3;

@@ -71,7 +71,7 @@ fn fit_targets(fit: &ComparedFit) -> impl Iterator<Item = &TargetComparison> {
     fit.report.components.iter().chain(&fit.report.features).chain(&fit.report.held_out)
 }
 
-/// Name and condition, which a target has in common with those of other fits.
+/// Name and condition of a target. Targets of several fits with the same key share a row.
 fn target_key(target: &TargetComparison) -> (&str, Option<&str>) {
     (&target.name, target.condition.as_deref())
 }

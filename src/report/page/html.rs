@@ -230,7 +230,8 @@ impl PageSection {
     }
 }
 
-/// The HTML without the style sheets of figures that an earlier figure has too, as one counts for the page.
+/// The HTML without repeated style sheets: a style sheet inside a figure applies to the whole page, so that
+/// figures with the same one need it only once.
 fn remove_repeated_styles(html: &str) -> String {
     let mut seen: Vec<&str> = Vec::new();
     let mut kept = String::new();
