@@ -125,9 +125,7 @@ fn track_ridge(
     let rate_hz = side.recording.grid().frame_rate_hz;
     let samples = side.samples(case.cycle_channel());
     let (inside, exposure_s) = (samples.get(frames.clone())?, case.exposure_s());
-    // the analysis serves only to remove components below the band, which needs no second pass
-    let settings = SpectrumSettings { second_pass: false, ..SpectrumSettings::default() };
-    let analysis = side.recording.analyse_samples(inside, exposure_s, &settings).ok()?;
+    let analysis = side.recording.analyse_samples(inside, exposure_s, &SpectrumSettings::default()).ok()?;
     let frames = frames.start + analysis.skipped_frames..frames.end;
     let top_hz = default_band_hz(frames.len(), rate_hz, None);
     let band_hz = match fastest_band(case) {

