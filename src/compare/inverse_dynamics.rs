@@ -200,8 +200,8 @@ mod tests {
         assert!((parabola.acceleration_gain() / gain - 1.0).abs() < 1e-12);
     }
 
-    /// Largest error, N, of the friction of a run from the positions of tip and head at instants `step_s` apart,
-    /// away from transitions; and the number of instants in slip and in stick.
+    /// Largest error, N, of the friction of a run from the positions of tip and head at instants `step_s`
+    /// apart, away from transitions; and the number of instants in slip and in stick.
     fn largest_error(step_s: f64) -> (f64, [usize; 2]) {
         let scene = Scene::parse("s", include_str!("../../data/scenes/actual-blade.toml")).unwrap();
         let motion = RunMotion::simulate(&scene);

@@ -1,8 +1,8 @@
 //! Diagnosis of recordings that a trace fit does not explain.
 //!
-//! Usual errors of a recording or a scene are tried as hypotheses: each is removed, and the changed problem is
-//! fitted on a few short segments. The best hypotheses are fitted to the whole recordings and judged like a
-//! fit.
+//! Usual errors of a recording or a scene are tried as hypotheses: each is removed, and the changed problem
+//! is fitted on a few short segments. The best hypotheses are fitted to the whole recordings and judged like
+//! a fit.
 
 mod hypothesis;
 mod lost_frames;
@@ -77,8 +77,8 @@ impl FitFinding {
 const TRIED_SEGMENTS: usize = 12;
 /// Number of steps of all hypotheses, and of further steps of the better ones.
 const STEPS: [usize; 2] = [4, 12];
-/// Number of hypotheses that are followed with more steps, with long segments, with a search for their number,
-/// and with all segments.
+/// Number of hypotheses that are followed with more steps, with long segments, with a search for their
+/// number, and with all segments.
 const FOLLOWED: [usize; 4] = [16, 7, 5, 3];
 /// Number of hypotheses that are followed further although they differ only in their number.
 const SAME_KIND: usize = 3;
@@ -106,8 +106,8 @@ struct FailedFit<'a> {
 }
 
 /// Findings on recordings that the fit does not explain: those of the recordings alone, the evidence against
-/// the model, and hypotheses that explain or nearly explain them. `descent` is the best descent of the search,
-/// and `misfit` its misfit. `None` if the fit was interrupted.
+/// the model, and hypotheses that explain or nearly explain them. `descent` is the best descent of the
+/// search, and `misfit` its misfit. `None` if the fit was interrupted.
 pub(super) fn diagnose_misfit(
     problem: &Problem,
     model: &TraceModel,
@@ -508,8 +508,8 @@ impl FailedFit<'_> {
         Some(said.map(|trial| trial.describe(self, chi2)).collect())
     }
 
-    /// The best hypotheses, at most `most`, and of those that differ only in their number at most `same_kind`.
-    /// The unchanged problem is always kept.
+    /// The best hypotheses, at most `most`, and of those that differ only in their number at most
+    /// `same_kind`. The unchanged problem is always kept.
     fn select_best(&self, mut trials: Vec<Trial>, most: usize, same_kind: usize) -> Vec<Trial> {
         trials.sort_by(|a, b| a.cost_per_dof().total_cmp(&b.cost_per_dof()));
         let least = trials.first().map_or(f64::INFINITY, Trial::cost_per_dof);

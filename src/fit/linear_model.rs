@@ -276,8 +276,8 @@ impl ParameterCombination {
         factors.into_iter().map(factor).collect::<Vec<_>>().join(" ")
     }
 
-    /// The product in words: the name of one parameter, "the ratio of X to Y", or "the combination of X, Y and
-    /// Z". Parameters with a small exponent are left out.
+    /// The product in words: the name of one parameter, "the ratio of X to Y", or "the combination of X, Y
+    /// and Z". Parameters with a small exponent are left out.
     pub(crate) fn describe_in_words(&self) -> String {
         let named: Vec<(&str, f64)> = self.exponents.iter().map(|(name, e)| (name.as_str(), *e)).collect();
         let mut named: Vec<_> = named.into_iter().filter(|(_, e)| e.abs() >= MIN_SPOKEN_EXPONENT).collect();

@@ -251,18 +251,13 @@ fn colour(svg: &str, across: f64, up: f64) -> [u8; 3] {
     let size = tree.size().to_int_size();
     let mut map = tiny_skia::Pixmap::new(size.width(), size.height()).unwrap();
     resvg::render(&tree, tiny_skia::Transform::default(), &mut map.as_mut());
-    // the whole map is laid in grey first: from the left upper corner to the right, down and back
-    let ground = svg
-        .split("<path fill=\"#E4E4E4\" d=\"M")
-        .nth(1)
-        .unwrap()
-        .split('H')
-        .take(2)
-        .collect::<Vec<_>>()
-        .join(" ")
-        .replace('V', " ");
-    let corners: Vec<f64> = ground.split_whitespace().map(|n| n.parse().unwrap()).collect();
-    let [left, top, right, bottom] = corners[..] else { panic!("{ground}") };
+    // the picture of the map: its left upper corner, width and height
+    let picture = svg.split("<g class=\"cells\">").nth(1).unwrap().split('>').next().unwrap();
+    let number = |key: &str| -> f64 {
+        picture.split(&format!(" {key}=\"")).nth(1).unwrap().split('"').next().unwrap().parse().unwrap()
+    };
+    let [left, top, width, height] = ["x", "y", "width", "height"].map(number);
+    let (right, bottom) = (left + width, top + height);
     let units = f64::from(size.width())
         / svg.split("viewBox=\"0 0 ").nth(1).unwrap().split(' ').next().unwrap().parse::<f64>().unwrap();
     let (x, y) = (left + across * (right - left), top + (1.0 - up) * (bottom - top));

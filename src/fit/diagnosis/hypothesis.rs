@@ -410,8 +410,8 @@ impl Problem {
         })
     }
 
-    /// Replaces the exposure times of all fitted recordings; `exposure_s` takes the time between frames and the
-    /// exposure time.
+    /// Replaces the exposure times of all fitted recordings; `exposure_s` takes the time between frames and
+    /// the exposure time.
     fn set_exposures(&mut self, exposure_s: impl Fn(f64, f64) -> f64) {
         for traced in &self.traces {
             let Some(recording) = &self.recordings[traced.condition] else { continue };

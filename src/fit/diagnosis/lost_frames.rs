@@ -64,7 +64,8 @@ pub(super) fn find_lost_frames(recording: &Recording) -> Vec<FrameGap> {
     if found.len() > MAX_GAPS { Vec::new() } else { found }
 }
 
-/// The recording with empty frames in place of those that are missing; `None` if it would have too few frames.
+/// The recording with empty frames in place of those that are missing; `None` if it would have too few
+/// frames.
 pub(super) fn insert_lost_frames(recording: &Recording, gaps: &[FrameGap]) -> Option<Recording> {
     let open = |column: &Vec<Option<f64>>| {
         let mut opened = Vec::with_capacity(column.len());
