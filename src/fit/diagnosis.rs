@@ -149,7 +149,7 @@ fn first_failed_stage(stages: &[StageMisfit]) -> usize {
 }
 
 /// A changed problem with an iterate of its search.
-struct TrialPart {
+struct TriedProblem {
     problem: Problem,
     model: TraceModel,
     at: Iterate,
@@ -157,8 +157,8 @@ struct TrialPart {
     length_s: f64,
 }
 
-impl TrialPart {
-    fn advance(&mut self, steps: usize) {
+impl TriedProblem {
+    fn make_steps(&mut self, steps: usize) {
         for _ in 0..steps {
             if self.at.settled {
                 break;
@@ -174,26 +174,26 @@ fn tried_settings(length_s: f64) -> TraceSearchSettings {
 }
 
 /// A hypothesis with its changed problems.
-struct Trial {
+struct TriedHypothesis {
     hypothesis: Hypothesis,
-    parts: Vec<TrialPart>,
+    parts: Vec<TriedProblem>,
     /// Number that the search for it has found: its coordinate and the standard deviation of this coordinate.
     found: Option<[f64; 2]>,
 }
 
 /// A hypothesis that was fitted to all segments.
-struct FittedTrial {
-    trial: Trial,
+struct FittedHypothesis {
+    trial: TriedHypothesis,
     misfits: Vec<TraceMisfit>,
     ends: Vec<Iterate>,
 }
 
-impl Trial {
+impl TriedHypothesis {
     /// The first iterate of a hypothesis, on segments of the stage at which the fit failed: the better of the
     /// starts in the middle of the bounds (only in the first stage) and at the end of the fit, if this is not
     /// junk.
-    fn start(hypothesis: Hypothesis, failed: &FailedFit<'_>) -> Option<Self> {
-        let same_frames = !matches!(hypothesis, Hypothesis::LostFrames | Hypothesis::Smoothing(_));
+    fn begin_search(hypothesis: Hypothesis, failed: &FailedFit<'_>) -> Option<Self> {
+        let same_frames = hypothesis != Hypothesis::LostFrames;
         let changed = hypothesis.change_problem(failed.problem);
         let part = |problem: Problem| {
             let model = problem.trace_model()?.ok()?;
@@ -212,9 +212,9 @@ impl Trial {
                 .iter()
                 .filter_map(|(point, before)| start_stage(&model, &settings, (0, false), point, before));
             let at = iterates.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
-            (!at.segments.is_empty()).then_some(TrialPart { problem, model, at, length_s })
+            (!at.segments.is_empty()).then_some(TriedProblem { problem, model, at, length_s })
         };
-        let parts: Vec<TrialPart> = changed.into_iter().map(part).collect::<Option<_>>()?;
+        let parts: Vec<TriedProblem> = changed.into_iter().map(part).collect::<Option<_>>()?;
         (!parts.is_empty()).then_some(Self { hypothesis, parts, found: None })
     }
 
@@ -222,7 +222,7 @@ impl Trial {
     fn change_number(&self, coordinate: f64, failed: &FailedFit<'_>) -> Option<Self> {
         let hypothesis = self.hypothesis.with_coordinate(coordinate, failed.problem);
         let changed = hypothesis.change_problem(failed.problem);
-        let part = |(problem, from): (Problem, &TrialPart)| {
+        let part = |(problem, from): (Problem, &TriedProblem)| {
             let model = problem.trace_model()?.ok()?;
             let [own_hz, from_hz] =
                 [&model, &from.model].map(|model| model.recordings[0].observation.rate_hz);
@@ -230,11 +230,12 @@ impl Trial {
             let middle = start_point(&model, problem.job().search.seed, 0);
             let point = carry_point(&model, &middle, &from.model, &from.at.point);
             let at = start_stage(&model, &tried_settings(length_s), (0, false), &point, &from.at.segments)?;
-            (!at.segments.is_empty()).then_some(TrialPart { problem, model, at, length_s })
+            (!at.segments.is_empty()).then_some(TriedProblem { problem, model, at, length_s })
         };
-        let parts: Vec<TrialPart> = changed.into_iter().zip(&self.parts).map(part).collect::<Option<_>>()?;
+        let parts: Vec<TriedProblem> =
+            changed.into_iter().zip(&self.parts).map(part).collect::<Option<_>>()?;
         let mut trial = (!parts.is_empty()).then_some(Self { hypothesis, parts, found: None })?;
-        trial.advance(SEARCH_STEPS);
+        trial.make_steps(SEARCH_STEPS);
         Some(trial)
     }
 
@@ -251,23 +252,24 @@ impl Trial {
                 let settings = TraceSearchSettings { max_segments, ..tried_settings(length_s) };
                 part.at = start_stage(&part.model, &settings, (0, false), &part.at.point, &part.at.segments)?;
                 part.length_s = length_s;
-                part.advance(steps);
+                part.make_steps(steps);
             }
         }
         Some(self)
     }
 
-    fn advance(&mut self, steps: usize) {
-        self.parts.iter_mut().for_each(|part| part.advance(steps));
+    fn make_steps(&mut self, steps: usize) {
+        self.parts.iter_mut().for_each(|part| part.make_steps(steps));
     }
 
     /// Robust cost of all parts.
-    fn cost(&self) -> f64 {
+    fn robust_cost(&self) -> f64 {
         self.parts.iter().map(|part| part.at.cost).sum()
     }
 
     fn cost_per_dof(&self) -> f64 {
-        self.cost() / self.parts.iter().map(|part| chi2_per_dof(&part.at).1).sum::<usize>().max(1) as f64
+        self.robust_cost()
+            / self.parts.iter().map(|part| chi2_per_dof(&part.at).1).sum::<usize>().max(1) as f64
     }
 
     /// Fraction of the frames that the segments of the trial contain.
@@ -289,7 +291,9 @@ impl Trial {
         /// Rise of the cost of all segments up to which a usual number is preferred: that of three standard
         /// deviations.
         const ROUND_COST: f64 = 9.0;
-        let Some([start, first_step]) = self.hypothesis.coordinate(failed.problem) else { return self };
+        let Some([start, first_step]) = self.hypothesis.search_coordinate(failed.problem) else {
+            return self;
+        };
         let mut best = self;
         let try_at = |from: &Self, coordinate: f64| from.change_number(coordinate, failed);
         let (mut middle, mut step) = (start, if is_long { FINER * first_step } else { first_step });
@@ -297,9 +301,9 @@ impl Trial {
         for _ in 0..=usize::from(is_long) {
             let mut sides = [-step, step].map(|by| try_at(&best, middle + by));
             for _ in 0..MAX_MOVES {
-                let cost = |side: &Option<Self>| side.as_ref().map_or(f64::INFINITY, Self::cost);
+                let cost = |side: &Option<Self>| side.as_ref().map_or(f64::INFINITY, Self::robust_cost);
                 let lower = usize::from(cost(&sides[1]) < cost(&sides[0]));
-                if cost(&sides[lower]) >= best.cost() {
+                if cost(&sides[lower]) >= best.robust_cost() {
                     break;
                 }
                 let by = if lower == 1 { step } else { -step };
@@ -309,7 +313,7 @@ impl Trial {
                 sides[1 - lower] = Some(std::mem::replace(&mut best, moved));
             }
             let [Some(below), Some(above)] = &sides else { break };
-            let [low, mid, high] = [below.cost(), best.cost(), above.cost()];
+            let [low, mid, high] = [below.robust_cost(), best.robust_cost(), above.robust_cost()];
             let curvature = (low - 2.0 * mid + high) / (step * step);
             let to_minimum = 0.5 * (low - high) / (step * curvature);
             if curvature <= 0.0 || to_minimum.abs() > step {
@@ -317,7 +321,7 @@ impl Trial {
             }
             sd = (2.0 * best.cost_per_dof().max(1.0) * best.tried_share() / curvature).sqrt();
             if let Some(trial) = try_at(&best, middle + to_minimum)
-                && trial.cost() <= best.cost()
+                && trial.robust_cost() <= best.robust_cost()
             {
                 best = trial;
                 middle += to_minimum;
@@ -333,15 +337,17 @@ impl Trial {
             tolerance = f64::INFINITY; // between frames, interpolation lowers the noise and thus the cost
         }
         let usual = best.hypothesis.usual_numbers(failed.problem).into_iter().filter_map(|usual| {
-            let mut trial = try_at(&best, usual.coordinate(failed.problem)?[0])?;
-            trial.advance(STEPS[1]);
+            let mut trial = try_at(&best, usual.search_coordinate(failed.problem)?[0])?;
+            trial.make_steps(STEPS[1]);
             Some(trial)
         });
-        let usual = usual.min_by(|a, b| a.cost().total_cmp(&b.cost()));
-        if let Some(usual) = usual.filter(|usual| usual.cost() < best.cost() + tolerance) {
-            if usual.cost() < best.cost() {
-                middle =
-                    usual.hypothesis.coordinate(failed.problem).map_or(middle, |[coordinate, _]| coordinate);
+        let usual = usual.min_by(|a, b| a.robust_cost().total_cmp(&b.robust_cost()));
+        if let Some(usual) = usual.filter(|usual| usual.robust_cost() < best.robust_cost() + tolerance) {
+            if usual.robust_cost() < best.robust_cost() {
+                middle = usual
+                    .hypothesis
+                    .search_coordinate(failed.problem)
+                    .map_or(middle, |[coordinate, _]| coordinate);
             }
             best = usual;
         }
@@ -350,7 +356,7 @@ impl Trial {
     }
 
     /// Fits all segments of the changed problems, through all stages.
-    fn fit_all_segments(self) -> Option<FittedTrial> {
+    fn fit_all_segments(self) -> Option<FittedHypothesis> {
         let (mut misfits, mut ends) = (Vec::new(), Vec::new());
         for part in &self.parts {
             let segment_s = part.problem.segment_s().to_vec();
@@ -369,12 +375,12 @@ impl Trial {
             misfits.push(judge_descent(&part.problem, &part.model, &descent)?);
             ends.push(at);
         }
-        Some(FittedTrial { trial: self, misfits, ends })
+        Some(FittedHypothesis { trial: self, misfits, ends })
     }
 }
 
-impl FittedTrial {
-    fn explains(&self) -> bool {
+impl FittedHypothesis {
+    fn is_explained(&self) -> bool {
         self.misfits.iter().all(|misfit| misfit.explained)
     }
 
@@ -387,7 +393,7 @@ impl FittedTrial {
 
     /// Chi2 and cost of the priors per degree of freedom, with a penalty for every unknown (Schwarz 1978), to
     /// compare hypotheses.
-    fn rank(&self) -> f64 {
+    fn penalized_chi2(&self) -> f64 {
         let (chi2, dof) = self.chi2_per_dof();
         let priors = self.trial.parts.iter().zip(&self.ends);
         let priors: f64 = priors.map(|(part, end)| part.model.unknowns.prior_cost(&end.point)).sum();
@@ -396,7 +402,7 @@ impl FittedTrial {
     }
 
     /// Factor on a number of the problem with its standard deviation; `None` without such a factor.
-    fn factor(&self, failed: &FailedFit<'_>) -> Option<[f64; 2]> {
+    fn preferred_factor(&self, failed: &FailedFit<'_>) -> Option<[f64; 2]> {
         let Hypothesis::Constant(name, _) = self.trial.hypothesis else {
             let [coordinate, sd] = self.trial.found?;
             let is_factor = matches!(self.trial.hypothesis, Hypothesis::FrameRate(_) | Hypothesis::Scale(_));
@@ -415,8 +421,8 @@ impl FittedTrial {
     }
 
     /// The finding; `chi2` is chi2 per degree of freedom without a change.
-    fn describe(&self, failed: &FailedFit<'_>, chi2: f64) -> FitFinding {
-        let values = |(part, end): (&TrialPart, &Iterate)| {
+    fn describe_finding(&self, failed: &FailedFit<'_>, chi2: f64) -> FitFinding {
+        let values = |(part, end): (&TriedProblem, &Iterate)| {
             let value =
                 |(free, (unknown, z)): (&super::job::FreeParameter, (&super::trace::TraceUnknown, &f64))| {
                     (free.name.clone(), unknown.value(*z))
@@ -425,15 +431,15 @@ impl FittedTrial {
             part.problem.job().parameters.iter().zip(all).map(value).collect()
         };
         let values: Vec<Vec<(String, f64)>> = self.trial.parts.iter().zip(&self.ends).map(values).collect();
-        let factor = self.factor(failed);
+        let factor = self.preferred_factor(failed);
         let found = factor.or_else(|| {
             let late = matches!(self.trial.hypothesis, Hypothesis::HeadLate(_));
             let shortest_s = failed.problem.segment_s()[0];
             self.trial.found.filter(|_| late).map(|found| found.map(|number| number * shortest_s))
         });
-        let words = self.trial.hypothesis.describe(failed.problem, found, &values);
+        let words = self.trial.hypothesis.describe_condition(failed.problem, found, &values);
         let own = self.chi2_per_dof().0;
-        let sentence = if self.explains() {
+        let sentence = if self.is_explained() {
             format!("Explained if {words}")
         } else {
             let [own, chi2] = [own, chi2].map(|chi2| format_trimmed(chi2, 3));
@@ -442,8 +448,8 @@ impl FittedTrial {
             )
         };
         FitFinding {
-            hypothesis: Some(self.trial.hypothesis.name().to_owned()),
-            explains: Some(self.explains()),
+            hypothesis: Some(self.trial.hypothesis.kind_name().to_owned()),
+            explains: Some(self.is_explained()),
             factor: factor.map(|[factor, _]| factor),
             factor_sd: factor.map(|[_, sd]| sd),
             chi2_per_dof: Some(own),
@@ -471,52 +477,60 @@ impl FailedFit<'_> {
         let count = all.len() - 1;
         let mut announce =
             |done: usize| journal.announce(format!("trying {count} explanations, {done} tried")).ok();
-        let mut trials: Vec<Trial> = Vec::new();
+        let mut trials: Vec<TriedHypothesis> = Vec::new();
         for (chunk, hypotheses) in all.chunks(4).enumerate() {
             announce(4 * chunk)?;
             let start = |hypothesis: &Hypothesis| {
-                let mut trial = Trial::start(hypothesis.clone(), self)?;
-                trial.advance(STEPS[0]);
+                let mut trial = TriedHypothesis::begin_search(hypothesis.clone(), self)?;
+                trial.make_steps(STEPS[0]);
                 Some(trial)
             };
-            let made: Vec<Option<Trial>> = hypotheses.par_iter().map(start).collect();
+            let made: Vec<Option<TriedHypothesis>> = hypotheses.par_iter().map(start).collect();
             trials.extend(made.into_iter().flatten());
         }
         let mut followed = self.select_best(trials, FOLLOWED[0], SAME_KIND);
-        followed.par_iter_mut().for_each(|trial| trial.advance(STEPS[1]));
+        followed.par_iter_mut().for_each(|trial| trial.make_steps(STEPS[1]));
         announce(count)?;
         let followed = self.select_best(followed, FOLLOWED[1], 1);
-        let followed: Vec<Trial> =
+        let followed: Vec<TriedHypothesis> =
             followed.into_par_iter().map(|trial| trial.search_number(self, false)).collect();
-        let lengthened = followed.into_par_iter().filter_map(Trial::lengthen_segments).collect();
+        let lengthened = followed.into_par_iter().filter_map(TriedHypothesis::lengthen_segments).collect();
         let mut lengthened = self.select_best(lengthened, FOLLOWED[2], 1);
         self.drop_useless(&mut lengthened);
         announce(count)?;
-        let searched: Vec<Trial> =
+        let searched: Vec<TriedHypothesis> =
             lengthened.into_par_iter().map(|trial| trial.search_number(self, true)).collect();
         announce(count)?;
         let best = self.select_best(searched, FOLLOWED[3], 1);
-        let fitted: Vec<Option<FittedTrial>> =
+        let fitted: Vec<Option<FittedHypothesis>> =
             best.into_par_iter().map(|trial| trial.fit_all_segments()).collect();
         announce(count)?;
         let chi2 = misfit.stages.last().map_or(f64::INFINITY, |stage| stage.chi2_per_dof);
-        let mut fitted: Vec<FittedTrial> = fitted.into_iter().flatten().collect();
-        fitted.sort_by(|a, b| b.explains().cmp(&a.explains()).then(a.rank().total_cmp(&b.rank())));
-        let explaining = fitted.iter().filter(|trial| trial.explains()).count();
-        let is_better = |trial: &&FittedTrial| trial.explains() || trial.chi2_per_dof().0 * MARKEDLY < chi2;
+        let mut fitted: Vec<FittedHypothesis> = fitted.into_iter().flatten().collect();
+        fitted.sort_by(|a, b| {
+            b.is_explained().cmp(&a.is_explained()).then(a.penalized_chi2().total_cmp(&b.penalized_chi2()))
+        });
+        let explaining = fitted.iter().filter(|trial| trial.is_explained()).count();
+        let is_better =
+            |trial: &&FittedHypothesis| trial.is_explained() || trial.chi2_per_dof().0 * MARKEDLY < chi2;
         let said = fitted.iter().filter(is_better).take(explaining.max(1));
-        Some(said.map(|trial| trial.describe(self, chi2)).collect())
+        Some(said.map(|trial| trial.describe_finding(self, chi2)).collect())
     }
 
     /// The best hypotheses, at most `most`, and of those that differ only in their number at most
     /// `same_kind`. The unchanged problem is always kept.
-    fn select_best(&self, mut trials: Vec<Trial>, most: usize, same_kind: usize) -> Vec<Trial> {
+    fn select_best(
+        &self,
+        mut trials: Vec<TriedHypothesis>,
+        most: usize,
+        same_kind: usize,
+    ) -> Vec<TriedHypothesis> {
         trials.sort_by(|a, b| a.cost_per_dof().total_cmp(&b.cost_per_dof()));
-        let least = trials.first().map_or(f64::INFINITY, Trial::cost_per_dof);
+        let least = trials.first().map_or(f64::INFINITY, TriedHypothesis::cost_per_dof);
         let limit = if least < NEAR_NOISE { WORSE * least } else { f64::INFINITY };
-        let mut kept: Vec<Trial> = Vec::new();
+        let mut kept: Vec<TriedHypothesis> = Vec::new();
         for trial in trials {
-            let is_same = |better: &&Trial| better.hypothesis.is_same_kind(&trial.hypothesis);
+            let is_same = |better: &&TriedHypothesis| better.hypothesis.is_same_kind(&trial.hypothesis);
             let is_good = trial.cost_per_dof() < limit
                 && kept.len() < most
                 && kept.iter().filter(is_same).count() < same_kind;
@@ -528,7 +542,7 @@ impl FailedFit<'_> {
     }
 
     /// Keeps the hypotheses that fit better than the unchanged problem.
-    fn drop_useless(&self, trials: &mut Vec<Trial>) {
+    fn drop_useless(&self, trials: &mut Vec<TriedHypothesis>) {
         let unchanged = trials.iter().find(|trial| trial.hypothesis == Hypothesis::Unchanged);
         let limit = unchanged.map_or(f64::INFINITY, |trial| BETTER * trial.cost_per_dof());
         trials.retain(|trial| trial.cost_per_dof() < limit);

@@ -28,9 +28,6 @@ pub(super) enum Hypothesis {
     Scale(f64),
     /// Time, s, by which the track of the head is late.
     HeadLate(f64),
-    /// Number of frames over which the tracking program has averaged. One frame in as many is fitted, with an
-    /// exposure of as many frames, because the noise of the frames between is the same.
-    Smoothing(usize),
     /// Frames were lost, and the remaining frames were closed up.
     LostFrames,
     /// The constant with this name has another value; the search starts at this factor on its value.
@@ -47,8 +44,6 @@ const RATE_FACTORS: [f64; 11] = [0.01, 0.1, 0.25, 0.5, 0.7, 1.0 / 1.2, 1.2, 1.4,
 const SCALE_FACTORS: [f64; 10] = [0.001, 0.1, 0.5, 0.7, 1.0 / 1.2, 1.2, 1.4, 2.0, 10.0, 1000.0];
 /// Times by which the head's track may be late, in units of the length of the shortest segments.
 const LATE_SEGMENTS: [f64; 6] = [-0.8, -0.3, -0.1, 0.1, 0.3, 0.8];
-/// Widths of the averages that a tracking program may take, in frames.
-const AVERAGED_FRAMES: [usize; 5] = [3, 5, 7, 9, 15];
 /// Constants whose values are doubted: those that are read off a picture, weighed or pressed.
 const CONSTANTS: [&str; 7] = [
     "blade.neck_length_m",
@@ -85,7 +80,6 @@ impl Hypothesis {
         all.extend(SCALE_FACTORS.map(Self::Scale));
         all.extend(LATE_SEGMENTS.map(|part| Self::HeadLate(part * shortest_s)));
         all.push(Self::LostFrames);
-        all.extend(AVERAGED_FRAMES.map(Self::Smoothing));
         let is_held = |name: &&str| {
             scenes().all(|scene| scene.written_values().any(|(own, value)| own == *name && value > 0.0))
                 && !problem.job.parameters.iter().any(|free| is_same_quantity(&free.name, name))
@@ -102,7 +96,7 @@ impl Hypothesis {
     }
 
     /// Name in `result.json`.
-    pub(super) fn name(&self) -> &'static str {
+    pub(super) fn kind_name(&self) -> &'static str {
         match self {
             Self::Unchanged => "unchanged",
             Self::SwappedPoints => "swapped-points",
@@ -111,7 +105,6 @@ impl Hypothesis {
             Self::FrameRate(_) => "frame-rate",
             Self::Scale(_) => "scale",
             Self::HeadLate(_) => "head-late",
-            Self::Smoothing(_) => "smoothing",
             Self::LostFrames => "lost-frames",
             Self::Constant(..) => "constant",
             Self::Shoulder(_) => "shoulder",
@@ -123,13 +116,13 @@ impl Hypothesis {
     pub(super) fn is_same_kind(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Constant(a, _), Self::Constant(b, _)) => a == b,
-            _ => self.name() == other.name(),
+            _ => self.kind_name() == other.kind_name(),
         }
     }
 
     /// The number of the hypothesis as a coordinate for a search, and the first step of this search; `None`
     /// without a number that is searched for.
-    pub(super) fn coordinate(&self, problem: &Problem) -> Option<[f64; 2]> {
+    pub(super) fn search_coordinate(&self, problem: &Problem) -> Option<[f64; 2]> {
         let shortest_s = problem.segment_s().first()?;
         match self {
             Self::FrameRate(factor) | Self::Scale(factor) => Some([math::ln(*factor), 0.08]),
@@ -165,7 +158,8 @@ impl Hypothesis {
             Self::HeadLate(late_s) => {
                 /// Largest distance from whole frames, in frames.
                 const NEAR_FRAME: f64 = 0.1;
-                let rate_hz = recordings(problem).next().map_or(0.0, |first| first.grid().frame_rate_hz);
+                let rate_hz =
+                    fitted_recordings(problem).next().map_or(0.0, |first| first.grid().frame_rate_hz);
                 let frames = (late_s * rate_hz).round();
                 let is_near = frames != 0.0 && (late_s * rate_hz - frames).abs() < NEAR_FRAME;
                 if is_near { vec![Self::HeadLate(frames / rate_hz)] } else { Vec::new() }
@@ -185,15 +179,8 @@ impl Hypothesis {
             Self::LostFrames => changed.insert_frames(),
             _ => changed.change_recordings(|recording| self.change_recording(recording)),
         };
-        match self {
-            Self::FrameRate(_) => changed.set_exposures(|period_s, exposure_s| exposure_s.min(period_s)),
-            Self::Smoothing(every) => {
-                changed.set_exposures(|period_s, _| period_s);
-                for traced in &mut changed.traces {
-                    traced.frames = traced.frames.start.div_ceil(*every)..traced.frames.end.div_ceil(*every);
-                }
-            }
-            _ => {}
+        if let Self::FrameRate(_) = self {
+            changed.limit_exposures();
         }
         if let Self::Scale(factor) = self {
             changed
@@ -235,18 +222,6 @@ impl Hypothesis {
                 columns.into_iter().for_each(|column| multiply(column, *factor));
             }
             Self::FrameRate(factor) => grid.frame_rate_hz *= factor,
-            Self::Smoothing(every) => {
-                let thin = |column: &Vec<Option<f64>>| column.iter().step_by(*every).copied().collect();
-                traces = Traces {
-                    tip_x_m: thin(&traces.tip_x_m),
-                    tip_y_m: thin(&traces.tip_y_m),
-                    head_x_m: thin(&traces.head_x_m),
-                    head_y_m: thin(&traces.head_y_m),
-                    ..Traces::default()
-                };
-                grid.frame_rate_hz /= *every as f64;
-                grid.frames = traces.tip_x_m.len();
-            }
             Self::HeadLate(late_s) => {
                 let shift = |column: &[Option<f64>]| {
                     (0..grid.frames)
@@ -264,7 +239,7 @@ impl Hypothesis {
     /// The condition under which the model would explain the recordings, in words that follow "if". `sd` is
     /// the standard deviation of the number, and `changed` are the problems with the estimates of their
     /// parameters.
-    pub(super) fn describe(
+    pub(super) fn describe_condition(
         &self,
         problem: &Problem,
         found: Option<[f64; 2]>,
@@ -290,7 +265,8 @@ impl Hypothesis {
                 "heights have the other sign, so that y points down instead of up or the reverse".to_owned()
             }
             Self::FrameRate(factor) => {
-                let mut rates: Vec<f64> = recordings(problem).map(|one| one.grid().frame_rate_hz).collect();
+                let mut rates: Vec<f64> =
+                    fitted_recordings(problem).map(|one| one.grid().frame_rate_hz).collect();
                 rates.dedup();
                 match rates[..] {
                     [stated_hz] => {
@@ -304,7 +280,8 @@ impl Hypothesis {
                 format!("all lengths are {} times those of the recording{prefers}", number(*factor))
             }
             Self::HeadLate(late_s) => {
-                let rate_hz = recordings(problem).next().map_or(0.0, |first| first.grid().frame_rate_hz);
+                let rate_hz =
+                    fitted_recordings(problem).next().map_or(0.0, |first| first.grid().frame_rate_hz);
                 let when = if *late_s > 0.0 { "late" } else { "early" };
                 let sd =
                     found.map_or(String::new(), |[_, sd]| format!(" +- {}", format_trimmed(1e3 * sd, 2)));
@@ -314,11 +291,8 @@ impl Hypothesis {
                     number((late_s * rate_hz).abs())
                 )
             }
-            Self::Smoothing(frames) => {
-                format!("the tracking program smoothed the positions over about {frames} frames")
-            }
             Self::LostFrames => {
-                let lost = recordings(problem).flat_map(|recording| {
+                let lost = fitted_recordings(problem).flat_map(|recording| {
                     let at = |frame: usize| recording.grid().time_s(frame);
                     find_lost_frames(recording)
                         .into_iter()
@@ -376,7 +350,7 @@ fn format_frame_rate(rate_hz: f64) -> String {
 }
 
 /// The recordings whose traces are fitted.
-fn recordings(problem: &Problem) -> impl Iterator<Item = &Recording> {
+fn fitted_recordings(problem: &Problem) -> impl Iterator<Item = &Recording> {
     problem.traces.iter().filter_map(|traced| problem.recordings[traced.condition].as_ref())
 }
 
@@ -410,13 +384,12 @@ impl Problem {
         })
     }
 
-    /// Replaces the exposure times of all fitted recordings; `exposure_s` takes the time between frames and
-    /// the exposure time.
-    fn set_exposures(&mut self, exposure_s: impl Fn(f64, f64) -> f64) {
+    /// Limits the exposure times of all fitted recordings to the time between frames.
+    fn limit_exposures(&mut self) {
         for traced in &self.traces {
             let Some(recording) = &self.recordings[traced.condition] else { continue };
-            let camera = &mut self.model.conditions_mut()[traced.condition].instrument.camera;
-            camera.exposure_s = exposure_s(1.0 / recording.grid().frame_rate_hz, camera.exposure_s);
+            let exposure_s = &mut self.model.conditions_mut()[traced.condition].instrument.camera.exposure_s;
+            *exposure_s = exposure_s.min(1.0 / recording.grid().frame_rate_hz);
         }
     }
 
@@ -473,5 +446,16 @@ impl Problem {
             })
         });
         !self.segment_s.is_empty()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::format_frame_rate;
+
+    #[test]
+    fn a_frame_rate_has_commas() {
+        let rates = [999.0, 5000.0, 50_000.0, 1234.5].map(format_frame_rate);
+        assert_eq!(rates, ["999", "5,000", "50,000", "1,234"]);
     }
 }

@@ -89,3 +89,35 @@ pub(super) fn insert_lost_frames(recording: &Recording, gaps: &[FrameGap]) -> Op
     let grid = FrameGrid { frames: opened.tip_x_m.len(), ..recording.grid() };
     Recording::new(recording.name(), grid, opened, recording.is_synthetic()).ok()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Head that moves by a parabola, with alternating errors of 1 um.
+    fn recording(frames: impl Iterator<Item = usize>) -> Recording {
+        let place = |i: usize| {
+            4e-5 * i as f64 - 1e-8 * (i * i) as f64 + if i.is_multiple_of(2) { 1e-6 } else { -1e-6 }
+        };
+        let head_x_m: Vec<Option<f64>> = frames.map(|i| Some(place(i))).collect();
+        let frames = head_x_m.len();
+        let grid = FrameGrid { start_s: 0.0, frame_rate_hz: 5000.0, frames };
+        let none = vec![None; frames];
+        let (tip_x_m, tip_y_m, head_y_m) = (none.clone(), none.clone(), none);
+        let traces = Traces { tip_x_m, tip_y_m, head_x_m, head_y_m, ..Traces::default() };
+        Recording::new("head", grid, traces, true).unwrap()
+    }
+
+    #[test]
+    fn lost_frames_are_found_and_inserted() {
+        assert_eq!(find_lost_frames(&recording(0..600)), []);
+        let closed_up = recording((0..200).chain(207..400).chain(402..600));
+        let gaps = [FrameGap { after: 199, count: 7 }, FrameGap { after: 392, count: 2 }];
+        assert_eq!(find_lost_frames(&closed_up), gaps);
+        let (opened, whole) = (insert_lost_frames(&closed_up, &gaps).unwrap(), recording(0..600));
+        assert_eq!(opened.grid(), whole.grid());
+        let pairs = || opened.traces().head_x_m.iter().zip(&whole.traces().head_x_m);
+        assert!(pairs().all(|(opened, whole)| opened.is_none() || opened == whole));
+        assert_eq!(pairs().filter(|(opened, _)| opened.is_none()).count(), 9 + 2 * (2 * UNSURE));
+    }
+}
