@@ -12,7 +12,7 @@ mod view_model;
 use crate::compare::{ComparisonSummary, ComparisonTable, ParameterLine, RunSummary, TargetComparison};
 use crate::figures::FigureBlock;
 use crate::figures::friction::FrictionLine;
-use crate::fit::diagnosis::FitFinding;
+use crate::fit::findings::FitFinding;
 use crate::fit::misfit::TraceMisfit;
 use crate::fit::result::NuisanceResult;
 use serde::Serialize;

@@ -3,8 +3,8 @@
 mod assembly;
 mod validation;
 
-use super::diagnosis::FitFinding;
 use super::evaluation::FailureReason;
+use super::findings::FitFinding;
 use super::identifiability::Identifiability;
 use super::job::{FreeParameter, Job};
 use super::linear_model::ParameterCombination;

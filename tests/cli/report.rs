@@ -309,7 +309,7 @@ fn a_result_that_was_edited_and_a_folder_that_is_taken_are_refused_and_nothing_i
 fn figures_of_an_earlier_report_go_and_nothing_else_does() {
     // a fit of more features than parameters has pulls
     let means = ["0.341..0.345", "0.4..0.41"]
-        .map(|window| format!("[[feature]]\nkind = \"mean-deflection\"\nwindow = \"{window}\"\n\n"));
+        .map(|w| format!("[[feature]]\nname = \"{w}\"\nkind = \"mean-deflection\"\nwindow = \"{w}\"\n\n"));
     let project = Project::with_fits(&[
         ("x", &JOB.replace("[search]", &format!("{}[search]", means.concat()))),
         ("y", JOB),

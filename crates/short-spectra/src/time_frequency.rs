@@ -226,8 +226,8 @@ pub struct SpectrogramSettings {
     /// Band for which the length is chosen, Hz; `None` uses [`default_band_hz`] with no slow component.
     pub band_hz: Option<(f64, f64)>,
     /// Number of columns per segment length: with 10, segments overlap by 90 %. `None` is 4; zero is read as
-    /// one. It is ignored if `segment_s` is `None`. A spectrogram never has more than [`MOST_COLUMNS`] columns,
-    /// so segments of a long record overlap less.
+    /// one. It is ignored if `segment_s` is `None`. A spectrogram has at most [`MOST_COLUMNS`] columns, so
+    /// the segments of a long record overlap less.
     pub overlap: Option<usize>,
 }
 
