@@ -167,7 +167,7 @@ const MOST_STUCK: f64 = 0.8;
 const ROUNDING_M: f64 = 1e-12;
 
 /// A part of the motion, with its name in the panels, and its start and end, s.
-struct PortraitSpan {
+struct SheetSpan {
     name: String,
     from_s: f64,
     to_s: f64,
@@ -177,9 +177,13 @@ struct PortraitSpan {
 
 /// The figure of a condition; `None` if the motion is too short.
 pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
-    let spans = portrait_spans(case);
+    let spans = sheet_spans(case);
     let difference = choose_difference(case, &spans);
-    let parts = spans.iter().map(|span| build_part(case, span, difference));
+    let cycles: Vec<_> = spans.iter().map(|span| measure_cycle(case, (span.from_s, span.to_s))).collect();
+    let parts = spans.iter().zip(&cycles).map(|(span, cycle)| StickSlipPart {
+        measured_friction: cycle.as_ref().map_or_else(Vec::new, |cycle| cycle.states.clone()),
+        ..build_part(case, span, difference)
+    });
     let parts: Vec<StickSlipPart> = parts.filter(|part| !part.model.is_empty()).collect();
     let title = figure_title(parts.last()?)?;
     let inferred = case.restarted.is_some();
@@ -192,7 +196,8 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
         friction_label,
         parts,
     };
-    let words = figure_text(case, &shown, &title);
+    let sd_n = cycles.iter().flatten().map(|cycle| cycle.sd_n).reduce(f64::max);
+    let words = figure_text(case, &shown, &title, sd_n);
     Some(case.figure_block("stick-slip", words, draw_figure(&shown)))
 }
 
@@ -209,7 +214,7 @@ fn figure_title(part: &StickSlipPart) -> Option<String> {
     Some(format!("The tip swings through {range} {within}{}", part.name))
 }
 
-fn portrait_spans(case: &ConditionComparison) -> Vec<PortraitSpan> {
+fn sheet_spans(case: &ConditionComparison) -> Vec<SheetSpan> {
     let shown = case.measured_or_model();
     let grid = shown.recording.grid();
     let start_s = shown.instant_s(InstantKind::Release).unwrap_or(grid.start_s);
@@ -222,7 +227,7 @@ fn portrait_spans(case: &ConditionComparison) -> Vec<PortraitSpan> {
     let first_s = low_hz.map_or(LONGEST_S, |hz| LOW_CYCLES / hz).min(LONGEST_S).min(end_s - start_s);
     let after =
         if shown.instant_s(InstantKind::Release).is_some() { "after the release" } else { "from the start" };
-    let first = PortraitSpan {
+    let first = SheetSpan {
         name: format!("{} {after}", format_milliseconds(first_s)),
         from_s: start_s,
         to_s: start_s + first_s,
@@ -243,7 +248,7 @@ fn portrait_spans(case: &ConditionComparison) -> Vec<PortraitSpan> {
                 ("head", of_head)
             };
             let from_s = starts(at_s);
-            Some(PortraitSpan {
+            Some(SheetSpan {
                 name: format!("{} at the {whose}'s top speed", format_milliseconds(length_s)),
                 from_s,
                 to_s: from_s + length_s,
@@ -274,12 +279,12 @@ fn stick_duration_s(case: &ConditionComparison, from_s: f64, length_s: f64) -> f
 /// The central difference that suits the noise of the recorded tip. The velocity range with which the noise
 /// is compared is that of the model, since that of a recording would include noise. Of the parts, the one
 /// with the smallest range counts.
-fn choose_difference(case: &ConditionComparison, spans: &[PortraitSpan]) -> CentralDifference {
+fn choose_difference(case: &ConditionComparison, spans: &[SheetSpan]) -> CentralDifference {
     let rate_hz = case.measured_or_model().recording.grid().frame_rate_hz;
     let shortest = CentralDifference::of_neighbouring_frames(rate_hz);
     let noise_m = case.noise_m(Channel::TipX).filter(|noise_m| *noise_m > ROUNDING_M);
     let model = case.model_side();
-    let range = |span: &PortraitSpan| {
+    let range = |span: &SheetSpan| {
         velocity_range(&recorded_velocities(&model, model_clock_span(case, span), shortest, 0.0))
     };
     let range = spans.iter().filter_map(range).reduce(f64::min);
@@ -290,15 +295,11 @@ fn choose_difference(case: &ConditionComparison, spans: &[PortraitSpan]) -> Cent
 }
 
 /// Start and end of a part on the model's clock, s.
-fn model_clock_span(case: &ConditionComparison, span: &PortraitSpan) -> (f64, f64) {
+fn model_clock_span(case: &ConditionComparison, span: &SheetSpan) -> (f64, f64) {
     (span.from_s - case.alignment.shift_s, span.to_s - case.alignment.shift_s)
 }
 
-fn build_part(
-    case: &ConditionComparison,
-    span: &PortraitSpan,
-    difference: CentralDifference,
-) -> StickSlipPart {
+fn build_part(case: &ConditionComparison, span: &SheetSpan, difference: CentralDifference) -> StickSlipPart {
     let span_s = (span.from_s, span.to_s);
     let measured = case.measured_side().map(|side| recorded_velocities(&side, span_s, difference, 0.0));
     let measured = measured.filter(|velocities| velocities.iter().any(Option::is_some));
@@ -323,7 +324,7 @@ fn build_part(
     StickSlipPart {
         name: span.name.clone(),
         span_s,
-        measured_friction: measure_cycle(case, span_s).map_or_else(Vec::new, |cycle| cycle.states),
+        measured_friction: Vec::new(),
         law: law_curve(case, &friction, mean_n),
         measured: measured.unwrap_or_default(),
         sticks: history::stick_spans(&case.sticks_on_clock(), span_s, frame_s),
@@ -401,15 +402,20 @@ fn recorded_velocities(
     found.map(|(i, v)| Some((time_s(i), v?))).collect()
 }
 
-fn figure_text(case: &ConditionComparison, shown: &StickSlipSheet, title: &str) -> FigureText {
+/// Caption; `sd_n` is the largest standard deviation of the measured friction, N, if it was measured.
+fn figure_text(
+    case: &ConditionComparison,
+    shown: &StickSlipSheet,
+    title: &str,
+    sd_n: Option<f64>,
+) -> FigureText {
     let forces = shown.parts.last().into_iter().flat_map(|part| part.friction.iter().flatten());
     let (low, high) = value_span(forces.map(|state| MILLI * state.friction_n));
     let whose = if case.recording().is_some() { "" } else { " (model alone)" };
     let [low, high] = [low, high].map(|mn| format_digits(mn, 3));
     let caption = format!("{title}; friction on it runs from {low} to {high} mN{whose}.");
-    let measured = shown.parts.iter().find_map(|part| measure_cycle(case, part.span_s));
-    let details = measured.map_or_else(String::new, |cycle| {
-        let sd = format_digits(MILLI * cycle.sd_n, 2);
+    let details = sd_n.map_or_else(String::new, |sd_n| {
+        let sd = format_digits(MILLI * sd_n, 2);
         format!("The noise of the tip gives each measured friction a standard deviation of at most {sd} mN.")
     });
     FigureText { caption, details }
