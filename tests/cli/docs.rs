@@ -310,11 +310,13 @@ fn examples_benches_and_tests_that_a_page_names_exist() {
             if words.first() != Some(&"cargo") {
                 continue;
             }
+            let package = words.iter().position(|word| *word == "-p");
+            let home = package.map_or_else(String::new, |at| format!("crates/{}/", words[at + 1]));
             for (folder, option) in [("examples", "--example"), ("benches", "--bench"), ("tests", "--test")] {
                 let Some(at) = words.iter().position(|word| *word == option) else { continue };
                 let name = words[at + 1];
-                let found = [format!("{folder}/{name}.rs"), format!("{folder}/{name}/main.rs")];
-                assert!(found.iter().any(|file| files.contains(file)), "{page}: {code}: no {folder}/{name}");
+                let found = [format!("{home}{folder}/{name}.rs"), format!("{home}{folder}/{name}/main.rs")];
+                assert!(found.iter().any(|file| files.contains(file)), "{page}: {code}: no {}", found[0]);
                 named += 1;
                 let filter = words
                     .get(at + 2)

@@ -1,6 +1,6 @@
 //! The complete analysis against records whose components are known: its errors beside the Cramér-Rao bound
 //! and beside the deviations that it states, and its verdicts. The records are those of the study
-//! `examples/spectra`, which takes a thousand seeds.
+//! `crates/short-spectra/examples/spectra`, which takes a thousand seeds.
 
 use crate::score::{Errors, Reading, deviation, largest, mean, near, read, read_all, rms};
 use crate::signal::{AMPLITUDE_M, FLIPS, Signal, Tone};

@@ -1,5 +1,5 @@
 //! Records on which a reading of spectra fails, and the exact answers of what begins inside a record. The
-//! records are those of the study `examples/spectra`.
+//! records are those of the study `crates/short-spectra/examples/spectra`.
 
 use crate::counts::Counts;
 use crate::hard::KINDS;

@@ -5,11 +5,11 @@
 mod belt;
 #[path = "../common/blade.rs"]
 mod blade;
-#[path = "../../examples/spectra/counts.rs"]
+#[path = "../../crates/short-spectra/examples/spectra/counts.rs"]
 mod counts;
 #[path = "../../examples/cycles/count.rs"]
 mod cycle_count;
-#[path = "../../examples/spectra/hard.rs"]
+#[path = "../../crates/short-spectra/examples/spectra/hard.rs"]
 mod hard;
 #[path = "../common/lagrangian.rs"]
 mod lagrangian;
@@ -17,9 +17,9 @@ mod lagrangian;
 mod noise;
 #[path = "../common/scenes.rs"]
 mod scenes;
-#[path = "../../examples/spectra/score.rs"]
+#[path = "../../crates/short-spectra/examples/spectra/score.rs"]
 mod score;
-#[path = "../../examples/spectra/signal.rs"]
+#[path = "../../crates/short-spectra/examples/spectra/signal.rs"]
 mod signal;
 #[path = "../common/thorough.rs"]
 mod thorough;

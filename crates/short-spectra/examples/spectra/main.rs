@@ -1,9 +1,9 @@
 //! How exact the spectra are: records of known components in noise, and the errors of what is read from them.
 //!
-//! `cargo run --release --example spectra` prints the tables from 200 seeds a line, `-- 1000` from a
-//! thousand; `-- 200 hard` prints what is read from hard records, beside other methods, and `-- 200 hard
-//! noise` the lines of one group. A record is 0.15 s at 5,000 frames/s (750 frames) with 20 dB unless the
-//! line says otherwise.
+//! `cargo run --release -p short-spectra --example spectra` prints the tables from 200 seeds a line, `-- 1000`
+//! from a thousand; `-- 200 hard` prints what is read from hard records, beside other methods, and `-- 200
+//! hard noise` the lines of one group. A record is 0.15 s at 5,000 frames/s (750 frames) with 20 dB unless
+//! the line says otherwise.
 
 mod counts;
 mod hard;
