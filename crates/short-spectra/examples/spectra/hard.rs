@@ -73,22 +73,26 @@ pub struct Kind {
 pub struct Draw(Xoshiro256PlusPlus);
 
 impl Draw {
+    pub fn from_seed(seed: u64) -> Self {
+        Self(Xoshiro256PlusPlus::seed_from_u64(seed))
+    }
+
     fn phase(&mut self) -> f64 {
         self.within(0.0, TAU)
     }
 
-    fn within(&mut self, low: f64, high: f64) -> f64 {
+    pub fn within(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.0.random::<f64>()
     }
 
-    fn normal(&mut self) -> f64 {
+    pub fn normal(&mut self) -> f64 {
         self.0.sample::<f64, _>(StandardNormal)
     }
 }
 
 impl Kind {
     pub fn made(&self, seed: u64) -> Made {
-        (self.make)(&mut Draw(Xoshiro256PlusPlus::seed_from_u64(seed)))
+        (self.make)(&mut Draw::from_seed(seed))
     }
 }
 

@@ -7,6 +7,8 @@
 
 mod counts;
 mod hard;
+mod mixture_scores;
+mod mixtures;
 mod rivals;
 mod score;
 mod signal;
@@ -29,6 +31,10 @@ const HIGH_HZ: f64 = 900.0;
 const RANGE_WITHIN: f64 = 0.02;
 
 fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    if arguments.first().is_some_and(|argument| argument == "mixtures") {
+        return mixture_scores::print(&arguments[1..]);
+    }
     let seeds = std::env::args().nth(1).and_then(|n| n.parse().ok()).unwrap_or(SEEDS);
     println!("{seeds} seeds a line; 750 frames at 5,000 frames/s and 20 dB unless the line says otherwise.");
     if std::env::args().any(|argument| argument == "hard") {

@@ -340,7 +340,7 @@ fn refine(record: &[f64], mask: &[f64], tones: &mut Vec<f64>) {
 }
 
 /// Discrete Fourier transform of a real series padded with zeros to a power of two.
-fn fourier(series: &[f64], size: usize) -> Vec<Complex<f64>> {
+pub fn fourier(series: &[f64], size: usize) -> Vec<Complex<f64>> {
     let mut values = vec![Complex::new(0.0, 0.0); size];
     let shift = usize::BITS - size.trailing_zeros();
     series.iter().enumerate().for_each(|(at, &value)| values[at.reverse_bits() >> shift].re = value);

@@ -31,11 +31,16 @@ pub fn read(signal: &Signal, seed: u64) -> Reading {
         frame_rate_hz: signal.rate_hz,
         exposure_s: signal.exposure_s,
     };
+    read_record(&record, &SpectrumSettings::default())
+}
+
+/// The components that the complete analysis lists.
+pub fn read_record(record: &SampledRecord, settings: &SpectrumSettings) -> Reading {
     let reading = |a: SpectralAnalysis| Reading {
-        from_s: a.skipped_frames as f64 / signal.rate_hz,
+        from_s: a.skipped_frames as f64 / record.frame_rate_hz,
         components: a.spectrum.components,
     };
-    SpectralAnalysis::from_record(&record, &SpectrumSettings::default())
+    SpectralAnalysis::from_record(record, settings)
         .map_or_else(|_| Reading { components: Vec::new(), from_s: 0.0 }, reading)
 }
 
