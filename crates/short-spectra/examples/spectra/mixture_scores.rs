@@ -29,18 +29,16 @@ use std::time::Instant;
 type Method = (&'static str, fn(&[Option<f64>], f64) -> Reading, bool);
 
 const METHODS: [Method; 3] = [
-    (
-        "today",
-        |samples, rate_hz| {
-            // frequencies above the fold are sought where they appear
-            let settings = SpectrumSettings { fastest_hz: 0.0, ..SpectrumSettings::default() };
-            read_record(&SampledRecord { samples, frame_rate_hz: rate_hz, exposure_s: None }, &settings)
-        },
-        true,
-    ),
+    ("today", read_today, true),
     ("ESPRIT", |samples, rate_hz| unsaid(rivals::esprit(samples, rate_hz)), false),
     ("Lomb-Scargle", |samples, rate_hz| unsaid(rivals::lomb_scargle(samples, rate_hz)), false),
 ];
+
+/// The complete analysis. Frequencies above the fold are sought where they appear, so none is suspected.
+fn read_today(samples: &[Option<f64>], rate_hz: f64) -> Reading {
+    let settings = SpectrumSettings { fastest_hz: 0.0, ..SpectrumSettings::default() };
+    read_record(&SampledRecord { samples, frame_rate_hz: rate_hz, exposure_s: None }, &settings)
+}
 
 /// Frequencies without deviations and verdicts.
 fn unsaid(list: Vec<f64>) -> Reading {
@@ -52,7 +50,6 @@ fn unsaid(list: Vec<f64>) -> Reading {
 const SOUGHT_DB: f64 = 15.0;
 const STRONG_DB: f64 = 20.0;
 const FALSE_DEVIATIONS: f64 = 4.0;
-const VERDICTS: usize = ComponentVerdict::Clear as usize + 1;
 /// Records of a pair of kinds from which it has a line.
 const PAIR_RECORDS: usize = 20;
 
@@ -72,7 +69,7 @@ struct Fate {
 struct Outcome {
     fates: Vec<Fate>,
     /// False components by verdict.
-    others: [usize; VERDICTS],
+    others: BTreeMap<ComponentVerdict, usize>,
     clear: usize,
     wrong: usize,
     wrong_apart: usize,
@@ -139,9 +136,9 @@ fn judge(mixture: &Mixture, reading: &Reading, ms: f64) -> Outcome {
         }
     };
     let fates = list.iter().zip(&of).map(fate).collect();
-    let mut others = [0; VERDICTS];
+    let mut others = BTreeMap::new();
     for (c, _) in components.iter().zip(&taken).filter(|(c, taken)| !**taken && !is_part(c, &near_hz)) {
-        others[c.verdict as usize] += 1;
+        *others.entry(c.verdict).or_insert(0) += 1;
     }
     let clear = || components.iter().filter(|c| is_clear(c));
     let wrong = || clear().filter(|c| !is_part(c, &stated_hz) && !list.iter().any(|o| is_right(o, c)));
@@ -167,7 +164,7 @@ struct Tally {
     records: usize,
     sought: usize,
     missed: usize,
-    others: [usize; VERDICTS],
+    others: BTreeMap<ComponentVerdict, usize>,
     clear: usize,
     wrong: usize,
     strong: usize,
@@ -179,7 +176,7 @@ struct Tally {
     apart: [usize; 3],
     /// Records without a missed oscillation, and those of them with a false component of each verdict.
     open: usize,
-    needless: [usize; VERDICTS],
+    needless: BTreeMap<ComponentVerdict, usize>,
 }
 
 impl Tally {
@@ -205,9 +202,9 @@ impl Tally {
         self.ms.push(outcome.ms);
         let open = !outcome.fates.iter().any(|fate| !fate.listed && !fate.covered);
         self.open += usize::from(open);
-        for verdict in 0..VERDICTS {
-            self.others[verdict] += outcome.others[verdict];
-            self.needless[verdict] += usize::from(open && outcome.others[verdict] > 0);
+        for (verdict, count) in &outcome.others {
+            *self.others.entry(*verdict).or_insert(0) += count;
+            *self.needless.entry(*verdict).or_insert(0) += usize::from(open);
         }
     }
 
@@ -217,7 +214,7 @@ impl Tally {
         ms.sort_by(f64::total_cmp);
         [
             self.missed.to_string(),
-            self.others.iter().sum::<usize>().to_string(),
+            self.others.values().sum::<usize>().to_string(),
             said(self.clear.to_string()),
             said(format!("{} ({})", self.wrong, percent(self.wrong, self.clear))),
             said(percent(self.kept, self.strong)),
@@ -378,11 +375,11 @@ fn print_tables(judged: &[Judged], methods: &[Method]) {
     println!("| method | verdict | false | records without a miss that have one |\n|---|---|---:|---:|");
     for (k, (name, _, verdicts)) in methods.iter().enumerate() {
         let all = tally(k, &|_| true, None);
-        for verdict in (0..VERDICTS).filter(|verdict| all.others[*verdict] > 0) {
-            let needless = percent(all.needless[verdict], all.open);
-            let often = if all.needless[verdict] * 20 > all.open { ", more than 5 %" } else { "" };
-            let word = if *verdicts { verdict_name(verdict) } else { "-" };
-            println!("| {name} | {word} | {} | {needless}{often} |", all.others[verdict]);
+        for (verdict, count) in &all.others {
+            let needless = all.needless[verdict];
+            let often = if needless * 20 > all.open { ", more than 5 %" } else { "" };
+            let word = if *verdicts { verdict.name() } else { "-" };
+            println!("| {name} | {word} | {count} | {}{often} |", percent(needless, all.open));
         }
     }
     let names: Vec<&str> = methods.iter().map(|method| method.0).collect();
@@ -416,24 +413,4 @@ fn print_tables(judged: &[Judged], methods: &[Method]) {
             apart(2)
         );
     }
-}
-
-fn verdict_name(verdict: usize) -> &'static str {
-    use ComponentVerdict::{
-        AliasSuspected, Ambiguous, Attenuated, Clear, Harmonic, Mains, NotResolvable, Sideband, Subharmonic,
-        Weak,
-    };
-    [
-        NotResolvable,
-        AliasSuspected,
-        Ambiguous,
-        Harmonic,
-        Subharmonic,
-        Sideband,
-        Mains,
-        Attenuated,
-        Weak,
-        Clear,
-    ][verdict]
-        .name()
 }

@@ -6,6 +6,7 @@
 
 use crate::hard::Draw;
 use crate::rivals::fourier;
+use crate::score::mean;
 use nalgebra::{DMatrix, DVector};
 use short_spectra::sampling::alias_hz;
 use std::f64::consts::{PI, TAU};
@@ -123,10 +124,6 @@ impl Window {
     fn duration_s(&self) -> f64 {
         self.frames as f64 / self.rate_hz
     }
-
-    fn good_share(&self) -> f64 {
-        self.good.iter().filter(|good| **good).count() as f64 / self.frames as f64
-    }
 }
 
 impl Mixture {
@@ -162,6 +159,7 @@ impl Mixture {
             let times = draw.ratio(1.0, 30.0);
             noise.power.iter_mut().zip(&shake.power).for_each(|(power, shake)| *power += times * shake);
         }
+        let values = noise.draw_values(frames, draw);
         let step_m = if noise_name == "quantised" { NOISE_M * draw.within(0.5, 3.0) } else { 0.0 };
         noise.power.iter_mut().for_each(|power| *power += (step_m / NOISE_M).powi(2) / 12.0);
 
@@ -174,8 +172,6 @@ impl Mixture {
             Vec::new()
         };
 
-        noise.power.iter_mut().for_each(|power| *power -= (step_m / NOISE_M).powi(2) / 12.0);
-        let values = noise.draw_values(frames, draw);
         let place = |i: usize| i as f64 / frames as f64;
         let value = |(i, noise): (usize, &f64)| {
             let moves: f64 = oscillations.iter().map(|o| o.displacement_m(i, 0.0)).sum();
@@ -259,8 +255,8 @@ impl Noise {
     fn of_shape(frames: usize, shape: impl Fn(f64) -> f64) -> Self {
         let size = (4 * frames).next_power_of_two();
         let power: Vec<f64> = (0..size).map(|bin| shape(bin.min(size - bin) as f64 / size as f64)).collect();
-        let mean = power.iter().sum::<f64>() / size as f64;
-        Self { power: power.iter().map(|power| power / mean).collect() }
+        let scale = 1.0 / mean(&power);
+        Self { power: power.iter().map(|power| power * scale).collect() }
     }
 
     fn white(frames: usize) -> Self {
@@ -274,21 +270,12 @@ impl Noise {
         Self::of_shape(frames, |cycles| 1.0 / distance(TAU * cycles - angle) / distance(TAU * cycles + angle))
     }
 
-    /// One-sided density within one resolution of a frequency, m²/Hz. Frames that do not show the motion raise
-    /// it as if their values were white noise.
+    /// One-sided density within one resolution of a frequency, m²/Hz.
     fn density(&self, hz: f64, window: &Window) -> f64 {
         let bins_a_hz = self.power.len() as f64 / window.rate_hz;
         let reach = (bins_a_hz / window.duration_s()).ceil() as usize;
         let bin = ((hz * bins_a_hz) as usize).min(self.power.len() / 2);
-        let near = &self.power[bin.saturating_sub(reach)..=bin + reach];
-        2.0 * NOISE_M * NOISE_M / window.rate_hz * near.iter().sum::<f64>() / near.len() as f64
-    }
-
-    fn density_with_losses(&self, hz: f64, window: &Window) -> f64 {
-        let share = window.good_share();
-        let mean = 2.0 * NOISE_M * NOISE_M / window.rate_hz * self.power.iter().sum::<f64>()
-            / self.power.len() as f64;
-        self.density(hz, window) + (1.0 - share) / share * mean
+        2.0 * NOISE_M * NOISE_M / window.rate_hz * mean(&self.power[bin.saturating_sub(reach)..=bin + reach])
     }
 
     /// Values with this power. The Hartley transform of white noise is white noise.
@@ -410,8 +397,8 @@ fn draw_oscillations(
         list.push(oscillation);
     }
     let hz: Vec<f64> = list.iter().map(|o| o.mean_hz(0.0)).collect();
-    let sum_bounds = bound_frequencies(&list, noise, window);
-    for (k, (oscillation, bound_hz)) in list.iter_mut().zip(sum_bounds).enumerate() {
+    let bounds = bound_frequencies(&list, noise, window);
+    for (k, (oscillation, bound_hz)) in list.iter_mut().zip(bounds).enumerate() {
         let cycles = oscillation.cycles[window.frames - 1] - oscillation.cycles[oscillation.onset];
         let near = |j: usize| j != k && (hz[j] - hz[k]).abs() < 1.0 / window.duration_s();
         oscillation.apart = cycles < 3.0 || (0..hz.len()).any(near);
@@ -502,11 +489,14 @@ fn draw_oscillation(kind: &'static str, window: &Window, at: f64, draw: &mut Dra
 }
 
 impl Oscillation {
+    /// Scales the amplitude. Frames that do not show the motion raise the noise as if they were white noise.
     fn scale_to(&mut self, snr_db: f64, noise: &Noise, window: &Window) {
-        let total: f64 = (0..window.frames).map(|i| self.displacement_m(i, 0.0).powi(2)).sum();
-        let density = noise.density_with_losses(self.mean_hz(0.0), window);
+        let squares: Vec<f64> = (0..window.frames).map(|i| self.displacement_m(i, 0.0).powi(2)).collect();
+        let (all, good) = (window.frames as f64, window.good.iter().filter(|good| **good).count() as f64);
+        let lost = (all - good) / good * 2.0 * NOISE_M * NOISE_M / window.rate_hz * mean(&noise.power);
+        let density = noise.density(self.mean_hz(0.0), window) + lost;
         let wanted = 10.0_f64.powf(snr_db / 10.0) * density * 2.0 / window.duration_s();
-        let scale = (wanted / (total / window.frames as f64).max(f64::MIN_POSITIVE)).sqrt();
+        let scale = (wanted / mean(&squares).max(f64::MIN_POSITIVE)).sqrt();
         self.envelope_m.iter_mut().for_each(|envelope_m| *envelope_m *= scale);
         self.snr_db = snr_db;
     }
@@ -557,4 +547,49 @@ fn bound_frequencies(list: &[Oscillation], noise: &Noise, window: &Window) -> Ve
         (oscillation.jitter == 0.0).then_some(bound_hz)
     };
     list.iter().zip(&slopes).map(bound).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn window(frames: usize) -> Window {
+        Window { frames, rate_hz: 5000.0, top_hz: 2250.0, good: vec![true; frames] }
+    }
+
+    #[test]
+    fn the_bound_of_a_fast_steady_oscillation_has_the_closed_form() {
+        let (window, noise) = (window(1000), Noise::white(1000));
+        let mut tone = steady("steady", 987.0, &window, &mut Draw::from_seed(1));
+        tone.scale_to(30.0, &noise, &window);
+        // `A^2 / 2` is the mean square, so `A^2 / (2 sigma^2) = 4 snr / N`
+        let (count, ratio) = (1000.0_f64, 4.0 * 1000.0 / 1000.0);
+        let closed = 5000.0 / TAU * (12.0 / (ratio * count * (count * count - 1.0))).sqrt();
+        let bound_hz = bound_frequencies(&[tone], &noise, &window)[0].unwrap();
+        assert!((bound_hz / closed - 1.0).abs() < 1e-3, "{bound_hz} {closed}");
+    }
+
+    #[test]
+    fn drawn_noise_has_the_density_of_its_autoregression() {
+        const DRAWS: usize = 2000;
+        let (window, last, hz) = (window(256), 0.9_f64, 300.0);
+        let turn = |i: usize| TAU * hz * i as f64 / window.rate_hz;
+        let noise =
+            Noise::of_shape(256, |cycles| 1.0 / (1.0 + last * last - 2.0 * last * (TAU * cycles).cos()));
+        let draw = &mut Draw::from_seed(1);
+        let (mut power, mut products) = (0.0, 0.0);
+        for _ in 0..DRAWS {
+            let values = noise.draw_values(256, draw);
+            let part =
+                |shift: f64| values.iter().enumerate().map(|(i, x)| x * (turn(i) + shift).cos()).sum::<f64>();
+            power += part(0.0).powi(2) + part(PI / 2.0).powi(2);
+            products += values[100] * values[101] / (NOISE_M * NOISE_M);
+        }
+        let of_draws = 2.0 * power / (DRAWS as f64 * 256.0 * window.rate_hz);
+        let closed = 2.0 * NOISE_M.powi(2) / window.rate_hz * (1.0 - last * last)
+            / (1.0 + last * last - 2.0 * last * (TAU * hz / window.rate_hz).cos());
+        assert!((of_draws / closed - 1.0).abs() < 0.1, "{of_draws} {closed}");
+        assert!((noise.density(hz, &window) / closed - 1.0).abs() < 0.05);
+        assert!((products / DRAWS as f64 - last).abs() < 0.1, "{products}");
+    }
 }
