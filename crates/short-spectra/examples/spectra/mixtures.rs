@@ -421,7 +421,14 @@ fn steady(kind: &'static str, hz: f64, window: &Window, draw: &mut Draw) -> Osci
 
 fn draw_oscillation(kind: &'static str, window: &Window, at: f64, draw: &mut Draw) -> Oscillation {
     let (duration_s, phase) = (window.duration_s(), draw.within(0.0, 1.0));
-    let mut hz = draw.ratio(2.0 / duration_s, window.top_hz);
+    // multiples, sidebands and the second of a pair stay below the fold too
+    let room = match kind {
+        "comb" => 3.0,
+        "modulated" => 1.5,
+        "pair" => 1.2,
+        _ => 1.0,
+    };
+    let mut hz = draw.ratio(2.0 / duration_s, window.top_hz / room);
     if kind == "folded" {
         let rate_hz = window.top_hz / 0.45;
         hz = alias_hz(draw.within(0.55, 1.45) * rate_hz, rate_hz);
@@ -459,7 +466,6 @@ fn draw_oscillation(kind: &'static str, window: &Window, at: f64, draw: &mut Dra
             set(&mut made.cycles, &|i| duration_s * integral(times_s[i] / duration_s) + phase);
         }
         "comb" => {
-            hz = draw.ratio(3.0 / duration_s, window.top_hz / 3.0);
             made.jitter = if draw.chance(0.33) { 0.0 } else { draw.within(0.0, 0.05) };
             let (roundness, drops) =
                 (draw.within(0.7, 1.0), if draw.chance(0.33) { draw.within(0.02, 0.1) } else { 0.0 });
