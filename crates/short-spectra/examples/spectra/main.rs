@@ -1,9 +1,9 @@
 //! How exact the spectra are: records of known components in noise, and the errors of what is read from them.
 //!
-//! `cargo run --release -p short-spectra --example spectra` prints the tables from 200 seeds a line, `-- 1000`
-//! from a thousand; `-- 200 hard` prints what is read from hard records, beside other methods, and `-- 200
-//! hard noise` the lines of one group. A record is 0.15 s at 5,000 frames/s (750 frames) with 20 dB unless
-//! the line says otherwise.
+//! `cargo run --release -p short-spectra --example spectra` prints the tables from 200 seeds a line, `--
+//! 1000` from a thousand; `-- 200 hard` prints what is read from hard records, beside other methods, and `--
+//! 200 hard noise` the lines of one group. A record is 0.15 s at 5,000 frames/s (750 frames) with 20 dB
+//! unless the line says otherwise.
 //!
 //! `-- mixtures 2000` scores methods on 2,000 random records, `-- mixtures 2000 1 today drift` the present
 //! analysis on those from seed 1 that hold a drift. `list` at the end prints the records on which it fails,
@@ -37,7 +37,7 @@ const RANGE_WITHIN: f64 = 0.02;
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     if arguments.first().is_some_and(|argument| argument == "mixtures") {
-        return mixture_scores::print(&arguments[1..]);
+        return mixture_scores::print_scores(&arguments[1..]);
     }
     let seeds = std::env::args().nth(1).and_then(|n| n.parse().ok()).unwrap_or(SEEDS);
     println!("{seeds} seeds a line; 750 frames at 5,000 frames/s and 20 dB unless the line says otherwise.");

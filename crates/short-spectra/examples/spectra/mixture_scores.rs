@@ -2,17 +2,17 @@
 //!
 //! A component is an oscillation if its frequency is within the largest of these of the oscillation's mean
 //! frequency: one resolution (`1/T`); four stated deviations, but at most two resolutions; four Cramér-Rao
-//! bounds; for combs the width that their jitter gives the line. A range must overlap that of the oscillation,
-//! widened as much. Each oscillation takes one component, the nearest pairs first. Multiples of a comb and
-//! sidebands of a modulated cycle are not sought and not false.
+//! bounds; for combs the width that their jitter gives the line. A range must overlap that of the
+//! oscillation, widened as much. Each oscillation takes one component, the nearest pairs first. Multiples of
+//! a comb and sidebands of a modulated cycle are not sought and not false.
 //!
-//! - missed: above 15 dB, not listed and not in the interval (frequency ± deviation, at most two resolutions) of
-//!   a component with a doubt.
+//! - missed: above 15 dB, not listed and not in the interval (frequency ± deviation, at most two resolutions)
+//!   of a component with a doubt.
 //! - false: components that are no oscillation and no part of one.
 //! - wrong clear: `clear`, and no oscillation or part within four deviations (or the width from jitter).
 //! - clear kept: `clear` and within four deviations, of the oscillations above 20 dB.
-//! - scaled: error over stated deviation, and over the bound, of the clear components that are oscillations: rms,
-//!   and in brackets the median of the absolute values over 0.6745.
+//! - scaled: error over stated deviation, and over the bound, of the clear components that are oscillations:
+//!   rms, and in brackets the median of the absolute values over 0.6745.
 //! - apart: oscillations with fewer than three cycles or within one resolution of another are left out of all
 //!   that; those above 15 dB are counted with the missed ones, and the wrong clear components that lie there.
 
@@ -25,13 +25,14 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-/// A method: its name, what it lists of samples with their rate in Hz, and whether it gives deviations and verdicts.
+/// A method: its name, what it lists of samples with their rate in Hz, and whether it gives deviations and
+/// verdicts.
 type Method = (&'static str, fn(&[Option<f64>], f64) -> Reading, bool);
 
 const METHODS: [Method; 3] = [
     ("today", read_today, true),
-    ("ESPRIT", |samples, rate_hz| unsaid(rivals::esprit(samples, rate_hz)), false),
-    ("Lomb-Scargle", |samples, rate_hz| unsaid(rivals::lomb_scargle(samples, rate_hz)), false),
+    ("ESPRIT", |samples, rate_hz| list_frequencies(rivals::esprit(samples, rate_hz)), false),
+    ("Lomb-Scargle", |samples, rate_hz| list_frequencies(rivals::lomb_scargle(samples, rate_hz)), false),
 ];
 
 /// The complete analysis. Frequencies above the fold are sought where they appear, so none is suspected.
@@ -41,7 +42,7 @@ fn read_today(samples: &[Option<f64>], rate_hz: f64) -> Reading {
 }
 
 /// Frequencies without deviations and verdicts.
-fn unsaid(list: Vec<f64>) -> Reading {
+fn list_frequencies(list: Vec<f64>) -> Reading {
     let component = |frequency_hz| Component { frequency_hz, ..Component::default() };
     Reading { components: list.into_iter().map(component).collect(), from_s: 0.0 }
 }
@@ -85,7 +86,7 @@ struct Judged {
     found: Vec<String>,
 }
 
-fn judge(mixture: &Mixture, reading: &Reading, ms: f64) -> Outcome {
+fn judge_reading(mixture: &Mixture, reading: &Reading, ms: f64) -> Outcome {
     let (list, resolution_hz) = (&mixture.oscillations, mixture.resolution_hz());
     let mean_hz = |o: &Oscillation| o.mean_hz(reading.from_s);
     let stated_hz = |c: &Component| FALSE_DEVIATIONS * c.frequency_sd_hz;
@@ -216,21 +217,21 @@ impl Tally {
             self.missed.to_string(),
             self.others.values().sum::<usize>().to_string(),
             said(self.clear.to_string()),
-            said(format!("{} ({})", self.wrong, percent(self.wrong, self.clear))),
-            said(percent(self.kept, self.strong)),
-            said(spread(&self.scaled)),
-            spread(&self.over_bound),
+            said(format!("{} ({})", self.wrong, format_percent(self.wrong, self.clear))),
+            said(format_percent(self.kept, self.strong)),
+            said(format_spread(&self.scaled)),
+            format_spread(&self.over_bound),
             format!("{:.1}, {:.0}", ms[ms.len() / 2], ms[ms.len() - 1]),
         ]
     }
 }
 
-fn percent(part: usize, of: usize) -> String {
+fn format_percent(part: usize, of: usize) -> String {
     if of == 0 { "-".to_owned() } else { format!("{:.1} %", 100.0 * part as f64 / of as f64) }
 }
 
 /// Rms, and in brackets the deviation from the median of the absolute values.
-fn spread(values: &[f64]) -> String {
+fn format_spread(values: &[f64]) -> String {
     let mut sizes: Vec<f64> = values.iter().map(|value| value.abs()).collect();
     sizes.sort_by(f64::total_cmp);
     sizes
@@ -238,8 +239,8 @@ fn spread(values: &[f64]) -> String {
         .map_or_else(|| "-".to_owned(), |m| format!("{:.2} ({:.2})", rms(values), m / 0.6745))
 }
 
-/// Time that this thread has used since it started, ms, to some milliseconds; `None` where the system does not
-/// say it.
+/// Time that this thread has used since it started, ms, to some milliseconds; `None` where the system does
+/// not say it.
 fn thread_ms() -> Option<f64> {
     let said = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
     said.split(' ').next()?.parse::<f64>().ok().map(|ns| ns / 1e6)
@@ -285,7 +286,7 @@ fn judge_seed(seed: u64, filter: &[&str], methods: &[Method]) -> Option<Judged> 
     let (mut outcomes, mut found) = (Vec::new(), Vec::new());
     for (_, read, _) in methods {
         let (reading, ms) = run_timed(|| read(&mixture.samples, mixture.rate_hz));
-        outcomes.push(judge(&mixture, &reading, ms));
+        outcomes.push(judge_reading(&mixture, &reading, ms));
         found.push(reading.components.iter().map(said).collect::<Vec<_>>().join("; "));
     }
     let truth = format!("{} frames, {} Hz: {}", mixture.samples.len(), mixture.rate_hz, truth.join("; "));
@@ -312,10 +313,10 @@ fn judge_seeds(seeds: std::ops::Range<u64>, filter: &[&str], methods: &[Method])
     all.into_inner().expect("no thread fails").into_values().collect()
 }
 
-/// Prints what `mixtures COUNT [FIRST_SEED] [WORD..]` asks for: the table, with `list` the records with a miss
-/// or a wrong clear component, with `dump` the samples of the first record. The name of a method selects it; any
-/// other word selects the records of the families that contain it.
-pub fn print(arguments: &[String]) {
+/// Prints what `mixtures COUNT [FIRST_SEED] [WORD..]` asks for: the table, with `list` the records with a
+/// miss or a wrong clear component, with `dump` the samples of the first record. The name of a method selects
+/// it; any other word selects the records of the families that contain it.
+pub fn print_scores(arguments: &[String]) {
     let mut numbers = arguments.iter().filter_map(|word| word.parse::<u64>().ok());
     let (count, first) = (numbers.next().unwrap_or(2000), numbers.next().unwrap_or(1));
     let words: Vec<&str> =
@@ -379,7 +380,7 @@ fn print_tables(judged: &[Judged], methods: &[Method]) {
             let needless = all.needless[verdict];
             let often = if needless * 20 > all.open { ", more than 5 %" } else { "" };
             let word = if *verdicts { verdict.name() } else { "-" };
-            println!("| {name} | {word} | {count} | {}{often} |", percent(needless, all.open));
+            println!("| {name} | {word} | {count} | {}{often} |", format_percent(needless, all.open));
         }
     }
     let names: Vec<&str> = methods.iter().map(|method| method.0).collect();

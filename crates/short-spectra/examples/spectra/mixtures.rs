@@ -164,8 +164,8 @@ impl Mixture {
         noise.power.iter_mut().for_each(|power| *power += (step_m / NOISE_M).powi(2) / 12.0);
 
         let rings = !draw.chance(0.25);
-        let (trend_name, trend) = if bent { draw_trend(draw) } else { ("none", still()) };
-        let (flip_name, at, flip) = if flips { draw_flip(rings, draw) } else { ("none", 0.0, still()) };
+        let (trend_name, trend) = if bent { draw_trend(draw) } else { ("none", stand_still()) };
+        let (flip_name, at, flip) = if flips { draw_flip(rings, draw) } else { ("none", 0.0, stand_still()) };
         let oscillations = if rings {
             draw_oscillations(&window, &noise, (several, special), (flip_name, at), draw)
         } else {
@@ -317,7 +317,7 @@ fn draw_noise(window: &Window, draw: &mut Draw) -> (&'static str, Noise) {
 /// A slow motion over the record (0 to 1), m.
 type Motion = Box<dyn Fn(f64) -> f64>;
 
-fn still() -> Motion {
+fn stand_still() -> Motion {
     Box::new(|_| 0.0)
 }
 
@@ -390,7 +390,7 @@ fn draw_oscillations(
             let apart = draw.within(0.5, 4.0) / window.duration_s();
             let hz = oscillation.mean_hz(0.0) + apart;
             list.push(oscillation);
-            oscillation = steady(kind, hz, window, draw);
+            oscillation = make_steady(kind, hz, window, draw);
             snr_db -= draw.within(0.0, 10.0);
             oscillation.scale_to(snr_db, noise, window);
         }
@@ -407,7 +407,7 @@ fn draw_oscillations(
     list
 }
 
-fn steady(kind: &'static str, hz: f64, window: &Window, draw: &mut Draw) -> Oscillation {
+fn make_steady(kind: &'static str, hz: f64, window: &Window, draw: &mut Draw) -> Oscillation {
     let phase = draw.within(0.0, 1.0);
     Oscillation {
         kind,
@@ -433,7 +433,7 @@ fn draw_oscillation(kind: &'static str, window: &Window, at: f64, draw: &mut Dra
         let rate_hz = window.top_hz / 0.45;
         hz = alias_hz(draw.within(0.55, 1.45) * rate_hz, rate_hz);
     }
-    let mut made = steady(kind, hz, window, draw);
+    let mut made = make_steady(kind, hz, window, draw);
     let times_s: Vec<f64> = (0..window.frames).map(|i| i as f64 / window.rate_hz).collect();
     let set = |values: &mut Vec<f64>, value: &dyn Fn(usize) -> f64| {
         *values = (0..window.frames).map(value).collect()
@@ -510,9 +510,9 @@ impl Oscillation {
 
 /// Cramér-Rao bounds of the frequencies with all parameters of all oscillations and a cubic unknown, Hz.
 ///
-/// Unknown are amplitude, phase and frequency, of damped and growing ones the decay, of drifting ones the rate
-/// of the drift, of combs every multiple's amplitude and phase; onset, modulation and dropped beats are known.
-/// The noise counts as white with its density around each oscillation.
+/// Unknown are amplitude, phase and frequency, of damped and growing ones the decay, of drifting ones the
+/// rate of the drift, of combs every multiple's amplitude and phase; onset, modulation and dropped beats are
+/// known. The noise counts as white with its density around each oscillation.
 fn bound_frequencies(list: &[Oscillation], noise: &Noise, window: &Window) -> Vec<Option<f64>> {
     let rows: Vec<usize> = (0..window.frames).filter(|i| window.good[*i]).collect();
     let mut columns: Vec<Vec<f64>> = Vec::new();
@@ -566,7 +566,7 @@ mod tests {
     #[test]
     fn the_bound_of_a_fast_steady_oscillation_has_the_closed_form() {
         let (window, noise) = (window(1000), Noise::white(1000));
-        let mut tone = steady("steady", 987.0, &window, &mut Draw::from_seed(1));
+        let mut tone = make_steady("steady", 987.0, &window, &mut Draw::from_seed(1));
         tone.scale_to(30.0, &noise, &window);
         // `A^2 / 2` is the mean square, so `A^2 / (2 sigma^2) = 4 snr / N`
         let (count, ratio) = (1000.0_f64, 4.0 * 1000.0 / 1000.0);
