@@ -6,6 +6,7 @@
 pub mod alignment;
 pub mod channel;
 pub mod clock;
+pub mod cycles;
 pub mod files;
 mod frame_times;
 pub mod motion_traces;

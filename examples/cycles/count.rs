@@ -1,7 +1,10 @@
 //! What the spectrum reads of a cycle whose sticks are counted.
 
 use short_spectra::{Component, SampledRecord, SpectralAnalysis, SpectrumSettings};
+use std::ops::Range;
+use wiperlab::recording::Recording;
 use wiperlab::recording::channel::Channel;
+use wiperlab::recording::cycles::median_interval_s;
 use wiperlab::simulate::SolverOptions;
 use wiperlab::simulate::scene::Scene;
 use wiperlab::simulate::twin::{Camera, TrackingModel, add_tracking_noise, film_scene};
@@ -31,6 +34,10 @@ pub struct Count {
     /// The same of both ends of the range of those that drift, and the errors, Hz.
     pub ends: Vec<f64>,
     pub ends_hz: Vec<f64>,
+    /// Windows whose slips are counted in the recording, and those of them in which a stick between the first
+    /// and the last slip is missed or too much.
+    pub counted: usize,
+    pub miscounted: usize,
 }
 
 /// Ends of sticks that follow one another regularly.
@@ -42,11 +49,9 @@ impl Cycles {
         let first = ends_s.partition_point(|t| *t < from_s).checked_sub(2)?;
         let last = ends_s.partition_point(|t| *t < to_s) + 1;
         let inside = ends_s.get(first..=last).filter(|inside| inside.len() > FEWEST)?;
-        let mut periods: Vec<f64> = inside.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        periods.sort_by(f64::total_cmp);
-        let median = periods[periods.len() / 2];
-        (periods[0] > median / REGULAR && periods[periods.len() - 1] < REGULAR * median)
-            .then(|| Self(inside.to_vec()))
+        let median = median_interval_s(inside.iter().copied())?;
+        let is_regular = |pair: &[f64]| (median / REGULAR..REGULAR * median).contains(&(pair[1] - pair[0]));
+        inside.windows(2).all(is_regular).then(|| Self(inside.to_vec()))
     }
 
     /// Cycles since the first stick, by a straight line between two.
@@ -96,6 +101,7 @@ impl Count {
                         exposure_s: None,
                     };
                     count.read(&record, from_s, &cycles)?;
+                    count.count_slips(&recording, first..first + frames, &cycles);
                 }
             }
         }
@@ -109,6 +115,19 @@ impl Count {
         self.means.extend(other.means);
         self.ends.extend(other.ends);
         self.ends_hz.extend(other.ends_hz);
+        self.counted += other.counted;
+        self.miscounted += other.miscounted;
+    }
+
+    /// Compares the slips that are counted in a range of frames with the ends of the sticks: each stick ends
+    /// less than half a period before the middle of its slip.
+    fn count_slips(&mut self, recording: &Recording, frames: Range<usize>, cycles: &Cycles) {
+        let Ok(found) = recording.count_cycles(frames) else { return };
+        let [Some(first), Some(last)] = [found.slips.first(), found.slips.last()] else { return };
+        let between = first.time_s - 0.5 * found.period_s..last.time_s;
+        let sticks = cycles.0.iter().filter(|end_s| between.contains(*end_s)).count();
+        self.counted += 1;
+        self.miscounted += usize::from(sticks != found.count);
     }
 
     fn read(

@@ -192,7 +192,7 @@ pub(super) fn median_of_three(points: &[(usize, f64)], index: usize) -> f64 {
 }
 
 /// Smallest and largest value; infinity and minus infinity without values.
-pub(super) fn value_range(values: &[f64]) -> (f64, f64) {
+pub(crate) fn value_range(values: &[f64]) -> (f64, f64) {
     values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)))
 }
 
