@@ -3,9 +3,8 @@
 use super::condition::{ConditionComparison, TimedRecording, spectral_band};
 use crate::feature::{FeatureBand, Reading};
 use crate::model::modes::body_frequencies;
-use crate::recording::channel::{
-    Channel, InstantKind, Window, WindowEnd, mean_speed_m_per_s, median_in_place,
-};
+use crate::recording::channel::{Channel, InstantKind, Window, WindowEnd, mean_speed_m_per_s};
+use crate::recording::cycles::median_interval_s;
 use short_spectra::time_frequency::{
     Ridge, RidgePoint, Spectrogram, SpectrogramSettings, SpeedPoint, course, default_band_hz,
 };
@@ -152,11 +151,17 @@ fn track_ridge(
     }
     let start_s = side.recording.grid().time_s(frames.start);
     let shift_s = if is_measured { case.alignment.shift_s } else { 0.0 };
-    // a measured component needs no stick of the model: a wrong model may slide where the recorded tip sticks
+    // a measured component needs no stick of the model, which may slide where the recorded tip sticks
+    let counted = if is_measured { side.recording.count_cycles(frames.clone()).ok() } else { None };
+    let slips_s: Vec<f64> = match &counted {
+        Some(cycle) => cycle.slips.iter().map(|slip| slip.time_s).collect(),
+        None => case.states.stick_s.iter().map(|[start_s, _]| start_s + shift_s).collect(),
+    };
     let is_cycle = |p: &&RidgePoint| {
-        let sticks = count_sticks(case, start_s + p.time_s - shift_s, ridge.segment_s);
-        let least_hz = (LEAST_OF_STICK_RATE * sticks as f64 / ridge.segment_s).max(least_cycle_hz(case));
-        (is_measured || sticks > 0) && p.frequency_hz >= least_hz
+        let within = |time_s: &&f64| (**time_s - start_s - p.time_s).abs() <= 0.5 * ridge.segment_s;
+        let slips = slips_s.iter().filter(within).count();
+        let least_hz = (LEAST_OF_STICK_RATE * slips as f64 / ridge.segment_s).max(least_cycle_hz(case));
+        (is_measured || slips > 0) && p.frequency_hz >= least_hz
     };
     let cycle: Vec<RidgePoint> = courses.iter().flatten().filter(is_cycle).copied().collect();
     let over_speed = ridge_over_speed(side, frames.start, &cycle, ridge.segment_s);
@@ -217,11 +222,8 @@ const LEAST_OF_STICK_RATE: f64 = 0.6;
 /// of the next; 0 for fewer than [`MIN_STICKS`] sticks.
 fn usual_stick_rate_hz(case: &ConditionComparison) -> f64 {
     let sticks = &case.states.stick_s;
-    let mut periods_s: Vec<f64> = sticks.windows(2).map(|pair| pair[1][0] - pair[0][0]).collect();
-    if sticks.len() < MIN_STICKS {
-        return 0.0;
-    }
-    median_in_place(&mut periods_s).map_or(0.0, f64::recip)
+    let period_s = median_interval_s(sticks.iter().map(|[start_s, _]| *start_s));
+    period_s.filter(|_| sticks.len() >= MIN_STICKS).map_or(0.0, f64::recip)
 }
 
 /// Minimum number of sticks for a median rate.
@@ -234,12 +236,6 @@ const LEAST_OF_NECK: f64 = 0.5;
 /// Frequency, Hz, below which a component is the swing of the head, however often the model sticks.
 fn least_cycle_hz(case: &ConditionComparison) -> f64 {
     LEAST_OF_NECK * body_frequencies(&case.model.scene.linkage).neck_hz
-}
-
-/// Number of sticks of the model in a segment around an instant on its clock, s.
-fn count_sticks(case: &ConditionComparison, time_s: f64, segment_s: f64) -> usize {
-    let within = |start_s: f64| (start_s - time_s).abs() <= 0.5 * segment_s;
-    case.states.stick_s.iter().filter(|[start_s, _]| within(*start_s)).count()
 }
 
 /// Points of the stick-slip cycle, each with the mean speed of the tip in its segment.
