@@ -1,6 +1,7 @@
 //! Reasons why a recording or a run does not give a value.
 
 use crate::recording::channel::{InstantNotFound, WindowError};
+use crate::recording::cycles::NoCycle;
 use crate::simulate::RunStatus;
 use serde::{Deserialize, Serialize};
 use short_spectra::SpectrumError;
@@ -90,6 +91,9 @@ pub enum MissingValue {
         /// Number of frames in the window.
         window: usize,
     },
+    /// The tip has no stick-slip cycle in the window.
+    #[error("no stick-slip cycle: {0}")]
+    NoCycle(#[from] NoCycle),
     /// The channel was not tracked in the window.
     #[error("no frame of the window has both points tracked")]
     NoFrames,
@@ -151,6 +155,7 @@ impl MissingValue {
             Self::Faded { .. } => MissingReason::Faded,
             Self::FewCycles { .. } => MissingReason::FewCycles,
             Self::Segment { .. } => MissingReason::SegmentLength,
+            Self::NoCycle(_) => MissingReason::NoCycle,
             Self::NoFrames => MissingReason::NoFrames,
             Self::Speed { .. } | Self::NoSpeed => MissingReason::NoSpeed,
             Self::NoRecording { .. } => MissingReason::NoRecording,
@@ -191,6 +196,7 @@ reasons! {
     Faded "faded" "decayed into the noise";
     FewCycles "few-cycles" "too few cycles in the window";
     SegmentLength "segment-length" "the segment does not fit the window";
+    NoCycle "no-cycle" "no stick-slip cycle";
     NoWindow "no-window" "no such window in the run";
     NoFrames "no-frames" "not tracked in the window";
     NoSpeed "no-speed" "the head does not have the speed";

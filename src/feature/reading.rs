@@ -52,6 +52,8 @@ pub enum Reading {
         /// Whether the lowest or the highest frequency is evaluated.
         end: CycleRangeEnd,
     },
+    /// Slips per second of the stick-slip cycle that is counted in the path of the tip over a window, Hz.
+    SlipRate(Window),
     /// Mean of the deflection `tip_x - head_x` over a window, m.
     MeanDeflection(Window),
     /// Mean of the deflection over the frames of a window in which the head has a given speed, m.
@@ -124,6 +126,7 @@ kinds! {
     "damping-ratio" DIMENSIONLESS BAND One |e| Ok(Reading::DampingRatio(e.parse_band()?));
     "cycle-frequency-low" HERTZ CYCLE One |e| cycle_frequency_reading(e, CycleRangeEnd::Low);
     "cycle-frequency-high" HERTZ CYCLE One |e| cycle_frequency_reading(e, CycleRangeEnd::High);
+    "slip-rate" HERTZ WINDOW One |e| Ok(Reading::SlipRate(e.parse_window()?));
     "mean-deflection" MILLIMETRES WINDOW One |e| Ok(Reading::MeanDeflection(e.parse_window()?));
     "deflection-at-speed" MILLIMETRES STROKE One deflection_reading;
     "release-after-reversal" MILLISECONDS REVERSAL Interval ReversalInterval::ReleaseAfterReversal;
@@ -260,6 +263,7 @@ impl Reading {
             Self::DampingRatio(_) => "damping-ratio",
             Self::CycleFrequency { end: CycleRangeEnd::Low, .. } => "cycle-frequency-low",
             Self::CycleFrequency { end: CycleRangeEnd::High, .. } => "cycle-frequency-high",
+            Self::SlipRate(_) => "slip-rate",
             Self::MeanDeflection(_) => "mean-deflection",
             Self::DeflectionAtSpeed { .. } => "deflection-at-speed",
             Self::Interval { interval, .. } => interval.kind(),
@@ -292,7 +296,8 @@ impl Reading {
             | Self::BandLevel { band, .. }
             | Self::DampingRatio(band)
             | Self::CycleFrequency { band, .. } => Some(band),
-            Self::MeanDeflection(_)
+            Self::SlipRate(_)
+            | Self::MeanDeflection(_)
             | Self::DeflectionAtSpeed { .. }
             | Self::Interval { .. }
             | Self::Contact(_) => None,
@@ -302,7 +307,9 @@ impl Reading {
     /// The window of the reading, if it has one.
     pub(crate) fn window(&self) -> Option<&Window> {
         match self {
-            Self::MeanDeflection(window) | Self::DeflectionAtSpeed { window, .. } => Some(window),
+            Self::SlipRate(window)
+            | Self::MeanDeflection(window)
+            | Self::DeflectionAtSpeed { window, .. } => Some(window),
             Self::Contact(contact) => contact.window(),
             Self::Frequency(_)
             | Self::Amplitude(_)
@@ -323,6 +330,7 @@ impl Reading {
             Self::Frequency(_)
             | Self::DampingRatio(_)
             | Self::CycleFrequency { .. }
+            | Self::SlipRate(_)
             | Self::Interval { .. }
             | Self::Contact(_) => None,
         }
@@ -348,6 +356,10 @@ impl Reading {
             Self::DampingRatio(band) => spectral::read_damping_ratio(band, reader),
             Self::CycleFrequency { band, segment_s, end } => {
                 spectral::read_cycle_frequency(band, *segment_s, *end, reader)
+            }
+            Self::SlipRate(window) => {
+                let cycle = reader.recording.count_cycles(reader.window_frames(window)?)?;
+                Ok(FeatureValue::new(cycle.rate_hz, Some(cycle.rate_sd_hz)))
             }
             Self::MeanDeflection(window) => deflection::read_mean_deflection(window, reader),
             Self::DeflectionAtSpeed { window, speed_m_per_s, width_relative } => {

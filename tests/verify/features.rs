@@ -425,13 +425,25 @@ fn features_read_together_are_those_read_alone_and_those_of_a_spectrum_of_their_
         Reading::CycleFrequency { band: high.clone(), segment_s: 0.02, end: CycleRangeEnd::Low },
         Reading::CycleFrequency { band: high, segment_s: 0.02, end: CycleRangeEnd::High },
         Reading::MeanDeflection(Window::WHOLE),
+        Reading::SlipRate(Window::WHOLE),
     ];
     let features: Vec<Feature> = readings.into_iter().map(feature).collect();
     let instants = ReversalInstants::find_instants(&seen);
     let alone: Vec<_> = features.iter().map(|feature| feature.read(&seen, &instants)).collect();
     assert_eq!(read_features(&features, std::slice::from_ref(&seen)), alone);
-    assert!(alone.iter().all(Result::is_ok), "{alone:?}");
+    assert!(alone[..8].iter().all(Result::is_ok), "{alone:?}");
+    assert!(matches!(alone[8], Err(MissingValue::NoCycle(_))), "{alone:?}");
     let settings = SpectrumSettings { band_hz: Some((40.0, 140.0)), ..SpectrumSettings::default() };
     let own = analyse_spectrum(&Channel::Deflection.samples(&seen)[250..1750], RATE_HZ, &settings).unwrap();
     assert_eq!(alone[0].as_ref().unwrap().value, own.component_in_band(40.0, 140.0).unwrap().frequency_hz);
+}
+
+#[test]
+fn the_rate_of_slips_is_that_of_a_saw_tooth() {
+    let head = |t: f64| 0.1 * t;
+    // the tip rests for 8 ms and slips in 2 ms
+    let tip = |t: f64| 1e-3 * ((100.0 * t).floor() + ((100.0 * t).fract() * 5.0 - 4.0).max(0.0));
+    let seen = recording(0.4, NOISE_M, head, |t| tip(t) - head(t));
+    let found = read(Reading::SlipRate(Window::WHOLE), &seen).unwrap();
+    assert!((found.value - 100.0).abs() < 3.0 * found.sd.unwrap() && found.sd.unwrap() < 0.1, "{found:?}");
 }

@@ -351,6 +351,7 @@ fn a_study_maps_what_a_fit_reads() {
         ("damping-ratio", ring),
         ("cycle-frequency-low", format!("{cycle}segment_s = 0.02\n")),
         ("cycle-frequency-high", format!("{cycle}segment_s = 0.02\n")),
+        ("slip-rate", "window = \"after\"\n".to_owned()),
         ("mean-deflection", "window = \"after\"\n".to_owned()),
         ("deflection-at-speed", "part = \"after\"\nspeed_m_per_s = 0.1\n".to_owned()),
         ("friction-curve", "part = \"after\"\nspeeds_m_per_s = [0.05, 0.15]\n".to_owned()),
@@ -364,7 +365,7 @@ fn a_study_maps_what_a_fit_reads() {
         |(kind, keys): (&str, String)| format!("[[map]]\nname = \"{kind}\"\nkind = \"{kind}\"\n{keys}");
     let (scene, study, outcomes) = of_the_actual_blade(&kinds.map(entry).concat());
     let columns: Vec<String> = study.maps.iter().map(SweepMap::column).collect();
-    assert_eq!(columns.len(), 17, "{columns:?}");
+    assert_eq!(columns.len(), 18, "{columns:?}");
     assert!(columns.contains(&"friction_curve_at_0_05_m_s_m".to_owned()), "{columns:?}");
     for (index, outcome) in outcomes.iter().enumerate() {
         let at = study.scene_of_point(&scene, index).unwrap();
