@@ -10,6 +10,7 @@ use crate::figures::analysis::{AnalysedWindow, compare_spectra};
 use crate::figures::spectrum::{self, SpectraPlot};
 use crate::recording::Recording;
 use crate::recording::channel::{Channel, ReversalInstants, Window};
+use crate::recording::cycles::{CountedCycle, NoCycle};
 use crate::simulate::twin::film::{DropoutPattern, film_like_recording};
 use plain_charts::Figure;
 use short_spectra::{Detrend, FASTEST_HZ, MAX_COMPONENTS, SpectralAnalysis, SpectrumSettings};
@@ -75,6 +76,7 @@ struct StudiedWindow {
     exposure_s: Option<f64>,
     frames: Range<usize>,
     analysis: SpectralAnalysis,
+    cycle: Result<CountedCycle, NoCycle>,
     /// The analysed frames and what was removed from them, as text.
     note: String,
     /// Advice on a better window, if the analysed window contains a whole flip of the blade.
@@ -219,7 +221,8 @@ impl SpectrumRequest {
         let uneven = recording.describe_resampling().map_or_else(String::new, |said| format!("; {said}"));
         let note =
             format!("{from_s:.4} s to {to_s:.4} s{cut}, {count} frames{kept}, {removed} removed{uneven}");
-        Ok(StudiedWindow { recording, exposure_s, frames, analysis, note, hint })
+        let cycle = recording.count_cycles(frames.clone());
+        Ok(StudiedWindow { recording, exposure_s, frames, analysis, cycle, note, hint })
     }
 
     fn output_files(&self, studied: &StudiedWindow) -> Outcome<Vec<(String, Vec<u8>)>> {

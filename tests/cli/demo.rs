@@ -51,8 +51,12 @@ fn the_demo_goes_from_an_export_to_a_page_and_tells_the_truth() {
     {
         let list = json(&at("spectra").join(name).join("components.json"));
         let frequency_hz = |c: &serde_json::Value| c["frequency_hz"].as_f64().unwrap();
-        let found =
-            list.as_array().unwrap().iter().find(|c| (least_hz..most_hz).contains(&frequency_hz(c))).unwrap();
+        let found = list["components"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .find(|c| (least_hz..most_hz).contains(&frequency_hz(c)))
+            .unwrap();
         // the stick-slip cycle drifts: what the fit reads at the top of a periodogram lies in its range
         let range_hz = |end: &str| found["range_hz"][end].as_f64().unwrap_or(frequency_hz(found));
         let (low_hz, high_hz) = (range_hz("low_hz"), range_hz("high_hz"));

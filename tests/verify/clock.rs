@@ -66,10 +66,11 @@ fn spectrum(recording: Recording, window: &str) -> [Value; 2] {
         exposure_s: None,
     };
     let files = spectrum_files(recording, &options).unwrap();
-    ["components.json", "spectrum.json"].map(|name| {
+    let [mut components, description] = ["components.json", "spectrum.json"].map(|name| {
         let (_, bytes) = files.iter().find(|(found, _)| found == name).unwrap();
-        serde_json::from_slice(bytes).unwrap()
-    })
+        serde_json::from_slice::<Value>(bytes).unwrap()
+    });
+    [components["components"].take(), description]
 }
 
 fn number(of: &Value, key: &str) -> f64 {

@@ -180,7 +180,10 @@ class Spectrum:
         self._files = dict(files)
         #: What components.json holds: ``frequency_hz``, ``frequency_sd_hz``, ``amplitude_m``, ``damping_ratio``,
         #: ``verdict``, ... of each component, the largest first.
-        self.components: list[dict[str, Any]] = json.loads(files["components.json"])
+        self.components: list[dict[str, Any]] = json.loads(files["components.json"])["components"]
+        #: The stick-slip cycle that is counted in the path of the tip: ``count``, ``rate_hz``, ``period_s``,
+        #: ``period_scatter``, ``size_m``, ``slips``, ...; without a cycle ``count`` is 0 and ``reason`` says why.
+        self.cycles: dict[str, Any] = json.loads(files["components.json"])["cycles"]
         #: What spectrum.json holds: what was analysed, and how.
         self.description: dict[str, Any] = json.loads(files["spectrum.json"])
 

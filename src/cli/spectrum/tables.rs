@@ -4,11 +4,12 @@ use super::{SpectrumRequest, StudiedWindow};
 use crate::cli::failure::{Failure, Outcome};
 use crate::figures::analysis::CoursePoint;
 use crate::recording::channel::{Channel, ReversalInstants, phase_windows};
-use crate::text::{format_with_sd, to_ascii};
+use crate::recording::cycles::{CountedCycle, NoCycle};
+use crate::text::{format_digits, format_milliseconds, format_percent, format_with_sd, pluralise, to_ascii};
 use rayon::prelude::*;
 use serde::Serialize;
 use short_spectra::time_frequency::FrequencyRange;
-use short_spectra::{Component, ComponentVerdict, SpectralAnalysis};
+use short_spectra::{Component, ComponentVerdict, SpectralAnalysis, Spectrum};
 use std::fmt::Write;
 
 /// Number of rows in a block of text; the blocks of a long record are made in parallel.
@@ -18,7 +19,12 @@ const BLOCK_ROWS: usize = 4096;
 pub(crate) fn components_json(studied: &StudiedWindow) -> Outcome<Vec<u8>> {
     let from_s = studied.recording.grid().time_s(studied.frames.start);
     let timed = |c: &Component| Component { begins_s: c.begins_s.map(|s| from_s + s), ..c.clone() };
-    to_json(&studied.analysis.spectrum.components.iter().map(timed).collect::<Vec<_>>())
+    let components: Vec<Component> = studied.analysis.spectrum.components.iter().map(timed).collect();
+    let cycles = match &studied.cycle {
+        Ok(cycle) => serde_json::to_value(cycle).map_err(Failure::internal)?,
+        Err(reason) => serde_json::json!({ "count": 0, "reason": reason.to_string() }),
+    };
+    to_json(&serde_json::json!({ "components": components, "cycles": cycles }))
 }
 
 fn to_json(value: &impl Serialize) -> Outcome<Vec<u8>> {
@@ -153,6 +159,33 @@ pub(crate) fn print_summary(channel: Channel, studied: &StudiedWindow) {
         "resolution {resolution_hz:.2} Hz, noise floor {floor_um:.4} um, {missing:.1} % of the frames missing"
     );
     studied.hint.iter().for_each(|hint| print_line!("{hint}"));
+    print_components(from_s, spectrum);
+    print_cycle(&studied.cycle);
+}
+
+/// Prints the cycle that is counted in the path of the tip.
+fn print_cycle(cycle: &Result<CountedCycle, NoCycle>) {
+    let cycle = match cycle {
+        Ok(cycle) => cycle,
+        Err(reason) => return print_line!("no stick-slip cycle is counted: {reason}"),
+    };
+    let rate = ascii_with_sd(cycle.rate_hz, cycle.rate_sd_hz);
+    let period = ascii_with_sd(cycle.period_s * 1e3, cycle.period_sd_s * 1e3);
+    let [scatter, sizes] = [cycle.period_scatter, cycle.size_scatter].map(format_percent);
+    print_line!("stick-slip cycle, counted: {} slips of the tip, {rate} 1/s", cycle.count);
+    print_line!("{:>18} period {period} ms, scatter of a period {scatter}", "");
+    print_line!("{:>18} slips of {} um, scatter {sizes}", "", format_digits(cycle.size_m * 1e6, 3));
+    if cycle.dropped_beats > 0 {
+        print_line!("{:>18} {} dropped {}", "", cycle.dropped_beats, pluralise("beat", cycle.dropped_beats));
+    }
+    if let Some(times) = &cycle.times {
+        let [stick, slip] = [times.stick_s, times.slip_s].map(format_milliseconds);
+        print_line!("{:>18} a stick takes {stick}, a slip {slip} (medians)", "");
+    }
+    cycle.remarks.iter().for_each(|remark| print_line!("{:>18} {remark}", ""));
+}
+
+fn print_components(from_s: f64, spectrum: &Spectrum) {
     if spectrum.components.is_empty() {
         print_line!("no component stands out of the noise");
         return;
