@@ -8,14 +8,13 @@
 //! that changes from one frame to the next. The checks of single columns, frames and twins use it, because
 //! they compare neighbouring frames, and so do fits and comparisons of recordings that are too short.
 
-mod autoregressive;
 mod blocks;
 mod common_noise;
 pub(crate) mod differences;
 mod likelihood;
 
 use super::Recording;
-pub(crate) use autoregressive::{AutoregressiveNoise, Whitener};
+pub(crate) use short_spectra::noise::{AutoregressiveNoise, Whitener};
 use blocks::{BlockCut, NoiseBlock, cut_blocks, keep_quiet_blocks};
 use common_noise::{CommonNoise, SharedNoise, measure_common_noise};
 pub use differences::{noise_floor, quantisation_step};

@@ -47,8 +47,10 @@ impl RecordContext {
 }
 
 /// Evidence for and against one component.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Evidence {
+    /// Further reasons for which the frequency is ambiguous.
+    pub doubts: Vec<String>,
     /// Whether the trend could not grow further and the component is slow enough to be a part of a step.
     pub trend_exhausted: bool,
     /// Shift of the frequency with a richer trend, in standard deviations of the frequency.
@@ -105,6 +107,7 @@ fn collect_reasons(c: &Component, evidence: &Evidence, at: &RecordContext) -> Ve
     let few = || format!("{cycles:.1} cycles in the window, of {MIN_CYCLES} at least");
     add(ComponentVerdict::NotResolvable, (cycles < MIN_CYCLES).then(few));
     add(ComponentVerdict::AliasSuspected, (!c.folded_from.is_empty()).then(|| describe_aliases(c, at)));
+    evidence.doubts.iter().for_each(|words| add(ComponentVerdict::Ambiguous, Some(words.clone())));
     describe_ambiguities(c, evidence).into_iter().for_each(|words| add(ComponentVerdict::Ambiguous, words));
     describe_relations(c).into_iter().for_each(|(verdict, words)| add(verdict, words));
     let attenuated = c.exposure_passes.filter(|passes| *passes < ATTENUATED_BELOW);

@@ -43,6 +43,7 @@ mod chirp_alternatives;
 mod classification;
 mod component;
 mod decimation;
+mod decomposition;
 mod error;
 mod frequency_drift;
 mod gap_filling;
@@ -51,6 +52,7 @@ mod least_squares;
 mod matrix_pencil;
 mod model_selection;
 mod multitaper;
+pub mod noise;
 mod peak_zoom;
 mod peaks;
 mod periodogram;
@@ -73,6 +75,7 @@ pub use component::{
     AliasSource, Component, ComponentReason, ComponentVerdict, Estimator, Harmonic, MainsMultiple, Sideband,
     Subharmonic,
 };
+pub use decomposition::decompose_record;
 pub use error::SpectrumError;
 pub use record::SampledRecord;
 

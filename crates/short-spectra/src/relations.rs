@@ -60,7 +60,9 @@ pub(super) fn find_relations(components: &mut [Component], at: &RecordContext) {
                 && base.frequency_hz >= MIN_CYCLES * at.resolution_hz
         };
         let bases = || larger.iter().filter(own);
-        c.harmonic_of = bases().find_map(|base| find_harmonic(base, c, at));
+        if c.harmonic_of.is_none() {
+            c.harmonic_of = bases().find_map(|base| find_harmonic(base, c, at));
+        }
         if c.harmonic_of.is_none() {
             c.subharmonic_of = bases().find_map(|base| find_subharmonic(base, c, at));
         }

@@ -119,7 +119,7 @@ pub(super) enum Trend {
 
 /// Factors of the recurrence `P_k = ((2k - 1) s P_(k-1) - (k - 1) P_(k-2)) / k`: precomputed, because
 /// divisions for each of a million frames take time.
-const LEGENDRE: [[f64; 2]; HIGHEST_DEGREE + 1] = {
+pub(super) const LEGENDRE: [[f64; 2]; HIGHEST_DEGREE + 1] = {
     let mut factors = [[0.0; 2]; HIGHEST_DEGREE + 1];
     let mut k = 1;
     while k <= HIGHEST_DEGREE {

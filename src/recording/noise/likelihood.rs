@@ -3,11 +3,11 @@
 //! selects the order.
 
 use super::ChannelNoise;
-use super::autoregressive::{AutoregressiveNoise, Whitener, raise_order};
 use super::blocks::{NoiseBlock, dot_product, project_out};
 use crate::recording::channel::median_in_place;
 use nalgebra::{DMatrix, DVector};
 use portable_math as math;
+use short_spectra::noise::{AutoregressiveNoise, Whitener, raise_order};
 use std::f64::consts::PI;
 
 /// Highest order of the autoregressive process: the noise of trackers consists of vibration and sub-pixel

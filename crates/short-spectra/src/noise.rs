@@ -4,7 +4,7 @@ use portable_math as math;
 use std::array::from_fn;
 
 /// Maximum number of coefficients of a process.
-pub(crate) const MOST_COEFFICIENTS: usize = 8;
+pub const MOST_COEFFICIENTS: usize = 8;
 
 /// Stationary autoregressive noise of a channel.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,8 +18,10 @@ pub struct AutoregressiveNoise {
 #[error(
     "found a standard deviation of {sd} and the coefficients {coefficients:?} of noise, expected a positive number and at most {MOST_COEFFICIENTS} coefficients of a stationary process"
 )]
-pub(crate) struct NotStationary {
+pub struct NotStationary {
+    /// The standard deviation.
     pub sd: f64,
+    /// The coefficients.
     pub coefficients: Vec<f64>,
 }
 
@@ -29,7 +31,7 @@ impl AutoregressiveNoise {
     ///
     /// # Errors
     /// [`NotStationary`] unless the standard deviation is positive and the process is stationary.
-    pub(crate) fn new(sd: f64, coefficients: Vec<f64>) -> Result<Self, NotStationary> {
+    pub fn new(sd: f64, coefficients: Vec<f64>) -> Result<Self, NotStationary> {
         let usable = sd > 0.0 && sd.is_finite() && coefficients.len() <= MOST_COEFFICIENTS;
         if usable && reflection_coefficients(&coefficients).iter().all(|kappa| kappa.abs() < 1.0) {
             Ok(Self { sd, coefficients })
@@ -42,30 +44,30 @@ impl AutoregressiveNoise {
     ///
     /// # Errors
     /// [`NotStationary`] unless the standard deviation is positive.
-    pub(crate) fn white(sd: f64) -> Result<Self, NotStationary> {
+    pub fn white(sd: f64) -> Result<Self, NotStationary> {
         Self::new(sd, Vec::new())
     }
 
     /// Standard deviation of the noise itself, in the unit of its channel.
-    pub(crate) fn sd(&self) -> f64 {
+    pub fn sd(&self) -> f64 {
         self.sd
     }
 
     /// Coefficients, beginning with that of the previous frame; none for white noise.
-    pub(crate) fn coefficients(&self) -> &[f64] {
+    pub fn coefficients(&self) -> &[f64] {
         &self.coefficients
     }
 
     /// Standard deviation of the innovation, the part of a frame's noise that the previous frames do not
     /// predict.
-    pub(crate) fn innovation_sd(&self) -> f64 {
+    pub fn innovation_sd(&self) -> f64 {
         let unexplained: f64 =
             reflection_coefficients(&self.coefficients).iter().map(|kappa| 1.0 - kappa * kappa).product();
         self.sd * unexplained.sqrt()
     }
 
     /// Correlations of the noise in two frames that are 0, 1, ... `count - 1` frames apart.
-    pub(crate) fn correlations(&self, count: usize) -> Vec<f64> {
+    pub fn correlations(&self, count: usize) -> Vec<f64> {
         let mut correlations = vec![1.0];
         let (mut known, mut unexplained) = (Vec::new(), 1.0);
         for kappa in reflection_coefficients(&self.coefficients) {
@@ -89,7 +91,7 @@ fn predict_value(coefficients: &[f64], values: &[f64]) -> f64 {
 
 /// Coefficients of the process of the next higher order, from those of the present order and the reflection
 /// coefficient `kappa` of the next order (Levinson's recursion; Percival and Walden 1993, section 9.4).
-pub(super) fn raise_order(coefficients: &[f64], kappa: f64) -> Vec<f64> {
+pub fn raise_order(coefficients: &[f64], kappa: f64) -> Vec<f64> {
     let turned = coefficients.iter().rev();
     let mut longer: Vec<f64> = coefficients.iter().zip(turned).map(|(a, b)| a - kappa * b).collect();
     longer.push(kappa);
@@ -119,7 +121,7 @@ type NoiseMemory = [f64; MOST_COEFFICIENTS];
 
 /// Linear map that makes the noise white for a given pattern of present frames.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Whitener {
+pub struct Whitener {
     coefficients: NoiseMemory,
     /// Order of the process, at least 1.
     order: usize,
@@ -141,14 +143,14 @@ struct WhiteningStep {
 
 impl Whitener {
     /// The map for `frames`, the indices of the present frames in rising order.
-    pub(crate) fn new(noise: &AutoregressiveNoise, frames: &[usize]) -> Self {
+    pub fn new(noise: &AutoregressiveNoise, frames: &[usize]) -> Self {
         Self::at_places(noise, &frames.iter().map(|frame| *frame as f64).collect::<Vec<_>>())
     }
 
     /// The map for frames at their true times `places`, in units of the mean frame interval and in rising
     /// order. If times are not whole numbers, the noise must be white or of first order: over a time `t`, its
     /// correlation is `r^t`, where `r` is its coefficient.
-    pub(crate) fn at_places(noise: &AutoregressiveNoise, places: &[f64]) -> Self {
+    pub fn at_places(noise: &AutoregressiveNoise, places: &[f64]) -> Self {
         let mut coefficients = [0.0; MOST_COEFFICIENTS];
         coefficients[..noise.coefficients().len()].copy_from_slice(noise.coefficients());
         let order = noise.coefficients().len().max(1);
@@ -170,7 +172,7 @@ impl Whitener {
 
     /// Whitens a column in place; the column has one value per present frame, in the unit of the noise.
     /// Whitened noise is independent from frame to frame and has unit variance.
-    pub(crate) fn whiten_column(&self, column: &mut [f64]) {
+    pub fn whiten_column(&self, column: &mut [f64]) {
         let mut memory = [0.0; MOST_COEFFICIENTS];
         for (value, step) in column.iter_mut().zip(&self.steps) {
             (0..step.ahead).for_each(|_| self.predict_next(&mut memory));
@@ -182,7 +184,7 @@ impl Whitener {
     }
 
     /// Logarithm of the determinant of the covariance of the frames.
-    pub(crate) fn log_determinant(&self) -> f64 {
+    pub fn log_determinant(&self) -> f64 {
         self.steps.iter().map(|step| 2.0 * math::ln(step.sd)).sum()
     }
 

@@ -1,0 +1,414 @@
+//! The parts of which a record may consist beside its trend and noise, each a few columns that are linear in
+//! their amplitudes and depend on a few shape parameters.
+
+use crate::trend::LEGENDRE;
+use portable_math as math;
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+/// Positions of the frames in a record, from 0 to 1: frame `i` of `n` lies at `(i + 1/2) / n`.
+#[derive(Debug, Clone)]
+pub(crate) struct FramePlaces {
+    /// Positions of the frames used.
+    pub places: Vec<f64>,
+    /// Number of frames of the record, used or not.
+    pub frames: usize,
+}
+
+/// Highest degree of the phase of an oscillation.
+pub(crate) const MOST_PHASE_DEGREE: usize = 9;
+/// Highest degree of the amplitude of an oscillation.
+pub(crate) const MOST_ENVELOPE_DEGREE: usize = 6;
+/// Fastest decay, nepers per record, that is fitted.
+pub(crate) const MOST_NEPERS: f64 = 400.0;
+/// Largest growth, nepers per record.
+const MOST_GROWTH: f64 = 6.0;
+/// Distance from the record, in units of its length, at which a step whose tail it shows may have its centre.
+pub(crate) const OUTSIDE: f64 = 0.25;
+/// Fewest cycles in a record of an oscillation; the trend takes what is slower.
+pub(crate) const FEWEST_CYCLES: f64 = 1.5;
+/// Largest damping, nepers per radian: beyond it an oscillation is over within half a cycle and cannot be
+/// told from a relaxation.
+const MOST_DAMPING: f64 = 0.6;
+
+/// An oscillation `exp(-d (s - s0)) (a cos 2 pi p(s) + b sin 2 pi p(s))` for `s >= s0`, with harmonics that
+/// share its phase `p(s) = n u/2 + sum q_k P_k(u)`, `u = 2 s - 1`, with Legendre polynomials `P_k`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OscillationAtom {
+    /// Cycles in the record without the phase of higher degree.
+    pub cycles: f64,
+    /// Decay over the record, nepers; `None` for a constant amplitude.
+    pub nepers: Option<f64>,
+    /// Position at which it begins; 0 if it is present from the first frame on.
+    pub onset: f64,
+    /// Coefficients, cycles, of the Legendre polynomials of degree 2, 3, ... of its phase.
+    pub phase: Vec<f64>,
+    /// Coefficients of the Legendre polynomials of degree 1, 2, ... of its amplitude, in units of its mean.
+    pub envelope: Vec<f64>,
+    /// Multiples of its frequency that are present beside it.
+    pub multiples: Vec<usize>,
+}
+
+/// Shape of a smooth step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum StepShape {
+    /// `tanh x`.
+    Tanh,
+    /// `sin (pi x / 2)`, constant beyond -1 and 1.
+    HalfCosine,
+    /// `(15 x - 10 x^3 + 3 x^5) / 8`, the path of least jerk (Flash and Hogan 1985), constant beyond -1 and
+    /// 1.
+    MinimumJerk,
+    /// `x`, constant beyond -1 and 1.
+    Straight,
+}
+
+impl StepShape {
+    pub(crate) const ALL: [Self; 4] = [Self::Tanh, Self::HalfCosine, Self::MinimumJerk, Self::Straight];
+
+    /// Value and derivative at `x`.
+    fn value_and_slope(self, x: f64) -> (f64, f64) {
+        if self == Self::Tanh {
+            let value = math::tanh(x);
+            return (value, 1.0 - value * value);
+        }
+        if x.abs() >= 1.0 {
+            return (x.signum(), 0.0);
+        }
+        match self {
+            Self::HalfCosine => {
+                let (sine, cosine) = math::sin_cos(FRAC_PI_2 * x);
+                (sine, FRAC_PI_2 * cosine)
+            }
+            Self::MinimumJerk => {
+                let (square, left) = (x * x, 1.0 - x * x);
+                (x * (15.0 - 10.0 * square + 3.0 * square * square) / 8.0, 15.0 / 8.0 * left * left)
+            }
+            Self::Tanh | Self::Straight => (x, 1.0),
+        }
+    }
+
+    /// Width of this step with the steepness of a hyperbolic tangent of unit width.
+    pub(crate) fn steepness(self) -> f64 {
+        self.value_and_slope(0.0).1
+    }
+}
+
+/// A part of a record.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Atom {
+    Oscillation(OscillationAtom),
+    /// A smooth step from -1 to 1, with its shape at `(s - centre) / width`.
+    Step {
+        shape: StepShape,
+        centre: f64,
+        width: f64,
+    },
+    /// A step at `onset` that relaxes exponentially to its end value; without the step if `onset` is 0.
+    Relaxation {
+        onset: f64,
+        nepers: f64,
+    },
+    /// From this position on, the trend is a cubic of its own.
+    Break {
+        at: f64,
+    },
+}
+
+impl OscillationAtom {
+    pub(crate) fn steady(cycles: f64) -> Self {
+        Self {
+            cycles,
+            nepers: None,
+            onset: 0.0,
+            phase: Vec::new(),
+            envelope: Vec::new(),
+            multiples: Vec::new(),
+        }
+    }
+
+    /// Phase, cycles, at position `s`.
+    pub(crate) fn phase_at(&self, s: f64) -> f64 {
+        let u = 2.0 * s - 1.0;
+        let (mut before, mut last, mut sum) = (1.0, u, self.cycles * u / 2.0);
+        for (q, [a, b]) in self.phase.iter().zip(&LEGENDRE[2..]) {
+            (before, last) = (last, a * u * last - b * before);
+            sum += q * last;
+        }
+        sum
+    }
+
+    /// Frequency, cycles per record, at position `s`.
+    pub(crate) fn cycles_at(&self, s: f64) -> f64 {
+        const STEP: f64 = 1e-4;
+        (self.phase_at(s + STEP) - self.phase_at(s - STEP)) / (2.0 * STEP)
+    }
+
+    /// Position at which it is over: a twentieth of its amplitude is left, or the record ends.
+    fn end_place(&self) -> f64 {
+        const OVER_NEPERS: f64 = 3.0;
+        let over = |nepers: &f64| *nepers > 0.0;
+        self.nepers.filter(over).map_or(1.0, |nepers| (self.onset + OVER_NEPERS / nepers).min(1.0))
+    }
+
+    /// Mean frequency from its onset until it is over, cycles per record.
+    pub(crate) fn mean_cycles(&self) -> f64 {
+        if self.phase.is_empty() {
+            return self.cycles;
+        }
+        (self.phase_at(self.end_place()) - self.phase_at(self.onset)) / (self.end_place() - self.onset)
+    }
+
+    /// Lowest and highest frequency, cycles per record.
+    pub fn cycles_range(&self) -> (f64, f64) {
+        const POINTS: usize = 33;
+        let at = |k: usize| {
+            self.cycles_at(self.onset + (self.end_place() - self.onset) * k as f64 / (POINTS - 1) as f64)
+        };
+        (0..POINTS).map(at).fold((f64::INFINITY, 0.0), |(low, high), c| (low.min(c), high.max(c)))
+    }
+
+    /// Amplitude at position `s`, in units of its amplitude.
+    pub(crate) fn envelope_at(&self, s: f64) -> f64 {
+        let decay = self.decay_at(s);
+        if self.envelope.is_empty() || decay == 0.0 { decay } else { decay * self.modulation_at(s) }
+    }
+
+    /// Decay at position `s` since the onset.
+    fn decay_at(&self, s: f64) -> f64 {
+        if s < self.onset - 1e-12 {
+            return 0.0;
+        }
+        self.nepers.map_or(1.0, |nepers| math::exp((-nepers * (s - self.onset)).min(MOST_GROWTH)))
+    }
+
+    /// Factor of the amplitude at position `s` beside the decay.
+    fn modulation_at(&self, s: f64) -> f64 {
+        let u = 2.0 * s - 1.0;
+        let (mut before, mut last, mut sum) = (0.0, 1.0, 1.0);
+        for (e, [a, b]) in self.envelope.iter().zip(&LEGENDRE[1..]) {
+            (before, last) = (last, a * u * last - b * before);
+            sum += e * last;
+        }
+        sum
+    }
+
+    /// Cosine and sine columns of the oscillation and of each multiple.
+    fn columns(&self, at: &FramePlaces) -> Vec<Vec<f64>> {
+        let mut columns = vec![Vec::with_capacity(at.places.len()); 2 * (1 + self.multiples.len())];
+        for s in &at.places {
+            let envelope = self.envelope_at(*s);
+            if envelope == 0.0 {
+                columns.iter_mut().for_each(|column| column.push(0.0));
+                continue;
+            }
+            let turn = self.phase_at(*s);
+            let (sine, cosine) = math::sin_cos(TAU * (turn - turn.floor()));
+            columns[0].push(envelope * cosine);
+            columns[1].push(envelope * sine);
+            for (k, multiple) in self.multiples.iter().enumerate() {
+                let turn = *multiple as f64 * turn;
+                let (sine, cosine) = math::sin_cos(TAU * (turn - turn.floor()));
+                columns[2 * k + 2].push(envelope * cosine);
+                columns[2 * k + 3].push(envelope * sine);
+            }
+        }
+        columns
+    }
+
+    /// Derivatives of the oscillation with these columns and coefficients by each of its parameters: cycles,
+    /// decay if there is one, coefficients of phase and amplitude.
+    fn derivatives(&self, at: &FramePlaces, columns: &[Vec<f64>], coefficients: &[f64]) -> Vec<Vec<f64>> {
+        let count = 1 + usize::from(self.nepers.is_some()) + self.phase.len() + self.envelope.len();
+        let mut derivatives = vec![Vec::with_capacity(at.places.len()); count];
+        for (i, s) in at.places.iter().enumerate() {
+            let (mut by_phase, mut value) = (0.0, 0.0);
+            for (k, multiple) in std::iter::once(&1).chain(&self.multiples).enumerate() {
+                let (cosine, sine) = (columns[2 * k][i], columns[2 * k + 1][i]);
+                let (a, b) = (coefficients[2 * k], coefficients[2 * k + 1]);
+                by_phase += TAU * *multiple as f64 * (b * cosine - a * sine);
+                value += a * cosine + b * sine;
+            }
+            let u = 2.0 * s - 1.0;
+            let mut parameters = derivatives.iter_mut();
+            let mut push = |x: f64| parameters.next().into_iter().for_each(|column| column.push(x));
+            push(by_phase * u / 2.0);
+            if self.nepers.is_some() {
+                push(-(s - self.onset) * value);
+            }
+            let (mut before, mut last) = (1.0, u);
+            for [a, b] in &LEGENDRE[2..2 + self.phase.len()] {
+                (before, last) = (last, a * u * last - b * before);
+                push(by_phase * last);
+            }
+            if !self.envelope.is_empty() {
+                let modulation = self.modulation_at(*s);
+                let plain = if modulation.abs() > 1e-9 { value / modulation } else { 0.0 };
+                let (mut before, mut last) = (0.0, 1.0);
+                for [a, b] in &LEGENDRE[1..1 + self.envelope.len()] {
+                    (before, last) = (last, a * u * last - b * before);
+                    push(plain * last);
+                }
+            }
+        }
+        derivatives
+    }
+}
+
+impl Atom {
+    pub(crate) fn oscillation(&self) -> Option<&OscillationAtom> {
+        match self {
+            Self::Oscillation(oscillation) => Some(oscillation),
+            _ => None,
+        }
+    }
+
+    pub(crate) fn column_count(&self) -> usize {
+        match self {
+            Self::Oscillation(o) => 2 * (1 + o.multiples.len()),
+            Self::Step { .. } => 1,
+            Self::Relaxation { onset, .. } => 1 + usize::from(*onset > 0.0),
+            Self::Break { .. } => 4,
+        }
+    }
+
+    /// The columns of the part in the frames used.
+    pub(crate) fn columns(&self, at: &FramePlaces) -> Vec<Vec<f64>> {
+        let each = |value: &dyn Fn(f64) -> f64| at.places.iter().map(|s| value(*s)).collect();
+        match self {
+            Self::Oscillation(oscillation) => oscillation.columns(at),
+            Self::Step { shape, centre, width } => {
+                vec![each(&|s| shape.value_and_slope((s - centre) / width).0)]
+            }
+            Self::Relaxation { onset, nepers } => {
+                let after = |s: f64| f64::from(u8::from(s >= *onset));
+                let decay = |s: f64| if s >= *onset { math::exp(-nepers * (s - onset)) } else { 0.0 };
+                if *onset > 0.0 { vec![each(&after), each(&decay)] } else { vec![each(&decay)] }
+            }
+            Self::Break { at } => {
+                let power = |k: i32| move |s: f64| if s > *at { math::powi(s - at, k) } else { 0.0 };
+                (0..4).map(|k| each(&power(k))).collect()
+            }
+        }
+    }
+
+    /// Derivatives by each parameter of the part with these columns and coefficients.
+    pub(crate) fn derivatives(
+        &self,
+        at: &FramePlaces,
+        columns: &[Vec<f64>],
+        coefficients: &[f64],
+    ) -> Vec<Vec<f64>> {
+        let each = |value: &dyn Fn(usize, f64) -> f64| {
+            at.places.iter().enumerate().map(|(i, s)| value(i, *s)).collect()
+        };
+        match self {
+            Self::Oscillation(oscillation) => oscillation.derivatives(at, columns, coefficients),
+            Self::Step { shape, centre, width } => {
+                let slope = |s: f64| coefficients[0] * shape.value_and_slope((s - centre) / width).1 / width;
+                vec![each(&|_, s| -slope(s)), each(&|_, s| -slope(s) * (s - centre) / width)]
+            }
+            Self::Relaxation { onset, .. } => {
+                let k = columns.len() - 1;
+                vec![each(&|i, s| -(s - onset) * coefficients[k] * columns[k][i])]
+            }
+            Self::Break { .. } => Vec::new(),
+        }
+    }
+
+    /// The parameters, in the order of the derivatives.
+    pub(crate) fn parameters(&self) -> Vec<f64> {
+        match self {
+            Self::Oscillation(o) => std::iter::once(o.cycles)
+                .chain(o.nepers)
+                .chain(o.phase.iter().copied())
+                .chain(o.envelope.iter().copied())
+                .collect(),
+            Self::Step { centre, width, .. } => vec![*centre, *width],
+            Self::Relaxation { nepers, .. } => vec![*nepers],
+            Self::Break { .. } => Vec::new(),
+        }
+    }
+
+    /// The part with other parameters.
+    pub(crate) fn with_parameters(&self, values: &[f64]) -> Self {
+        let mut atom = self.clone();
+        match &mut atom {
+            Self::Oscillation(o) => {
+                let mut values = values.iter().copied();
+                o.cycles = values.next().unwrap_or(o.cycles);
+                o.nepers = o.nepers.map(|nepers| values.next().unwrap_or(nepers));
+                o.phase.iter_mut().chain(&mut o.envelope).zip(values).for_each(|(q, value)| *q = value);
+            }
+            Self::Step { centre, width, .. } => {
+                values.first().into_iter().for_each(|value| *centre = *value);
+                values.get(1).into_iter().for_each(|value| *width = *value);
+            }
+            Self::Relaxation { nepers, .. } => values.first().into_iter().for_each(|value| *nepers = *value),
+            Self::Break { .. } => {}
+        }
+        atom
+    }
+
+    /// Longest step of each parameter in one iteration: about the range over which the part is linear in it.
+    pub(crate) fn step_limits(&self) -> Vec<f64> {
+        match self {
+            Self::Oscillation(o) => {
+                let nepers = o.nepers.map_or(0.0, f64::abs);
+                std::iter::once(0.8 + 0.25 * nepers)
+                    .chain(o.nepers.map(|_| (0.9 * nepers).max(1.5)))
+                    .chain(o.phase.iter().map(|_| 0.8))
+                    .chain(o.envelope.iter().map(|_| 0.7))
+                    .collect()
+            }
+            Self::Step { width, .. } => vec![*width, 0.9 * width],
+            Self::Relaxation { nepers, .. } => vec![0.9 * nepers],
+            Self::Break { .. } => Vec::new(),
+        }
+    }
+
+    /// Whether the parameters lie where the part can be told from the others.
+    pub(crate) fn is_usable(&self, frames: usize) -> bool {
+        match self {
+            Self::Oscillation(o) => {
+                let most = frames as f64 / 2.0 - 1.0;
+                (FEWEST_CYCLES..most).contains(&o.cycles)
+                    && o.nepers.is_none_or(|d| {
+                        d > -MOST_GROWTH && d < MOST_NEPERS.min(TAU * o.cycles * MOST_DAMPING)
+                    })
+                    && o.phase.iter().all(|q| q.abs() < frames as f64 / 8.0)
+                    && o.envelope.iter().all(|e| e.abs() < 3.0)
+                    && (o.phase.is_empty() || o.cycles_range().0 > 0.0)
+            }
+            Self::Step { centre, width, .. } => {
+                *width > 1.0 / frames as f64 && *width < 0.3 && (-OUTSIDE..1.0 + OUTSIDE).contains(centre)
+            }
+            Self::Relaxation { nepers, .. } => (0.5..2.0 * MOST_NEPERS).contains(nepers),
+            Self::Break { .. } => true,
+        }
+    }
+
+    /// Price of the part in units of the logarithm of the number of frames. Djurić (1996) derives 1/2 for an
+    /// amplitude and 3/2 for a frequency; a place in the record costs 1, a shape parameter 1 to 3/2.
+    pub(crate) fn price(&self) -> f64 {
+        match self {
+            Self::Oscillation(o) => {
+                let onset = if o.onset > 0.0 { 1.0 } else { 0.0 };
+                let decay = if o.nepers.is_some() { 1.5 } else { 0.0 };
+                2.5 + decay
+                    + onset
+                    + 1.5 * o.phase.len() as f64
+                    + 1.2 * o.envelope.len() as f64
+                    + 1.5 * o.multiples.len() as f64
+            }
+            Self::Step { .. } => 2.5,
+            Self::Relaxation { onset, .. } => {
+                if *onset > 0.0 {
+                    3.0
+                } else {
+                    1.5
+                }
+            }
+            Self::Break { .. } => 2.0,
+        }
+    }
+}

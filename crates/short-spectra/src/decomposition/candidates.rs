@@ -1,0 +1,291 @@
+//! Parts that a residual may contain, from matched filters: steady, decaying, late and drifting oscillations
+//! from transforms, steps and relaxations from averages of neighbouring frames.
+
+use super::atom::{Atom, FEWEST_CYCLES, OUTSIDE, OscillationAtom, StepShape};
+use super::problem::{Basis, Fixed, NoisyRecord, dot};
+use crate::transform::RealTransform;
+use portable_math as math;
+use std::f64::consts::{PI, TAU};
+
+/// Decays, nepers per record, of the filters for oscillations that are present from the first frame on.
+const DECAYS: [f64; 4] = [0.0, 3.0, 7.0, 20.0];
+/// Decays of the filters for oscillations that begin inside the record: neighbours differ by a factor of two,
+/// at which a filter keeps 94 % of the energy.
+const LATE_DECAYS: [f64; 6] = [6.0, 12.0, 24.0, 48.0, 96.0, 192.0];
+/// Drifts of the filters: half the change of frequency over the record, cycles per record.
+const DRIFTS: [f64; 16] =
+    [1.0, 2.0, 3.5, 5.5, 8.5, 12.5, 17.5, 24.0, 32.5, 45.0, 60.0, 80.0, 110.0, 150.0, 200.0, 270.0];
+/// Nepers over which a filter for a late oscillation extends.
+const FILTER_NEPERS: f64 = 3.0;
+/// Number of onsets tried in the time in which an oscillation decays by a neper.
+const ONSETS_PER_DECAY: f64 = 2.0;
+const STEP_WIDTHS: [f64; 6] = [0.004, 0.01, 0.022, 0.045, 0.09, 0.16];
+const RELAXATIONS: [f64; 6] = [3.0, 8.0, 20.0, 50.0, 120.0, 300.0];
+/// Number of averages of neighbouring frames for steps and relaxations.
+const BLOCKS: usize = 128;
+
+/// A part that may be added, with the estimated fall of the criterion, nats.
+#[derive(Debug, Clone)]
+pub(crate) struct Candidate {
+    pub atom: Atom,
+    pub gain: f64,
+}
+
+struct Search<'a> {
+    problem: &'a NoisyRecord,
+    /// Residual in every frame of the record, zero where none is used.
+    residual: Vec<f64>,
+    /// One where a frame is used.
+    present: Vec<f64>,
+    squares: f64,
+    band: (f64, f64),
+    best: Vec<Candidate>,
+}
+
+/// The best candidate of each kind for what fixed parts leave, the most promising first. Oscillations lie in
+/// the band, cycles per record.
+pub(crate) fn find_candidates(
+    problem: &NoisyRecord,
+    fixed: &Fixed,
+    band: (f64, f64),
+    steps: bool,
+) -> Vec<Candidate> {
+    let frames = problem.at.frames;
+    let (mut residual, mut present) = (vec![0.0; frames], vec![0.0; frames]);
+    for (i, r) in problem.used.iter().zip(problem.residual_of(fixed)) {
+        residual[*i] = *r;
+        present[*i] = 1.0;
+    }
+    let squares = dot(&residual, &residual);
+    let band = (band.0.max(FEWEST_CYCLES + 0.2), band.1.min(frames as f64 / 2.0 - 2.0));
+    let mut search = Search { problem, residual, present, squares, band, best: Vec::new() };
+    search.add_from_start();
+    search.add_drifting();
+    search.add_late();
+    if steps {
+        search.add_steps(fixed);
+    }
+    search.best.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    search.best
+}
+
+impl Search<'_> {
+    /// Fall of the criterion when a part of a certain price explains some of the sum of squares.
+    fn net_gain(&self, explained: f64, atom: &Atom) -> f64 {
+        let share = (explained / self.squares.max(1e-300)).clamp(0.0, 1.0 - 1e-9);
+        -0.5 * self.problem.len() as f64 * math::ln_1p(-share) - atom.price() * self.problem.log_frames()
+    }
+
+    /// Keeps the best candidate of those offered.
+    fn keep_best(&mut self, offered: impl Iterator<Item = (f64, Atom)>) {
+        let rated =
+            offered.map(|(explained, atom)| Candidate { gain: self.net_gain(explained, &atom), atom });
+        let best = rated.max_by(|a, b| a.gain.total_cmp(&b.gain));
+        self.best.extend(best);
+    }
+
+    /// Cycles and energy at the highest peak of a spectrum inside the band.
+    fn highest_peak(
+        &self,
+        spectrum: impl Iterator<Item = f64>,
+        padded: usize,
+        least: f64,
+    ) -> Option<(f64, f64)> {
+        let cycles = |k: usize| k as f64 * self.residual.len() as f64 / padded as f64;
+        let inside = |k: usize| cycles(k) >= self.band.0.max(least) && cycles(k) <= self.band.1;
+        let peak = spectrum.enumerate().filter(|(k, _)| inside(*k)).max_by(|a, b| a.1.total_cmp(&b.1));
+        peak.map(|(k, square)| (cycles(k), square))
+    }
+
+    fn padded_length(length: usize) -> usize {
+        (2 * length).next_power_of_two()
+    }
+
+    fn add_from_start(&mut self) {
+        let frames = self.residual.len();
+        let padded = Self::padded_length(frames);
+        let transform = RealTransform::new(padded);
+        let mut offered = Vec::new();
+        for nepers in DECAYS {
+            let shrink = math::exp(-nepers / frames as f64);
+            let mut envelope = Vec::with_capacity(frames);
+            let mut level = shrink.sqrt();
+            for present in &self.present {
+                envelope.push(level * present);
+                level *= shrink;
+            }
+            let energy = dot(&envelope, &envelope) / 2.0;
+            let values = self.residual.iter().zip(&envelope).map(|(r, e)| r * e);
+            let squares = transform.squared_magnitudes(values);
+            let least = nepers / TAU * 2.0;
+            if let Some((cycles, square)) = self.highest_peak(squares.into_iter(), padded, least) {
+                let nepers = (nepers > 0.0).then_some(nepers);
+                let atom = OscillationAtom { nepers, ..OscillationAtom::steady(cycles) };
+                offered.push((square / energy, Atom::Oscillation(atom)));
+            }
+        }
+        let decaying = offered.split_off(1.min(offered.len()));
+        self.keep_best(offered.into_iter());
+        self.keep_best(decaying.into_iter());
+    }
+
+    fn add_drifting(&mut self) {
+        let frames = self.residual.len();
+        let padded = Self::padded_length(frames);
+        let transform = RealTransform::new(padded);
+        let energy = self.present.iter().sum::<f64>() / 2.0;
+        let mut offered = Vec::new();
+        for drift in DRIFTS.into_iter().filter(|drift| *drift < frames as f64 / 8.0) {
+            // phase `drift u^2`, u from -1/2 to 1/2
+            let (mut cosines, mut sines) = (Vec::with_capacity(frames), Vec::with_capacity(frames));
+            for (i, r) in self.residual.iter().enumerate() {
+                let u = (i as f64 + 0.5) / frames as f64 - 0.5;
+                let turn = drift * u * u;
+                let (sine, cosine) = math::sin_cos(TAU * (turn - turn.floor()));
+                cosines.push(r * cosine);
+                sines.push(r * sine);
+            }
+            let a = transform.spectrum_values(cosines.into_iter());
+            let b = transform.spectrum_values(sines.into_iter());
+            // sum r exp(-i (w t + phase)) = A - i B, and A + i B for the opposite drift
+            for sign in [1.0, -1.0] {
+                let squares = a.iter().zip(&b).map(|(a, b)| {
+                    let (re, im) = (a.re + sign * b.im, a.im - sign * b.re);
+                    re * re + im * im
+                });
+                if let Some((cycles, square)) = self.highest_peak(squares, padded, drift) {
+                    // u^2 = (P2(2 u) + 1/2) / 6
+                    let phase = vec![sign * drift / 6.0];
+                    let atom = OscillationAtom { phase, ..OscillationAtom::steady(cycles) };
+                    offered.push((square / energy, Atom::Oscillation(atom)));
+                }
+            }
+        }
+        self.keep_best(offered.into_iter());
+    }
+
+    fn add_late(&mut self) {
+        let frames = self.residual.len();
+        let mut offered = Vec::new();
+        for nepers in LATE_DECAYS {
+            let length = ((FILTER_NEPERS * frames as f64 / nepers).ceil() as usize).min(frames);
+            if length < 10 {
+                continue;
+            }
+            let padded = Self::padded_length(length);
+            let transform = RealTransform::new(padded);
+            let envelope: Vec<f64> =
+                (0..length).map(|i| math::exp(-nepers * (i as f64 + 0.5) / frames as f64)).collect();
+            let step = ((frames as f64 / nepers / ONSETS_PER_DECAY) as usize).max(1);
+            let full = dot(&envelope, &envelope);
+            let mut best: Option<(f64, Atom)> = None;
+            for first in (step..frames.saturating_sub(length / 3)).step_by(step) {
+                let part = first..(first + length).min(frames);
+                let weights = self.present[part.clone()].iter().zip(&envelope);
+                let energy: f64 = weights.map(|(p, e)| p * e * e).sum();
+                if energy < 0.3 * full {
+                    continue;
+                }
+                let values = self.residual[part].iter().zip(&envelope).map(|(r, e)| r * e);
+                let squares = transform.squared_magnitudes(values);
+                // cycles per record of the transform of a part
+                let cycles = |k: usize| k as f64 * frames as f64 / padded as f64;
+                let least = self.band.0.max(nepers / PI);
+                let inside = |k: usize| cycles(k) >= least && cycles(k) <= self.band.1;
+                let peak =
+                    squares.iter().enumerate().filter(|(k, _)| inside(*k)).max_by(|a, b| a.1.total_cmp(b.1));
+                let Some((k, square)) = peak else { continue };
+                let explained = 2.0 * square / energy;
+                if best.as_ref().is_none_or(|(most, _)| explained > *most) {
+                    let onset = first as f64 / frames as f64;
+                    let atom =
+                        OscillationAtom { nepers: Some(nepers), onset, ..OscillationAtom::steady(cycles(k)) };
+                    best = Some((explained, Atom::Oscillation(atom)));
+                }
+            }
+            offered.extend(best);
+        }
+        self.keep_best(offered.into_iter());
+    }
+
+    /// Steps and relaxations, from averages over blocks of frames.
+    fn add_steps(&mut self, fixed: &Fixed) {
+        let frames = self.residual.len();
+        let length = frames.div_ceil(BLOCKS);
+        let count = frames.div_ceil(length);
+        let pool = |values: &[f64]| {
+            let mut sums = vec![0.0; count];
+            for (i, x) in self.problem.used.iter().zip(values) {
+                sums[i / length] += x;
+            }
+            sums
+        };
+        let used = pool(&vec![1.0; self.problem.len()]);
+        // sums over a block have the variance of the number of its frames
+        let scale = |sums: Vec<f64>| -> Vec<f64> {
+            sums.iter().zip(&used).map(|(sum, n)| if *n > 0.0 { sum / n.sqrt() } else { 0.0 }).collect()
+        };
+        let mut basis = Basis::default();
+        for column in fixed.basis_columns() {
+            basis.push_column(scale(pool(column)));
+        }
+        let residual = scale(pool(self.problem.residual_of(fixed)));
+        let root: Vec<f64> = used.iter().map(|n| n.sqrt()).collect();
+        // a template over twice the record and what lies outside, cut where a part begins or has its centre
+        let outside = (OUTSIDE * count as f64) as usize;
+        let template = |value: &dyn Fn(f64) -> f64| -> Vec<f64> {
+            (0..2 * (count + outside))
+                .map(|j| value((j as f64 - (count + outside) as f64 + 0.5) / count as f64))
+                .collect()
+        };
+        let place = |block: usize| (block as f64 - outside as f64) * length as f64 / frames as f64;
+        let cut = |template: &[f64], block: usize| -> Vec<f64> {
+            template[count + 2 * outside - block..].iter().zip(&root).map(|(x, n)| x * n).collect()
+        };
+        let explained = |columns: Vec<Vec<f64>>| {
+            let mut extended = Basis::default();
+            let mut sum = 0.0;
+            for mut column in columns {
+                let before = dot(&column, &column);
+                basis.project_out(&mut column);
+                extended.project_out(&mut column);
+                let left = dot(&column, &column);
+                if left > 1e-6 * before {
+                    let along = dot(&column, &residual);
+                    sum += along * along / left;
+                    extended.push_column(column);
+                }
+            }
+            sum
+        };
+        let mut steps = Vec::new();
+        for width in STEP_WIDTHS.into_iter().filter(|width| *width > 2.0 / frames as f64) {
+            let step = template(&|s| math::tanh(s / width));
+            let spacing = ((0.5 * width * count as f64) as usize).max(1);
+            for block in (1..count + 2 * outside).step_by(spacing) {
+                // a narrow step outside the record is flat inside
+                if !(-width..1.0 + width).contains(&place(block)) {
+                    continue;
+                }
+                let atom = Atom::Step { shape: StepShape::Tanh, centre: place(block), width };
+                steps.push((explained(vec![cut(&step, block)]), atom));
+            }
+        }
+        let mut relaxations = Vec::new();
+        let after = template(&|s| f64::from(u8::from(s >= 0.0)));
+        for nepers in RELAXATIONS {
+            let decay = template(&|s| if s >= 0.0 { math::exp(-nepers * s) } else { 0.0 });
+            let spacing = ((0.5 / nepers * count as f64) as usize).max(1);
+            let last = if nepers < 8.0 { 1 } else { count - count / 16 };
+            for block in (outside..outside + last).step_by(spacing) {
+                let mut columns = vec![cut(&decay, block)];
+                if block > outside {
+                    columns.insert(0, cut(&after, block));
+                }
+                relaxations.push((explained(columns), Atom::Relaxation { onset: place(block), nepers }));
+            }
+        }
+        self.keep_best(steps.into_iter());
+        self.keep_best(relaxations.into_iter());
+    }
+}

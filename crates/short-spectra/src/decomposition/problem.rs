@@ -1,0 +1,463 @@
+//! The frames of a record with their noise, and the least squares of its parts: amplitudes are eliminated
+//! (variable projection, Golub and Pereyra 1973), shape parameters follow by Levenberg-Marquardt.
+
+use super::atom::{Atom, FramePlaces};
+use crate::noise::{AutoregressiveNoise, Whitener};
+use crate::trend::Trend;
+use nalgebra::{DMatrix, DVector};
+use portable_math as math;
+
+/// A trend and the parts beside it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Parts {
+    pub trend: Trend,
+    pub atoms: Vec<Atom>,
+}
+
+/// Fitted parts of a record.
+#[derive(Debug, Clone)]
+pub(crate) struct Explanation {
+    pub parts: Parts,
+    /// Negative logarithm of the posterior probability, up to a constant, nats.
+    pub criterion: f64,
+    /// Sum of the squares of the whitened residuals.
+    pub squares: f64,
+    /// Whitened residual of each frame used.
+    pub residual: Vec<f64>,
+    /// Amplitudes of the columns of the atoms, in order.
+    pub amplitudes: Vec<f64>,
+}
+
+/// The frames used of a record, scaled to unit size, and their noise.
+#[derive(Debug, Clone)]
+pub(crate) struct NoisyRecord {
+    pub at: FramePlaces,
+    /// Indices of the frames used.
+    pub used: Vec<usize>,
+    /// Their values.
+    pub values: Vec<f64>,
+    whitener: Option<Whitener>,
+    /// Coefficients of the noise.
+    pub order: usize,
+    /// Whitened values.
+    target: Vec<f64>,
+    /// Variance of rounding errors: what is left below it counts as nothing.
+    pub(crate) least_variance: f64,
+    /// Price of the frames that are left out, nats.
+    pub price_left_out: f64,
+}
+
+/// Squared sine of the angle between a column and the columns before it, below which it adds nothing.
+const LEAST_INDEPENDENT: f64 = 1e-18;
+
+/// `sum a b`, in an order that the processor can compute four at a time.
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (left, right) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest: f64 = left.remainder().iter().zip(right.remainder()).map(|(a, b)| a * b).sum();
+    for (a, b) in left.zip(right) {
+        for k in 0..8 {
+            sums[k] += a[k] * b[k];
+        }
+    }
+    sums.iter().sum::<f64>() + rest
+}
+
+fn subtract(column: &mut [f64], factor: f64, other: &[f64]) {
+    column.iter_mut().zip(other).for_each(|(x, q)| *x -= factor * q);
+}
+
+/// Orthonormal columns.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Basis {
+    pub columns: Vec<Vec<f64>>,
+}
+
+impl Basis {
+    pub(crate) fn project_out(&self, column: &mut [f64]) {
+        for q in &self.columns {
+            subtract(column, dot(q, column), q);
+        }
+    }
+
+    /// Adds a column; a column that depends on the others is left out.
+    pub(crate) fn push_column(&mut self, mut column: Vec<f64>) {
+        let before = dot(&column, &column);
+        self.project_out(&mut column);
+        self.project_out(&mut column);
+        let left = dot(&column, &column);
+        if left > LEAST_INDEPENDENT * before && left > 0.0 {
+            let norm = left.sqrt();
+            column.iter_mut().for_each(|x| *x /= norm);
+            self.columns.push(column);
+        }
+    }
+}
+
+/// What stays as it is while some atoms are fitted: the trend and other atoms.
+pub(crate) struct Fixed {
+    basis: Basis,
+    /// Whitened values without these parts.
+    residual: Vec<f64>,
+}
+
+impl Fixed {
+    pub(crate) fn basis_columns(&self) -> &[Vec<f64>] {
+        &self.basis.columns
+    }
+}
+
+/// Atoms fitted over a fixed rest.
+struct Projection {
+    columns: Vec<Vec<Vec<f64>>>,
+    amplitudes: Vec<f64>,
+    basis: Basis,
+    residual: Vec<f64>,
+    squares: f64,
+}
+
+impl NoisyRecord {
+    /// The frames `used` of a record with `values`, in white noise.
+    pub(crate) fn new(frames: usize, used: Vec<usize>, values: Vec<f64>) -> Self {
+        let place = |i: &usize| (*i as f64 + 0.5) / frames as f64;
+        let at = FramePlaces { places: used.iter().map(place).collect(), frames };
+        Self {
+            at,
+            used,
+            target: values.clone(),
+            values,
+            whitener: None,
+            order: 0,
+            least_variance: 1e-300,
+            price_left_out: 0.0,
+        }
+    }
+
+    /// The same frames in noise with these autoregressive coefficients.
+    pub(crate) fn with_noise(mut self, coefficients: &[f64]) -> Self {
+        let noise = AutoregressiveNoise::new(1.0, coefficients.to_vec()).ok();
+        let unit = noise.and_then(|noise| {
+            AutoregressiveNoise::new(1.0 / noise.innovation_sd(), coefficients.to_vec()).ok()
+        });
+        self.order = unit.as_ref().map_or(0, |noise| noise.coefficients().len());
+        self.whitener = unit
+            .filter(|noise| !noise.coefficients().is_empty())
+            .map(|noise| Whitener::new(&noise, &self.used));
+        self.target = self.whiten_values(self.values.clone());
+        self
+    }
+
+    /// The problem without the frames for which `leave_out` holds; each costs `price` nats.
+    pub(crate) fn without_frames(&self, leave_out: impl Fn(usize) -> bool, price: f64) -> Self {
+        let kept: Vec<usize> = (0..self.used.len()).filter(|k| !leave_out(self.used[*k])).collect();
+        let used = kept.iter().map(|k| self.used[*k]).collect();
+        let values = kept.iter().map(|k| self.values[*k]).collect();
+        Self {
+            price_left_out: self.price_left_out + price * (self.used.len() - kept.len()) as f64,
+            least_variance: self.least_variance,
+            ..Self::new(self.at.frames, used, values)
+        }
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.used.len()
+    }
+
+    /// Logarithm of the number of frames used: the unit of prices, nats.
+    pub(crate) fn log_frames(&self) -> f64 {
+        math::ln(self.used.len().max(2) as f64)
+    }
+
+    pub(crate) fn whiten_values(&self, mut column: Vec<f64>) -> Vec<f64> {
+        self.whitener.iter().for_each(|whitener| whitener.whiten_column(&mut column));
+        column
+    }
+
+    /// Whitened columns of the trend.
+    fn trend_columns(&self, trend: Trend) -> Vec<Vec<f64>> {
+        let mut columns = vec![Vec::with_capacity(self.len()); trend.column_count()];
+        let mut row = [0.0; crate::trend::MOST_COLUMNS];
+        for s in &self.at.places {
+            trend.fill_row(2.0 * s - 1.0, &mut row);
+            columns.iter_mut().zip(row).for_each(|(column, x)| column.push(x));
+        }
+        columns.into_iter().map(|column| self.whiten_values(column)).collect()
+    }
+
+    /// The trend and atoms that stay as they are.
+    pub(crate) fn fix_parts(&self, trend: Trend, atoms: &[Atom]) -> Fixed {
+        let mut basis = Basis::default();
+        self.trend_columns(trend).into_iter().for_each(|column| basis.push_column(column));
+        for atom in atoms {
+            atom.columns(&self.at)
+                .into_iter()
+                .for_each(|column| basis.push_column(self.whiten_values(column)));
+        }
+        let mut residual = self.target.clone();
+        basis.project_out(&mut residual);
+        Fixed { basis, residual }
+    }
+
+    /// Least squares of the amplitudes of `atoms` beside a fixed rest.
+    fn project_onto(&self, fixed: &Fixed, atoms: &[Atom]) -> Projection {
+        let columns: Vec<Vec<Vec<f64>>> = atoms.iter().map(|atom| atom.columns(&self.at)).collect();
+        let flat: Vec<&Vec<f64>> = columns.iter().flatten().collect();
+        let mut basis = Basis::default();
+        let mut upper = DMatrix::identity(flat.len(), flat.len());
+        let mut residual = fixed.residual.clone();
+        let mut projections = DVector::zeros(flat.len());
+        for (k, column) in flat.iter().enumerate() {
+            let mut column = self.whiten_values((*column).clone());
+            let before = dot(&column, &column);
+            fixed.basis.project_out(&mut column);
+            let projected = dot(&column, &column);
+            for (j, q) in basis.columns.iter().enumerate() {
+                let along = dot(q, &column);
+                upper[(j, k)] = along;
+                subtract(&mut column, along, q);
+            }
+            let mut left = dot(&column, &column);
+            if left < 1e-4 * before {
+                // cancellation: project a second time
+                fixed.basis.project_out(&mut column);
+                for (j, q) in basis.columns.iter().enumerate() {
+                    let along = dot(q, &column);
+                    upper[(j, k)] += along;
+                    subtract(&mut column, along, q);
+                }
+                left = dot(&column, &column);
+            }
+            if left > LEAST_INDEPENDENT * before && left > 0.0 && projected > 0.0 {
+                let norm = left.sqrt();
+                column.iter_mut().for_each(|x| *x /= norm);
+                upper[(k, k)] = norm;
+                projections[k] = dot(&column, &residual);
+                subtract(&mut residual, projections[k], &column);
+            } else {
+                // a dependent column gets no amplitude
+                column.iter_mut().for_each(|x| *x = 0.0);
+                upper.column_mut(k).fill(0.0);
+                upper[(k, k)] = 1.0;
+            }
+            basis.columns.push(column);
+        }
+        let amplitudes = upper.solve_upper_triangular(&projections).unwrap_or(projections);
+        let squares = dot(&residual, &residual);
+        Projection { amplitudes: amplitudes.as_slice().to_vec(), basis, residual, squares, columns }
+    }
+
+    /// Derivatives of the residual by every shape parameter, without what amplitudes take up (Kaufman 1975),
+    /// with the number of parameters of each atom.
+    fn jacobian(&self, fixed: &Fixed, atoms: &[Atom], at: &Projection) -> Vec<Vec<f64>> {
+        let mut jacobian = Vec::new();
+        let mut first = 0;
+        for (atom, columns) in atoms.iter().zip(&at.columns) {
+            let amplitudes = &at.amplitudes[first..first + columns.len()];
+            first += columns.len();
+            for derivative in atom.derivatives(&self.at, columns, amplitudes) {
+                let mut column = self.whiten_values(derivative);
+                fixed.basis.project_out(&mut column);
+                at.basis.project_out(&mut column);
+                jacobian.push(column);
+            }
+        }
+        jacobian
+    }
+
+    /// Fits `atoms` beside a fixed rest in at most `iterations` steps.
+    pub(crate) fn fit_atoms(&self, fixed: &Fixed, atoms: Vec<Atom>, iterations: usize) -> (Vec<Atom>, f64) {
+        let (atoms, at) = self.minimise_squares(fixed, atoms, iterations);
+        let squares = if self.is_cancelling(&atoms, &at.amplitudes) { f64::INFINITY } else { at.squares };
+        (atoms, squares)
+    }
+
+    /// Whether an oscillation is far larger than the record: it and another one cancel.
+    fn is_cancelling(&self, atoms: &[Atom], amplitudes: &[f64]) -> bool {
+        const MOST: f64 = 4.0;
+        let largest = self.values.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        let mut first = 0;
+        atoms.iter().any(|atom| {
+            let own = &amplitudes[first..first + atom.column_count()];
+            first += atom.column_count();
+            atom.oscillation().is_some() && own.iter().any(|a| a.abs() > MOST * largest)
+        })
+    }
+
+    fn minimise_squares(
+        &self,
+        fixed: &Fixed,
+        mut atoms: Vec<Atom>,
+        iterations: usize,
+    ) -> (Vec<Atom>, Projection) {
+        const RAISE: f64 = 6.0;
+        const LOWER: f64 = 0.3;
+        const TRIES: usize = 5;
+        /// Relative gain below which the fit has ended.
+        const SMALL: f64 = 1e-6;
+        let mut at = self.project_onto(fixed, &atoms);
+        let mut damping = 1e-3;
+        for _ in 0..iterations {
+            let jacobian = self.jacobian(fixed, &atoms, &at);
+            if jacobian.is_empty() {
+                break;
+            }
+            let n = jacobian.len();
+            let gradient = DVector::from_fn(n, |i, _| dot(&jacobian[i], &at.residual));
+            let mut normal = DMatrix::zeros(n, n);
+            for i in 0..n {
+                for j in 0..=i {
+                    normal[(i, j)] = dot(&jacobian[i], &jacobian[j]);
+                    normal[(j, i)] = normal[(i, j)];
+                }
+            }
+            let mut ended = true;
+            for _ in 0..TRIES {
+                let mut damped = normal.clone();
+                (0..n).for_each(|i| damped[(i, i)] += damping * normal[(i, i)] + f64::MIN_POSITIVE);
+                let Some(step) = damped.cholesky().map(|c| c.solve(&gradient)) else {
+                    damping *= RAISE;
+                    continue;
+                };
+                let moved = move_atoms(&atoms, step.as_slice());
+                if moved.iter().all(|atom| atom.is_usable(self.at.frames)) {
+                    let next = self.project_onto(fixed, &moved);
+                    if next.squares < at.squares {
+                        ended = at.squares - next.squares < SMALL * at.squares;
+                        (atoms, at) = (moved, next);
+                        damping *= LOWER;
+                        break;
+                    }
+                }
+                damping = damping.max(1e-6) * RAISE;
+            }
+            if ended {
+                break;
+            }
+        }
+        (atoms, at)
+    }
+
+    /// Fits all parts together.
+    pub(crate) fn fit_parts(&self, parts: &Parts, iterations: usize) -> Explanation {
+        let fixed = self.fix_parts(parts.trend, &[]);
+        let (atoms, at) = self.minimise_squares(&fixed, parts.atoms.clone(), iterations);
+        let parts = Parts { trend: parts.trend, atoms };
+        let cancels = self.is_cancelling(&parts.atoms, &at.amplitudes);
+        Explanation {
+            criterion: if cancels { f64::INFINITY } else { self.criterion(&parts, at.squares) },
+            parts,
+            squares: at.squares,
+            residual: at.residual,
+            amplitudes: at.amplitudes,
+        }
+    }
+
+    /// Negative logarithm of the posterior probability of parts that leave these squares: the likelihood with
+    /// the level of the noise estimated, and Djurić's penalty.
+    pub(crate) fn criterion(&self, parts: &Parts, squares: f64) -> f64 {
+        let n = self.len() as f64;
+        let linear = (parts.trend.column_count() + self.order) as f64;
+        let price = 0.5 * linear + parts.atoms.iter().map(Atom::price).sum::<f64>();
+        let determinant = self.whitener.as_ref().map_or(0.0, Whitener::log_determinant);
+        self.price_left_out
+            + 0.5 * n * math::ln((squares / n).max(self.least_variance))
+            + 0.5 * determinant
+            + self.log_frames() * price
+    }
+
+    /// Covariance of the shape parameters of all atoms for noise of unit variance; `None` if it is singular.
+    pub(crate) fn shape_covariance(&self, explanation: &Explanation) -> Option<DMatrix<f64>> {
+        let fixed = self.fix_parts(explanation.parts.trend, &[]);
+        let at = self.project_onto(&fixed, &explanation.parts.atoms);
+        let jacobian = self.jacobian(&fixed, &explanation.parts.atoms, &at);
+        let n = jacobian.len();
+        let scales: Vec<f64> = jacobian.iter().map(|c| dot(c, c).sqrt().max(1e-300)).collect();
+        let normal = DMatrix::from_fn(n, n, |i, j| dot(&jacobian[i], &jacobian[j]) / (scales[i] * scales[j]));
+        let inverse = normal.cholesky()?.inverse();
+        Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] / (scales[i] * scales[j])))
+    }
+
+    /// Trend and atoms in every frame of the record: the trend with everything that does not oscillate, and
+    /// each atom.
+    pub(crate) fn values_everywhere(&self, explanation: &Explanation) -> (Vec<f64>, Vec<Vec<f64>>) {
+        let all = FramePlaces {
+            places: (0..self.at.frames).map(|i| (i as f64 + 0.5) / self.at.frames as f64).collect(),
+            frames: self.at.frames,
+        };
+        let mut first = 0;
+        let mut atoms = Vec::new();
+        let mut rest = self.values.clone();
+        for atom in &explanation.parts.atoms {
+            let sum = |at: &FramePlaces| {
+                let columns = atom.columns(at);
+                let amplitudes = &explanation.amplitudes[first..first + columns.len()];
+                let value = |i: usize| columns.iter().zip(amplitudes).map(|(c, a)| c[i] * a).sum();
+                ((0..at.places.len()).map(value).collect::<Vec<f64>>(), columns.len())
+            };
+            let (here, count) = sum(&self.at);
+            rest.iter_mut().zip(&here).for_each(|(x, y)| *x -= y);
+            atoms.push(sum(&all).0);
+            first += count;
+        }
+        // what the atoms leave is fitted by the trend alone
+        let columns = self.trend_columns(explanation.parts.trend);
+        let whitened = self.whiten_values(rest);
+        let n = columns.len();
+        let normal = DMatrix::from_fn(n, n, |i, j| dot(&columns[i], &columns[j]));
+        let right = DVector::from_fn(n, |i, _| dot(&columns[i], &whitened));
+        let trend = normal.clone().cholesky().map_or_else(|| right.clone() * 0.0, |c| c.solve(&right));
+        let mut row = [0.0; crate::trend::MOST_COLUMNS];
+        let trend_values = all.places.iter().map(|s| {
+            explanation.parts.trend.fill_row(2.0 * s - 1.0, &mut row);
+            row.iter().zip(trend.iter()).map(|(b, c)| b * c).sum()
+        });
+        (trend_values.collect(), atoms)
+    }
+
+    /// Residual of the frames of this problem with the parts that explain `fitted`, which uses some of these
+    /// frames.
+    pub(crate) fn residual_everywhere(&self, fitted: &NoisyRecord, explanation: &Explanation) -> Vec<f64> {
+        let (trend, atoms) = fitted.values_everywhere(explanation);
+        let model = |i: usize| trend[i] + atoms.iter().map(|atom| atom[i]).sum::<f64>();
+        self.used.iter().zip(&self.values).map(|(i, x)| x - model(*i)).collect()
+    }
+
+    /// Gain, in halves of the relative sum of squares, of each column beside fixed parts: half the logarithm
+    /// of the likelihood ratio for small gains.
+    pub(crate) fn gain_of_columns(&self, fixed: &Fixed, columns: Vec<Vec<f64>>) -> f64 {
+        let mut basis = Basis::default();
+        let mut gain = 0.0;
+        for column in columns {
+            let mut column = self.whiten_values(column);
+            let before = dot(&column, &column);
+            fixed.basis.project_out(&mut column);
+            basis.project_out(&mut column);
+            let left = dot(&column, &column);
+            if left > 1e-12 * before {
+                let along = dot(&column, &fixed.residual);
+                gain += along * along / left;
+                let norm = left.sqrt();
+                column.iter_mut().for_each(|x| *x /= norm);
+                basis.columns.push(column);
+            }
+        }
+        gain / dot(&fixed.residual, &fixed.residual).max(1e-300)
+    }
+
+    /// Residual of the fixed parts.
+    pub(crate) fn residual_of<'a>(&self, fixed: &'a Fixed) -> &'a [f64] {
+        &fixed.residual
+    }
+}
+
+/// Atoms after a step, each parameter moved by at most its limit.
+fn move_atoms(atoms: &[Atom], step: &[f64]) -> Vec<Atom> {
+    let mut steps = step.iter();
+    let moved = |atom: &Atom| {
+        let limits = atom.step_limits();
+        let values = atom.parameters().into_iter().zip(limits).zip(&mut steps);
+        let values: Vec<f64> = values.map(|((value, limit), by)| value + by.clamp(-limit, limit)).collect();
+        atom.with_parameters(&values)
+    };
+    atoms.iter().map(moved).collect()
+}

@@ -1,0 +1,412 @@
+//! What the parts of a record say: oscillations with deviations averaged over the rivals, and the doubts that
+//! follow from the odds.
+
+use super::atom::{Atom, OscillationAtom};
+use super::problem::{self, Parts};
+use super::search::Rival;
+use super::{Decomposition, with_noise_of};
+use crate::classification::{Evidence, RecordContext, SINGLE_CYCLE_DAMPING, classify_components};
+use crate::component::{Component, Estimator, Harmonic};
+use crate::record::SampledRecord;
+use crate::sampling::alias_hz;
+use crate::settings::SpectrumSettings;
+use crate::time_frequency::FrequencyRange;
+use nalgebra::DMatrix;
+use portable_math as math;
+use std::f64::consts::TAU;
+
+/// Rivals further behind, nats, do not count in an average.
+const FURTHEST: f64 = 8.0;
+/// Lead, nats, over every rival that has no oscillation near a frequency, from which there is one.
+const CLEAR_LEAD: f64 = 5.0;
+/// An oscillation of fewer cycles than this may be a part of the slow motion, if a trend of more than a cubic
+/// or a step describes that motion.
+const SLOW_CYCLES: f64 = 6.5;
+/// Cycles up to which an oscillation may be a piece of a grown trend, for each column of the trend, which
+/// describes half a wave.
+const SLOW_CYCLES_PER_COLUMN: f64 = 0.75;
+/// Distance, in resolutions, below which two oscillations may be pieces of one.
+const LEAST_APART: f64 = 0.5;
+/// Number of other oscillations that begin or are over within the record from which none of them is clear.
+const CROWD: usize = 3;
+/// Cycles below which several oscillations look like the shaking of a camera, and number of the others.
+const SHAKE_CYCLES: f64 = 20.0;
+const SHAKE_PARTS: usize = 2;
+/// Decay, nepers, from its onset to the end of the record of an oscillation that begins within it.
+const LEAST_DECAY: f64 = 2.0;
+/// Decay, nepers per record, from which an oscillation is over within the record.
+const TRANSIENT_NEPERS: f64 = 6.0;
+/// Chi squared, per degree of freedom, of the frequencies in parts of the record above which it is no single
+/// oscillation: chance exceeds it in one of three hundred.
+const MOST_SCATTER: f64 = 4.5;
+/// Frames per parameter below which no part is clear.
+const PARAMETERS_WITHIN: usize = 6;
+/// Columns of a cubic.
+const CUBIC_COLUMNS: usize = 4;
+
+/// An oscillation of a record with its deviations, in cycles and nepers per record.
+#[derive(Debug, Clone)]
+struct OscillationReading {
+    atom: OscillationAtom,
+    cycles: f64,
+    /// Standard deviation of the mean frequency, and the same averaged over the rivals.
+    own_cycles_sd: f64,
+    cycles_sd: f64,
+    /// Standard deviation of the decay, or of the decay that an oscillation of constant amplitude may have.
+    nepers_sd: f64,
+    /// Amplitudes of cosine and sine at the onset, for it and each multiple, m.
+    amplitudes_m: Vec<[f64; 2]>,
+    amplitude_sd_m: f64,
+    snr_db: f64,
+    /// Lead over the best rival that has no oscillation near its frequency, nats.
+    lead: f64,
+    /// Chi squared, per degree of freedom, of the frequencies that parts of the record ask for.
+    scatter: f64,
+}
+
+/// Whether an oscillation begins or is over within the record.
+fn is_transient(o: &OscillationAtom) -> bool {
+    o.onset > 0.0 || o.nepers.is_some_and(|d| d > TRANSIENT_NEPERS)
+}
+
+/// Half width of the peak of an oscillation, resolutions.
+fn lobe_half_width(o: &OscillationAtom) -> f64 {
+    (o.nepers.map_or(0.0, f64::abs) / TAU).max(1.0)
+}
+
+impl Decomposition {
+    /// Adds the rivals that the search need not have met: without each oscillation, in the noise that is then
+    /// left.
+    pub(super) fn add_rivals(&mut self) {
+        /// Signal-to-noise ratio, dB, from which noise is no rival.
+        const STRONG_DB: f64 = 40.0;
+        let atoms = &self.explanation.parts.atoms;
+        let oscillations = self.read_oscillations();
+        let mut found = Vec::new();
+        for (k, atom) in atoms.iter().enumerate() {
+            let Some(o) = atom.oscillation() else { continue };
+            let strong = oscillations.iter().any(|r| r.atom == *o && r.snr_db > STRONG_DB);
+            if strong {
+                continue;
+            }
+            let mut rest = atoms.clone();
+            rest.remove(k);
+            let parts = Parts { trend: self.explanation.parts.trend, atoms: rest };
+            let problem = with_noise_of(&self.problem, &parts);
+            let rival = problem.fit_parts(&parts, 2);
+            found.push(Rival { atoms: rival.parts.atoms, criterion: rival.criterion });
+        }
+        self.rivals.extend(found);
+    }
+
+    /// The components of the record with their verdicts, the largest first.
+    pub(crate) fn components(&self, record: &SampledRecord, settings: &SpectrumSettings) -> Vec<Component> {
+        let frames = record.samples.len();
+        let resolution_hz = record.frame_rate_hz / frames as f64;
+        let mut read: Vec<(Component, Vec<String>)> = Vec::new();
+        for reading in self.read_oscillations() {
+            let component = self.to_component(&reading, record, resolution_hz);
+            let doubts = self.list_doubts(&reading, resolution_hz);
+            for (multiple, amplitudes) in reading.atom.multiples.iter().zip(&reading.amplitudes_m[1..]) {
+                let times = *multiple as f64;
+                let harmonic = Component {
+                    frequency_hz: alias_hz(times * component.frequency_hz, record.frame_rate_hz),
+                    frequency_sd_hz: times * component.frequency_sd_hz,
+                    cramer_rao_hz: times * component.cramer_rao_hz,
+                    amplitude_m: math::hypot(amplitudes[0], amplitudes[1]),
+                    snr_db: component.snr_db
+                        + 20.0
+                            * math::log10(math::hypot(amplitudes[0], amplitudes[1]) / component.amplitude_m),
+                    damping_ratio: component.damping_ratio.map(|ratio| ratio / times),
+                    damping_ratio_sd: component.damping_ratio_sd.map(|sd| sd / times),
+                    range_hz: None,
+                    harmonic_of: Some(Harmonic { frequency_hz: component.frequency_hz, multiple: *multiple }),
+                    ..component.clone()
+                };
+                read.push((harmonic, Vec::new()));
+            }
+            read.push((component, doubts));
+        }
+        read.sort_by(|a, b| b.0.amplitude_m.total_cmp(&a.0.amplitude_m));
+        let (mut components, doubts): (Vec<_>, Vec<_>) = read.into_iter().unzip();
+        let evidence = |doubts| Evidence { doubts, keeps_peak: true, ..Evidence::default() };
+        let evidence: Vec<Evidence> = doubts.into_iter().map(evidence).collect();
+        classify_components(&mut components, &evidence, &RecordContext::new(record, resolution_hz, settings));
+        components
+    }
+
+    fn to_component(
+        &self,
+        reading: &OscillationReading,
+        record: &SampledRecord,
+        resolution_hz: f64,
+    ) -> Component {
+        let o = &reading.atom;
+        let frames = record.samples.len();
+        let duration_s = frames as f64 / record.frame_rate_hz;
+        let ratio = |nepers: f64| nepers / math::hypot(nepers, TAU * o.cycles);
+        let range = (!o.phase.is_empty()).then(|| {
+            let (low, high) = o.cycles_range();
+            let sd_hz = reading.cycles_sd * resolution_hz;
+            FrequencyRange {
+                low_hz: low * resolution_hz,
+                low_sd_hz: 2.0 * sd_hz,
+                high_hz: high * resolution_hz,
+                high_sd_hz: 2.0 * sd_hz,
+            }
+        });
+        let amplitude_m = math::hypot(reading.amplitudes_m[0][0], reading.amplitudes_m[0][1]);
+        Component {
+            frequency_hz: reading.cycles * resolution_hz,
+            frequency_sd_hz: reading.cycles_sd * resolution_hz,
+            range_hz: range,
+            begins_s: (o.onset > 0.0).then_some(o.onset * duration_s),
+            amplitude_m,
+            amplitude_sd_m: reading.amplitude_sd_m,
+            damping_ratio: o.phase.is_empty().then(|| o.nepers.map_or(0.0, ratio)),
+            damping_ratio_sd: o.phase.is_empty().then(|| reading.nepers_sd / (TAU * o.cycles)),
+            snr_db: reading.snr_db,
+            cramer_rao_hz: reading.own_cycles_sd * resolution_hz,
+            estimator: Estimator::LeastSquares,
+            ..Component::default()
+        }
+    }
+
+    /// Reasons for which the frequency of an oscillation is in doubt.
+    fn list_doubts(&self, reading: &OscillationReading, resolution_hz: f64) -> Vec<String> {
+        let o = &reading.atom;
+        let mut doubts = Vec::new();
+        if reading.lead < CLEAR_LEAD {
+            doubts.push(format!(
+                "without it, other parts or noise explain the record nearly as well (odds 1 to {:.0})",
+                math::exp(reading.lead.max(0.0))
+            ));
+        }
+        let ratio = o.nepers.map_or(0.0, |d| d / math::hypot(d, TAU * o.cycles));
+        if ratio > SINGLE_CYCLE_DAMPING {
+            doubts
+                .push(format!("it is over within a cycle (damping ratio {ratio:.2}): a step looks the same"));
+        }
+        let parts = &self.explanation.parts;
+        let steps = parts.atoms.iter().any(|a| a.oscillation().is_none());
+        let columns = parts.trend.column_count();
+        let grown = columns > CUBIC_COLUMNS || steps;
+        if grown && o.cycles < SLOW_CYCLES.max(SLOW_CYCLES_PER_COLUMN * columns as f64) {
+            doubts.push(
+                "it is slow, and the trend had to grow: it may be a piece of what that describes".to_owned(),
+            );
+        }
+        let others = || parts.atoms.iter().filter_map(Atom::oscillation).filter(|other| *other != o);
+        if let Some(apart) =
+            others().map(|other| (other.mean_cycles() - reading.cycles).abs()).min_by(f64::total_cmp)
+            && apart < LEAST_APART
+        {
+            doubts.push(format!("another lies {apart:.2} resolutions from it: pieces of one look the same"));
+        }
+        let neighbour = |other: &&OscillationAtom| {
+            (other.mean_cycles() - reading.cycles).abs() < lobe_half_width(o).max(lobe_half_width(other))
+        };
+        if others().filter(|other| is_transient(other) || is_transient(o)).any(|other| neighbour(&other)) {
+            doubts.push(
+                "another overlaps it and begins or is over within the record: pieces of one look the same"
+                    .to_owned(),
+            );
+        }
+        if is_transient(o) && others().filter(|other| is_transient(other)).count() >= CROWD {
+            doubts.push(
+                "one of several that begin or are over within the record: noise and jumps look the same"
+                    .to_owned(),
+            );
+        }
+        let slow = |o: &&OscillationAtom| o.cycles < SHAKE_CYCLES;
+        if slow(&o) && others().filter(slow).count() >= SHAKE_PARTS {
+            doubts.push("one of several slow ones: a camera that shakes looks the same".to_owned());
+        }
+        let lasts = o.nepers.map_or(0.0, |d| d * (1.0 - o.onset));
+        if o.onset > 0.0 && lasts < LEAST_DECAY {
+            doubts.push(
+                "it begins within the record and hardly decays: two lines that beat look the same".to_owned(),
+            );
+        }
+        if reading.scatter > MOST_SCATTER {
+            doubts.push(
+                "parts of the record ask for different frequencies: it is not one oscillation".to_owned(),
+            );
+        }
+        if PARAMETERS_WITHIN * self.parameter_count() > self.problem.len() {
+            doubts.push("the record is short for the parts that describe it".to_owned());
+        }
+        if reading.cycles_sd > (2.0 * reading.own_cycles_sd).max(0.05) {
+            doubts.push(format!(
+                "explanations nearly as probable move it by {:.2e} Hz",
+                reading.cycles_sd * resolution_hz
+            ));
+        }
+        doubts
+    }
+
+    /// Number of parameters of trend, parts and noise.
+    fn parameter_count(&self) -> usize {
+        let parts = &self.explanation.parts;
+        let shapes: usize = parts.atoms.iter().map(|a| a.parameters().len()).sum();
+        self.explanation.amplitudes.len() + parts.trend.column_count() + shapes + self.problem.order
+    }
+
+    /// The oscillations of the explanation.
+    fn read_oscillations(&self) -> Vec<OscillationReading> {
+        let parts = &self.explanation.parts;
+        let linear = self.explanation.amplitudes.len() + parts.trend.column_count();
+        let shapes: usize = parts.atoms.iter().map(|a| a.parameters().len()).sum();
+        let freedoms = (self.problem.len() as f64 - (linear + shapes) as f64).max(1.0);
+        let variance = self.explanation.squares / freedoms;
+        let unknown = || DMatrix::from_diagonal_element(shapes, shapes, 1e6);
+        let covariance = self.problem.shape_covariance(&self.explanation).unwrap_or_else(unknown);
+        let (mut first, mut parameter) = (0, 0);
+        let mut found = Vec::new();
+        for atom in &parts.atoms {
+            let amplitudes = &self.explanation.amplitudes[first..first + atom.column_count()];
+            if let Some(o) = atom.oscillation() {
+                let count = atom.parameters().len();
+                let own = covariance.view((parameter, parameter), (count, count)) * variance;
+                found.push(self.read_oscillation(o, amplitudes, &own, variance));
+            }
+            first += atom.column_count();
+            parameter += atom.parameters().len();
+        }
+        found
+    }
+
+    fn read_oscillation(
+        &self,
+        o: &OscillationAtom,
+        amplitudes: &[f64],
+        covariance: &DMatrix<f64>,
+        variance: f64,
+    ) -> OscillationReading {
+        let columns = Atom::Oscillation(o.clone()).columns(&self.problem.at);
+        let mut value = vec![0.0; self.problem.len()];
+        for (column, a) in columns.iter().zip(amplitudes).take(2) {
+            value.iter_mut().zip(column).for_each(|(x, c)| *x += a * c);
+        }
+        let white = self.problem.whiten_values(value);
+        let energy = problem::dot(&white, &white) / variance;
+        let cycles = o.mean_cycles();
+        // gradient of the mean frequency by the shape parameters
+        let first_phase = 1 + usize::from(o.nepers.is_some());
+        let gradient = |i: usize| match i {
+            0 => 1.0,
+            i if (first_phase..first_phase + o.phase.len()).contains(&i) => {
+                let mut moved = o.clone();
+                moved.phase[i - first_phase] += 1.0;
+                moved.mean_cycles() - cycles
+            }
+            _ => 0.0,
+        };
+        let n = covariance.nrows();
+        let gradient: Vec<f64> = (0..n).map(gradient).collect();
+        let pairs = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
+        let own: f64 = pairs.map(|(i, j)| gradient[i] * gradient[j] * covariance[(i, j)]).sum();
+        // the record may begin and end half a frame before or after the frames: its mean drifts by as much
+        let (low, high) = if o.phase.is_empty() { (0.0, 0.0) } else { o.cycles_range() };
+        let half_frame = 0.5 * (high - low) / self.problem.at.frames as f64;
+        let own_cycles_sd = math::hypot(own.max(0.0).sqrt(), half_frame);
+        let (spread, lead) = self.average_rivals(o, cycles);
+        let scatter = self.frequency_scatter(o, amplitudes, &columns, variance);
+        let own_cycles_sd = own_cycles_sd * scatter.max(1.0).sqrt();
+        OscillationReading {
+            cycles,
+            cycles_sd: math::hypot(own_cycles_sd, spread),
+            own_cycles_sd,
+            nepers_sd: o.nepers.map_or((12.0 / energy).sqrt(), |_| covariance[(1, 1)].max(0.0).sqrt()),
+            amplitude_sd_m: self.amplitude_sd(o, amplitudes, &columns) * variance.sqrt() * self.scale_m,
+            // mean square over noise density times two resolutions
+            snr_db: 10.0 * math::log10((energy / 4.0).max(1e-9)),
+            amplitudes_m: amplitudes.chunks(2).map(|c| [c[0] * self.scale_m, c[1] * self.scale_m]).collect(),
+            lead,
+            scatter,
+            atom: o.clone(),
+        }
+    }
+
+    /// Standard deviation of the amplitude in noise of unit variance, with the shape of the oscillation free.
+    fn amplitude_sd(&self, o: &OscillationAtom, amplitudes: &[f64], columns: &[Vec<f64>]) -> f64 {
+        let derivatives = Atom::Oscillation(o.clone()).derivatives(&self.problem.at, columns, amplitudes);
+        let free: Vec<Vec<f64>> = columns[..2]
+            .iter()
+            .chain(&derivatives)
+            .map(|column| self.problem.whiten_values(column.clone()))
+            .collect();
+        let n = free.len();
+        let normal = DMatrix::from_fn(n, n, |i, j| problem::dot(&free[i], &free[j]));
+        let size = math::hypot(amplitudes[0], amplitudes[1]).max(1e-300);
+        let Some(inverse) = normal.cholesky().map(|c| c.inverse()) else { return size };
+        let [a, b] = [amplitudes[0] / size, amplitudes[1] / size];
+        (a * a * inverse[(0, 0)] + 2.0 * a * b * inverse[(0, 1)] + b * b * inverse[(1, 1)]).max(0.0).sqrt()
+    }
+
+    /// Chi squared, per degree of freedom, of the frequencies that parts of the record ask for, each with a
+    /// quarter of the energy of the oscillation: 1 for an oscillation that is as described, more for a piece
+    /// of noise or of another motion.
+    fn frequency_scatter(
+        &self,
+        o: &OscillationAtom,
+        amplitudes: &[f64],
+        columns: &[Vec<f64>],
+        variance: f64,
+    ) -> f64 {
+        const SEGMENTS: usize = 4;
+        let atom = Atom::Oscillation(o.clone());
+        let by_cycles = atom.derivatives(&self.problem.at, columns, amplitudes).swap_remove(0);
+        let value = |i: usize| columns.iter().zip(amplitudes).map(|(c, a)| c[i] * a).sum::<f64>();
+        let energies: Vec<f64> = (0..by_cycles.len()).map(|i| math::powi(value(i), 2)).collect();
+        let total: f64 = energies.iter().sum();
+        let by_cycles = self.problem.whiten_values(by_cycles);
+        let fixed: Vec<Vec<f64>> =
+            columns.iter().take(2).map(|column| self.problem.whiten_values(column.clone())).collect();
+        let residual = &self.explanation.residual;
+        let mut shifts = Vec::new();
+        let (mut first, mut sum) = (0, 0.0);
+        for (i, energy) in energies.iter().enumerate() {
+            sum += energy;
+            if sum < total * (shifts.len() + 1) as f64 / SEGMENTS as f64 && i + 1 < energies.len() {
+                continue;
+            }
+            let part = first..i + 1;
+            first = i + 1;
+            let mut basis = problem::Basis::default();
+            fixed.iter().for_each(|column| basis.push_column(column[part.clone()].to_vec()));
+            let mut slope = by_cycles[part.clone()].to_vec();
+            basis.project_out(&mut slope);
+            let mut left = residual[part].to_vec();
+            basis.project_out(&mut left);
+            let information = problem::dot(&slope, &slope) / variance;
+            shifts.push((problem::dot(&slope, &left) / variance / information.max(1e-300), information));
+        }
+        let weight: f64 = shifts.iter().map(|(_, w)| w).sum();
+        let mean = shifts.iter().map(|(x, w)| x * w).sum::<f64>() / weight.max(1e-300);
+        let chi2: f64 = shifts.iter().map(|(x, w)| w * (x - mean) * (x - mean)).sum();
+        chi2 / (shifts.len().max(2) - 1) as f64
+    }
+
+    /// Standard deviation of the frequency among the rivals, weighed by their odds, and the lead over the
+    /// best rival that has no oscillation near it, nats.
+    fn average_rivals(&self, o: &OscillationAtom, cycles: f64) -> (f64, f64) {
+        let (mut weights, mut sum, mut lead) = (1.0, 0.0, f64::INFINITY);
+        let reach = 1.5 + o.nepers.map_or(0.0, |d| d.abs() / TAU);
+        for rival in &self.rivals {
+            let behind = rival.criterion - self.explanation.criterion;
+            let means = rival.atoms.iter().filter_map(Atom::oscillation).map(OscillationAtom::mean_cycles);
+            let nearest = means.min_by(|a, b| (a - cycles).abs().total_cmp(&(b - cycles).abs()));
+            match nearest.filter(|near| (near - cycles).abs() < reach) {
+                None => lead = lead.min(behind),
+                Some(near) if behind > 1e-9 && behind < FURTHEST => {
+                    let weight = math::exp(-behind);
+                    weights += weight;
+                    sum += weight * (near - cycles) * (near - cycles);
+                }
+                Some(_) => {}
+            }
+        }
+        ((sum / weights).sqrt(), lead)
+    }
+}

@@ -1,0 +1,140 @@
+//! Parts with known shapes, and records whose parts are known.
+
+use super::atom::{Atom, FramePlaces, OscillationAtom, StepShape};
+use super::{Decomposition, DecompositionSettings};
+use crate::record::SampledRecord;
+use crate::trend::Trend;
+use crate::{ComponentVerdict, SpectrumSettings};
+use portable_math::StandardNormal;
+use rand::{Rng, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use std::f64::consts::TAU;
+
+const RATE_HZ: f64 = 5000.0;
+const FRAMES: usize = 750;
+
+fn atoms() -> Vec<Atom> {
+    let ring = OscillationAtom { nepers: Some(7.0), onset: 0.2, ..OscillationAtom::steady(31.3) };
+    let cycle = OscillationAtom {
+        phase: vec![3.1, -0.4],
+        envelope: vec![0.3, -0.2, 0.1],
+        multiples: vec![2, 5],
+        ..OscillationAtom::steady(40.7)
+    };
+    let steps = StepShape::ALL.map(|shape| Atom::Step { shape, centre: 0.43, width: 0.06 });
+    let relaxations = [0.0, 0.3].map(|onset| Atom::Relaxation { onset, nepers: 9.0 });
+    [Atom::Oscillation(ring), Atom::Oscillation(cycle)].into_iter().chain(steps).chain(relaxations).collect()
+}
+
+#[test]
+fn derivatives_of_all_parts_are_those_of_their_values() {
+    const STEP: f64 = 1e-6;
+    let at = FramePlaces { places: (0..200).map(|i| (f64::from(i) + 0.5) / 200.0).collect(), frames: 200 };
+    for atom in atoms() {
+        let columns = atom.columns(&at);
+        let amplitudes: Vec<f64> = (0..columns.len()).map(|k| 1.0 - 0.3 * k as f64).collect();
+        let value = |atom: &Atom| -> Vec<f64> {
+            let columns = atom.columns(&at);
+            (0..200).map(|i| columns.iter().zip(&amplitudes).map(|(c, a)| a * c[i]).sum()).collect()
+        };
+        let derivatives = atom.derivatives(&at, &columns, &amplitudes);
+        let parameters = atom.parameters();
+        assert_eq!(derivatives.len(), parameters.len());
+        for (k, derivative) in derivatives.iter().enumerate() {
+            let moved = |by: f64| {
+                let mut values = parameters.clone();
+                values[k] += by;
+                value(&atom.with_parameters(&values))
+            };
+            let largest = derivative.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+            for ((ahead, behind), exact) in moved(STEP).iter().zip(moved(-STEP)).zip(derivative) {
+                let error = ((ahead - behind) / (2.0 * STEP) - exact).abs();
+                assert!(error < 1e-4 * largest, "{atom:?} parameter {k}: {error:e} of {largest:e}");
+            }
+        }
+    }
+}
+
+fn taken_apart(value: impl Fn(f64) -> f64, noise: f64, seed: u64) -> (Decomposition, Vec<Option<f64>>) {
+    let mut generator = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let mut draw = || noise * generator.sample::<f64, _>(StandardNormal);
+    let samples: Vec<Option<f64>> = (0..FRAMES).map(|i| Some(value(i as f64 / RATE_HZ) + draw())).collect();
+    let settings = DecompositionSettings::new(FRAMES, Trend::Polynomial(4), true);
+    let found = Decomposition::from_record(&record(&samples), settings).unwrap();
+    (found, samples)
+}
+
+fn record(samples: &[Option<f64>]) -> SampledRecord<'_> {
+    SampledRecord { samples, frame_rate_hz: RATE_HZ, exposure_s: None }
+}
+
+/// Frequencies, Hz, of the components, rising, with their deviations.
+fn listed(found: &Decomposition, samples: &[Option<f64>]) -> Vec<(f64, f64)> {
+    let components = found.components(&record(samples), &SpectrumSettings::default());
+    let mut list: Vec<(f64, f64)> = components.iter().map(|c| (c.frequency_hz, c.frequency_sd_hz)).collect();
+    list.sort_by(|a, b| a.0.total_cmp(&b.0));
+    list
+}
+
+/// Phase, cycles, of a frequency that changes evenly from `from` to `to`, Hz, between the first frame less
+/// half a frame and the last one and a half.
+fn chirp(from: f64, to: f64, t: f64) -> f64 {
+    let (t, duration) = (t + 0.5 / RATE_HZ, FRAMES as f64 / RATE_HZ);
+    from * t + (to - from) * t * t / (2.0 * duration)
+}
+
+#[test]
+fn parts_without_noise_are_found_exactly() {
+    let value = |t: f64| {
+        let ring = |since: f64| 2e-5 * (-60.0 * since).exp() * (TAU * 410.0 * since).sin();
+        1e-3 * ((t - 0.07) / 0.004).tanh()
+            + 1e-5 * (TAU * chirp(700.0, 1100.0, t)).cos()
+            + if t >= 0.08 { ring(t - 0.08) } else { 0.0 }
+    };
+    let (found, samples) = taken_apart(value, 1e-10, 1);
+    let list = listed(&found, &samples);
+    assert_eq!(list.len(), 2, "{list:?}");
+    assert!((list[0].0 - 410.0).abs() < 1e-3 && (list[1].0 - 900.0).abs() < 1e-3, "{list:?}");
+    let left = found.explanation.squares.sqrt() * found.scale_m;
+    assert!(left < 1e-8, "{left:e} m left in all frames together");
+}
+
+#[test]
+fn two_cycles_that_cross_are_two_and_a_line_between_them_is_a_third() {
+    for seed in 0..4 {
+        let value = |t: f64| {
+            let phases = [chirp(300.0, 700.0, t), chirp(620.0, 380.0, t) + 0.2, 480.0 * t + 0.7];
+            phases.iter().map(|p| 1e-5 * (TAU * p).cos()).sum()
+        };
+        let (found, samples) = taken_apart(value, 7e-7, seed);
+        let list = listed(&found, &samples);
+        assert_eq!(list.len(), 3, "seed {seed}: {list:?}");
+        for ((hz, sd_hz), exact) in list.iter().zip([480.0, 500.0, 500.0]) {
+            assert!((hz - exact).abs() < 4.0 * sd_hz && *sd_hz < 0.5, "seed {seed}: {list:?}");
+        }
+    }
+}
+
+#[test]
+fn mistracked_frames_are_left_out_and_both_tones_are_clear() {
+    let mut generator = Xoshiro256PlusPlus::seed_from_u64(3);
+    let (_, mut samples) =
+        taken_apart(|t| 1e-5 * ((TAU * 84.7 * t).cos() + (TAU * 865.6 * t).cos()), 7e-7, 4);
+    for i in (5..FRAMES).step_by(93) {
+        *samples[i].as_mut().unwrap() += 3e-4 * (generator.random::<f64>() + 0.5);
+    }
+    let settings = DecompositionSettings::new(FRAMES, Trend::Polynomial(4), true);
+    let found = Decomposition::from_record(&record(&samples), settings).unwrap();
+    // the bad frames, and at most three good ones
+    assert!((FRAMES - 12..=FRAMES - 9).contains(&found.problem.len()), "{}", found.problem.len());
+    let components = found.components(&record(&samples), &SpectrumSettings::default());
+    assert_eq!(components.len(), 2, "{components:?}");
+    assert!(components.iter().all(|c| c.verdict == ComponentVerdict::Clear), "{components:?}");
+}
+
+#[test]
+fn a_record_without_variation_has_no_parts() {
+    let samples = vec![Some(3.0); 100];
+    let settings = DecompositionSettings::new(100, Trend::Polynomial(4), true);
+    assert!(Decomposition::from_record(&record(&samples), settings).is_none());
+}
