@@ -1,6 +1,6 @@
 //! One model for every record: a trend, oscillations with decay, onset and drift, harmonics, smooth steps and
-//! relaxations, frames left out at a price, and autoregressive noise. One criterion, the posterior
-//! probability, chooses among all of them (Djurić 1996, *IEEE Trans. Signal Process.* 44).
+//! relaxations, frames that are left out at a price, and autoregressive noise. The posterior probability
+//! decides which of these parts a record has (Djurić 1996, *IEEE Trans. Signal Process.* 44).
 
 mod atom;
 mod candidates;
@@ -23,18 +23,20 @@ use portable_math as math;
 use problem::{Explanation, NoisyRecord, Parts};
 use search::{PartSearch, Rival};
 
-/// Most oscillations that are looked for, and frames for each: an oscillation has up to six parameters.
+/// Largest number of oscillations; it bounds the time of a search.
 const MOST_OSCILLATIONS: usize = 12;
+/// Frames per oscillation: an oscillation with decay, onset and linear drift has six parameters, so this
+/// allows about three frames per parameter.
 const FRAMES_PER_OSCILLATION: usize = 16;
-/// Highest order of the noise.
+/// Highest order of the noise: the number of coefficients that [`crate::noise`] can hold.
 const MOST_ORDER: usize = 8;
 
-/// A record taken apart.
+/// The most probable explanation of a record, with the frames and the noise for which it holds.
 pub(crate) struct Decomposition {
     problem: NoisyRecord,
     explanation: Explanation,
     rivals: Vec<Rival>,
-    /// Size, m, of one unit of the scaled values.
+    /// Size, m, of one unit of the scaled values: the standard deviation of the record.
     scale_m: f64,
 }
 
@@ -42,15 +44,16 @@ pub(crate) struct Decomposition {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct DecompositionSettings {
     pub trend: Trend,
-    /// Whether the trend may become richer, with smooth steps and jumps.
+    /// Whether the trend may get more columns, and steps, relaxations and a jump may be added to it.
     pub trend_grows: bool,
-    /// Most oscillations.
+    /// Largest number of oscillations.
     pub most_oscillations: usize,
 }
 
-/// The components of a record with their verdicts, the largest first: trend, oscillations, steps and noise
-/// are chosen together by their posterior probability. `settings.detrend`, if given, is the only trend;
-/// without it the trend starts as a cubic and may grow.
+/// The components of a record inside the band of the settings with their verdicts, the largest first, at most
+/// `settings.max_components`. Trend, oscillations, steps and noise are chosen together by their posterior
+/// probability. `settings.detrend`, if given, is the only trend; without it the trend starts as a cubic and
+/// may grow. The list is empty if too few frames have a value or all values are equal.
 ///
 /// # Errors
 /// [`SpectrumError`] if the record, the frame rate or the band allows no spectrum.
@@ -88,7 +91,8 @@ impl DecompositionSettings {
 }
 
 impl Decomposition {
-    /// Takes a record apart; `None` if too few frames have a value or all are equal.
+    /// Finds the most probable explanation of a record; `None` if too few frames have a value or all values
+    /// are equal.
     pub(crate) fn from_record(record: &SampledRecord, settings: DecompositionSettings) -> Option<Self> {
         let samples = record.samples;
         let used: Vec<usize> = (0..samples.len()).filter(|i| samples[*i].is_some()).collect();
@@ -112,11 +116,15 @@ impl Decomposition {
     }
 }
 
-/// The most probable explanation among those with and without a jump, in white and in coloured noise.
+/// The most probable explanation among those with and without a jump, in white and in coloured noise. A first
+/// search in white noise finds the slow parts. The noise that these leave decides whether coloured noise is
+/// tried.
 fn select_explanation(white: NoisyRecord, settings: &DecompositionSettings) -> (PartSearch, Explanation) {
-    /// Number of oscillations of a first look in white noise.
+    /// Largest number of oscillations in the first search: the slow parts are known before all oscillations
+    /// are.
     const FIRST_LOOK: usize = 4;
-    /// Lead in the criterion, nats, with which an explanation ends the search for others.
+    /// If a jump lowers the criterion of the first search by more than this, nats, that search is not
+    /// completed: further oscillations do not make up for the jump.
     const CLEAR_LEAD: f64 = 20.0;
     let start = Parts { trend: settings.trend, atoms: Vec::new() };
     let new_search = |problem: NoisyRecord, most: usize| PartSearch::new(problem, settings.trend_grows, most);
@@ -170,11 +178,13 @@ fn select_explanation(white: NoisyRecord, settings: &DecompositionSettings) -> (
     best.expect("an explanation was taken")
 }
 
-/// The search again in the noise that its explanation leaves, as long as that is more probable.
+/// Repeats a search in the noise that its explanation leaves, as long as this lowers the criterion by at
+/// least 0.1 nats.
 fn search_in_left_noise(
     mut best: (PartSearch, Explanation),
     settings: &DecompositionSettings,
 ) -> (PartSearch, Explanation) {
+    /// Largest number of repetitions; it bounds the time.
     const MOST_ROUNDS: usize = 3;
     for _ in 0..MOST_ROUNDS {
         let coloured = with_noise_of(&best.0.problem, &best.1.parts);
@@ -191,10 +201,12 @@ fn search_in_left_noise(
     best
 }
 
-/// The problem with the noise below the lines of what parts leave: a running median of the power density,
-/// which lines do not change, gives the autocorrelation.
+/// The problem in the noise that `parts` leave, without the lines of further oscillations. A running median
+/// over frequency removes lines from the power density of the residual. The transform of the smooth density
+/// gives the autocorrelation, and Levinson's recursion gives the coefficients.
 fn with_background(problem: &NoisyRecord, parts: &Parts) -> NoisyRecord {
-    /// Half width of the running median, bins: four times that of a line.
+    /// Half width of the running median, resolutions: four times the half width of a line under a Hann
+    /// window, so that a line changes fewer than half of the values.
     const HALF_WIDTH: usize = 8;
     let white = problem.clone().with_noise(&[]);
     let left = white.fit_parts(parts, 4);
@@ -239,10 +251,11 @@ fn with_background(problem: &NoisyRecord, parts: &Parts) -> NoisyRecord {
     white.with_noise(&best.1)
 }
 
-/// Gain of the criterion, nats, that the scatter of a running median pretends.
+/// A higher order must lower the criterion by more than this, nats: the scatter of a running median alone can
+/// cause a smaller fall.
 const MEDIAN_SCATTER: f64 = 4.0;
 
-/// The problem with the noise that parts leave.
+/// The problem in noise with the coefficients estimated from the residual of `parts`.
 fn with_noise_of(problem: &NoisyRecord, parts: &Parts) -> NoisyRecord {
     let white = problem.clone().with_noise(&[]);
     let left = white.fit_parts(parts, 4);
@@ -250,14 +263,15 @@ fn with_noise_of(problem: &NoisyRecord, parts: &Parts) -> NoisyRecord {
     white.with_noise(&coefficients)
 }
 
-/// Highest order of the noise of so many frames.
+/// Highest order of the noise of a record of which `frames` frames are used.
 fn most_order(frames: usize) -> usize {
+    /// Frames per coefficient: a coefficient from 25 frames has a standard deviation of a fifth.
     const FRAMES_PER_COEFFICIENT: usize = 25;
     MOST_ORDER.min(frames / FRAMES_PER_COEFFICIENT)
 }
 
-/// Autoregressive coefficients of a residual with gaps (Burg's method over the stretches without a gap); the
-/// order has the lowest Bayesian information criterion.
+/// Autoregressive coefficients of a residual with gaps, by Burg's method over the stretches without a gap.
+/// The order is that with the lowest Bayesian information criterion.
 fn estimate_coefficients(used: &[usize], residual: &[f64]) -> Vec<f64> {
     let n = residual.len() as f64;
     let mut stretches: Vec<(Vec<f64>, Vec<f64>)> = Vec::new();
@@ -300,16 +314,18 @@ fn estimate_coefficients(used: &[usize], residual: &[f64]) -> Vec<f64> {
     best.1
 }
 
-/// The interval that is best left out between two trends, with the parts that describe the jump; `None` if
-/// leaving nothing out is as probable.
+/// The problem without the frames of a jump, with a trend that starts anew behind them. The interval left out
+/// is the one with the lowest criterion; its two ends cost one unit of price each. `None` if this lowers the
+/// criterion too little.
 fn find_jump(problem: &NoisyRecord, start: &Parts) -> Option<(NoisyRecord, Parts)> {
+    /// Lengths, frames, of the intervals from which the search starts: from one frame to a slow jump.
     const WIDTHS: [usize; 9] = [1, 2, 6, 15, 30, 60, 100, 150, 250];
-    /// Fall of the criterion, nats, from which a jump is tried.
+    /// Smallest fall of the criterion, nats, with which a jump is tried: each jump costs another search.
     const WORTHWHILE: f64 = 8.0;
     let n = problem.len();
     let frames = problem.at.frames;
     let base = problem.fit_parts(start, 0).criterion;
-    // the steepest rise over a sixtieth of the record
+    // the interval lies around the steepest change within a sixtieth of the frames
     let span = (n / 60).max(3);
     if n < 4 * span + 12 {
         return None;

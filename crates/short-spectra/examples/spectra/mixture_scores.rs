@@ -1,20 +1,25 @@
-//! What methods list of random records, held against what the records hold, in one table.
+//! Compares the components that methods list of random records with the oscillations in these records, in one
+//! table.
 //!
-//! A component is an oscillation if its frequency is within the largest of these of the oscillation's mean
-//! frequency: one resolution (`1/T`); four stated deviations, but at most two resolutions; four Cramér-Rao
-//! bounds; for combs the width that their jitter gives the line. A range must overlap that of the
-//! oscillation, widened as much. Each oscillation takes one component, the nearest pairs first. Multiples of
-//! a comb and sidebands of a modulated cycle are not sought and not false.
+//! A component matches an oscillation if its frequency differs from the oscillation's mean frequency by at
+//! most the largest of these distances: one resolution (`1/T`); four stated deviations, but at most two
+//! resolutions; four Cramér-Rao bounds; for combs the width that their jitter gives the line. Its range must
+//! overlap that of the oscillation, widened by this distance. Each oscillation gets at most one component,
+//! and the nearest pairs come first. Multiples of a comb and sidebands of a modulated cycle are neither
+//! sought nor false.
 //!
-//! - missed: above 15 dB, not listed and not in the interval (frequency ± deviation, at most two resolutions)
-//!   of a component with a doubt.
-//! - false: components that are no oscillation and no part of one.
-//! - wrong clear: `clear`, and no oscillation or part within four deviations (or the width from jitter).
-//! - clear kept: `clear` and within four deviations, of the oscillations above 20 dB.
-//! - scaled: error over stated deviation, and over the bound, of the clear components that are oscillations:
-//!   rms, and in brackets the median of the absolute values over 0.6745.
-//! - apart: oscillations with fewer than three cycles or within one resolution of another are left out of all
-//!   that; those above 15 dB are counted with the missed ones, and the wrong clear components that lie there.
+//! - missed: oscillations above 15 dB that match no component and lie in no interval of a component with a
+//!   doubt. The interval is frequency ± deviation, where the deviation counts as at most one resolution.
+//! - false: components that match no oscillation and are no multiple or sideband of one.
+//! - wrong clear: `clear` components without an oscillation, multiple or sideband within four deviations (or
+//!   the width from jitter).
+//! - clear kept: of the oscillations above 20 dB, the fraction with a `clear` component within four
+//!   deviations.
+//! - error/deviation, error/CRB: errors of the clear components that match, over the stated deviation and
+//!   over the Cramér-Rao bound: rms, and in brackets the median of the absolute values over 0.6745.
+//! - apart: oscillations with fewer than three cycles or within one resolution of another are left out of the
+//!   columns above. The last columns count those of them above 15 dB, those missed, and the wrong clear
+//!   components that match one of them.
 
 use crate::mixtures::{Mixture, Oscillation};
 use crate::rivals;
@@ -25,8 +30,8 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-/// A method: its name, what it lists of samples with their rate in Hz, and whether it gives deviations and
-/// verdicts.
+/// A method: its name, the function that lists the components of samples with their rate in Hz, and whether
+/// it gives deviations and verdicts.
 type Method = (&'static str, fn(&[Option<f64>], f64) -> Reading, bool);
 
 const METHODS: [Method; 4] = [
@@ -36,7 +41,8 @@ const METHODS: [Method; 4] = [
     ("Lomb-Scargle", |samples, rate_hz| list_frequencies(rivals::lomb_scargle(samples, rate_hz)), false),
 ];
 
-/// The complete analysis. Frequencies above the fold are sought where they appear, so none is suspected.
+/// The complete analysis. A frequency above the fold counts at the frequency at which it appears, so no
+/// component is suspected of folding.
 fn read_today(samples: &[Option<f64>], rate_hz: f64) -> Reading {
     let settings = SpectrumSettings { fastest_hz: 0.0, ..SpectrumSettings::default() };
     read_record(&SampledRecord { samples, frame_rate_hz: rate_hz, exposure_s: None }, &settings)
@@ -56,26 +62,33 @@ fn list_frequencies(list: Vec<f64>) -> Reading {
     Reading { components: list.into_iter().map(component).collect(), from_s: 0.0 }
 }
 
-/// Signal-to-noise ratios from which an oscillation is sought, and from which it should be clear, dB.
+/// Signal-to-noise ratio, dB, above which an oscillation is sought: weaker ones are often hidden in the
+/// noise.
 const SOUGHT_DB: f64 = 15.0;
+/// Signal-to-noise ratio, dB, above which an oscillation should be clear.
 const STRONG_DB: f64 = 20.0;
+/// Number of stated deviations beyond which a component is wrong: a normal error exceeds it in one of 16,000
+/// cases.
 const FALSE_DEVIATIONS: f64 = 4.0;
-/// Records of a pair of kinds from which it has a line.
+/// Smallest number of records with a pair of kinds for which the table has a row: fewer say little.
 const PAIR_RECORDS: usize = 20;
 
-/// What became of an oscillation.
+/// How a method lists an oscillation.
 struct Fate {
     kind: &'static str,
     snr_db: f64,
     apart: bool,
+    /// Whether a component matches it.
     listed: bool,
+    /// Whether it lies in the interval of a component with a doubt.
     covered: bool,
+    /// Whether a clear component matches it within four deviations.
     kept: bool,
-    /// Error over the deviation and over the bound, if it is listed as clear.
+    /// Error over the deviation and over the bound, if the component is clear.
     scaled: Option<(f64, Option<f64>)>,
 }
 
-/// What a method lists of a record.
+/// Counts of what a method lists of a record.
 struct Outcome {
     fates: Vec<Fate>,
     /// False components by verdict.
@@ -182,15 +195,16 @@ struct Tally {
     scaled: Vec<f64>,
     over_bound: Vec<f64>,
     ms: Vec<f64>,
-    /// Sought, missed and wrong clear apart.
+    /// Numbers of sought, missed and wrong clear ones among those apart.
     apart: [usize; 3],
-    /// Records without a missed oscillation, and those of them with a false component of each verdict.
+    /// Number of records in which every oscillation is listed or covered, whatever its signal-to-noise ratio,
+    /// and the number of these with a false component of each verdict.
     open: usize,
     needless: BTreeMap<ComponentVerdict, usize>,
 }
 
 impl Tally {
-    /// Adds a record; of its oscillations only those of a kind, if one is given.
+    /// Adds a record. If a kind is given, only oscillations of this kind count; components count in any case.
     fn add(&mut self, outcome: &Outcome, kind: Option<&str>) {
         self.records += 1;
         for fate in outcome.fates.iter().filter(|fate| kind.is_none_or(|kind| fate.kind == kind)) {
@@ -239,7 +253,7 @@ fn format_percent(part: usize, of: usize) -> String {
     if of == 0 { "-".to_owned() } else { format!("{:.1} %", 100.0 * part as f64 / of as f64) }
 }
 
-/// Rms, and in brackets the deviation from the median of the absolute values.
+/// Rms, and in brackets the standard deviation that follows from the median of the absolute values.
 fn format_spread(values: &[f64]) -> String {
     let mut sizes: Vec<f64> = values.iter().map(|value| value.abs()).collect();
     sizes.sort_by(f64::total_cmp);
@@ -248,15 +262,16 @@ fn format_spread(values: &[f64]) -> String {
         .map_or_else(|| "-".to_owned(), |m| format!("{:.2} ({:.2})", rms(values), m / 0.6745))
 }
 
-/// Time that this thread has used since it started, ms, to some milliseconds; `None` where the system does
-/// not say it.
+/// Processor time of this thread since its start, ms, to a few milliseconds; `None` on systems without it.
 fn thread_ms() -> Option<f64> {
     let said = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
     said.split(' ').next()?.parse::<f64>().ok().map(|ns| ns / 1e6)
 }
 
-/// What a call returns, and the time it takes, ms: wall time of short ones, processor time of long ones.
+/// The result of a call and the time that it takes, ms: wall time of short calls, processor time of long
+/// ones.
 fn run_timed<T>(call: impl FnOnce() -> T) -> (T, f64) {
+    /// Wall time, ms, up to which a call is short: processor time is too coarse for it.
     const SHORT_MS: f64 = 20.0;
     let (started, before_ms) = (Instant::now(), thread_ms());
     let result = call();
@@ -302,7 +317,8 @@ fn judge_seed(seed: u64, filter: &[&str], methods: &[Method]) -> Option<Judged> 
     Some(Judged { seed, families, truth, outcomes, found })
 }
 
-/// Judges the records of some seeds, each on one thread, so that its time is that of the thread.
+/// Judges the records of seeds in parallel, each on one thread, so that the time of a record is that of its
+/// thread.
 fn judge_seeds(seeds: std::ops::Range<u64>, filter: &[&str], methods: &[Method]) -> Vec<Judged> {
     let (next, all) = (AtomicU64::new(seeds.start), Mutex::new(BTreeMap::new()));
     let work = || {
@@ -322,9 +338,9 @@ fn judge_seeds(seeds: std::ops::Range<u64>, filter: &[&str], methods: &[Method])
     all.into_inner().expect("no thread fails").into_values().collect()
 }
 
-/// Prints what `mixtures COUNT [FIRST_SEED] [WORD..]` asks for: the table, with `list` the records with a
-/// miss or a wrong clear component, with `dump` the samples of the first record. The name of a method selects
-/// it; any other word selects the records of the families that contain it.
+/// Prints the result of `mixtures COUNT [FIRST_SEED] [WORD..]`: the table; with `list` the records with a
+/// missed oscillation or a wrong clear component; with `dump` the samples of the first record. The name of a
+/// method selects this method. Any other word selects the records with a family whose name contains it.
 pub fn print_scores(arguments: &[String]) {
     let mut numbers = arguments.iter().filter_map(|word| word.parse::<u64>().ok());
     let (count, first) = (numbers.next().unwrap_or(2000), numbers.next().unwrap_or(1));

@@ -13,7 +13,8 @@ use std::f64::consts::{PI, TAU};
 
 /// Standard deviation of the noise without the shake of a camera, m.
 const NOISE_M: f64 = 1e-6;
-/// Most multiples of a comb.
+/// Largest number of multiples of a comb: a further one would have at most a seventh of the height of the
+/// first.
 const MULTIPLES: usize = 6;
 
 /// A random record and what it holds.
@@ -21,7 +22,7 @@ pub struct Mixture {
     pub samples: Vec<Option<f64>>,
     pub rate_hz: f64,
     pub oscillations: Vec<Oscillation>,
-    /// Kinds of length, trend, flip, fault and noise.
+    /// Length, trend, flip, fault and noise of the record, each as `family: kind`.
     pub families: Vec<String>,
 }
 
@@ -35,15 +36,15 @@ pub struct Oscillation {
     /// Cramér-Rao bound of the mean frequency, Hz; `None` for a comb with jitter, whose frequency no model of
     /// a few parameters describes.
     pub bound_hz: Option<f64>,
-    /// Fewer than three cycles, or closer than one resolution to another oscillation.
+    /// Whether it has fewer than three cycles, or is within one resolution of another oscillation.
     pub apart: bool,
-    /// Cycles at each frame. The frequency between two frames is the difference times the frame rate.
+    /// Phase at each frame, cycles. The frequency between two frames is the difference times the frame rate.
     cycles: Vec<f64>,
     /// Amplitude of the first multiple at each frame, m; zero before the onset.
     envelope_m: Vec<f64>,
-    /// Heights of the multiples of a comb over that of the first; `[1.0]` for other kinds.
+    /// Amplitudes of the multiples of a comb relative to that of the first; `[1.0]` for other kinds.
     multiples: Vec<f64>,
-    /// Standard deviation of a period of a comb over the period.
+    /// Standard deviation of a period of a comb, relative to the mean period.
     jitter: f64,
     /// Frequency of an amplitude modulation, Hz.
     modulation_hz: Option<f64>,
@@ -70,8 +71,9 @@ impl Oscillation {
         (ends.0.min(ends.1), ends.0.max(ends.1))
     }
 
-    /// Full width of the line of a multiple of a comb with jitter, Hz: each period adds an independent
-    /// `2 pi h j` to the phase, which gives a Lorentz line of the width `2 pi h^2 j^2 f`.
+    /// Full width at half maximum of the line of a multiple of a comb with jitter, Hz. Each period adds an
+    /// independent error with the standard deviation `2 pi h j` to the phase of multiple `h`, which gives a
+    /// Lorentz line of the width `2 pi h^2 j^2 f`.
     pub fn width_hz(&self, multiple: usize) -> f64 {
         TAU * (multiple as f64 * self.jitter).powi(2) * self.mean_hz(0.0)
     }
@@ -101,7 +103,7 @@ impl Draw {
         self.within(0.0, 1.0) < probability
     }
 
-    /// Evenly distributed logarithm.
+    /// A number between `low` and `high` with an evenly distributed logarithm.
     fn ratio(&mut self, low: f64, high: f64) -> f64 {
         self.within(low.ln(), high.ln()).exp()
     }
@@ -115,7 +117,7 @@ impl Draw {
 struct Window {
     frames: usize,
     rate_hz: f64,
-    /// Highest frequency below the fold of the frames that are kept, Hz.
+    /// Highest frequency of an oscillation, Hz: nine tenths of the fold of the frames that are kept.
     top_hz: f64,
     good: Vec<bool>,
 }
@@ -130,7 +132,8 @@ impl Mixture {
     pub fn from_seed(seed: u64) -> Self {
         let draw = &mut Draw::from_seed(seed);
         let (few, count) = (draw.chance(0.47), draw.choose(&[0, 1, 2]));
-        // of a simple record, as many complications as drawn; of others each with a probability
+        // a simple record gets at most as many complications as drawn, any other each with the same
+        // probability
         let mut gates = [false; 6];
         if few {
             (0..count).for_each(|_| gates[draw.choose(&[0, 1, 2, 3, 4, 5])] = true);
@@ -207,7 +210,7 @@ const FAULTS: [&str; 7] = [
     "camera shakes",
 ];
 
-/// Frames that show the motion where it is.
+/// Whether each frame shows the motion at its own time and place.
 fn draw_good_frames(fault: &str, frames: usize, draw: &mut Draw) -> Vec<bool> {
     let mut good = vec![true; frames];
     match fault {
@@ -244,14 +247,14 @@ fn spoil_frames(fault: &str, values: &mut [f64], good: &[bool], draw: &mut Draw)
     }
 }
 
-/// Noise as its power in the bins of a circle of frames, in units of the power of white noise of the
-/// deviation `NOISE_M`.
+/// Noise, as its power in the bins of the transform of a periodic record. The unit is the power of white
+/// noise of the standard deviation `NOISE_M`.
 struct Noise {
     power: Vec<f64>,
 }
 
 impl Noise {
-    /// Of the unit variance, from a shape over cycles a frame.
+    /// Noise of unit variance from the shape of its power over frequency, cycles per frame.
     fn of_shape(frames: usize, shape: impl Fn(f64) -> f64) -> Self {
         let size = (4 * frames).next_power_of_two();
         let power: Vec<f64> = (0..size).map(|bin| shape(bin.min(size - bin) as f64 / size as f64)).collect();
@@ -263,14 +266,15 @@ impl Noise {
         Self::of_shape(frames, |_| 1.0)
     }
 
-    /// Band around a frequency, both in resolutions: an autoregression of the second order.
+    /// A band of noise around a frequency, `place` and `width` in resolutions: an autoregression of the
+    /// second order.
     fn resonance(frames: usize, place: f64, width: f64) -> Self {
         let (radius, angle) = ((-PI * width / frames as f64).exp(), TAU * place / frames as f64);
         let distance = move |sum: f64| 1.0 + radius * radius - 2.0 * radius * sum.cos();
         Self::of_shape(frames, |cycles| 1.0 / distance(TAU * cycles - angle) / distance(TAU * cycles + angle))
     }
 
-    /// One-sided density within one resolution of a frequency, m²/Hz.
+    /// Mean one-sided density within one resolution of a frequency, m²/Hz.
     fn density(&self, hz: f64, window: &Window) -> f64 {
         let bins_a_hz = self.power.len() as f64 / window.rate_hz;
         let reach = (bins_a_hz / window.duration_s()).ceil() as usize;
@@ -278,7 +282,7 @@ impl Noise {
         2.0 * NOISE_M * NOISE_M / window.rate_hz * mean(&self.power[bin.saturating_sub(reach)..=bin + reach])
     }
 
-    /// Values with this power. The Hartley transform of white noise is white noise.
+    /// Values with this power, m. Uses a Hartley transform, which turns white noise into white noise.
     fn draw_values(&self, frames: usize, draw: &mut Draw) -> Vec<f64> {
         let bins: Vec<f64> = self.power.iter().map(|power| power.sqrt() * draw.normal()).collect();
         let scale = NOISE_M / (bins.len() as f64).sqrt();
@@ -314,7 +318,7 @@ fn draw_noise(window: &Window, draw: &mut Draw) -> (&'static str, Noise) {
     (name, noise)
 }
 
-/// A slow motion over the record (0 to 1), m.
+/// A slow motion, m, over the position in the record, 0 to 1.
 type Motion = Box<dyn Fn(f64) -> f64>;
 
 fn stand_still() -> Motion {
@@ -332,7 +336,7 @@ fn draw_trend(draw: &mut Draw) -> (&'static str, Motion) {
     ("polynomial", Box::new(move |s| height_m * legendre(2.0 * s - 1.0)))
 }
 
-/// Name, place in the record and motion of a flip.
+/// Name, position in the record (0 to 1) and motion of a flip.
 fn draw_flip(rings: bool, draw: &mut Draw) -> (&'static str, f64, Motion) {
     const FLIPS: [&str; 8] = [
         "tanh",
@@ -421,7 +425,7 @@ fn make_steady(kind: &'static str, hz: f64, window: &Window, draw: &mut Draw) ->
 
 fn draw_oscillation(kind: &'static str, window: &Window, at: f64, draw: &mut Draw) -> Oscillation {
     let (duration_s, phase) = (window.duration_s(), draw.within(0.0, 1.0));
-    // multiples, sidebands and the second of a pair stay below the fold too
+    // room for multiples, sidebands and the second of a pair below the fold
     let room = match kind {
         "comb" => 3.0,
         "modulated" => 1.5,
@@ -495,7 +499,8 @@ fn draw_oscillation(kind: &'static str, window: &Window, at: f64, draw: &mut Dra
 }
 
 impl Oscillation {
-    /// Scales the amplitude. Frames that do not show the motion raise the noise as if they were white noise.
+    /// Scales the amplitude to a signal-to-noise ratio. Frames that do not show the motion count as
+    /// additional white noise.
     fn scale_to(&mut self, snr_db: f64, noise: &Noise, window: &Window) {
         let squares: Vec<f64> = (0..window.frames).map(|i| self.displacement_m(i, 0.0).powi(2)).collect();
         let (all, good) = (window.frames as f64, window.good.iter().filter(|good| **good).count() as f64);
@@ -508,11 +513,13 @@ impl Oscillation {
     }
 }
 
-/// Cramér-Rao bounds of the frequencies with all parameters of all oscillations and a cubic unknown, Hz.
+/// Cramér-Rao bounds of the frequencies, Hz; all parameters of all oscillations and of a cubic trend are
+/// unknown.
 ///
-/// Unknown are amplitude, phase and frequency, of damped and growing ones the decay, of drifting ones the
-/// rate of the drift, of combs every multiple's amplitude and phase; onset, modulation and dropped beats are
-/// known. The noise counts as white with its density around each oscillation.
+/// Every oscillation has an unknown amplitude, phase and frequency; damped and growing ones an unknown decay,
+/// drifting ones an unknown rate of drift, combs an unknown amplitude and phase of every multiple. Onset,
+/// modulation and dropped beats are known. The noise counts as white with its density around each
+/// oscillation.
 fn bound_frequencies(list: &[Oscillation], noise: &Noise, window: &Window) -> Vec<Option<f64>> {
     let rows: Vec<usize> = (0..window.frames).filter(|i| window.good[*i]).collect();
     let mut columns: Vec<Vec<f64>> = Vec::new();
@@ -548,7 +555,7 @@ fn bound_frequencies(list: &[Oscillation], noise: &Noise, window: &Window) -> Ve
     let bound = |(oscillation, slope): (&Oscillation, &usize)| {
         let variance = inverse.as_ref()?[(*slope, *slope)] / norms[*slope].powi(2);
         let density = noise.density(oscillation.mean_hz(0.0), window);
-        // a column is the derivative with respect to `2 pi f T / 2`
+        // the column of a frequency is the derivative with respect to `2 pi f T / 2`
         let bound_hz = (variance * density * window.rate_hz / 2.0).sqrt() / (PI * window.duration_s());
         (oscillation.jitter == 0.0).then_some(bound_hz)
     };

@@ -1,5 +1,5 @@
-//! The parts of which a record may consist beside its trend and noise, each a few columns that are linear in
-//! their amplitudes and depend on a few shape parameters.
+//! The parts of a record other than its trend and noise. A part is a sum of columns, each times an amplitude.
+//! The columns depend on a few shape parameters.
 
 use crate::trend::LEGENDRE;
 use portable_math as math;
@@ -14,41 +14,45 @@ pub(crate) struct FramePlaces {
     pub frames: usize,
 }
 
-/// Highest degree of the phase of an oscillation.
+/// Highest degree of the phase of an oscillation; it bounds the number of parameters.
 pub(crate) const MOST_PHASE_DEGREE: usize = 9;
-/// Highest degree of the amplitude of an oscillation.
+/// Highest degree of the amplitude of an oscillation: amplitudes that change faster are sums of oscillations.
 pub(crate) const MOST_ENVELOPE_DEGREE: usize = 6;
-/// Fastest decay, nepers per record, that is fitted.
+/// Fastest decay that is fitted, nepers per record: about twice that of the fastest filter of
+/// `candidates.rs`.
 pub(crate) const MOST_NEPERS: f64 = 400.0;
-/// Largest growth, nepers per record.
+/// Largest growth, nepers per record: with more, only the last sixth of a record would show the oscillation.
 const MOST_GROWTH: f64 = 6.0;
-/// Distance from the record, in units of its length, at which a step whose tail it shows may have its centre.
+/// Largest distance of the centre of a step from the record, as a fraction of its length: the record then
+/// shows the tail of the step.
 pub(crate) const OUTSIDE: f64 = 0.25;
-/// Fewest cycles in a record of an oscillation; the trend takes what is slower.
+/// Smallest number of cycles of an oscillation in a record; the trend describes slower motion.
 pub(crate) const FEWEST_CYCLES: f64 = 1.5;
-/// Largest damping, nepers per radian: beyond it an oscillation is over within half a cycle and cannot be
-/// told from a relaxation.
+/// Largest damping, nepers per radian: with more, an oscillation ends within half a cycle and cannot be
+/// distinguished from a relaxation.
 const MOST_DAMPING: f64 = 0.6;
 
-/// An oscillation `exp(-d (s - s0)) (a cos 2 pi p(s) + b sin 2 pi p(s))` for `s >= s0`, with harmonics that
-/// share its phase `p(s) = n u/2 + sum q_k P_k(u)`, `u = 2 s - 1`, with Legendre polynomials `P_k`.
+/// An oscillation `exp(-d (s - s0)) e(s) (a cos 2 pi p(s) + b sin 2 pi p(s))` for `s >= s0`, and zero before.
+/// `s` is the position in the record, 0 to 1, and `u = 2 s - 1`. The phase is `p(s) = n u/2 + sum q_k P_k(u)`
+/// from degree 2 on, and `e(s) = 1 + sum e_k P_k(u)` from degree 1 on, with Legendre polynomials `P_k`. A
+/// harmonic `h` has the phase `h p(s)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OscillationAtom {
-    /// Cycles in the record without the phase of higher degree.
+    /// Cycles in the record, `n`, without the terms of higher degree of the phase.
     pub cycles: f64,
-    /// Decay over the record, nepers; `None` for a constant amplitude.
+    /// Decay `d`, nepers per record, negative for growth; `None` without decay.
     pub nepers: Option<f64>,
-    /// Position at which it begins; 0 if it is present from the first frame on.
+    /// Position at which it begins, `s0`, 0 to 1; 0 if it is present from the first frame on.
     pub onset: f64,
-    /// Coefficients, cycles, of the Legendre polynomials of degree 2, 3, ... of its phase.
+    /// Coefficients `q_k`, cycles, of degree 2, 3, ... of its phase.
     pub phase: Vec<f64>,
-    /// Coefficients of the Legendre polynomials of degree 1, 2, ... of its amplitude, in units of its mean.
+    /// Coefficients `e_k` of degree 1, 2, ... of its amplitude, in units of its mean.
     pub envelope: Vec<f64>,
-    /// Multiples of its frequency that are present beside it.
+    /// Its harmonics, as multiples of its frequency from 2 on.
     pub multiples: Vec<usize>,
 }
 
-/// Shape of a smooth step.
+/// Shape of a smooth step as a function of `x`, from -1 to 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum StepShape {
     /// `tanh x`.
@@ -87,13 +91,13 @@ impl StepShape {
         }
     }
 
-    /// Width of this step with the steepness of a hyperbolic tangent of unit width.
+    /// Slope at 0. A step of this width is as steep as a hyperbolic tangent of unit width.
     pub(crate) fn steepness(self) -> f64 {
         self.value_and_slope(0.0).1
     }
 }
 
-/// A part of a record.
+/// A part of a record. Positions and widths are fractions of the record.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Atom {
     Oscillation(OscillationAtom),
@@ -103,12 +107,13 @@ pub(crate) enum Atom {
         centre: f64,
         width: f64,
     },
-    /// A step at `onset` that relaxes exponentially to its end value; without the step if `onset` is 0.
+    /// A step at `onset` and an exponential decay that begins there, `nepers` per record. Without the step if
+    /// `onset` is 0: the trend contains it.
     Relaxation {
         onset: f64,
         nepers: f64,
     },
-    /// From this position on, the trend is a cubic of its own.
+    /// From this position on, a cubic is added to the trend.
     Break {
         at: f64,
     },
@@ -139,12 +144,15 @@ impl OscillationAtom {
 
     /// Frequency, cycles per record, at position `s`.
     pub(crate) fn cycles_at(&self, s: f64) -> f64 {
+        /// Half of the interval of the difference, as a fraction of the record: short for a phase of degree
+        /// nine, and long enough that rounding errors do not matter.
         const STEP: f64 = 1e-4;
         (self.phase_at(s + STEP) - self.phase_at(s - STEP)) / (2.0 * STEP)
     }
 
     /// Position at which it is over: a twentieth of its amplitude is left, or the record ends.
     fn end_place(&self) -> f64 {
+        /// Decay, nepers, that leaves a twentieth of the amplitude.
         const OVER_NEPERS: f64 = 3.0;
         let over = |nepers: &f64| *nepers > 0.0;
         self.nepers.filter(over).map_or(1.0, |nepers| (self.onset + OVER_NEPERS / nepers).min(1.0))
@@ -158,8 +166,9 @@ impl OscillationAtom {
         (self.phase_at(self.end_place()) - self.phase_at(self.onset)) / (self.end_place() - self.onset)
     }
 
-    /// Lowest and highest frequency, cycles per record.
+    /// Lowest and highest frequency from its onset until it is over, cycles per record.
     pub fn cycles_range(&self) -> (f64, f64) {
+        /// Number of positions compared: several between two extremes of a phase of degree nine.
         const POINTS: usize = 33;
         let at = |k: usize| {
             self.cycles_at(self.onset + (self.end_place() - self.onset) * k as f64 / (POINTS - 1) as f64)
@@ -167,13 +176,13 @@ impl OscillationAtom {
         (0..POINTS).map(at).fold((f64::INFINITY, 0.0), |(low, high), c| (low.min(c), high.max(c)))
     }
 
-    /// Amplitude at position `s`, in units of its amplitude.
+    /// Factor of the amplitude at position `s`: decay times polynomial.
     pub(crate) fn envelope_at(&self, s: f64) -> f64 {
         let decay = self.decay_at(s);
         if self.envelope.is_empty() || decay == 0.0 { decay } else { decay * self.modulation_at(s) }
     }
 
-    /// Decay at position `s` since the onset.
+    /// Factor of the amplitude by decay since the onset; 0 before it.
     fn decay_at(&self, s: f64) -> f64 {
         if s < self.onset - 1e-12 {
             return 0.0;
@@ -181,7 +190,7 @@ impl OscillationAtom {
         self.nepers.map_or(1.0, |nepers| math::exp((-nepers * (s - self.onset)).min(MOST_GROWTH)))
     }
 
-    /// Factor of the amplitude at position `s` beside the decay.
+    /// Factor of the amplitude by the polynomial `e(s)`.
     fn modulation_at(&self, s: f64) -> f64 {
         let u = 2.0 * s - 1.0;
         let (mut before, mut last, mut sum) = (0.0, 1.0, 1.0);
@@ -192,7 +201,7 @@ impl OscillationAtom {
         sum
     }
 
-    /// Cosine and sine columns of the oscillation and of each multiple.
+    /// Cosine and sine columns of the oscillation, then those of each multiple; one value per frame used.
     fn columns(&self, at: &FramePlaces) -> Vec<Vec<f64>> {
         let mut columns = vec![Vec::with_capacity(at.places.len()); 2 * (1 + self.multiples.len())];
         for s in &at.places {
@@ -215,8 +224,9 @@ impl OscillationAtom {
         columns
     }
 
-    /// Derivatives of the oscillation with these columns and coefficients by each of its parameters: cycles,
-    /// decay if there is one, coefficients of phase and amplitude.
+    /// Derivatives of the oscillation by each of its parameters, one column each: cycles, decay if there is
+    /// one, coefficients of the phase, coefficients of the amplitude. `coefficients` are the amplitudes of
+    /// `columns`.
     fn derivatives(&self, at: &FramePlaces, columns: &[Vec<f64>], coefficients: &[f64]) -> Vec<Vec<f64>> {
         let count = 1 + usize::from(self.nepers.is_some()) + self.phase.len() + self.envelope.len();
         let mut derivatives = vec![Vec::with_capacity(at.places.len()); count];
@@ -271,7 +281,7 @@ impl Atom {
         }
     }
 
-    /// The columns of the part in the frames used.
+    /// The columns of the part, with one value per frame used.
     pub(crate) fn columns(&self, at: &FramePlaces) -> Vec<Vec<f64>> {
         let each = |value: &dyn Fn(f64) -> f64| at.places.iter().map(|s| value(*s)).collect();
         match self {
@@ -291,7 +301,8 @@ impl Atom {
         }
     }
 
-    /// Derivatives by each parameter of the part with these columns and coefficients.
+    /// Derivatives of the part by each parameter, one column each. `coefficients` are the amplitudes of
+    /// `columns`.
     pub(crate) fn derivatives(
         &self,
         at: &FramePlaces,
@@ -315,7 +326,8 @@ impl Atom {
         }
     }
 
-    /// The parameters, in the order of the derivatives.
+    /// The shape parameters that a fit varies, in the order of the derivatives. Onsets and breaks are not
+    /// among them.
     pub(crate) fn parameters(&self) -> Vec<f64> {
         match self {
             Self::Oscillation(o) => std::iter::once(o.cycles)
@@ -329,7 +341,7 @@ impl Atom {
         }
     }
 
-    /// The part with other parameters.
+    /// The part with other values of [`Self::parameters`].
     pub(crate) fn with_parameters(&self, values: &[f64]) -> Self {
         let mut atom = self.clone();
         match &mut atom {
@@ -349,7 +361,8 @@ impl Atom {
         atom
     }
 
-    /// Longest step of each parameter in one iteration: about the range over which the part is linear in it.
+    /// Longest step of each parameter in one iteration: about the range over which the part is linear in the
+    /// parameter.
     pub(crate) fn step_limits(&self) -> Vec<f64> {
         match self {
             Self::Oscillation(o) => {
@@ -366,7 +379,7 @@ impl Atom {
         }
     }
 
-    /// Whether the parameters lie where the part can be told from the others.
+    /// Whether the parameters lie in the range in which the part differs from the trend and from other parts.
     pub(crate) fn is_usable(&self, frames: usize) -> bool {
         match self {
             Self::Oscillation(o) => {
@@ -388,7 +401,8 @@ impl Atom {
     }
 
     /// Price of the part in units of the logarithm of the number of frames. Djurić (1996) derives 1/2 for an
-    /// amplitude and 3/2 for a frequency; a place in the record costs 1, a shape parameter 1 to 3/2.
+    /// amplitude and 3/2 for a frequency. A position in the record costs 1, and every other shape parameter 1
+    /// to 3/2. A harmonic costs two amplitudes and 1/2 for the choice of its multiple.
     pub(crate) fn price(&self) -> f64 {
         match self {
             Self::Oscillation(o) => {

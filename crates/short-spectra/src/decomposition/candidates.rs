@@ -1,5 +1,5 @@
-//! Parts that a residual may contain, from matched filters: steady, decaying, late and drifting oscillations
-//! from transforms, steps and relaxations from averages of neighbouring frames.
+//! Parts that a residual may contain, found by matched filters. Oscillations (steady, decaying, late,
+//! drifting) are found by transforms, steps and relaxations in sums over blocks of frames.
 
 use super::atom::{Atom, FEWEST_CYCLES, OUTSIDE, OscillationAtom, StepShape};
 use super::problem::{Basis, Fixed, NoisyRecord, dot};
@@ -7,21 +7,29 @@ use crate::transform::RealTransform;
 use portable_math as math;
 use std::f64::consts::{PI, TAU};
 
-/// Decays, nepers per record, of the filters for oscillations that are present from the first frame on.
+/// Decays, nepers per record, of the filters for oscillations that are present from the first frame on. The
+/// fit that follows refines them.
 const DECAYS: [f64; 4] = [0.0, 3.0, 7.0, 20.0];
-/// Decays of the filters for oscillations that begin inside the record: neighbours differ by a factor of two,
-/// at which a filter keeps 94 % of the energy.
+/// Decays, nepers per record, of the filters for oscillations that begin inside the record. Neighbours differ
+/// by a factor of two: a filter with the decay of its neighbour keeps 94 % of the amplitude.
 const LATE_DECAYS: [f64; 6] = [6.0, 12.0, 24.0, 48.0, 96.0, 192.0];
-/// Drifts of the filters: half the change of frequency over the record, cycles per record.
+/// Drifts of the filters: half the change of frequency over the record, cycles per record. Neighbours are
+/// further apart at large drifts, so that few filters are enough.
 const DRIFTS: [f64; 16] =
     [1.0, 2.0, 3.5, 5.5, 8.5, 12.5, 17.5, 24.0, 32.5, 45.0, 60.0, 80.0, 110.0, 150.0, 200.0, 270.0];
-/// Nepers over which a filter for a late oscillation extends.
+/// Length of a filter for a late oscillation, as its decay in nepers: it contains 99.8 % of the energy.
 const FILTER_NEPERS: f64 = 3.0;
-/// Number of onsets tried in the time in which an oscillation decays by a neper.
+/// Number of onsets tried in the time in which an oscillation decays by a neper: a filter that begins half an
+/// interval too early or too late keeps 61 % of the energy, and the fit that follows moves the onset.
 const ONSETS_PER_DECAY: f64 = 2.0;
+/// Widths of steps, as fractions of the record. Neighbours differ by a factor of about two, and the fit that
+/// follows refines them.
 const STEP_WIDTHS: [f64; 6] = [0.004, 0.01, 0.022, 0.045, 0.09, 0.16];
+/// Decays of relaxations, nepers per record. Neighbours differ by a factor of about 2.5, and the fit that
+/// follows refines them.
 const RELAXATIONS: [f64; 6] = [3.0, 8.0, 20.0, 50.0, 120.0, 300.0];
-/// Number of averages of neighbouring frames for steps and relaxations.
+/// Largest number of blocks of frames: steps and relaxations are slow, so sums over blocks show them, and a
+/// record of any length takes the same time.
 const BLOCKS: usize = 128;
 
 /// A part that may be added, with the estimated fall of the criterion, nats.
@@ -33,17 +41,19 @@ pub(crate) struct Candidate {
 
 struct Search<'a> {
     problem: &'a NoisyRecord,
-    /// Residual in every frame of the record, zero where none is used.
+    /// Whitened residual in every frame of the record; zero in frames that are not used.
     residual: Vec<f64>,
-    /// One where a frame is used.
+    /// One in every frame that is used, zero in the others.
     present: Vec<f64>,
+    /// Sum of the squares of the residual.
     squares: f64,
     band: (f64, f64),
     best: Vec<Candidate>,
 }
 
-/// The best candidate of each kind for what fixed parts leave, the most promising first. Oscillations lie in
-/// the band, cycles per record.
+/// The best candidate of each kind for the residual of fixed parts, the largest gain first. The kinds are
+/// steady, decaying, drifting and late oscillations with frequencies in `band`, cycles per record, and with
+/// `steps` also steps and relaxations.
 pub(crate) fn find_candidates(
     problem: &NoisyRecord,
     fixed: &Fixed,
@@ -70,13 +80,13 @@ pub(crate) fn find_candidates(
 }
 
 impl Search<'_> {
-    /// Fall of the criterion when a part of a certain price explains some of the sum of squares.
+    /// Fall of the criterion, nats, if an atom explains this much of the sum of squares.
     fn net_gain(&self, explained: f64, atom: &Atom) -> f64 {
         let share = (explained / self.squares.max(1e-300)).clamp(0.0, 1.0 - 1e-9);
         -0.5 * self.problem.len() as f64 * math::ln_1p(-share) - atom.price() * self.problem.log_frames()
     }
 
-    /// Keeps the best candidate of those offered.
+    /// Keeps the best candidate of those offered, each with the sum of squares that it explains.
     fn keep_best(&mut self, offered: impl Iterator<Item = (f64, Atom)>) {
         let rated =
             offered.map(|(explained, atom)| Candidate { gain: self.net_gain(explained, &atom), atom });
@@ -84,7 +94,8 @@ impl Search<'_> {
         self.best.extend(best);
     }
 
-    /// Cycles and energy at the highest peak of a spectrum inside the band.
+    /// Frequency, cycles per record, and value of the highest peak of a spectrum inside the band and above
+    /// `least` cycles. The spectrum is that of the whole record, padded to `padded` values.
     fn highest_peak(
         &self,
         spectrum: impl Iterator<Item = f64>,
@@ -101,6 +112,7 @@ impl Search<'_> {
         (2 * length).next_power_of_two()
     }
 
+    /// Steady oscillations, and those that decay from the first frame on.
     fn add_from_start(&mut self) {
         let frames = self.residual.len();
         let padded = Self::padded_length(frames);
@@ -129,6 +141,7 @@ impl Search<'_> {
         self.keep_best(decaying.into_iter());
     }
 
+    /// Oscillations whose frequency changes at a constant rate.
     fn add_drifting(&mut self) {
         let frames = self.residual.len();
         let padded = Self::padded_length(frames);
@@ -147,7 +160,8 @@ impl Search<'_> {
             }
             let a = transform.spectrum_values(cosines.into_iter());
             let b = transform.spectrum_values(sines.into_iter());
-            // sum r exp(-i (w t + phase)) = A - i B, and A + i B for the opposite drift
+            // `sum r exp(-i (w t + phase)) = A - i B`, where `A` and `B` are the transforms of residual times
+            // cosine and sine; `A + i B` belongs to the opposite drift
             for sign in [1.0, -1.0] {
                 let squares = a.iter().zip(&b).map(|(a, b)| {
                     let (re, im) = (a.re + sign * b.im, a.im - sign * b.re);
@@ -164,6 +178,7 @@ impl Search<'_> {
         self.keep_best(offered.into_iter());
     }
 
+    /// Decaying oscillations that begin inside the record.
     fn add_late(&mut self) {
         let frames = self.residual.len();
         let mut offered = Vec::new();
@@ -188,7 +203,7 @@ impl Search<'_> {
                 }
                 let values = self.residual[part].iter().zip(&envelope).map(|(r, e)| r * e);
                 let squares = transform.squared_magnitudes(values);
-                // cycles per record of the transform of a part
+                // the transform covers a part of the record, but its frequencies count cycles per record
                 let cycles = |k: usize| k as f64 * frames as f64 / padded as f64;
                 let least = self.band.0.max(nepers / PI);
                 let inside = |k: usize| cycles(k) >= least && cycles(k) <= self.band.1;
@@ -208,7 +223,7 @@ impl Search<'_> {
         self.keep_best(offered.into_iter());
     }
 
-    /// Steps and relaxations, from averages over blocks of frames.
+    /// Steps and relaxations, from sums over blocks of frames.
     fn add_steps(&mut self, fixed: &Fixed) {
         let frames = self.residual.len();
         let length = frames.div_ceil(BLOCKS);
@@ -221,7 +236,7 @@ impl Search<'_> {
             sums
         };
         let used = pool(&vec![1.0; self.problem.len()]);
-        // sums over a block have the variance of the number of its frames
+        // the variance of a sum over a block is proportional to the number of its frames
         let scale = |sums: Vec<f64>| -> Vec<f64> {
             sums.iter().zip(&used).map(|(sum, n)| if *n > 0.0 { sum / n.sqrt() } else { 0.0 }).collect()
         };
@@ -231,7 +246,8 @@ impl Search<'_> {
         }
         let residual = scale(pool(self.problem.residual_of(fixed)));
         let root: Vec<f64> = used.iter().map(|n| n.sqrt()).collect();
-        // a template over twice the record and what lies outside, cut where a part begins or has its centre
+        // a template is twice as long as the record with its margins, and has the centre or the onset in its
+        // middle; the cut of it that has its centre at `block` is a column
         let outside = (OUTSIDE * count as f64) as usize;
         let template = |value: &dyn Fn(f64) -> f64| -> Vec<f64> {
             (0..2 * (count + outside))
@@ -263,7 +279,7 @@ impl Search<'_> {
             let step = template(&|s| math::tanh(s / width));
             let spacing = ((0.5 * width * count as f64) as usize).max(1);
             for block in (1..count + 2 * outside).step_by(spacing) {
-                // a narrow step outside the record is flat inside
+                // a step that is further outside than its width is nearly constant in the record
                 if !(-width..1.0 + width).contains(&place(block)) {
                     continue;
                 }

@@ -1,5 +1,6 @@
-//! The frames of a record with their noise, and the least squares of its parts: amplitudes are eliminated
-//! (variable projection, Golub and Pereyra 1973), shape parameters follow by Levenberg-Marquardt.
+//! The frames of a record with their noise, and the least squares of its parts. Amplitudes are eliminated
+//! (variable projection, Golub and Pereyra 1973), and shape parameters are found by the Levenberg-Marquardt
+//! method.
 
 use super::atom::{Atom, FramePlaces};
 use crate::noise::{AutoregressiveNoise, Whitener};
@@ -7,7 +8,7 @@ use crate::trend::Trend;
 use nalgebra::{DMatrix, DVector};
 use portable_math as math;
 
-/// A trend and the parts beside it.
+/// A trend and the other parts of a record.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Parts {
     pub trend: Trend,
@@ -24,11 +25,11 @@ pub(crate) struct Explanation {
     pub squares: f64,
     /// Whitened residual of each frame used.
     pub residual: Vec<f64>,
-    /// Amplitudes of the columns of the atoms, in order.
+    /// Amplitudes of the columns of all atoms, in their order, in units of the scaled record.
     pub amplitudes: Vec<f64>,
 }
 
-/// The frames used of a record, scaled to unit size, and their noise.
+/// The frames used of a record, scaled to unit standard deviation, with the colour of their noise.
 #[derive(Debug, Clone)]
 pub(crate) struct NoisyRecord {
     pub at: FramePlaces,
@@ -37,20 +38,21 @@ pub(crate) struct NoisyRecord {
     /// Their values.
     pub values: Vec<f64>,
     whitener: Option<Whitener>,
-    /// Coefficients of the noise.
+    /// Number of coefficients of the noise; 0 for white noise.
     pub order: usize,
     /// Whitened values.
     target: Vec<f64>,
-    /// Variance of rounding errors: what is left below it counts as nothing.
+    /// Variance of rounding errors in scaled units: a smaller residual does not lower the criterion further.
     pub(crate) least_variance: f64,
     /// Price of the frames that are left out, nats.
     pub price_left_out: f64,
 }
 
-/// Squared sine of the angle between a column and the columns before it, below which it adds nothing.
+/// A column is dependent if the squared sine of its angle to the columns before it is below this number: what
+/// is left of it is rounding error.
 const LEAST_INDEPENDENT: f64 = 1e-18;
 
-/// `sum a b`, in an order that the processor can compute four at a time.
+/// `sum a b` in eight partial sums, of which the processor computes several at a time.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
     let (left, right) = (a.chunks_exact(8), b.chunks_exact(8));
@@ -63,6 +65,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + rest
 }
 
+/// Subtracts `factor` times `other` from a column.
 fn subtract(column: &mut [f64], factor: f64, other: &[f64]) {
     column.iter_mut().zip(other).for_each(|(x, q)| *x -= factor * q);
 }
@@ -74,13 +77,15 @@ pub(crate) struct Basis {
 }
 
 impl Basis {
+    /// Subtracts from a column its projection onto the basis.
     pub(crate) fn project_out(&self, column: &mut [f64]) {
         for q in &self.columns {
             subtract(column, dot(q, column), q);
         }
     }
 
-    /// Adds a column; a column that depends on the others is left out.
+    /// Adds a column without its projection onto the basis, scaled to unit length; a dependent column is not
+    /// added.
     pub(crate) fn push_column(&mut self, mut column: Vec<f64>) {
         let before = dot(&column, &column);
         self.project_out(&mut column);
@@ -94,10 +99,11 @@ impl Basis {
     }
 }
 
-/// What stays as it is while some atoms are fitted: the trend and other atoms.
+/// The trend and the atoms whose shapes stay as they are while others are fitted. Their amplitudes follow the
+/// fit.
 pub(crate) struct Fixed {
     basis: Basis,
-    /// Whitened values without these parts.
+    /// What these parts leave of the whitened values.
     residual: Vec<f64>,
 }
 
@@ -107,8 +113,9 @@ impl Fixed {
     }
 }
 
-/// Atoms fitted over a fixed rest.
+/// Least squares of the amplitudes of some atoms together with fixed parts.
 struct Projection {
+    /// Columns of each atom, not whitened.
     columns: Vec<Vec<Vec<f64>>>,
     amplitudes: Vec<f64>,
     basis: Basis,
@@ -147,7 +154,8 @@ impl NoisyRecord {
         self
     }
 
-    /// The problem without the frames for which `leave_out` holds; each costs `price` nats.
+    /// The problem without the frames for which `leave_out` holds, in white noise; each frame costs `price`
+    /// nats.
     pub(crate) fn without_frames(&self, leave_out: impl Fn(usize) -> bool, price: f64) -> Self {
         let kept: Vec<usize> = (0..self.used.len()).filter(|k| !leave_out(self.used[*k])).collect();
         let used = kept.iter().map(|k| self.used[*k]).collect();
@@ -184,7 +192,7 @@ impl NoisyRecord {
         columns.into_iter().map(|column| self.whiten_values(column)).collect()
     }
 
-    /// The trend and atoms that stay as they are.
+    /// Fixes the trend and atoms, and computes what they leave of the record.
     pub(crate) fn fix_parts(&self, trend: Trend, atoms: &[Atom]) -> Fixed {
         let mut basis = Basis::default();
         self.trend_columns(trend).into_iter().for_each(|column| basis.push_column(column));
@@ -198,7 +206,7 @@ impl NoisyRecord {
         Fixed { basis, residual }
     }
 
-    /// Least squares of the amplitudes of `atoms` beside a fixed rest.
+    /// Least squares of the amplitudes of `atoms` together with fixed parts.
     fn project_onto(&self, fixed: &Fixed, atoms: &[Atom]) -> Projection {
         let columns: Vec<Vec<Vec<f64>>> = atoms.iter().map(|atom| atom.columns(&self.at)).collect();
         let flat: Vec<&Vec<f64>> = columns.iter().flatten().collect();
@@ -218,7 +226,7 @@ impl NoisyRecord {
             }
             let mut left = dot(&column, &column);
             if left < 1e-4 * before {
-                // cancellation: project a second time
+                // little of the column is left, so rounding errors are large in it: project a second time
                 fixed.basis.project_out(&mut column);
                 for (j, q) in basis.columns.iter().enumerate() {
                     let along = dot(q, &column);
@@ -246,8 +254,8 @@ impl NoisyRecord {
         Projection { amplitudes: amplitudes.as_slice().to_vec(), basis, residual, squares, columns }
     }
 
-    /// Derivatives of the residual by every shape parameter, without what amplitudes take up (Kaufman 1975),
-    /// with the number of parameters of each atom.
+    /// Whitened derivatives of the atoms by every shape parameter, one column each, without their projections
+    /// onto the columns of all parts (Kaufman 1975): amplitudes follow every step.
     fn jacobian(&self, fixed: &Fixed, atoms: &[Atom], at: &Projection) -> Vec<Vec<f64>> {
         let mut jacobian = Vec::new();
         let mut first = 0;
@@ -264,15 +272,18 @@ impl NoisyRecord {
         jacobian
     }
 
-    /// Fits `atoms` beside a fixed rest in at most `iterations` steps.
+    /// Fits `atoms` together with fixed parts in at most `iterations` steps. Returns the atoms with their sum
+    /// of squares, which is infinite if oscillations cancel.
     pub(crate) fn fit_atoms(&self, fixed: &Fixed, atoms: Vec<Atom>, iterations: usize) -> (Vec<Atom>, f64) {
         let (atoms, at) = self.minimise_squares(fixed, atoms, iterations);
         let squares = if self.is_cancelling(&atoms, &at.amplitudes) { f64::INFINITY } else { at.squares };
         (atoms, squares)
     }
 
-    /// Whether an oscillation is far larger than the record: it and another one cancel.
+    /// Whether an oscillation is far larger than the record, as it is if two oscillations nearly cancel.
     fn is_cancelling(&self, atoms: &[Atom], amplitudes: &[f64]) -> bool {
+        /// Largest amplitude relative to the largest value of the record: only oscillations that cancel
+        /// exceed it.
         const MOST: f64 = 4.0;
         let largest = self.values.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         let mut first = 0;
@@ -283,16 +294,22 @@ impl NoisyRecord {
         })
     }
 
+    /// Levenberg-Marquardt iterations for the shape parameters, with the least squares of the amplitudes in
+    /// each.
     fn minimise_squares(
         &self,
         fixed: &Fixed,
         mut atoms: Vec<Atom>,
         iterations: usize,
     ) -> (Vec<Atom>, Projection) {
+        /// Factor of the damping after a step that does not lower the sum of squares.
         const RAISE: f64 = 6.0;
+        /// Factor of the damping after a step that lowers it.
         const LOWER: f64 = 0.3;
+        /// Steps tried with growing damping; if none of them lowers the sum of squares, the fit has ended.
         const TRIES: usize = 5;
-        /// Relative gain below which the fit has ended.
+        /// Relative fall of the sum of squares below which the fit has ended: it changes the criterion of
+        /// 4,096 frames by 0.002 nats.
         const SMALL: f64 = 1e-6;
         let mut at = self.project_onto(fixed, &atoms);
         let mut damping = 1e-3;
@@ -337,7 +354,8 @@ impl NoisyRecord {
         (atoms, at)
     }
 
-    /// Fits all parts together.
+    /// Fits all parts together in at most `iterations` steps. The criterion is infinite if oscillations
+    /// cancel.
     pub(crate) fn fit_parts(&self, parts: &Parts, iterations: usize) -> Explanation {
         let fixed = self.fix_parts(parts.trend, &[]);
         let (atoms, at) = self.minimise_squares(&fixed, parts.atoms.clone(), iterations);
@@ -352,8 +370,9 @@ impl NoisyRecord {
         }
     }
 
-    /// Negative logarithm of the posterior probability of parts that leave these squares: the likelihood with
-    /// the level of the noise estimated, and Djurić's penalty.
+    /// Negative logarithm of the posterior probability of parts that leave this sum of whitened squares,
+    /// nats: the likelihood with the estimated level of the noise, Djurić's penalty and the price of the
+    /// frames left out.
     pub(crate) fn criterion(&self, parts: &Parts, squares: f64) -> f64 {
         let n = self.len() as f64;
         let linear = (parts.trend.column_count() + self.order) as f64;
@@ -365,7 +384,8 @@ impl NoisyRecord {
             + self.log_frames() * price
     }
 
-    /// Covariance of the shape parameters of all atoms for noise of unit variance; `None` if it is singular.
+    /// Covariance of the shape parameters of all atoms, in the order of the atoms and of
+    /// [`Atom::parameters`], for noise of unit variance; `None` if it is singular.
     pub(crate) fn shape_covariance(&self, explanation: &Explanation) -> Option<DMatrix<f64>> {
         let fixed = self.fix_parts(explanation.parts.trend, &[]);
         let at = self.project_onto(&fixed, &explanation.parts.atoms);
@@ -377,7 +397,7 @@ impl NoisyRecord {
         Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] / (scales[i] * scales[j])))
     }
 
-    /// Trend and atoms in every frame of the record: the trend with everything that does not oscillate, and
+    /// Values in every frame of the record, used or not, in scaled units: those of the trend, and those of
     /// each atom.
     pub(crate) fn values_everywhere(&self, explanation: &Explanation) -> (Vec<f64>, Vec<Vec<f64>>) {
         let all = FramePlaces {
@@ -399,7 +419,7 @@ impl NoisyRecord {
             atoms.push(sum(&all).0);
             first += count;
         }
-        // what the atoms leave is fitted by the trend alone
+        // the trend is fitted to what the atoms leave
         let columns = self.trend_columns(explanation.parts.trend);
         let whitened = self.whiten_values(rest);
         let n = columns.len();
@@ -414,16 +434,16 @@ impl NoisyRecord {
         (trend_values.collect(), atoms)
     }
 
-    /// Residual of the frames of this problem with the parts that explain `fitted`, which uses some of these
-    /// frames.
+    /// Residual, not whitened, of every frame used here, with parts that were fitted to `fitted`, which uses
+    /// only some of these frames.
     pub(crate) fn residual_everywhere(&self, fitted: &NoisyRecord, explanation: &Explanation) -> Vec<f64> {
         let (trend, atoms) = fitted.values_everywhere(explanation);
         let model = |i: usize| trend[i] + atoms.iter().map(|atom| atom[i]).sum::<f64>();
         self.used.iter().zip(&self.values).map(|(i, x)| x - model(*i)).collect()
     }
 
-    /// Gain, in halves of the relative sum of squares, of each column beside fixed parts: half the logarithm
-    /// of the likelihood ratio for small gains.
+    /// Fraction, 0 to 1, of the sum of squares left by fixed parts that these columns explain together. `-n/2
+    /// ln(1 - fraction)` is the logarithm of the likelihood ratio for `n` frames.
     pub(crate) fn gain_of_columns(&self, fixed: &Fixed, columns: Vec<Vec<f64>>) -> f64 {
         let mut basis = Basis::default();
         let mut gain = 0.0;
@@ -444,13 +464,13 @@ impl NoisyRecord {
         gain / dot(&fixed.residual, &fixed.residual).max(1e-300)
     }
 
-    /// Residual of the fixed parts.
+    /// Whitened residual of fixed parts, one value per frame used.
     pub(crate) fn residual_of<'a>(&self, fixed: &'a Fixed) -> &'a [f64] {
         &fixed.residual
     }
 }
 
-/// Atoms after a step, each parameter moved by at most its limit.
+/// The atoms after a step; each parameter moves by at most its limit.
 fn move_atoms(atoms: &[Atom], step: &[f64]) -> Vec<Atom> {
     let mut steps = step.iter();
     let moved = |atom: &Atom| {

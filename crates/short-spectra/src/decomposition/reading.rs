@@ -1,5 +1,5 @@
-//! What the parts of a record say: oscillations with deviations averaged over the rivals, and the doubts that
-//! follow from the odds.
+//! Components from the parts of a record: each oscillation with standard deviations that include those of the
+//! rivals, and the doubts that follow from the odds.
 
 use super::atom::{Atom, OscillationAtom};
 use super::problem::{self, Parts};
@@ -15,52 +15,68 @@ use nalgebra::DMatrix;
 use portable_math as math;
 use std::f64::consts::TAU;
 
-/// Rivals further behind, nats, do not count in an average.
+/// Rivals whose criterion is higher by more than this, nats, do not count in an average: their odds are below
+/// one in 2,900.
 const FURTHEST: f64 = 8.0;
-/// Lead, nats, over every rival that has no oscillation near a frequency, from which there is one.
+/// An oscillation is in doubt if its explanation leads by less than this, nats, over a rival without an
+/// oscillation near its frequency: at this lead the odds are 1 to 148.
 const CLEAR_LEAD: f64 = 5.0;
-/// An oscillation of fewer cycles than this may be a part of the slow motion, if a trend of more than a cubic
-/// or a step describes that motion.
+/// An oscillation of fewer cycles than this may be a piece of the slow motion, if that needs more than a
+/// cubic: columns beyond four or a step describe waves that are almost as short.
 const SLOW_CYCLES: f64 = 6.5;
-/// Cycles up to which an oscillation may be a piece of a grown trend, for each column of the trend, which
-/// describes half a wave.
+/// Number of cycles, per column of the trend, below which an oscillation may be a piece of the slow motion: a
+/// column describes half a wave, and the margin is half as much again.
 const SLOW_CYCLES_PER_COLUMN: f64 = 0.75;
-/// Distance, in resolutions, below which two oscillations may be pieces of one.
+/// Distance, in resolutions, below which two oscillations may be pieces of one: closer lines are not
+/// separated reliably.
 const LEAST_APART: f64 = 0.5;
-/// Number of other oscillations that begin or are over within the record from which none of them is clear.
+/// An oscillation that begins or is over within the record is in doubt with this number of other such ones:
+/// together they describe noise or jumps as well.
 const CROWD: usize = 3;
-/// Cycles below which several oscillations look like the shaking of a camera, and number of the others.
+/// Number of cycles below which an oscillation may belong to the shaking of a camera, which has several slow
+/// lines.
 const SHAKE_CYCLES: f64 = 20.0;
+/// Number of other oscillations as slow as that from which each of them is in doubt.
 const SHAKE_PARTS: usize = 2;
-/// Decay, nepers, from its onset to the end of the record of an oscillation that begins within it.
+/// Smallest decay, nepers, between its onset and the end of the record of a late oscillation that is not in
+/// doubt: with less, two lines that beat explain it.
 const LEAST_DECAY: f64 = 2.0;
-/// Decay, nepers per record, from which an oscillation is over within the record.
+/// Decay, nepers per record, above which an oscillation is over within the record: a four-hundredth of its
+/// amplitude is left at the end.
 const TRANSIENT_NEPERS: f64 = 6.0;
-/// Chi squared, per degree of freedom, of the frequencies in parts of the record above which it is no single
-/// oscillation: chance exceeds it in one of three hundred.
+/// Largest scatter of the frequencies of parts of the record, as chi squared per degree of freedom, of a
+/// single oscillation: chance exceeds it in about one of three hundred.
 const MOST_SCATTER: f64 = 4.5;
-/// Frames per parameter below which no part is clear.
+/// Number of frames per parameter below which every part is in doubt: the odds hold only for many frames per
+/// parameter.
 const PARAMETERS_WITHIN: usize = 6;
-/// Columns of a cubic.
+/// Number of columns of a cubic trend.
 const CUBIC_COLUMNS: usize = 4;
 
-/// An oscillation of a record with its deviations, in cycles and nepers per record.
+/// An oscillation of a record with its standard deviations; frequencies in cycles and decays in nepers per
+/// record.
 #[derive(Debug, Clone)]
 struct OscillationReading {
     atom: OscillationAtom,
+    /// Mean frequency.
     cycles: f64,
-    /// Standard deviation of the mean frequency, and the same averaged over the rivals.
+    /// Standard deviation of the mean frequency that follows from the noise and from the scatter within the
+    /// record.
     own_cycles_sd: f64,
+    /// The same with the spread of the frequency among the rivals.
     cycles_sd: f64,
     /// Standard deviation of the decay, or of the decay that an oscillation of constant amplitude may have.
     nepers_sd: f64,
     /// Amplitudes of cosine and sine at the onset, for it and each multiple, m.
     amplitudes_m: Vec<[f64; 2]>,
+    /// Standard deviation of its amplitude, m.
     amplitude_sd_m: f64,
+    /// Mean square over the noise within two resolutions, dB.
     snr_db: f64,
-    /// Lead over the best rival that has no oscillation near its frequency, nats.
+    /// Lead over the best rival that has no oscillation near its frequency, nats; infinite without such a
+    /// rival.
     lead: f64,
-    /// Chi squared, per degree of freedom, of the frequencies that parts of the record ask for.
+    /// Chi squared, per degree of freedom, of the frequencies that fit parts of the record best.
     scatter: f64,
 }
 
@@ -69,16 +85,17 @@ fn is_transient(o: &OscillationAtom) -> bool {
     o.onset > 0.0 || o.nepers.is_some_and(|d| d > TRANSIENT_NEPERS)
 }
 
-/// Half width of the peak of an oscillation, resolutions.
+/// Half width of the peak of an oscillation in a spectrum, resolutions: a decay widens it.
 fn lobe_half_width(o: &OscillationAtom) -> f64 {
     (o.nepers.map_or(0.0, f64::abs) / TAU).max(1.0)
 }
 
 impl Decomposition {
-    /// Adds the rivals that the search need not have met: without each oscillation, in the noise that is then
-    /// left.
+    /// Adds a rival for each oscillation, which the search need not have tried: the other parts in the noise
+    /// that is left without that oscillation.
     pub(super) fn add_rivals(&mut self) {
-        /// Signal-to-noise ratio, dB, from which noise is no rival.
+        /// Signal-to-noise ratio, dB, above which no rival is added: coloured noise does not explain such a
+        /// line.
         const STRONG_DB: f64 = 40.0;
         let atoms = &self.explanation.parts.atoms;
         let oscillations = self.read_oscillations();
@@ -135,6 +152,7 @@ impl Decomposition {
         components
     }
 
+    /// The component of an oscillation, without a verdict.
     fn to_component(
         &self,
         reading: &OscillationReading,
@@ -193,7 +211,8 @@ impl Decomposition {
         let grown = columns > CUBIC_COLUMNS || steps;
         if grown && o.cycles < SLOW_CYCLES.max(SLOW_CYCLES_PER_COLUMN * columns as f64) {
             doubts.push(
-                "it is slow, and the trend had to grow: it may be a piece of what that describes".to_owned(),
+                "it is slow, and the slow motion is more than a cubic: it may be a piece of that motion"
+                    .to_owned(),
             );
         }
         let others = || parts.atoms.iter().filter_map(Atom::oscillation).filter(|other| *other != o);
@@ -208,19 +227,20 @@ impl Decomposition {
         };
         if others().filter(|other| is_transient(other) || is_transient(o)).any(|other| neighbour(&other)) {
             doubts.push(
-                "another overlaps it and begins or is over within the record: pieces of one look the same"
+                "another overlaps it, and one of the two begins or is over within the record: pieces of one \
+                 look the same"
                     .to_owned(),
             );
         }
         if is_transient(o) && others().filter(|other| is_transient(other)).count() >= CROWD {
             doubts.push(
-                "one of several that begin or are over within the record: noise and jumps look the same"
+                "it is one of several that begin or are over within the record: noise and jumps look the same"
                     .to_owned(),
             );
         }
         let slow = |o: &&OscillationAtom| o.cycles < SHAKE_CYCLES;
         if slow(&o) && others().filter(slow).count() >= SHAKE_PARTS {
-            doubts.push("one of several slow ones: a camera that shakes looks the same".to_owned());
+            doubts.push("it is one of several slow ones: a camera that shakes looks the same".to_owned());
         }
         let lasts = o.nepers.map_or(0.0, |d| d * (1.0 - o.onset));
         if o.onset > 0.0 && lasts < LEAST_DECAY {
@@ -229,16 +249,17 @@ impl Decomposition {
             );
         }
         if reading.scatter > MOST_SCATTER {
-            doubts.push(
-                "parts of the record ask for different frequencies: it is not one oscillation".to_owned(),
-            );
+            doubts
+                .push("parts of the record have different frequencies: it is not one oscillation".to_owned());
         }
         if PARAMETERS_WITHIN * self.parameter_count() > self.problem.len() {
-            doubts.push("the record is short for the parts that describe it".to_owned());
+            doubts.push(
+                "the record has too few frames for the number of parameters that describe it".to_owned(),
+            );
         }
         if reading.cycles_sd > (2.0 * reading.own_cycles_sd).max(0.05) {
             doubts.push(format!(
-                "explanations nearly as probable move it by {:.2e} Hz",
+                "explanations that are nearly as probable widen its standard deviation to {:.2e} Hz",
                 reading.cycles_sd * resolution_hz
             ));
         }
@@ -276,6 +297,8 @@ impl Decomposition {
         found
     }
 
+    /// Reads an oscillation. `covariance` is that of its shape parameters, and `variance` that of the
+    /// whitened residual.
     fn read_oscillation(
         &self,
         o: &OscillationAtom,
@@ -291,7 +314,7 @@ impl Decomposition {
         let white = self.problem.whiten_values(value);
         let energy = problem::dot(&white, &white) / variance;
         let cycles = o.mean_cycles();
-        // gradient of the mean frequency by the shape parameters
+        // gradient of the mean frequency with respect to the shape parameters
         let first_phase = 1 + usize::from(o.nepers.is_some());
         let gradient = |i: usize| match i {
             0 => 1.0,
@@ -306,7 +329,8 @@ impl Decomposition {
         let gradient: Vec<f64> = (0..n).map(gradient).collect();
         let pairs = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
         let own: f64 = pairs.map(|(i, j)| gradient[i] * gradient[j] * covariance[(i, j)]).sum();
-        // the record may begin and end half a frame before or after the frames: its mean drifts by as much
+        // where the record begins and ends is known to half a frame, which changes the mean of a drifting
+        // frequency
         let (low, high) = if o.phase.is_empty() { (0.0, 0.0) } else { o.cycles_range() };
         let half_frame = 0.5 * (high - low) / self.problem.at.frames as f64;
         let own_cycles_sd = math::hypot(own.max(0.0).sqrt(), half_frame);
@@ -319,7 +343,8 @@ impl Decomposition {
             own_cycles_sd,
             nepers_sd: o.nepers.map_or((12.0 / energy).sqrt(), |_| covariance[(1, 1)].max(0.0).sqrt()),
             amplitude_sd_m: self.amplitude_sd(o, amplitudes, &columns) * variance.sqrt() * self.scale_m,
-            // mean square over noise density times two resolutions
+            // (the energy is that of the oscillation over the variance of the noise; two resolutions hold
+            // four of its degrees of freedom)
             snr_db: 10.0 * math::log10((energy / 4.0).max(1e-9)),
             amplitudes_m: amplitudes.chunks(2).map(|c| [c[0] * self.scale_m, c[1] * self.scale_m]).collect(),
             lead,
@@ -328,7 +353,8 @@ impl Decomposition {
         }
     }
 
-    /// Standard deviation of the amplitude in noise of unit variance, with the shape of the oscillation free.
+    /// Standard deviation of the amplitude, scaled, in noise of unit variance. The shape of the oscillation
+    /// is unknown; the other parts count as known.
     fn amplitude_sd(&self, o: &OscillationAtom, amplitudes: &[f64], columns: &[Vec<f64>]) -> f64 {
         let derivatives = Atom::Oscillation(o.clone()).derivatives(&self.problem.at, columns, amplitudes);
         let free: Vec<Vec<f64>> = columns[..2]
@@ -344,9 +370,9 @@ impl Decomposition {
         (a * a * inverse[(0, 0)] + 2.0 * a * b * inverse[(0, 1)] + b * b * inverse[(1, 1)]).max(0.0).sqrt()
     }
 
-    /// Chi squared, per degree of freedom, of the frequencies that parts of the record ask for, each with a
-    /// quarter of the energy of the oscillation: 1 for an oscillation that is as described, more for a piece
-    /// of noise or of another motion.
+    /// Chi squared, per degree of freedom, of the frequencies that fit parts of the record best, each part
+    /// with a quarter of the energy of the oscillation. About 1 for an oscillation that is as described, more
+    /// for a piece of noise or of another motion.
     fn frequency_scatter(
         &self,
         o: &OscillationAtom,
@@ -354,6 +380,7 @@ impl Decomposition {
         columns: &[Vec<f64>],
         variance: f64,
     ) -> f64 {
+        /// Number of parts: with more, each has too little energy for a frequency of its own.
         const SEGMENTS: usize = 4;
         let atom = Atom::Oscillation(o.clone());
         let by_cycles = atom.derivatives(&self.problem.at, columns, amplitudes).swap_remove(0);
@@ -388,8 +415,8 @@ impl Decomposition {
         chi2 / (shifts.len().max(2) - 1) as f64
     }
 
-    /// Standard deviation of the frequency among the rivals, weighed by their odds, and the lead over the
-    /// best rival that has no oscillation near it, nats.
+    /// Spread of the frequency among the rivals, cycles per record: rms distance from `cycles`, weighted by
+    /// their odds. And the lead over the best rival that has no oscillation near it, nats.
     fn average_rivals(&self, o: &OscillationAtom, cycles: f64) -> (f64, f64) {
         let (mut weights, mut sum, mut lead) = (1.0, 0.0, f64::INFINITY);
         let reach = 1.5 + o.nepers.map_or(0.0, |d| d.abs() / TAU);

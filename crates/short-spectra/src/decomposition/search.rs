@@ -1,5 +1,6 @@
-//! The search for the most probable parts of a record: parts are added, given more or fewer parameters,
-//! divided, united and dropped as long as the criterion falls. Everything tried is kept for the odds.
+//! The search for the most probable parts of a record: parts are added, get more or fewer parameters, and are
+//! divided, united or dropped, as long as the criterion falls. The explanations tried on the way are kept as
+//! rivals: doubts follow from their odds.
 
 use super::atom::{Atom, FEWEST_CYCLES, MOST_ENVELOPE_DEGREE, MOST_PHASE_DEGREE, OscillationAtom, StepShape};
 use super::candidates::{Candidate, find_candidates};
@@ -9,28 +10,35 @@ use portable_math as math;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
-/// Iterations of a fit of one part beside a fixed rest, and of all parts.
+/// Iterations of a fit of one part while the others stay.
 const LOCAL_ITERATIONS: usize = 8;
+/// Iterations of a fit of all parts: it starts near the minimum, and each iteration takes longer.
 const JOINT_ITERATIONS: usize = 4;
-/// Number of changes that are fitted in a round beside the rest, and together with it.
+/// Largest number of changes in a round that are fitted while the other parts stay: those with the largest
+/// estimated gain, because estimates are much faster than fits.
 const TRIED_CHANGES: usize = 5;
+/// Largest number of these changes for which all parts are then fitted together.
 const JOINTLY_FITTED: usize = 2;
-/// Distance, nats, from the best change of a round within which others are fitted together with the rest.
+/// All parts are fitted together only for changes whose criterion is within this distance, nats, of the best
+/// change of the round: a joint fit rarely gains more.
 const NEARLY_AS_GOOD: f64 = 8.0;
-/// Fall of the criterion, nats, that counts.
+/// Smallest fall of the criterion, nats, that counts as a gain; smaller ones come from unfinished iterations.
 const LEAST_GAIN: f64 = 1e-3;
-/// A change whose local fit is worse by more than this, nats, is not fitted jointly.
+/// All parts are not fitted together for a change that raises the criterion by more than this, nats, while
+/// the other parts stay.
 const HOPELESS: f64 = 12.0;
 
-/// Price of a frame that is left out as an outlier, in units of the logarithm of the number of frames: a
-/// place and a value.
+/// Price of a frame that is left out as an outlier, in units of the logarithm of the number of frames: 1 for
+/// its position and 1/2 for its value.
 const OUTLIER_PRICE: f64 = 1.5;
-/// Decay, nepers per record, up to which a cycle may have harmonics.
+/// An oscillation with a faster decay or growth than this, nepers per record, gets no harmonics: it is a free
+/// oscillation, and not a driven cycle.
 const DRIVEN_NEPERS: f64 = 3.0;
-/// Deviations from the parts within which a frame is taken back.
+/// A frame left out as an outlier is used again if the parts explain it within this number of standard
+/// deviations: fewer than those with which it is left out, so that frames do not change sides in every round.
 const TAKEN_BACK_DEVIATIONS: f64 = 4.0;
 
-/// An explanation that was tried, for the odds.
+/// An explanation that was tried: the odds of a frequency follow from it.
 #[derive(Debug, Clone)]
 pub(crate) struct Rival {
     pub atoms: Vec<Atom>,
@@ -39,24 +47,29 @@ pub(crate) struct Rival {
 
 /// A search over one choice of frames and noise.
 pub(crate) struct PartSearch {
+    /// The frames used and their noise; outliers are taken out of it during the search.
     pub problem: NoisyRecord,
-    /// Whether the trend may grow and steps may be added.
+    /// Whether the trend may get more columns and steps and relaxations may be added.
     pub trend_grows: bool,
+    /// Largest number of oscillations.
     pub most_oscillations: usize,
+    /// Every explanation that was fitted.
     pub rivals: Vec<Rival>,
     /// The problem before frames were left out as outliers, if any were.
     whole: Option<NoisyRecord>,
-    /// Criterion of noise alone: a search that is still above it after a few changes ends.
+    /// Criterion of the best explanation that is known without this search, infinite if there is none. A
+    /// search that gains too slowly to reach it ends.
     pub bound: f64,
 }
 
-/// A change of parts with its estimated gain, nats: the atoms that are fitted first, and those that stay.
+/// A change of parts with its estimated gain, nats. The `fitted` atoms are fitted first, while the `kept`
+/// ones stay.
 struct Change {
     gain: f64,
     trend: Trend,
     kept: Vec<Atom>,
     fitted: Vec<Atom>,
-    /// Whether the gain follows from a fit beside the rest.
+    /// Whether `fitted` are already fitted, so that the gain is that of a fit.
     is_fitted: bool,
 }
 
@@ -72,15 +85,19 @@ impl PartSearch {
         }
     }
 
-    /// The most probable parts found from `start` on.
+    /// The most probable parts that are found from `start` on.
     pub(crate) fn find_parts(&mut self, start: Parts) -> Explanation {
-        /// Rounds after which a search ends that still gains.
+        /// Largest number of rounds for a record of at most `SHORT_RECORD` frames; it bounds the time.
         const MOST_ROUNDS: usize = 40;
+        /// Largest number of rounds for a long record: enough for several parts.
         const FEWEST_ROUNDS: usize = 12;
+        /// Frames up to which a record gets all rounds; the number falls in inverse proportion to longer
+        /// ones.
         const SHORT_RECORD: usize = 4096;
-        /// Changes after which a search that cannot reach the bound ends, and rounds that gain like the last
-        /// one in which it would have to.
+        /// Number of rounds before a search may end because of the bound: the first parts gain most.
         const FEW_CHANGES: usize = 4;
+        /// The search ends if this number of rounds with the gain of the last one does not reach the bound;
+        /// later rounds rarely gain more.
         const FORESEEN_ROUNDS: f64 = 6.0;
         let mut current = self.problem.fit_parts(&start, LOCAL_ITERATIONS);
         let mut last = f64::INFINITY;
@@ -116,7 +133,8 @@ impl PartSearch {
         self.rivals.push(Rival { atoms: explanation.parts.atoms.clone(), criterion: explanation.criterion });
     }
 
-    /// Fits the atoms of a change beside those that stay.
+    /// Fits the atoms of a change while those kept stay. Returns all parts with their criterion. Tries every
+    /// shape of a step, and moves the onset of a late oscillation.
     fn try_change(&self, change: &Change) -> (Parts, f64) {
         let fixed = self.problem.fix_parts(change.trend, &change.kept);
         let (mut fitted, mut squares) =
@@ -139,8 +157,10 @@ impl PartSearch {
         (parts, criterion)
     }
 
-    /// Moves the onset of an oscillation to the frame at which it explains most.
+    /// Moves the onset of an oscillation, in steps that are halved down to one frame, as long as the sum of
+    /// squares falls.
     fn place_onset(&self, fixed: &Fixed, atom: Atom, squares: f64) -> (Vec<Atom>, f64) {
+        /// Iterations of the fit at each onset: the other parameters hardly depend on it.
         const ITERATIONS: usize = 2;
         let frames = self.problem.at.frames as f64;
         let mut best = (atom, squares);
@@ -169,7 +189,8 @@ impl PartSearch {
         (vec![best.0], best.1)
     }
 
-    /// The best of the most promising changes.
+    /// The explanation with the lowest criterion after the most promising changes, which may be higher than
+    /// that of `current`; `None` without a promising change.
     fn best_change(&mut self, current: &Explanation) -> Option<Explanation> {
         let mut changes = self.list_additions(current);
         changes.extend(self.list_enrichments(current));
@@ -205,6 +226,7 @@ impl PartSearch {
         best
     }
 
+    /// Additions of one part that the residual may contain.
     fn list_additions(&self, current: &Explanation) -> Vec<Change> {
         let oscillations = current.parts.atoms.iter().filter(|a| a.oscillation().is_some()).count();
         let fixed = self.problem.fix_parts(current.parts.trend, &current.parts.atoms);
@@ -222,6 +244,7 @@ impl PartSearch {
         found.into_iter().map(change).collect()
     }
 
+    /// Changes to the next three richer trends.
     fn list_trends(&self, current: &Explanation) -> Vec<Change> {
         let mut changes = Vec::new();
         let mut trend = current.parts.trend;
@@ -273,7 +296,7 @@ impl PartSearch {
                     }
                 }
             }
-            // a free oscillation that dies out has no harmonics, a driven cycle has
+            // a driven cycle may have harmonics, a free oscillation that decays has none
             let driven = o.onset == 0.0 && o.nepers.is_none_or(|d| d.abs() < DRIVEN_NEPERS);
             let next = o.multiples.last().map_or(2, |m| m + 1);
             for multiple in (next..next + 2).filter(|_| driven) {
@@ -299,7 +322,8 @@ impl PartSearch {
         changes
     }
 
-    /// Estimated gain of an atom with more parameters or columns over the atom itself (score test), nats.
+    /// Estimated gain, nats, of a variant with more parameters or columns over the atom itself, which is
+    /// among the fixed parts (score test).
     fn gain_of_variant(&self, fixed: &Fixed, atom: &Atom, amplitudes: &[f64], variant: &Atom) -> f64 {
         let columns = variant.columns(&self.problem.at);
         // a column that the atom lacks has no amplitude yet
@@ -312,8 +336,11 @@ impl PartSearch {
             - (variant.price() - atom.price()) * self.problem.log_frames()
     }
 
-    /// Whether an oscillation whose amplitude and phase change slowly would explain more.
+    /// Whether the residual around an oscillation shows that its amplitude or phase changes slowly: then
+    /// changes that need a fit are worth their time.
     fn leaves_neighbours(&self, fixed: &Fixed, o: &OscillationAtom) -> bool {
+        /// Degree of the polynomials by which its columns are multiplied: it describes a neighbour up to
+        /// about a resolution away.
         const DEGREE: i32 = 3;
         let plain = OscillationAtom { multiples: Vec::new(), ..o.clone() };
         let columns = Atom::Oscillation(plain).columns(&self.problem.at);
@@ -327,17 +354,19 @@ impl PartSearch {
         -0.5 * self.problem.len() as f64 * math::ln_1p(-share) > 2.0 * self.problem.log_frames()
     }
 
-    /// The oscillation with a polynomial amplitude in place of its decay.
+    /// The oscillation with a polynomial amplitude in place of its decay; `None` if it has no decay that a
+    /// polynomial can follow.
     fn exchange_decay(&self, current: &Explanation, o: &OscillationAtom, kept: &[Atom]) -> Option<Change> {
+        /// Degree with which the polynomial starts; later changes raise or lower it.
         const DEGREE: usize = 3;
-        /// Fastest decay, nepers per record, that a polynomial can follow.
+        /// Fastest decay or growth, nepers per record, that a polynomial can follow.
         const MOST_FOLLOWED: f64 = 8.0;
         let follows = o.onset == 0.0 && o.nepers.is_some_and(|d| d.abs() < MOST_FOLLOWED);
         let polynomial = || OscillationAtom { nepers: None, envelope: vec![0.0; DEGREE], ..o.clone() };
         follows.then(|| self.fit_change(current, kept, vec![Atom::Oscillation(polynomial())]))
     }
 
-    /// A change with its gain after a fit of its atoms beside those that stay.
+    /// A change with its gain after a fit of `atoms` while those kept stay.
     fn fit_change(&self, current: &Explanation, kept: &[Atom], atoms: Vec<Atom>) -> Change {
         let trend = current.parts.trend;
         let fixed = self.problem.fix_parts(trend, kept);
@@ -347,7 +376,8 @@ impl PartSearch {
         Change { gain: current.criterion - criterion, trend, kept: kept.to_vec(), fitted, is_fitted: true }
     }
 
-    /// Divisions of an oscillation into two steady ones.
+    /// Divisions of an oscillation into two steady ones at three different distances; none if its drift is
+    /// more than linear or if it has harmonics.
     fn list_divisions(&self, current: &Explanation, o: &OscillationAtom, kept: &[Atom]) -> Vec<Change> {
         if o.phase.len() > 1 || !o.multiples.is_empty() {
             return Vec::new();
@@ -360,7 +390,8 @@ impl PartSearch {
         [(-half, half), (-1.0, 0.2), (-0.2, 1.0)].into_iter().map(offer).collect()
     }
 
-    /// Unions of an oscillation with its neighbours into one drifting or decaying oscillation.
+    /// Unions of an oscillation with its neighbours into one drifting or decaying oscillation. Neighbours are
+    /// oscillations whose peaks overlap its own.
     fn list_unions(&self, current: &Explanation, k: usize, o: &OscillationAtom) -> Vec<Change> {
         let atoms = &current.parts.atoms;
         let reach = |o: &OscillationAtom| {
@@ -377,7 +408,7 @@ impl PartSearch {
                 })
             })
             .collect();
-        // each group is looked at once
+        // only the first oscillation of a group unites it, so that no group is tried twice
         if near.len() < 2 || near[0] != k {
             return Vec::new();
         }
@@ -402,9 +433,12 @@ impl PartSearch {
         changes
     }
 
-    /// A group of neighbours given decays all at once, because one of them cannot gain by it alone, and the
-    /// group as one oscillation whose amplitude changes.
+    /// Changes of a group of neighbours as a whole: every one of them decays, because one alone may gain
+    /// nothing by it; the two largest remain, without drift or decay; one oscillation with a polynomial
+    /// amplitude replaces all of them.
     fn list_group_envelopes(&self, current: &Explanation, near: &[usize]) -> Vec<Change> {
+        /// Decay, nepers per record, from which the fit of a steady oscillation starts: a slow one, which the
+        /// fit can also turn into growth.
         const START_NEPERS: f64 = 1.0;
         let atoms = &current.parts.atoms;
         let group: Vec<&OscillationAtom> = near.iter().filter_map(|j| atoms[*j].oscillation()).collect();
@@ -430,6 +464,8 @@ impl PartSearch {
             changes.push(self.fit_change(current, &kept, pair.collect()));
         }
         // one oscillation whose amplitude changes
+        /// Degree of that amplitude: one more than in place of a decay, because beats of the group change it
+        /// more.
         const DEGREE: usize = 4;
         let centre = group.iter().map(|o| o.cycles).sum::<f64>() / group.len() as f64;
         if group.iter().all(|o| o.onset == 0.0 && o.phase.len() < 2) {
@@ -439,7 +475,7 @@ impl PartSearch {
         changes
     }
 
-    /// Amplitude of an oscillation of an explanation.
+    /// Amplitude of an oscillation of an explanation, in scaled units; 0 if it is not a part of it.
     fn amplitude_of(&self, current: &Explanation, o: &OscillationAtom) -> f64 {
         let mut first = 0;
         for atom in &current.parts.atoms {
@@ -451,7 +487,8 @@ impl PartSearch {
         0.0
     }
 
-    /// Drops atoms, or parameters of atoms, as long as the criterion falls.
+    /// Drops atoms or parameters of atoms one at a time, that with the largest fall of the criterion first,
+    /// as long as it falls.
     fn simplify_parts(&mut self, explanation: &Explanation) -> Explanation {
         let mut current = explanation.clone();
         loop {
@@ -461,9 +498,10 @@ impl PartSearch {
                     let mut atoms = current.parts.atoms.clone();
                     atoms.splice(k..=k, variant);
                     let parts = Parts { trend: current.parts.trend, atoms };
-                    // the amplitudes alone show whether a simpler part can do
+                    // a fit of the amplitudes alone shows whether a simpler part can be enough
                     let quick = self.problem.fit_parts(&parts, 0);
-                    // an onset a few frames off bends the other shapes, which must move back
+                    // an onset that is wrong by a few frames distorts the shapes of the other parts, so the
+                    // fit without this part starts further from its minimum
                     let late = atom.oscillation().is_some_and(|o| o.onset > 0.0);
                     let (reach, iterations) = if late {
                         (10.0 * HOPELESS, 3 * JOINT_ITERATIONS)
@@ -490,7 +528,8 @@ impl PartSearch {
         }
     }
 
-    /// Takes back frames that were left out as outliers and that the parts now explain.
+    /// Uses frames again that were left out as outliers and that the parts now explain, if the criterion
+    /// falls.
     fn take_back_frames(&mut self, current: Explanation) -> Explanation {
         let Some(whole) = self.whole.as_ref().filter(|whole| whole.len() > self.problem.len()) else {
             return current;
@@ -519,11 +558,17 @@ impl PartSearch {
         found
     }
 
-    /// Leaves out frames that a value of their own explains better; each costs a place and a value.
+    /// Leaves out outliers as long as the criterion falls: frames that a free value of their own explains
+    /// better, although position and value have a price. In coloured noise every frame is used.
     fn leave_out_outliers(&mut self, current: Explanation) -> Explanation {
+        /// Smallest deviation of an outlier, in standard deviations of the residual: normal noise exceeds it
+        /// in one of 150,000 frames.
         const LEAST_DEVIATIONS: f64 = 4.5;
+        /// Largest fraction of frames that is left out at once: if more deviate, a part is missing.
         const MOST_SHARE: f64 = 0.1;
+        /// Distance, frames, within which outliers count as close together.
         const OUTLIER_REACH: usize = 8;
+        /// Largest number of outliers close together, including the frame itself.
         const OUTLIERS_TOGETHER: usize = 3;
         if self.problem.order > 0 {
             return current;
@@ -543,7 +588,7 @@ impl PartSearch {
                 })
                 .map(|i| self.problem.used[i])
                 .collect();
-            // outliers stand alone; several close together are motion that is not explained yet
+            // more outliers close together are motion that no part explains yet
             let near = |i: usize| bad.iter().filter(|j| j.abs_diff(i) <= OUTLIER_REACH).count();
             let bad: Vec<usize> = bad.iter().copied().filter(|i| near(*i) <= OUTLIERS_TOGETHER).collect();
             if bad.is_empty() || bad.len() as f64 > MOST_SHARE * n {
@@ -563,7 +608,8 @@ impl PartSearch {
     }
 }
 
-/// The atom without one of its properties, or nothing.
+/// The lists of atoms that may replace an atom: none at all, or the atom with one property fewer. A break has
+/// no simpler variant.
 fn simpler_variants(atom: &Atom) -> Vec<Vec<Atom>> {
     let mut variants = vec![Vec::new()];
     if let Atom::Break { .. } = atom {

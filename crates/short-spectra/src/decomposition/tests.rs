@@ -1,4 +1,4 @@
-//! Parts with known shapes, and records whose parts are known.
+//! Derivatives of all parts, and records whose parts are known.
 
 use super::atom::{Atom, FramePlaces, OscillationAtom, StepShape};
 use super::{Decomposition, DecompositionSettings};
@@ -55,6 +55,8 @@ fn derivatives_of_all_parts_are_those_of_their_values() {
     }
 }
 
+/// Explanation of a record of `value`, m, over time, s, in white noise of a standard deviation, m, and its
+/// samples.
 fn taken_apart(value: impl Fn(f64) -> f64, noise: f64, seed: u64) -> (Decomposition, Vec<Option<f64>>) {
     let mut generator = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut draw = || noise * generator.sample::<f64, _>(StandardNormal);
@@ -68,7 +70,7 @@ fn record(samples: &[Option<f64>]) -> SampledRecord<'_> {
     SampledRecord { samples, frame_rate_hz: RATE_HZ, exposure_s: None }
 }
 
-/// Frequencies, Hz, of the components, rising, with their deviations.
+/// Frequencies of the components with their standard deviations, Hz, in rising order.
 fn listed(found: &Decomposition, samples: &[Option<f64>]) -> Vec<(f64, f64)> {
     let components = found.components(&record(samples), &SpectrumSettings::default());
     let mut list: Vec<(f64, f64)> = components.iter().map(|c| (c.frequency_hz, c.frequency_sd_hz)).collect();
@@ -76,8 +78,8 @@ fn listed(found: &Decomposition, samples: &[Option<f64>]) -> Vec<(f64, f64)> {
     list
 }
 
-/// Phase, cycles, of a frequency that changes evenly from `from` to `to`, Hz, between the first frame less
-/// half a frame and the last one and a half.
+/// Phase, cycles, at time `t`, s, of a frequency that changes at a constant rate from `from` to `to`, Hz:
+/// from half a frame before the first frame to half a frame after the last one.
 fn chirp(from: f64, to: f64, t: f64) -> f64 {
     let (t, duration) = (t + 0.5 / RATE_HZ, FRAMES as f64 / RATE_HZ);
     from * t + (to - from) * t * t / (2.0 * duration)
@@ -125,7 +127,7 @@ fn mistracked_frames_are_left_out_and_both_tones_are_clear() {
     }
     let settings = DecompositionSettings::new(FRAMES, Trend::Polynomial(4), true);
     let found = Decomposition::from_record(&record(&samples), settings).unwrap();
-    // the bad frames, and at most three good ones
+    // nine frames are mistracked; at most three good ones are left out with them
     assert!((FRAMES - 12..=FRAMES - 9).contains(&found.problem.len()), "{}", found.problem.len());
     let components = found.components(&record(&samples), &SpectrumSettings::default());
     assert_eq!(components.len(), 2, "{components:?}");
