@@ -5,9 +5,9 @@
 //! around each frame is subtracted. What is left rises in every slip and falls while the tip rests or lags.
 //! Its extremes, found with hysteresis, give the rises. They are slips in one of two cases: they are clearly
 //! shorter than the falls, or the tip comes to rest once a period and moves unlike a sinusoid. Noise and an
-//! oscillation rise as slowly as they fall. Lines of growing length are tried until one fits the period that
-//! it gives. Instants and sizes of the slips are then measured on the path itself, between the levels at
-//! which the tip rests.
+//! oscillation rise as slowly as they fall. Lines of growing length are tried until one is two to eight
+//! periods long, and the rises are found again with a line of two periods. Instants and sizes of the slips
+//! are then measured on the path itself, between the levels at which the tip rests.
 
 use super::Recording;
 use super::channel::{central_moments, median_in_place, value_range};
@@ -20,9 +20,11 @@ use std::ops::Range;
 
 /// Minimum number of slips: with fewer, rises that are shorter than falls are no evidence.
 const FEWEST_SLIPS: usize = 6;
-/// Minimum number of tracked frames.
+/// Minimum number of tracked frames: six slips take at least two frames each, and a line needs frames on both
+/// sides.
 const FEWEST_FRAMES: usize = 16;
-/// Hysteresis of the extremes, in standard deviations of the noise.
+/// Hysteresis of the extremes, in standard deviations of the noise: noise alone makes fewer than one of ten
+/// thousand pairs of frames differ by as much.
 const HYSTERESIS: f64 = 6.0;
 /// The usual rise must be this many times the hysteresis. Otherwise many of the slips would be missed, and
 /// rises of noise would be counted.
@@ -31,61 +33,77 @@ const CLEAR_RISE: f64 = 1.75;
 const LEAST_SLIP: f64 = 0.3;
 /// Largest mean fraction of a period that a rise may take; it is a half for a sinusoid.
 const MOST_RISING: f64 = 0.45;
-/// The fraction must be below a half by this number of its standard deviations.
+/// The fraction must be below a half by this number of its standard deviations, so that chance does not make
+/// an oscillation a cycle.
 const CLEAR_DEVIATIONS: f64 = 4.0;
-/// Shortest line that is subtracted, frames, and ratio of each length that is tried to the one before.
+/// Shortest line that is subtracted, frames, and ratio of each length that is tried to the one before. The
+/// ratio is so small that a length falls into [`LINE_PERIODS`] for every period.
 const LINES: (f64, f64) = (8.0, 1.3);
 /// Smallest and largest ratio of the length of the line to the period. A shorter line follows the slips; a
 /// longer one does not follow the stroke.
 const LINE_PERIODS: (f64, f64) = (2.0, 8.0);
-/// Length of the slowest part of a period, as a fraction of it, and its largest velocity, relative to the
-/// mean. The velocity is 0.15 if it falls to zero and rises along straight lines, and more between frames.
+/// Length of the slowest part of a period, as a fraction of the period.
 const SLOWEST_PART: f64 = 0.15;
+/// The tip rests if its velocity in this part is at most this fraction of its mean. A velocity that falls to
+/// zero and rises again along straight lines has 0.15; the fraction is larger if the part is not a whole
+/// number of frames.
 const SLOW_STEP: f64 = 0.25;
-/// Largest motion against the stroke in a period with rest, as a fraction of the travel in it.
+/// Largest motion against the stroke in a period with rest, as a fraction of the travel in the period: a tip
+/// that swings moves back further.
 const MOST_BACK: f64 = 0.02;
-/// Largest mean fraction of a period that a rise may take if the tip comes to rest.
+/// Largest mean fraction of a period that a rise may take if the tip comes to rest: a cycle whose rises are
+/// as long as its falls has a half, and noise changes it a little.
 const MOST_RISING_AT_REST: f64 = 0.53;
-/// Smallest ratio of the second harmonic to the first with which a motion differs from a sinusoid: that of
-/// interpolated instants, and in standard deviations of the noise.
+/// Smallest ratio of the second harmonic to the first with which a motion differs from a sinusoid. The first
+/// number is the ratio that interpolated instants give a sinusoid; the second is in standard deviations of
+/// the noise.
 const DISTORTED: (f64, f64) = (0.006, 5.0);
-/// Largest number of turns of the stroke per slip: a swing about a place rests at its turns.
+/// Largest number of turns of the stroke per slip: an oscillation about a place turns twice a period and
+/// rests at each turn.
 const MOST_TURNS: f64 = 0.5;
-/// The tip turns if it moves back by this fraction of its whole range.
+/// The tip turns if it moves back by this fraction of its whole range; smaller motions back are part of a
+/// cycle.
 const TURN_SHARE: f64 = 0.2;
-/// Fractions of a slip between which a line is fitted to the path if enough frames are there.
+/// Fractions of a slip between which a line is fitted to the path if enough frames are there; the path is
+/// curved near the rests.
 const SLOPE_SHARES: (f64, f64) = (0.2, 0.8);
-/// Minimum number of frames for that line. With fewer, the path is interpolated between two frames.
+/// Minimum number of frames for that line. With fewer, the path is interpolated between the two frames around
+/// the instant.
 const FEWEST_ON_SLOPE: usize = 4;
-/// Error of an instant by interpolation between frames, in frames: at least, and per fraction of the slip
-/// that lies between the two frames. It bounds the curvature of a slip of 2 to 300 frames.
+/// Standard deviation, frames, of an instant that is interpolated between frames: its smallest value, and its
+/// value per fraction of the slip that lies between the two frames. They bound the error that the curvature
+/// of slips of 2 to 300 frames causes.
 const INTERPOLATION: (f64, f64) = (0.01, 0.04);
-/// Number of intervals on either side whose median is the local period.
+/// Number of intervals on either side of an interval that, together with it, have the local period as their
+/// median: the median of seven follows a drift and ignores three odd intervals.
 const LOCAL_INTERVALS: usize = 3;
-/// An interval has dropped beats if it differs from a multiple of the local period by less than this
-/// fraction of the period.
+/// An interval of about two or three local periods has dropped beats if it differs from the whole number by
+/// less than this fraction of the period.
 const WHOLE_BEAT: f64 = 0.2;
 /// Median of the magnitude of a standard normal variable.
 const NORMAL_MEDIAN: f64 = 0.674_489_75;
-/// A period that is off by more than this number of deviations, which follow from the median, is odd.
+/// A period is odd, and left out of the scatter, if it is off by more than this number of standard
+/// deviations. They follow from the median, which odd periods do not change.
 const ODD_DEVIATIONS: f64 = 4.0;
-/// An interval of this many local periods is a pause of the cycle.
+/// An interval of at least this number of local periods is a pause of the cycle: it is longer than two
+/// dropped beats.
 const PAUSE: f64 = 3.5;
 /// Lost frames may hide a slip if they span at least this fraction of a period.
 const MOST_LOST: f64 = 0.5;
 /// The tip leaves its rest if it moves by this number of standard deviations of the noise, or by this
 /// fraction of the slip.
 const LEAVES_REST: (f64, f64) = (3.0, 0.02);
-/// Sticks and slips have durations if the median stick spans at least this many frames.
+/// Sticks and slips have durations if the median stick spans at least this number of frames: the ends of a
+/// shorter one are not known well enough.
 const LEAST_STICK_FRAMES: f64 = 5.0;
 /// Scatter of the period from which on the spectrum has no line: if independent periods scatter by a quarter,
-/// the density at their rate is less than twice that around it. Relative to the local period, of which each
-/// period is a part, a scatter of a quarter is found as 0.22.
+/// the power density at their rate is less than twice that around it. `period_scatter` of such periods is
+/// 0.22, because each period is one of the seven of its local period.
 const NO_LINE_SCATTER: f64 = 0.22;
-/// Smallest noise of a camera, m; what is less in the head comes from rounding.
+/// Smallest noise of a camera, m; a smaller noise of the head comes from rounding.
 const ROUNDING_M: f64 = 1e-9;
-/// Largest ratio of the noise of the tip to that of the head. What neighbouring frames of the tip differ by
-/// beyond it is a fast cycle.
+/// Largest ratio of the noise of the tip to that of the head: a larger difference between neighbouring frames
+/// of the tip is a fast cycle, not noise.
 const MOST_UNLIKE: f64 = 2.0;
 
 /// One slip of the tip.
@@ -117,11 +135,11 @@ pub struct CountedCycle {
     pub count: usize,
     /// Slips per second, 1/s.
     pub rate_hz: f64,
-    /// Standard deviation of the rate, 1/s: it includes the scatter of the period.
+    /// Standard deviation of the rate, 1/s, from the noise, the scatter of the period and the clock.
     pub rate_sd_hz: f64,
     /// Mean period of the cycle, s; a dropped beat counts as a period.
     pub period_s: f64,
-    /// Standard deviation of the mean period that follows from the noise, s.
+    /// Standard deviation of the mean period, s, from the noise and the clock, without the scatter.
     pub period_sd_s: f64,
     /// Standard deviation of a single period, relative to the local period, which is the median of seven. A
     /// few odd periods are left out, and the errors of the instants are subtracted.
@@ -130,13 +148,13 @@ pub struct CountedCycle {
     pub dropped_beats: usize,
     /// Median size of a slip, m.
     pub size_m: f64,
-    /// Standard deviation of the size of a slip, m, relative to the mean size.
+    /// Standard deviation of the sizes of the slips, relative to their mean.
     pub size_scatter: f64,
-    /// Mean fraction of a period in which the tip is faster than its mean.
+    /// Mean fraction of a period in which the tip is faster than the line that is subtracted from its path.
     pub rising_fraction: f64,
     /// Durations of sticks and slips; `None` if the sticks span too few frames.
     pub times: Option<StickTimes>,
-    /// What is to be known about the numbers, in words.
+    /// Limits of these numbers, in words.
     pub remarks: Vec<String>,
     /// The slips, in order of time.
     pub slips: Vec<TipSlip>,
@@ -150,8 +168,8 @@ pub struct NoCycle(String);
 impl Recording {
     /// Counts the stick-slip cycles of the tip in a range of frames of the grid.
     ///
-    /// # Errors
-    /// [`NoCycle`] with the reason, among them a motion that rises as slowly as it falls.
+    /// # Errors [`NoCycle`] with the reason: too few tracked frames, too few slips that are clear of the
+    /// noise, too many frames lost between slips, or a motion that may be an oscillation without sticks.
     pub fn count_cycles(&self, frames: Range<usize>) -> Result<CountedCycle, NoCycle> {
         let (tip, head) = (&self.traces.tip_x_m, &self.traces.head_x_m);
         let inside = tip.get(frames.clone()).unwrap_or_default();
@@ -203,8 +221,8 @@ struct TipTravel {
     noise_m: f64,
 }
 
-/// Rises of the path above its trend: first and last point of each, the usual height, m, the median period,
-/// frames, and the mean fraction of the period that a rise takes.
+/// Rises of the path above the line: first and last point of each, the usual height, m, the median period,
+/// frames, and the mean fraction of the period that a rise takes. Points count tracked frames.
 struct PathRises {
     ends: Vec<[usize; 2]>,
     usual_m: f64,
@@ -214,7 +232,8 @@ struct PathRises {
     is_rising_fast: bool,
 }
 
-/// A slip in frames: instant with its deviation, size with its deviation, m, and the ends of the motion.
+/// A slip: instant with its standard deviation, frames, size with its standard deviation, m, and start and
+/// end of the motion, frames.
 struct MeasuredSlip {
     frame: f64,
     frame_sd: f64,
@@ -231,7 +250,7 @@ impl TipTravel {
         let least = (TURN_SHARE * (high - low)).max(2.0 * HYSTERESIS * noise_m);
         let found = turning_points(&places, least);
         let (count, mut turns) = (found.len().saturating_sub(1), found.into_iter().peekable());
-        // (the first is the start of the path)
+        // (the first turning point is at the start of the path)
         let mut sign = if turns.next().is_some_and(|(_, is_crest)| is_crest) { -1.0 } else { 1.0 };
         let mut path_m = vec![0.0];
         for (i, pair) in places.windows(2).enumerate() {
@@ -273,7 +292,8 @@ impl TipTravel {
         })))
     }
 
-    /// Rises above lines of `length` frames; `None` if they are few or hardly larger than the noise.
+    /// Rises above lines of `length` frames; `None` if there are too few, or if they are hardly larger than
+    /// the noise.
     fn find_rises(&self, length: usize) -> Option<PathRises> {
         let above_m = self.subtract_lines(length / 2);
         let height = |[trough, crest]: &[usize; 2]| above_m[*crest] - above_m[*trough];
@@ -299,8 +319,9 @@ impl TipTravel {
         Some(PathRises { ends, usual_m, period, fraction, is_rising_fast })
     }
 
-    /// Whether the tip comes to rest once a period, by its slowest step and by its motion against the stroke,
-    /// and moves unlike a sinusoid. A sinusoid comes to rest too if its velocity happens to reach zero.
+    /// Whether the tip comes to rest once a period and moves unlike a sinusoid. It rests if its slowest step
+    /// is short and it does not move against the stroke. A sinusoid on a stroke also comes to rest if its
+    /// velocity just reaches zero.
     fn rests_every_period(&self, rises: &PathRises) -> bool {
         if self.turns as f64 > MOST_TURNS * rises.ends.len() as f64 {
             return false;
@@ -326,13 +347,14 @@ impl TipTravel {
         is_slow && rises.fraction <= MOST_RISING_AT_REST && self.is_distorted(rises)
     }
 
-    /// Whether the second harmonic of the path above its trend is clear of noise and of lost frames.
+    /// Whether the second harmonic of the path above its line is larger than noise and lost frames can make
+    /// it.
     fn is_distorted(&self, rises: &PathRises) -> bool {
         let above_m = self.subtract_lines(rises.period as usize);
         let (first, last) = (self.frames[0] as f64, self.frames[self.frames.len() - 1] as f64);
         let slips =
             (0..rises.ends.len()).filter_map(|at| self.measure_slip(rises, at).map(|slip| slip.frame));
-        // (near the ends of the record the lines reach to one side only)
+        // (near the ends of the record the lines lie on one side only)
         let is_inside = |frame: &f64| frame - first >= rises.period && last - frame >= rises.period;
         let instants: Vec<f64> = slips.filter(is_inside).collect();
         let (mut sums, mut points) = ([[0.0; 2]; 2], 0.0_f64);
@@ -357,7 +379,7 @@ impl TipTravel {
 
     /// The path above the line fitted to the points within `half` frames of each point, m.
     fn subtract_lines(&self, half: usize) -> Vec<f64> {
-        // sums over the points within reach, with times counted from the current frame
+        // sums over the points of the line, with times relative to the current frame
         let [mut n, mut t, mut tt, mut x, mut tx] = [0.0; 5];
         let (mut first, mut next, mut centre) = (0, 0, self.frames[0]);
         let above = self.frames.iter().zip(&self.path_m).map(|(&frame, value)| {
@@ -383,7 +405,7 @@ impl TipTravel {
                 first += 1;
             }
             let spread = n * tt - t * t;
-            // (the spread of two frames is 1)
+            // (two neighbouring frames have a spread of 1)
             let slope = if spread > 0.5 { (n * tx - t * x) / spread } else { 0.0 };
             value - (x - slope * t) / n
         });
@@ -413,8 +435,9 @@ impl TipTravel {
         Some(MeasuredSlip { frame, frame_sd, size_m, size_sd_m: size_variance.sqrt(), motion })
     }
 
-    /// Instant of a slip with its standard deviation, and the ends of the motion, frames. `levels_m` are the
-    /// levels of rest; their mean has the given variance, m2.
+    /// Instant of a slip with its standard deviation, and start and end of the motion, all in frames.
+    /// `levels_m` are the levels of rest; their mean has the variance `variance_m2`, m². `None` if the path
+    /// does not rise through the middle between them.
     fn time_slip(
         &self,
         [from, trough, crest, to]: [usize; 4],
@@ -484,7 +507,8 @@ fn turning_points(path: &[f64], least: f64) -> Vec<(usize, bool)> {
     found
 }
 
-/// The size for which half of the sum of all sizes is in larger ones; 0 without sizes.
+/// The size at which the sizes up to it make up half of the sum of all sizes: many small ones hardly change
+/// it. 0 without sizes.
 fn usual_size(mut sizes: Vec<f64>) -> f64 {
     sizes.sort_by(f64::total_cmp);
     let mut left = 0.5 * sizes.iter().sum::<f64>();
@@ -505,7 +529,7 @@ fn mean_and_sd(values: &[f64]) -> (f64, f64) {
     (mean, (squares / (values.len() - 1) as f64).sqrt())
 }
 
-/// Ratio of each interval to the local period, without pauses of the cycle, with the interval.
+/// Each interval as its ratio to the local period, and in frames; pauses of the cycle are left out.
 fn compare_intervals(intervals: &[f64]) -> Vec<(f64, f64)> {
     let ratio = |(at, interval): (usize, &f64)| {
         let near = at.saturating_sub(LOCAL_INTERVALS)..(at + LOCAL_INTERVALS + 1).min(intervals.len());
@@ -534,7 +558,7 @@ fn summarise_slips(
     let total_sd = math::hypot(found[0].frame_sd, found[found.len() - 1].frame_sd);
     let errors = 2.0 * find_median(found.iter().map(|slip| slip.frame_sd * slip.frame_sd));
     let without_errors = |sd: f64| (sd * sd - errors / (period * period)).max(0.0).sqrt();
-    // (the local period follows a drift)
+    // (relative to the local period, so that a drift is no scatter)
     let off = || compared.iter().map(|(ratio, _)| ratio / count_beats(*ratio) - 1.0);
     let most = ODD_DEVIATIONS / NORMAL_MEDIAN * find_median(off().map(f64::abs));
     let period_scatter =

@@ -1,5 +1,6 @@
-//! The cycle of a simulation as the spectrum reads it and as its slips are counted, against its sticks; the
-//! table of all scenes is that of `cargo run --release --example cycles`. Counted cycles of known instants.
+//! The cycle of simulations, from the spectrum and from counted slips, compared with the sticks of the
+//! simulation (`cargo run --release --example cycles` prints all scenes), and counted cycles of paths with
+//! known instants.
 
 use crate::cycle_count::Count;
 use crate::noise::noise;
@@ -25,10 +26,10 @@ fn the_cycle_is_named_and_its_mean_and_range_are_known_to_their_deviations() {
 }
 
 const RATE_HZ: f64 = 1000.0;
-/// Distance of a slip, m.
+/// Size of a slip, m.
 const SIZE_M: f64 = 1e-3;
 
-/// Counts the cycle of a tip whose head rests; the head has the noise of the tip.
+/// Counts the cycle of a tip while the head rests; `noise_m` is the noise of the head.
 fn count(tip_m: Vec<Option<f64>>, noise_m: f64) -> Result<CountedCycle, NoCycle> {
     let (frames, mut draw) = (tip_m.len(), noise(5));
     let head_x_m = (0..frames).map(|_| Some(noise_m * draw())).collect();
@@ -39,7 +40,8 @@ fn count(tip_m: Vec<Option<f64>>, noise_m: f64) -> Result<CountedCycle, NoCycle>
     Recording::new("tip", grid, traces, true).unwrap().count_cycles(0..frames)
 }
 
-/// Path of a tip that slips at instants, in frames, by [`SIZE_M`] each; a slip takes `slip` frames.
+/// Path, m, of a tip with slips of [`SIZE_M`] whose middles are at `instants`, frames; a slip takes `slip`
+/// frames.
 fn staircase(
     instants: &[f64],
     frames: usize,
@@ -56,14 +58,14 @@ fn staircase(
     (0..frames).map(|frame| Some(place(frame) + noise_m())).collect()
 }
 
-/// Instants that follow one another by `period` frames, from `first` on.
+/// `count` instants, frames: the first at `first`, the others `period` apart.
 fn regular(first: f64, period: f64, count: usize) -> Vec<f64> {
     (0..count).map(|k| first + period * k as f64).collect()
 }
 
 #[test]
 fn instants_without_noise_are_found_to_a_fraction_of_a_frame() {
-    // (without noise, hidden slips of one size look like steps of the sensor)
+    // (slips between two frames get noise: without it, slips of one size look like steps of the sensor)
     for (period, slip, most_frames, noise_m) in
         [(7.3, 3.0, 0.06, 0.0), (31.7, 8.0, 0.01, 0.0), (1000.3, 300.0, 0.02, 0.0), (31.7, 0.01, 0.51, 1e-7)]
     {
