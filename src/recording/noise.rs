@@ -14,11 +14,11 @@ pub(crate) mod differences;
 mod likelihood;
 
 use super::Recording;
-pub(crate) use short_spectra::noise::{AutoregressiveNoise, Whitener};
 use blocks::{BlockCut, NoiseBlock, cut_blocks, keep_quiet_blocks};
 use common_noise::{CommonNoise, SharedNoise, measure_common_noise};
 pub use differences::{noise_floor, quantisation_step};
 use portable_math as math;
+pub(crate) use short_spectra::noise::{AutoregressiveNoise, Whitener};
 
 // The position of the head along the sweep is compared with its smooth motion. The height of the tip is
 // compared with the glass, which is a straight line in the picture. In the other two channels the blade

@@ -4,6 +4,11 @@
 //! by least squares, and follows a component whose frequency drifts through short-time spectra. Every
 //! component has standard deviations and a verdict.
 //!
+//! [`decompose_record`] describes a whole record at once: trend, oscillations with decay, onset, drift and
+//! harmonics, smooth steps, frames left out, and coloured noise. The posterior probability chooses among all
+//! of them. It will take the place of [`SpectralAnalysis::from_record`], which it does not yet match on the
+//! hardest scenes.
+//!
 //! [`analyse_spectrum`] finds the peaks of one Hann-windowed spectrum. It is fast and makes no choices that
 //! depend on the data, so that a fit can compare thousands of records. Gaps of up to four frames are filled
 //! for the transform only (`gap_filling.rs`). If more than a tenth of the frames are missing, the components
