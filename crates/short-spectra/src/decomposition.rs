@@ -108,97 +108,94 @@ impl Decomposition {
         let largest = samples.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
         let mut white = NoisyRecord::new(samples.len(), used, values);
         white.least_variance = math::powi(ROUNDING * largest / scale_m, 2).max(1e-300);
-        let (search, explanation) = select_explanation(white, &settings);
-        let rivals = search.rivals;
-        let mut found = Self { problem: search.problem, explanation, rivals, scale_m };
+        let Contest { problem, best: explanation, rivals, .. } = select_explanation(white, settings);
+        let mut found = Self { problem, explanation, rivals, scale_m };
         found.add_rivals();
         Some(found)
     }
 }
 
-/// The most probable explanation among those with and without a jump, in white and in coloured noise. A first
-/// search in white noise finds the slow parts. The noise that these leave decides whether coloured noise is
-/// tried.
-fn select_explanation(white: NoisyRecord, settings: &DecompositionSettings) -> (PartSearch, Explanation) {
+/// Explanations that compete: with and without a jump, in white and in coloured noise.
+struct Contest {
+    settings: DecompositionSettings,
+    /// The frames used and the noise of the most probable explanation.
+    problem: NoisyRecord,
+    best: Explanation,
+    /// Everything that any of the searches tried.
+    rivals: Vec<Rival>,
+}
+
+impl Contest {
+    /// Smallest fall of the criterion, nats, for which a search is repeated in the noise that it leaves.
+    const LEAST_FALL: f64 = 0.1;
+    /// Largest number of repetitions; it bounds the time.
+    const MOST_REPETITIONS: usize = 3;
+
+    /// Searches from `parts` on, then again in the noise that the explanation leaves, as long as this lowers
+    /// the criterion.
+    fn search_parts(&mut self, problem: NoisyRecord, parts: Parts) {
+        let DecompositionSettings { trend_grows, most_oscillations, .. } = self.settings;
+        let mut search = PartSearch::new(problem, trend_grows, most_oscillations);
+        search.bound = self.best.criterion;
+        let mut found = search.find_parts(parts);
+        for _ in 0..Self::MOST_REPETITIONS {
+            let coloured = with_noise_of(&search.problem, &found.parts);
+            if coloured.order == 0 && search.problem.order == 0 {
+                break;
+            }
+            let mut again = PartSearch::new(coloured, trend_grows, most_oscillations);
+            let next = again.find_parts(found.parts.clone());
+            let falls = next.criterion < found.criterion - Self::LEAST_FALL;
+            if falls {
+                std::mem::swap(&mut search, &mut again);
+                found = next;
+            }
+            self.rivals.extend(again.rivals);
+            if !falls {
+                break;
+            }
+        }
+        self.rivals.extend(search.rivals);
+        if found.criterion < self.best.criterion {
+            (self.problem, self.best) = (search.problem, found);
+        }
+    }
+}
+
+/// The most probable explanation. A first search in white noise finds the slow parts. The noise that these
+/// leave decides whether coloured noise is tried.
+fn select_explanation(white: NoisyRecord, settings: DecompositionSettings) -> Contest {
     /// Largest number of oscillations in the first search: the slow parts are known before all oscillations
     /// are.
     const FIRST_LOOK: usize = 4;
-    /// If a jump lowers the criterion of the first search by more than this, nats, that search is not
-    /// completed: further oscillations do not make up for the jump.
+    /// If another explanation has a criterion below that of the first search by more than this, nats, that
+    /// search is not completed: further oscillations do not make up for it.
     const CLEAR_LEAD: f64 = 20.0;
     let start = Parts { trend: settings.trend, atoms: Vec::new() };
-    let new_search = |problem: NoisyRecord, most: usize| PartSearch::new(problem, settings.trend_grows, most);
-    let mut best: Option<(PartSearch, Explanation)> = None;
-    let take = |best: &mut Option<(PartSearch, Explanation)>, search: PartSearch, found: Explanation| {
-        if best.as_ref().is_none_or(|(_, best)| found.criterion < best.criterion) {
-            *best = Some((search, found));
-        }
-    };
-    let bound =
-        |best: &Option<(PartSearch, Explanation)>| best.as_ref().map_or(f64::INFINITY, |b| b.1.criterion);
     let jump = settings.trend_grows.then(|| find_jump(&white, &start)).flatten();
-    let plain = with_noise_of(&white, &start);
-    let noise_criterion = plain.fit_parts(&start, 0).criterion;
-    let mut search = new_search(white, FIRST_LOOK.min(settings.most_oscillations));
-    search.bound = noise_criterion;
+    let first_look = FIRST_LOOK.min(settings.most_oscillations);
+    let bound = with_noise_of(&white, &start).fit_parts(&start, 0).criterion;
+    let mut search = PartSearch::new(white, settings.trend_grows, first_look);
+    search.bound = bound;
     let first = search.find_parts(start);
-    search.bound = f64::INFINITY;
+    let white = search.problem;
+    let mut contest =
+        Contest { settings, problem: white.clone(), best: first.clone(), rivals: search.rivals };
     let slow: Vec<Atom> = first.parts.atoms.iter().filter(|a| a.oscillation().is_none()).cloned().collect();
     let slow = Parts { trend: first.parts.trend, atoms: slow };
-    let (background, alone) =
-        (with_background(&search.problem, &slow), with_noise_of(&search.problem, &slow));
+    let (background, alone) = (with_background(&white, &slow), with_noise_of(&white, &slow));
     let noise_alone = alone.fit_parts(&slow, 2);
-    let coloured = background.order > 0 || noise_alone.criterion < first.criterion;
-    if coloured {
-        let mut search = new_search(background, settings.most_oscillations);
-        let found = search.find_parts(slow.clone());
-        let (search, found) = search_in_left_noise((search, found), settings);
-        take(&mut best, search, found);
-        let mut search = new_search(alone, settings.most_oscillations);
-        search.bound = bound(&best);
-        let found = search.find_parts(noise_alone.parts);
-        take(&mut best, search, found);
+    if background.order > 0 || noise_alone.criterion < first.criterion {
+        contest.search_parts(background, slow);
+        contest.search_parts(alone, noise_alone.parts);
     }
     if let Some((problem, parts)) = jump {
-        let mut search = new_search(problem, settings.most_oscillations);
-        search.bound = bound(&best);
-        let with_jump = search.find_parts(parts);
-        let leads = with_jump.criterion < first.criterion - CLEAR_LEAD;
-        let (search, with_jump) = search_in_left_noise((search, with_jump), settings);
-        take(&mut best, search, with_jump);
-        if leads || coloured {
-            return best.expect("an explanation was taken");
-        }
+        contest.search_parts(problem, parts);
     }
-    search.most_oscillations = settings.most_oscillations;
-    search.bound = bound(&best);
-    let found = search.find_parts(first.parts);
-    let (search, found) = search_in_left_noise((search, found), settings);
-    take(&mut best, search, found);
-    best.expect("an explanation was taken")
-}
-
-/// Repeats a search in the noise that its explanation leaves, as long as this lowers the criterion by at
-/// least 0.1 nats.
-fn search_in_left_noise(
-    mut best: (PartSearch, Explanation),
-    settings: &DecompositionSettings,
-) -> (PartSearch, Explanation) {
-    /// Largest number of repetitions; it bounds the time.
-    const MOST_ROUNDS: usize = 3;
-    for _ in 0..MOST_ROUNDS {
-        let coloured = with_noise_of(&best.0.problem, &best.1.parts);
-        if coloured.order == 0 && best.0.problem.order == 0 {
-            break;
-        }
-        let mut again = PartSearch::new(coloured, settings.trend_grows, settings.most_oscillations);
-        let better = again.find_parts(best.1.parts.clone());
-        if better.criterion >= best.1.criterion - 0.1 {
-            break;
-        }
-        best = (again, better);
+    if contest.best.criterion > first.criterion - CLEAR_LEAD {
+        contest.search_parts(white, first.parts);
     }
-    best
+    contest
 }
 
 /// The problem in the noise that `parts` leave, without the lines of further oscillations. A running median
