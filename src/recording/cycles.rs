@@ -168,7 +168,8 @@ pub struct NoCycle(String);
 impl Recording {
     /// Counts the stick-slip cycles of the tip in a range of frames of the grid.
     ///
-    /// # Errors [`NoCycle`] with the reason: too few tracked frames, too few slips that are clear of the
+    /// # Errors
+    /// [`NoCycle`] with the reason: too few tracked frames, too few slips that are clear of the
     /// noise, too many frames lost between slips, or a motion that may be an oscillation without sticks.
     pub fn count_cycles(&self, frames: Range<usize>) -> Result<CountedCycle, NoCycle> {
         let (tip, head) = (&self.traces.tip_x_m, &self.traces.head_x_m);

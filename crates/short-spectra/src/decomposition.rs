@@ -13,7 +13,8 @@ mod tests;
 use crate::component::Component;
 use crate::decimation;
 use crate::error::{SpectrumError, check_record};
-use crate::noise::raise_order;
+use crate::noise::{MOST_COEFFICIENTS, raise_order};
+use crate::periodogram::upper_median;
 use crate::record::SampledRecord;
 use crate::settings::{ROUNDING, SpectrumSettings};
 use crate::transform::RealTransform;
@@ -28,8 +29,6 @@ const MOST_OSCILLATIONS: usize = 12;
 /// Frames per oscillation: an oscillation with decay, onset and linear drift has six parameters, so this
 /// allows about three frames per parameter.
 const FRAMES_PER_OSCILLATION: usize = 16;
-/// Highest order of the noise: the number of coefficients that [`crate::noise`] can hold.
-const MOST_ORDER: usize = 8;
 
 /// The most probable explanation of a record, with the frames and the noise for which it holds.
 pub(crate) struct Decomposition {
@@ -218,39 +217,57 @@ fn with_background(problem: &NoisyRecord, parts: &Parts) -> NoisyRecord {
     let bins = HALF_WIDTH * padded.div_ceil(frames);
     let smooth: Vec<f64> = (0..density.len())
         .map(|k| {
-            let mut near = density[k.saturating_sub(bins)..(k + bins + 1).min(density.len())].to_vec();
-            near.sort_by(f64::total_cmp);
-            near[near.len() / 2]
+            let near = &density[k.saturating_sub(bins)..(k + bins + 1).min(density.len())];
+            upper_median(near.to_vec()).unwrap_or(0.0)
         })
         .collect();
     let correlation = |lag: usize| -> f64 {
         let turn = std::f64::consts::TAU * lag as f64 / padded as f64;
         smooth.iter().enumerate().map(|(k, s)| s * math::cos(turn * k as f64)).sum()
     };
-    let correlations: Vec<f64> = (0..=MOST_ORDER).map(correlation).collect();
-    let n = white.len() as f64;
-    let mut coefficients: Vec<f64> = Vec::new();
-    let (mut variance, mut best) = (1.0, (0.0, Vec::new()));
-    for order in 1..=most_order(white.len()) {
+    let correlations: Vec<f64> = (0..=MOST_COEFFICIENTS).map(correlation).collect();
+    let mut variance = 1.0;
+    let levinson = |coefficients: &[f64]| {
+        let order = coefficients.len() + 1;
         let predicted: f64 =
             coefficients.iter().zip((1..order).rev()).map(|(a, lag)| a * correlations[lag]).sum();
         let kappa = (correlations[order] - predicted) / (variance * correlations[0]);
-        if kappa.is_nan() || kappa.abs() >= 1.0 {
-            break;
-        }
-        coefficients = raise_order(&coefficients, kappa);
         variance *= 1.0 - kappa * kappa;
-        let criterion = 0.5 * n * math::ln(variance) + 0.5 * order as f64 * math::ln(n);
-        if criterion < best.0 - MEDIAN_SCATTER {
-            best = (criterion, coefficients.clone());
-        }
-    }
-    white.with_noise(&best.1)
+        (kappa.abs() < 1.0).then_some(kappa)
+    };
+    let coefficients = select_coefficients(white.len(), MEDIAN_SCATTER, levinson);
+    white.with_noise(&coefficients)
 }
 
 /// A higher order must lower the criterion by more than this, nats: the scatter of a running median alone can
 /// cause a smaller fall.
 const MEDIAN_SCATTER: f64 = 4.0;
+
+/// Autoregressive coefficients of the order with the lowest Bayesian information criterion for `frames`
+/// frames. `next_kappa` gives the reflection coefficient of the next order from the coefficients of the
+/// present one, if there is one. A higher order counts only if it lowers the criterion by more than
+/// `least_fall`, nats.
+fn select_coefficients(
+    frames: usize,
+    least_fall: f64,
+    mut next_kappa: impl FnMut(&[f64]) -> Option<f64>,
+) -> Vec<f64> {
+    /// Frames per coefficient: a coefficient from 25 frames has a standard deviation of a fifth.
+    const FRAMES_PER_COEFFICIENT: usize = 25;
+    let n = frames as f64;
+    let mut coefficients: Vec<f64> = Vec::new();
+    let (mut variance, mut best) = (1.0, (0.0, Vec::new()));
+    for order in 1..=MOST_COEFFICIENTS.min(frames / FRAMES_PER_COEFFICIENT) {
+        let Some(kappa) = next_kappa(&coefficients) else { break };
+        coefficients = raise_order(&coefficients, kappa);
+        variance *= 1.0 - kappa * kappa;
+        let criterion = 0.5 * n * math::ln(variance) + 0.5 * order as f64 * math::ln(n);
+        if criterion < best.0 - least_fall {
+            best = (criterion, coefficients.clone());
+        }
+    }
+    best.1
+}
 
 /// The problem in noise with the coefficients estimated from the residual of `parts`.
 fn with_noise_of(problem: &NoisyRecord, parts: &Parts) -> NoisyRecord {
@@ -260,17 +277,9 @@ fn with_noise_of(problem: &NoisyRecord, parts: &Parts) -> NoisyRecord {
     white.with_noise(&coefficients)
 }
 
-/// Highest order of the noise of a record of which `frames` frames are used.
-fn most_order(frames: usize) -> usize {
-    /// Frames per coefficient: a coefficient from 25 frames has a standard deviation of a fifth.
-    const FRAMES_PER_COEFFICIENT: usize = 25;
-    MOST_ORDER.min(frames / FRAMES_PER_COEFFICIENT)
-}
-
 /// Autoregressive coefficients of a residual with gaps, by Burg's method over the stretches without a gap.
 /// The order is that with the lowest Bayesian information criterion.
 fn estimate_coefficients(used: &[usize], residual: &[f64]) -> Vec<f64> {
-    let n = residual.len() as f64;
     let mut stretches: Vec<(Vec<f64>, Vec<f64>)> = Vec::new();
     let mut first = 0;
     for k in 1..=used.len() {
@@ -279,9 +288,8 @@ fn estimate_coefficients(used: &[usize], residual: &[f64]) -> Vec<f64> {
             first = k;
         }
     }
-    let mut coefficients: Vec<f64> = Vec::new();
-    let (mut variance, mut best) = (1.0, (0.0, Vec::new()));
-    for order in 1..=most_order(used.len()) {
+    select_coefficients(used.len(), 0.0, |coefficients| {
+        let order = coefficients.len() + 1;
         let (mut product, mut energy, mut pairs) = (0.0, 0.0, 0);
         for (forward, backward) in &stretches {
             for i in order..forward.len() {
@@ -291,7 +299,7 @@ fn estimate_coefficients(used: &[usize], residual: &[f64]) -> Vec<f64> {
             }
         }
         if pairs < 4 * order || energy <= 0.0 {
-            break;
+            return None;
         }
         let kappa: f64 = 2.0 * product / energy;
         for (forward, backward) in &mut stretches {
@@ -301,14 +309,8 @@ fn estimate_coefficients(used: &[usize], residual: &[f64]) -> Vec<f64> {
                 backward[i] = b - kappa * f;
             }
         }
-        coefficients = raise_order(&coefficients, kappa);
-        variance *= 1.0 - kappa * kappa;
-        let criterion = 0.5 * n * math::ln(variance) + 0.5 * order as f64 * math::ln(n);
-        if criterion < best.0 {
-            best = (criterion, coefficients.clone());
-        }
-    }
-    best.1
+        Some(kappa)
+    })
 }
 
 /// The problem without the frames of a jump, with a trend that starts anew behind them. The interval left out

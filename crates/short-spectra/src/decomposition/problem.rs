@@ -425,7 +425,7 @@ impl NoisyRecord {
         let n = columns.len();
         let normal = DMatrix::from_fn(n, n, |i, j| dot(&columns[i], &columns[j]));
         let right = DVector::from_fn(n, |i, _| dot(&columns[i], &whitened));
-        let trend = normal.clone().cholesky().map_or_else(|| right.clone() * 0.0, |c| c.solve(&right));
+        let trend = normal.cholesky().map_or_else(|| right.clone() * 0.0, |c| c.solve(&right));
         let mut row = [0.0; crate::trend::MOST_COLUMNS];
         let trend_values = all.places.iter().map(|s| {
             explanation.parts.trend.fill_row(2.0 * s - 1.0, &mut row);

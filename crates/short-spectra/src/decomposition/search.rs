@@ -5,6 +5,7 @@
 use super::atom::{Atom, FEWEST_CYCLES, MOST_ENVELOPE_DEGREE, MOST_PHASE_DEGREE, OscillationAtom, StepShape};
 use super::candidates::{Candidate, find_candidates};
 use super::problem::{Explanation, Fixed, NoisyRecord, Parts, dot};
+use crate::periodogram::upper_median;
 use crate::trend::Trend;
 use portable_math as math;
 use rayon::prelude::*;
@@ -534,9 +535,7 @@ impl PartSearch {
         let Some(whole) = self.whole.as_ref().filter(|whole| whole.len() > self.problem.len()) else {
             return current;
         };
-        let mut sizes: Vec<f64> = current.residual.iter().map(|r| r.abs()).collect();
-        sizes.sort_by(f64::total_cmp);
-        let sd = 1.4826 * sizes[sizes.len() / 2];
+        let sd = robust_sd(&current.residual);
         let residual = whole.residual_everywhere(&self.problem, &current);
         let explained = |k: usize| residual[k].abs() < TAKEN_BACK_DEVIATIONS * sd;
         let used = &self.problem.used;
@@ -576,9 +575,7 @@ impl PartSearch {
         let mut current = current;
         loop {
             let n = self.problem.len() as f64;
-            let mut sizes: Vec<f64> = current.residual.iter().map(|r| r.abs()).collect();
-            sizes.sort_by(f64::total_cmp);
-            let sd = 1.4826 * sizes[sizes.len() / 2];
+            let sd = robust_sd(&current.residual);
             let gain = |r: f64| -0.5 * n * math::ln_1p(-(r * r / current.squares).min(1.0 - 1e-12));
             let price = OUTLIER_PRICE * self.problem.log_frames();
             let bad: Vec<usize> = (0..current.residual.len())
@@ -606,6 +603,13 @@ impl PartSearch {
             current = found;
         }
     }
+}
+
+/// Standard deviation of normal values from the median of their sizes, which outliers hardly change.
+fn robust_sd(values: &[f64]) -> f64 {
+    /// Standard deviation of normal values over the median of their sizes.
+    const SD_OVER_MEDIAN: f64 = 1.4826;
+    upper_median(values.iter().map(|x| x.abs()).collect()).map_or(0.0, |median| SD_OVER_MEDIAN * median)
 }
 
 /// The lists of atoms that may replace an atom: none at all, or the atom with one property fewer. A break has
