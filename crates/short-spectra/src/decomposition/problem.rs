@@ -284,7 +284,7 @@ impl NoisyRecord {
     fn is_cancelling(&self, atoms: &[Atom], amplitudes: &[f64]) -> bool {
         /// Largest amplitude relative to the largest value of the record: only oscillations that cancel
         /// exceed it.
-        const MOST: f64 = 4.0;
+        const MOST: f64 = 2.0;
         let largest = self.values.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         let mut first = 0;
         atoms.iter().any(|atom| {

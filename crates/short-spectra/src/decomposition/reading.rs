@@ -90,6 +90,13 @@ fn lobe_half_width(o: &OscillationAtom) -> f64 {
     (o.nepers.map_or(0.0, f64::abs) / TAU).max(1.0)
 }
 
+/// Greatest distance of two frequencies at the start, in the middle and at the end of the record, resolutions:
+/// cycles that cross are close only where they do.
+fn greatest_distance(a: &OscillationAtom, b: &OscillationAtom) -> f64 {
+    let apart = |s: f64| (a.cycles_at(s) - b.cycles_at(s)).abs();
+    [0.0, 0.5, 1.0].map(apart).into_iter().fold(0.0, f64::max)
+}
+
 impl Decomposition {
     /// Adds a rival for each oscillation, which the search need not have tried: the other parts in the noise
     /// that is left without that oscillation.
@@ -216,14 +223,13 @@ impl Decomposition {
             );
         }
         let others = || parts.atoms.iter().filter_map(Atom::oscillation).filter(|other| *other != o);
-        if let Some(apart) =
-            others().map(|other| (other.mean_cycles() - reading.cycles).abs()).min_by(f64::total_cmp)
+        if let Some(apart) = others().map(|other| greatest_distance(o, other)).min_by(f64::total_cmp)
             && apart < LEAST_APART
         {
             doubts.push(format!("another lies {apart:.2} resolutions from it: pieces of one look the same"));
         }
         let neighbour = |other: &&OscillationAtom| {
-            (other.mean_cycles() - reading.cycles).abs() < lobe_half_width(o).max(lobe_half_width(other))
+            greatest_distance(o, other) < lobe_half_width(o).max(lobe_half_width(other))
         };
         if others().filter(|other| is_transient(other) || is_transient(o)).any(|other| neighbour(&other)) {
             doubts.push(
