@@ -100,6 +100,9 @@ const LEAST_STICK_FRAMES: f64 = 5.0;
 /// the power density at their rate is less than twice that around it. `period_scatter` of such periods is
 /// 0.22, because each period is one of the seven of its local period.
 const NO_LINE_SCATTER: f64 = 0.22;
+/// Ratio of the longest local period to the shortest from which the mean is not the period of any part: a
+/// fifth is more than the noise of a median of seven.
+const CHANGING: f64 = 1.2;
 /// Smallest noise of a camera, m; a smaller noise of the head comes from rounding.
 const ROUNDING_M: f64 = 1e-9;
 /// Largest ratio of the noise of the tip to that of the head: a larger difference between neighbouring frames
@@ -577,7 +580,16 @@ fn summarise_slips(
     let percent = 100.0 * period_scatter;
     let no_line = format!("the period scatters by {percent:.0} %: the slips have a rate, but no line");
     let paused = format!("{pauses} {} between slips left out", pluralise("pause", pauses));
+    // (the local period of an interval is the interval over its ratio)
+    let (shortest, longest) = value_range(&compared.iter().map(|(ratio, x)| x / ratio).collect::<Vec<_>>());
+    let ms = 1e3 / rate_hz;
+    let changing = format!(
+        "the period changes from {:.3} to {:.3} ms: its mean and the rate are those of the whole window",
+        shortest * ms,
+        longest * ms
+    );
     let remarks = [
+        (longest > CHANGING * shortest).then_some(changing),
         (!is_timed).then_some(untimed),
         (period_scatter >= NO_LINE_SCATTER).then_some(no_line),
         (pauses > 0).then_some(paused),

@@ -152,6 +152,18 @@ fn dropped_beats_lost_frames_and_steps_of_the_sensor_are_told() {
     assert!(found.remarks.iter().any(|remark| remark.contains("no line")), "{:?}", found.remarks);
 }
 
+/// A period that grows from 24 to 37 frames is no single period; the scatter about the local one stays small.
+#[test]
+fn a_period_that_changes_is_said_and_is_no_scatter() {
+    let instants: Vec<f64> =
+        (0..30).scan(20.0, |t, k| Some(std::mem::replace(t, *t + 24.0 + 0.45 * f64::from(k)))).collect();
+    let found = count(staircase(&instants, 940, 6.0, || 0.0), 0.0).unwrap();
+    assert!(found.remarks.iter().any(|remark| remark.starts_with("the period changes from")), "{found:?}");
+    assert!(found.period_scatter < 0.03, "{found:?}");
+    let steady = count(staircase(&regular(20.0, 30.3, 30), 940, 6.0, || 0.0), 0.0).unwrap();
+    assert!(steady.remarks.is_empty(), "{steady:?}");
+}
+
 #[test]
 fn motions_without_stick_and_slip_have_no_cycle() {
     let mut alarms = Vec::new();
