@@ -90,8 +90,8 @@ fn lobe_half_width(o: &OscillationAtom) -> f64 {
     (o.nepers.map_or(0.0, f64::abs) / TAU).max(1.0)
 }
 
-/// Greatest distance of two frequencies at the start, in the middle and at the end of the record, resolutions:
-/// cycles that cross are close only where they do.
+/// Greatest distance, resolutions, of two frequencies at the start, in the middle and at the end of the
+/// record: cycles that cross are close only where they cross.
 fn greatest_distance(a: &OscillationAtom, b: &OscillationAtom) -> f64 {
     let apart = |s: f64| (a.cycles_at(s) - b.cycles_at(s)).abs();
     [0.0, 0.5, 1.0].map(apart).into_iter().fold(0.0, f64::max)
