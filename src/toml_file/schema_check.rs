@@ -92,7 +92,13 @@ impl<'a> SchemaCheck<'a> {
             let key = path.join(".");
             let name = path.last().copied().unwrap_or_default();
             let kinds: Vec<&str> = ways.iter().flat_map(|way| list_types(way)).collect();
-            let hint = suggest_value(name, value, &kinds).map(|hint| format!("; {hint}")).unwrap_or_default();
+            let words: Vec<&str> = ways.iter().filter_map(|way| list_words(way)).flatten().collect();
+            let nearest = |word: &str| Some(suggest_key(word, &words)).filter(|hint| hint.ends_with('?'));
+            let hint = match value {
+                DeValue::String(word) if !words.is_empty() => nearest(word),
+                _ => suggest_value(name, value, &kinds),
+            };
+            let hint = hint.map(|hint| format!("; {hint}")).unwrap_or_default();
             let (found, expected) = (describe_value(value), describe_expected(self.root, schema));
             let problem = format!("key `{key}`: found {found}, expected {expected}{hint}");
             return self.add_problem(span.start, problem);
