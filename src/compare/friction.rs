@@ -216,7 +216,8 @@ mod tests {
                 deflection_m: linkage.l1_m * d.sin_theta + linkage.l2_m * d.sin_phi,
             };
             let found = block.friction_point(&deflections).unwrap();
-            let law = linkage.friction.dynamic_coefficient(velocity_m_per_s.abs());
+            let (speed, direction) = (velocity_m_per_s.abs(), velocity_m_per_s.signum());
+            let law = linkage.friction.dynamic_coefficient(speed, direction);
             assert!((found.coefficient - law).abs() < 1e-4, "{velocity_m_per_s}: {found:?} {law}");
         }
     }

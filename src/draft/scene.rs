@@ -5,6 +5,7 @@ use super::stroke::Stroke;
 use super::{CommentedToml, ParameterRole, plan_parameters};
 use crate::fit::nuisance_parameters::default_prior_sd;
 use crate::fit::result::{FitResult, NuisanceResult};
+use crate::model::friction::FrictionShape;
 use crate::model::parameters;
 use crate::model::parameters::{ModelParameter, SAME_LENGTH_ADVICE};
 use crate::simulate::drive::Drive;
@@ -219,8 +220,11 @@ fn write_scene_toml(
         let of_table =
             scene.written_values().filter_map(|(name, value)| Some((name.split_once('.')?, name, value)));
         let rows: Vec<_> = of_table.filter(|((of, _), ..)| *of == table).collect();
-        if !rows.is_empty() {
+        if !rows.is_empty() || table == "friction" {
             text = text.add_table(table);
+        }
+        if table == "friction" {
+            text = add_law(text, &scene.linkage.friction.shape);
         }
         for ((_, key), name, value) in rows {
             text = text.add_comments(note(name)).add_number(key, value);
@@ -242,6 +246,18 @@ fn write_scene_toml(
         text = text.add_line(&format!("most_evaluations = {most}"));
     }
     Some(text.add_word("outputs", &run.outputs).into_text())
+}
+
+/// Adds the name of the friction law, unless it is the default, and the points of a table.
+fn add_law(text: CommentedToml, law: &FrictionShape) -> CommentedToml {
+    let text = match law {
+        FrictionShape::Exponential => return text,
+        _ => text.add_text("law", law.name()),
+    };
+    let FrictionShape::Table(table) = law else { return text };
+    let (speeds, coefficients): (Vec<f64>, Vec<f64>) = table.points().unzip();
+    let text = text.add_line(&format!("speeds_m_per_s = {speeds:?}"));
+    text.add_line(&format!("coefficients = {coefficients:?}"))
 }
 
 fn add_drive(
@@ -303,6 +319,21 @@ mod tests {
             // a number that needs all its digits, and a parameter that the scene states by another quantity
             let moved = scene.with_parameter("friction.a", 0.1 + 0.2).unwrap();
             reads_back(&moved.with_parameter("blade.neck_natural_frequency_hz", 1000.0 / 3.0).unwrap());
+        }
+    }
+
+    #[test]
+    fn a_scene_reads_back_with_its_friction_law() {
+        for law in [
+            "a = 0.1\nb_s_per_m = 5.0\nc = 0.3\nstatic_ratio = 1.25\nviscous_s_per_m = 0.1\nbackward_ratio = 0.9",
+            "law = \"stribeck\"\nlimit_at_zero = 0.4\ncoulomb_level = 0.3\nstribeck_speed_m_per_s = 0.2\n\
+             stribeck_exponent = 1.5",
+            "law = \"rational\"\nlimit_at_zero = 0.4\nrational_s_per_m = 3",
+            "law = \"table\"\nspeeds_m_per_s = [0, 0.1, 1.5]\ncoefficients = [0.4, 0.3, 0.35]",
+        ] {
+            let (head, rest) = SCENES[0].split_once("[friction]").unwrap();
+            let (_, rest) = rest.split_once("\n[").unwrap();
+            reads_back(&Scene::parse("scene", &format!("{head}[friction]\n{law}\n[{rest}")).unwrap());
         }
     }
 

@@ -156,7 +156,7 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     let speeds: Vec<f64> = (0..=CURVE_POINTS).map(|i| top * i as f64 / CURVE_POINTS as f64).collect();
     let half = friction_half_95(case.job, case.result, &law);
     let curve =
-        |law: FrictionLaw| speeds.iter().map(|v| (*v, law.dynamic_coefficient(*v))).collect::<Vec<_>>();
+        |law: FrictionLaw| speeds.iter().map(|v| (*v, law.dynamic_coefficient(*v, 1.0))).collect::<Vec<_>>();
     let band = |half: &dyn Fn(f64) -> f64| {
         curve(law)
             .into_iter()
@@ -182,7 +182,7 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
 
 /// The main result in one sentence, with its numbers.
 fn claim_sentence(law: &FrictionLaw, fastest: f64) -> String {
-    let (rest, moving) = (law.static_coefficient(), law.dynamic_coefficient(fastest));
+    let (rest, moving) = (law.static_coefficient(1.0), law.dynamic_coefficient(fastest, 1.0));
     let how = if moving < rest { "falls" } else { "goes" };
     let [rest, moving] = [rest, moving].map(|coefficient| format_digits(coefficient, 3));
     format!("Friction {how} from {rest} at rest to {moving} at {}", format_speed(fastest))
@@ -193,7 +193,7 @@ fn true_law(case: &ConditionComparison) -> Option<FrictionLaw> {
     let twin = case.measured.and_then(|m| m.file).and_then(|file| file.twin.as_ref())?;
     let known = twin.get("truth").and_then(toml::Value::as_table)?;
     let [a, b_s_per_m, c] = COEFFICIENTS.map(|c| known.get(c.name).and_then(toml::Value::as_float));
-    Some(FrictionLaw { a: a?, b_s_per_m: b_s_per_m?, c: c? })
+    Some(FrictionLaw::exponential(a?, b_s_per_m?, c?))
 }
 
 /// Speeds, ascending, and friction coefficients of the model's slip states.
@@ -213,7 +213,7 @@ pub(crate) fn friction_lines(case: &ConditionComparison) -> Vec<FrictionLine> {
     let speeds = std::iter::once(0.0).chain(slip_speeds(case).last().map(|(fastest, _)| *fastest));
     let line = |speed_m_per_s: f64| FrictionLine {
         speed_m_per_s,
-        coefficient: law.dynamic_coefficient(speed_m_per_s),
+        coefficient: law.dynamic_coefficient(speed_m_per_s, 1.0),
         half_95: half.as_ref().map(|half| half(speed_m_per_s)),
     };
     speeds.map(line).collect()
@@ -256,7 +256,7 @@ fn figure_text(
 
 /// Number of points and their largest deviation from the law; `None` without points.
 fn largest_deviation(law: &FrictionLaw, points: &[FrictionPoint]) -> Option<(usize, f64)> {
-    let off = |p: &FrictionPoint| (p.coefficient - law.dynamic_coefficient(p.speed_m_per_s)).abs();
+    let off = |p: &FrictionPoint| (p.coefficient - law.dynamic_coefficient(p.speed_m_per_s, 1.0)).abs();
     points.iter().map(off).reduce(f64::max).map(|most| (points.len(), most))
 }
 

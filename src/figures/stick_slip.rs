@@ -355,7 +355,7 @@ fn law_curve(
     let branch = |end: f64| {
         let point = move |i: usize| {
             let v = end * i as f64 / POINTS as f64;
-            Some((v, normal_n * law.dynamic_coefficient(v.abs()) * end.signum()))
+            Some((v, normal_n * law.dynamic_coefficient(v.abs(), end.signum()) * end.signum()))
         };
         (0..=POINTS).map(point).chain([None])
     };

@@ -132,8 +132,7 @@ pub(crate) fn default_prior_sd(parameter: &ModelParameter) -> Option<f64> {
         Q::ShoulderAngle => return Some(SIMILAR),
         Q::LipStiffness => HEARD,
         Q::HeadStiffness | Q::NeckStiffness | Q::ShoulderStiffness => SIMILAR,
-        Q::FrictionA | Q::FrictionB | Q::FrictionC => return None,
-        Q::DriveAmplitude | Q::DriveFrequency | Q::Restitution => return None,
+        _ => return None, // friction, drive and restitution
     };
     // a stiffness varies with the square of the frequency
     Some(if parameter.unit == "Hz" { frequency_sd } else { 2.0 * frequency_sd })
@@ -144,8 +143,8 @@ pub(crate) fn default_prior_sd(parameter: &ModelParameter) -> Option<f64> {
 fn is_constant(parameter: &ModelParameter) -> bool {
     use ParameterQuantity as Q;
     let exact = [Q::NeckLength, Q::LipLength, Q::NeckCentre, Q::LipCentre, Q::Restitution];
-    let sought = [Q::FrictionA, Q::FrictionB, Q::FrictionC, Q::DriveAmplitude, Q::DriveFrequency];
-    !exact.contains(&parameter.quantity) && !sought.contains(&parameter.quantity)
+    let is_sought = ["friction.", "drive."].iter().any(|table| parameter.name.starts_with(table));
+    !exact.contains(&parameter.quantity) && !is_sought
 }
 
 /// Refuses a job in which all parameters whose unit contains a mass are free and have no prior.

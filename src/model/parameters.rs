@@ -79,6 +79,14 @@ pub enum ParameterQuantity {
     FrictionA,
     FrictionB,
     FrictionC,
+    FrictionLimit,
+    CoulombLevel,
+    StribeckSpeed,
+    StribeckExponent,
+    RationalDecay,
+    StaticRatio,
+    ViscousFriction,
+    BackwardRatio,
     DriveAmplitude,
     DriveFrequency,
     Restitution,
@@ -153,6 +161,14 @@ table! {
     "friction.a" "A" "1" FrictionA None, NotNegative, Linear, "part of the friction coefficient that falls with speed";
     "friction.b_s_per_m" "B" "s/m" FrictionB None, NotNegative, Log, "decay of friction with speed";
     "friction.c" "C" "1" FrictionC None, NotNegative, Linear, "part of the friction coefficient that stays";
+    "friction.limit_at_zero" "mu0" "1" FrictionLimit None, NotNegative, Linear, "friction coefficient of slip at zero speed";
+    "friction.coulomb_level" "muC" "1" CoulombLevel None, NotNegative, Linear, "friction coefficient that a Stribeck law approaches";
+    "friction.stribeck_speed_m_per_s" "vS" "m/s" StribeckSpeed None, Positive, Log, "speed at which a Stribeck law has fallen to 1/e of its way";
+    "friction.stribeck_exponent" "n" "1" StribeckExponent None, Within(0.25, 4.0), Linear, "exponent of the speed in a Stribeck law";
+    "friction.rational_s_per_m" "R" "s/m" RationalDecay None, NotNegative, Log, "decay of a rational law with speed";
+    "friction.static_ratio" "rs" "1" StaticRatio Some(1.0), Within(1.0, 10.0), Linear, "ratio of the limit at rest to the friction of slip at zero speed";
+    "friction.viscous_s_per_m" "V" "s/m" ViscousFriction Some(0.0), NotNegative, Linear, "rise of friction with speed";
+    "friction.backward_ratio" "rb" "1" BackwardRatio Some(1.0), Positive, Log, "ratio of friction towards -v to friction towards +v";
     "drive.amplitude_m" "a" "m" DriveAmplitude None, Positive, Log, "half the stroke of the head";
     "drive.frequency_hz" "f" "Hz" DriveFrequency None, Positive, Log, "strokes there and back a second";
     "contact.restitution" "e" "1" Restitution Some(0.0), Within(0.0, 1.0), Linear, "normal restitution of a landing";
@@ -294,6 +310,16 @@ impl ParameterQuantity {
             Self::FrictionA | Self::FrictionB | Self::FrictionC => {
                 "side force over normal force at several steady speeds gives A exp(-B |v|) + C"
             }
+            Self::FrictionLimit
+            | Self::CoulombLevel
+            | Self::StribeckSpeed
+            | Self::StribeckExponent
+            | Self::RationalDecay
+            | Self::ViscousFriction => "from side force over normal force at several steady speeds",
+            Self::StaticRatio => {
+                "side force at the release after a rest, over side force at the lowest steady speed"
+            }
+            Self::BackwardRatio => "side force at the same steady speed in both directions",
             Self::DriveAmplitude => "half the way of the head from one end of the stroke to the other",
             Self::DriveFrequency => "one over the time of a stroke there and back",
             Self::Restitution => "0 for a lip that does not bounce",

@@ -16,6 +16,7 @@
 //! Each coefficient costs eight products of series, and friction adds two. The highest coefficients enter
 //! linearly; their matrix depends only on the angles at the instant and is inverted once.
 
+use super::friction::FrictionSeries;
 use super::{LinkDirections, Linkage, Pose, ShoulderContact};
 
 /// One value for the neck and one for the lip.
@@ -61,8 +62,8 @@ pub(super) struct RightFactors {
     next_rate: LinkPair,
     pub x: LinkPair,
     pub y: LinkPair,
-    /// Coefficient `N_m` of the normal force, and coefficient `m + 1` of the part of `mu` that falls with
-    /// speed.
+    /// Coefficient `N_m` of the normal force, and coefficient `m + 1` of the part of `mu` that changes
+    /// with speed.
     slip: LinkPair,
 }
 
@@ -89,6 +90,10 @@ pub struct MotionSeries<const K: usize> {
     pub indicator: f64,
     /// Order of the last expansion.
     pub order: usize,
+    /// Piece of the friction law in slip; the caller sets it.
+    pub law_piece: usize,
+    /// Series of the friction law in slip, unless the law is that of equation (4) without further terms.
+    pub(crate) law: FrictionSeries<K>,
     pub(super) drop_rate: [f64; K],
     pub(super) left: [LeftFactors; K],
     pub(super) right: [RightFactors; K],
@@ -110,6 +115,8 @@ impl<const K: usize> Default for MotionSeries<K> {
             gap_rate: [0.0; K],
             indicator: 1.0,
             order: 0,
+            law_piece: 0,
+            law: FrictionSeries::default(),
             drop_rate: [0.0; K],
             left: [LeftFactors::default(); K],
             right: [RightFactors::default(); K],
@@ -118,6 +125,13 @@ impl<const K: usize> Default for MotionSeries<K> {
         }
     }
 }
+
+/// Friction coefficient that does not change: slip without falling friction, stick, and flight.
+const CONSTANT: u8 = 0;
+/// Friction coefficient of equation (4), without further terms.
+const EXPONENTIAL: u8 = 1;
+/// Friction coefficient of any other law, from its own series.
+const ANY_LAW: u8 = 2;
 
 /// Sums of the products of coefficients of lower orders in the recurrence.
 #[derive(Clone, Copy, Default)]
@@ -166,6 +180,8 @@ pub(super) struct RecurrenceConstants {
     pub sin_m: LinkPair,
     /// Friction coefficient with the sign of the friction force.
     pub mu: f64,
+    /// Part of the friction coefficient that does not depend on speed, without sign.
+    pub staying: f64,
     /// Three numbers for the neck: its stiffness, its damping, and its moment at zero angle and rate. All
     /// include the shoulder if the neck leans on it.
     pub neck: [f64; 3],
@@ -191,11 +207,13 @@ impl<const K: usize> MotionSeries<K> {
         self.indicator = instant.indicator;
         (self.right[order], self.friction_n[order]) = (RightFactors::default(), 0.0);
         match touch {
-            ContactMode::Slip(direction) if linkage.friction.a != 0.0 => {
-                (0..order).for_each(|k| self.advance_order::<true>(linkage, touch, &instant, k, direction))
+            ContactMode::Slip(direction) if !linkage.friction.is_plain() => {
+                (0..order).for_each(|k| self.advance_order::<ANY_LAW>(linkage, touch, &instant, k, direction))
             }
+            ContactMode::Slip(direction) if linkage.friction.a != 0.0 => (0..order)
+                .for_each(|k| self.advance_order::<EXPONENTIAL>(linkage, touch, &instant, k, direction)),
             _ => (0..order).for_each(|k| {
-                self.advance_order::<false>(linkage, touch, &instant, k, touch.slip_direction())
+                self.advance_order::<CONSTANT>(linkage, touch, &instant, k, touch.slip_direction())
             }),
         }
     }
@@ -231,9 +249,14 @@ impl<const K: usize> MotionSeries<K> {
             ContactMode::Flight(drop, rate) => (drop, rate),
             _ => (linkage.head_drop_m(&d), linkage.l1_m * self.q[0] + linkage.l2_m * self.q[1]),
         };
+        let (law, tip_velocity) = (&linkage.friction, self.tip_velocity[0]);
         let mu = match touch {
+            ContactMode::Slip(direction) if law.is_plain() => {
+                law.dynamic_coefficient(direction * tip_velocity, direction)
+            }
             ContactMode::Slip(direction) => {
-                linkage.friction.dynamic_coefficient(direction * self.tip_velocity[0])
+                law.direction_factor(direction)
+                    * self.law.start_series(law, self.law_piece, direction * tip_velocity)
             }
             _ => 0.0,
         };
@@ -295,15 +318,16 @@ impl<const K: usize> MotionSeries<K> {
             cos_m: per_link(|i| c[i] * m[i]),
             sin_m: per_link(|i| s[i] * m[i]),
             mu: -direction * mu,
+            staying: linkage.friction.direction_factor(direction) * linkage.friction.c,
             neck: linkage.neck_spring(lean),
             indicator: with_friction / determinant,
         }
     }
 
-    /// Computes the coefficients of angles and rates at `x^(k + 1)` from those up to `x^k`. `FALLING` means
-    /// slip with friction that falls with speed.
+    /// Computes the coefficients of angles and rates at `x^(k + 1)` from those up to `x^k`. `LAW` says how
+    /// the friction coefficient changes: [`CONSTANT`], [`EXPONENTIAL`] or [`ANY_LAW`].
     #[inline(always)]
-    fn advance_order<const FALLING: bool>(
+    fn advance_order<const LAW: u8>(
         &mut self,
         linkage: &Linkage,
         touch: ContactMode,
@@ -316,7 +340,7 @@ impl<const K: usize> MotionSeries<K> {
         let LeftFactors { cos: c, sin: s, slip: [mu, _] } = self.left[0];
         self.angle[k + 1] = per_link(|i| self.rate[k][i] * share);
         let (cos, sin) = (per_link(|i| -self.q[i] * share), per_link(|i| self.p[i] * share));
-        let sums = self.sum_products::<FALLING>(k);
+        let sums = self.sum_products::<LAW>(k);
         // p and q of the next order without the contribution of the unknown accelerations
         let rest_p = per_link(|i| sums.p[i] + cos[i] * self.rate[0][i]);
         let rest_q = per_link(|i| sums.q[i] + sin[i] * self.rate[0][i]);
@@ -334,7 +358,8 @@ impl<const K: usize> MotionSeries<K> {
         };
         let springs = self.spring_moments(linkage, at, k);
         let known = per_link(|i| {
-            sums.x[i] + sums.y[i] + springs[i] + if FALLING { at.per_slip[i] * sums.slip[0] } else { 0.0 }
+            let varying = if LAW == CONSTANT { 0.0 } else { at.per_slip[i] * sums.slip[0] };
+            sums.x[i] + sums.y[i] + springs[i] + varying
         });
         let b = per_link(|i| {
             let other = 1 - i;
@@ -352,7 +377,7 @@ impl<const K: usize> MotionSeries<K> {
         }
         let drop = rest_drop + at.drop[0] * a[0] + at.drop[1] * a[1];
         let normal = rest_normal + at.normal[0] * a[0] + at.normal[1] * a[1];
-        let force = at.mu * normal + held - if FALLING { direction * sums.slip[0] } else { 0.0 };
+        let force = at.mu * normal + held - if LAW == CONSTANT { 0.0 } else { direction * sums.slip[0] };
 
         let rate = per_link(|i| a[i] * share);
         (self.p, self.q) =
@@ -370,10 +395,13 @@ impl<const K: usize> MotionSeries<K> {
         let tip = self.tip_velocity_at(linkage, k + 1);
         self.tip_velocity[k + 1] = tip;
         let mut falling = 0.0;
-        if FALLING {
+        if LAW == EXPONENTIAL {
             // the part E of mu = E + c that falls with speed satisfies E' = -b sigma v3'' E
-            let sum = sums.slip[1] + next * tip * (mu - linkage.friction.c);
+            let sum = sums.slip[1] + next * tip * (mu - at.staying);
             falling = -linkage.friction.b_s_per_m * direction * sum * share;
+        } else if LAW == ANY_LAW {
+            let law = &linkage.friction;
+            falling = law.direction_factor(direction) * self.law.advance_series(law, k + 1, direction * tip);
         }
         self.left[k + 1] = LeftFactors { cos, sin, slip: [falling, next * tip] };
         self.right[k] = RightFactors { next_rate: rate, x, y, slip: [normal, falling] };
@@ -382,7 +410,7 @@ impl<const K: usize> MotionSeries<K> {
     /// Sums the products of the known coefficients in the recurrence. The newest factors are added last,
     /// because the processor may still be computing them when the sum starts.
     #[inline(always)]
-    fn sum_products<const FALLING: bool>(&self, k: usize) -> ProductSums {
+    fn sum_products<const LAW: u8>(&self, k: usize) -> ProductSums {
         let mut sums = ProductSums::default();
         for (left, right) in self.left[1..=k].iter().rev().zip(&self.right[..k]) {
             for i in 0..2 {
@@ -390,7 +418,7 @@ impl<const K: usize> MotionSeries<K> {
                 sums.q[i] += left.sin[i] * right.next_rate[i];
                 sums.x[i] += left.cos[i] * right.x[i];
                 sums.y[i] += left.sin[i] * right.y[i];
-                if FALLING {
+                if LAW != CONSTANT {
                     sums.slip[i] += left.slip[i] * right.slip[i];
                 }
             }

@@ -10,10 +10,13 @@
 //! (I_i d angle_i'' + d moment_i + Z_i d angle_i) / cos_i + dX_i + t_i dY_i + (d I_i angle_i'') / cos_i = 0
 //! dX_1 = m_c y2'' + m_a d v'' - l1 df + (d m_c p2' + d m_a v'' - d l1 f)       Z_i = cos_i Y_i - sin_i X_i
 //! dY_1 = m_c S2'' - m_a du'' - l1 dN + (d m_c q2' - d m_a u'' - d l1 N)        likewise for the lip
-//! slip:   df = -sigma mu dN + b N E d v3' - sigma N (d a e + d c) + d b v3' N E,   E = a e
+//! slip:   df = -sigma mu dN + b N E d v3' - sigma N (d a F + d c) + d b v3' N E
 //! stick:  l1 y1 + l2 y2 + d v + d l1 sin theta + d l2 sin phi is constant, which determines df
 //! flight: dN = df = 0, and the gap between tip and glass is a third unknown
 //! ```
+//!
+//! `F` is the part of the friction law that changes with speed, and `E` is minus `a` times its derivative by
+//! `b |v3'|`, which is `a F` for an exponential.
 //!
 //! The coefficients of the unknowns, and the terms from a change of one constant, are the same for all
 //! directions.
@@ -127,7 +130,14 @@ impl<const K: usize> ReferenceMotion<'_, K> {
     /// Derivative of the friction force with respect to the tip's velocity, N s/m.
     #[inline(always)]
     pub(super) fn friction_per_speed(&self, at: &MotionSamples) -> LaneVector {
-        self.linkage.friction.b_s_per_m * at.falling
+        let law = &self.linkage.friction;
+        let falling = law.b_s_per_m * at.falling;
+        match self.touch {
+            ContactMode::Slip(direction) if law.viscous_s_per_m != 0.0 => {
+                falling - (law.direction_factor(direction) * law.viscous_s_per_m) * at.normal
+            }
+            _ => falling,
+        }
     }
 
     /// Matrices of the variation at the sampled instants; in stick, they do not include the friction force.

@@ -25,7 +25,8 @@ pub fn steady_slip_pose(linkage: &Linkage, speed_m_per_s: f64) -> Option<Pose> {
         return None;
     }
     let head = HeadMotion { position_m: 0.0, velocity_m_per_s: speed_m_per_s, acceleration_m_per_s2: 0.0 };
-    let mu = speed_m_per_s.signum() * linkage.friction.dynamic_coefficient(speed_m_per_s.abs());
+    let direction = speed_m_per_s.signum();
+    let mu = direction * linkage.friction.dynamic_coefficient(speed_m_per_s.abs(), direction);
     let mut angles = Vector2::zeros();
     for step in 1..=LOAD_STEPS {
         angles = solve_for_load(linkage, mu * f64::from(step) / f64::from(LOAD_STEPS), angles)?;
@@ -223,7 +224,7 @@ mod tests {
             .unwrap();
         let speed = scene.drive.motion_at(scene.start_s).velocity_m_per_s;
         let pose = steady_slip_pose(&scene.linkage, speed).expect("an equilibrium");
-        let mu = scene.linkage.friction.dynamic_coefficient(speed);
+        let mu = scene.linkage.friction.dynamic_coefficient(speed, 1.0);
         let left = residual_moments(
             &scene.linkage,
             mu,

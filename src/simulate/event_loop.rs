@@ -8,8 +8,8 @@ use super::flight::LANDING;
 pub(super) use super::impact::TipStrike;
 use super::mode::{RestDecision, TipMode, decide_mode_at_rest, holding_force};
 use super::phases::{
-    DrivenBlade, GUARDS, JAMS, LEVEL_GUARDS, SHOULDER_GUARDS, SLIP_CONTACT_LOST, STICK_CONTACT_LOST,
-    SlipPhase, StickPhase, TIP_STOPS, TaylorMotion, mode_after_release, pose_from_states,
+    DrivenBlade, GUARDS, JAMS, LAW_PIECE_ENDS, LEVEL_GUARDS, SHOULDER_GUARDS, SLIP_CONTACT_LOST,
+    STICK_CONTACT_LOST, SlipPhase, StickPhase, TIP_STOPS, TaylorMotion, mode_after_release, pose_from_states,
 };
 use super::scene::{Scene, StartKind};
 use super::solution_segment::{SegmentSolution, SolutionSegment};
@@ -38,6 +38,8 @@ pub(super) struct EventLoop<'a> {
     work: WorkCounters,
     transitions: u64,
     lean: ShoulderContact,
+    /// Piece of the friction law in slip.
+    law_piece: usize,
     /// First trial step, s, of the next phase of stick, of slip and of flight.
     steps: [Option<f64>; 3],
     recent: ChatterDetector,
@@ -88,6 +90,7 @@ impl<'a> EventLoop<'a> {
             work: WorkCounters { most_rhs_evaluations, ..WorkCounters::default() },
             transitions: 0,
             lean: ShoulderContact::Off,
+            law_piece: 0,
             steps: [None; 3],
             recent: ChatterDetector::new(shortest_period_s),
             shortest_period_s,
@@ -144,8 +147,8 @@ impl<'a> EventLoop<'a> {
     fn decide_in_motion(&mut self, pose: &Pose, velocity: f64, before: PendingTransition) -> NextPhase {
         let at = self.system.contact_instant(self.t, pose, self.lean);
         let mode = TipMode::slip_towards(velocity);
-        let (_, forces) = SlipPhase { system: self.system, direction: mode.direction(), lean: self.lean }
-            .slip_forces(pose, &at);
+        self.law_piece = self.system.linkage.friction.piece_at(velocity.abs());
+        let (_, forces) = self.slip_phase(mode).slip_forces(pose, &at);
         if forces.indicator > 0.0 && forces.normal_n <= 0.0 {
             return self.lose_contact(pose, before);
         }
@@ -162,7 +165,8 @@ impl<'a> EventLoop<'a> {
     /// Decides the next mode of a tip at rest.
     fn decide_at_rest(&mut self, pose: &Pose, before: PendingTransition) -> NextPhase {
         let at = self.system.contact_instant(self.t, pose, self.lean);
-        match decide_mode_at_rest(&at.contact, self.system.linkage.friction.static_coefficient()) {
+        let law = &self.system.linkage.friction;
+        match decide_mode_at_rest(&at.contact, law) {
             RestDecision::Becomes(TipMode::Flight) => self.lose_contact(pose, before),
             RestDecision::Indeterminate => NextPhase::End(RunStatus::Indeterminate),
             RestDecision::Jammed => NextPhase::End(RunStatus::Jammed),
@@ -172,8 +176,8 @@ impl<'a> EventLoop<'a> {
                 }
                 let mut zero_order = [0; GUARDS];
                 if mode != TipMode::Stick {
-                    let mu = self.system.linkage.friction.static_coefficient();
-                    zero_order[TIP_STOPS] = release_order(&at.contact, mu);
+                    self.law_piece = law.piece_at(0.0);
+                    zero_order[TIP_STOPS] = release_order(&at.contact, law.limit_at_zero(mode.direction()));
                 }
                 NextPhase::Phase(mode, *pose, zero_order)
             }
@@ -265,18 +269,21 @@ impl<'a> EventLoop<'a> {
     }
 
     /// Decides the next phase when the holding force reaches the static friction limit in stick. If slip
-    /// follows, the tip's velocity has a double zero at the start of slip.
+    /// follows, the tip's velocity has a double zero at the start of slip, or a simple one if friction falls
+    /// from a static limit above that of slip. The normal force jumps with it, and may vanish.
     fn release_tip(&mut self, mode: TipMode, pose: Pose) -> NextPhase {
         let at = self.system.contact_instant(self.t, &pose, self.lean);
-        let (_, forces) = SlipPhase { system: self.system, direction: mode.direction(), lean: self.lean }
-            .slip_forces(&pose, &at);
-        if forces.indicator <= 0.0 {
+        let law = &self.system.linkage.friction;
+        self.law_piece = law.piece_at(0.0);
+        let (_, forces) = self.slip_phase(mode).slip_forces(&pose, &at);
+        let falls = law.static_ratio > 1.0;
+        if forces.indicator <= 0.0 || (falls && forces.normal_n <= 0.0) {
             return self.resolve_jam(&pose, TipMode::Stick);
         }
         self.recent.note_event(self.t);
         self.record_transition(TipMode::Stick, mode, TransitionCause::FrictionLimit);
         let mut zero_order = [0; GUARDS];
-        zero_order[TIP_STOPS] = 2;
+        zero_order[TIP_STOPS] = if falls { 1 } else { 2 };
         NextPhase::Phase(mode, pose, zero_order)
     }
 
@@ -292,7 +299,7 @@ impl<'a> EventLoop<'a> {
     }
 
     fn integrate_slip(&mut self, mode: TipMode, pose: &Pose, zero_order: [u8; GUARDS]) -> NextPhase {
-        let phase = SlipPhase { system: self.system, direction: mode.direction(), lean: self.lean };
+        let phase = self.slip_phase(mode);
         let y = [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate];
         let started = self.t;
         let start = PhaseStart { t: started, y, zero_order, step: self.steps[1] };
@@ -334,6 +341,11 @@ impl<'a> EventLoop<'a> {
             }
             Ended::Guard(SLIP_CONTACT_LOST) => self.lose_contact(&pose, Some((mode, None))),
             Ended::Guard(guard) if LEVEL_GUARDS.contains(&guard) => NextPhase::End(RunStatus::Diverged),
+            Ended::Guard(guard) if self.enter_law_piece(guard) => {
+                let mut next_order = [0; GUARDS];
+                next_order[LAW_PIECE_ENDS + TIP_STOPS - guard] = 1;
+                NextPhase::Phase(mode, pose, next_order)
+            }
             Ended::Guard(TIP_STOPS) => {
                 self.recent.note_event(self.t);
                 let next = self.decide_at_rest(&self.remove_tip_velocity(pose), Some((mode, None)));
@@ -351,6 +363,21 @@ impl<'a> EventLoop<'a> {
                 NextPhase::Phase(mode, pose, next_order)
             }
         }
+    }
+
+    fn slip_phase(&self, mode: TipMode) -> SlipPhase<'a> {
+        SlipPhase { system: self.system, direction: mode.direction(), lean: self.lean, piece: self.law_piece }
+    }
+
+    /// Enters the next piece of the friction law, if a guard has found its start or end in slip.
+    fn enter_law_piece(&mut self, guard: usize) -> bool {
+        let [from, _] = self.system.linkage.friction.piece_ends_m_per_s(self.law_piece);
+        match guard {
+            LAW_PIECE_ENDS => self.law_piece += 1,
+            TIP_STOPS if from > 0.0 => self.law_piece -= 1,
+            _ => return false,
+        }
+        true
     }
 
     fn shorten_slip_step(&mut self) {
@@ -386,9 +413,9 @@ impl<'a> EventLoop<'a> {
 }
 
 /// Order of the zero of the tip's velocity when slip starts from rest: 1 if the holding force exceeds the
-/// static limit, 2 if both are equal up to rounding, as at the end of stick.
+/// limit of slip, 2 if both are equal up to rounding, as at the end of stick without a larger static limit.
 fn release_order(contact: &FrictionResponse, mu: f64) -> u8 {
-    /// The holding force counts as equal to the static limit if its relative excess over the limit is below
+    /// The holding force counts as equal to the limit if its relative excess over the limit is below
     /// this value, which is far above rounding errors and far below the resolution of a step.
     const EQUAL: f64 = 1e-11;
     let force = holding_force(contact);

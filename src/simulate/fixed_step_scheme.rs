@@ -96,11 +96,12 @@ impl HybridPhase<4, GUARDS> for StabilisedStickPhase<'_> {
         let pose = pose_from_states(y);
         let at = self.system.contact_instant(t, &pose, self.lean);
         let forces = self.stabilised_forces(&pose, &at);
-        let limit = self.system.linkage.friction.static_coefficient() * forces.normal_n;
+        let [forwards, backwards] = self.system.static_limits();
         let [forward, backward] = self.system.corner_distances(y[0], self.lean);
         let LinkDirections { cos_theta, cos_phi, .. } = at.directions;
         let TipForces { friction_n: force, normal_n: normal, .. } = forces;
-        [limit + force, limit - force, normal, forward, backward, cos_theta, cos_phi]
+        let limits = [forwards * normal + force, backwards * normal - force];
+        [limits[0], limits[1], normal, forward, backward, cos_theta, cos_phi, f64::INFINITY]
     }
 
     fn scale(&self) -> [f64; 4] {

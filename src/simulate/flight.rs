@@ -51,7 +51,16 @@ impl HybridPhase<6, GUARDS> for FlightPhase<'_> {
     #[inline]
     fn guards(&self, _: f64, y: &[f64; 6]) -> [f64; GUARDS] {
         let [forward, backward] = self.system.corner_distances(y[0], self.lean);
-        [y[2], f64::INFINITY, f64::INFINITY, forward, backward, math::cos(y[0]), math::cos(y[1])]
+        [
+            y[2],
+            f64::INFINITY,
+            f64::INFINITY,
+            forward,
+            backward,
+            math::cos(y[0]),
+            math::cos(y[1]),
+            f64::INFINITY,
+        ]
     }
 
     fn scale(&self) -> [f64; 6] {

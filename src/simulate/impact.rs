@@ -7,7 +7,7 @@
 //! ```text
 //! dv_n/dp = W_nn + W_nt lambda     dv_t/dp = W_nt + W_tt lambda
 //! slip:   lambda = -sigma mu(|v_t|), sigma = sign v_t
-//! stick:  lambda = -W_nt / W_tt, if that is at most mu(0) in size;
+//! stick:  lambda = -W_nt / W_tt, if that is at most the static limit in size;
 //!         otherwise the tip slips on in the direction of W_nt
 //! ```
 //!
@@ -98,7 +98,7 @@ pub fn solve_impact(
         return Some(ImpactOutcome { velocity: before, impulse_n_s: [0.0; 2], lost_j: 0.0 });
     }
     let ContactSurface { friction, restitution } = *surface;
-    let friction = FrictionLaw { b_s_per_m: friction.b_s_per_m * unit, ..friction };
+    let friction = friction.with_speed_unit(unit);
     let (cross, along) = (mass.nt / mass.nn, mass.tt / mass.nn);
     let blow = ScaledImpact { cross, along, friction, restitution, relative };
     let mut state = ImpactState {
@@ -175,8 +175,8 @@ impl ScaledImpact {
 
     /// Direction of slip; `None` for a tip that sticks.
     fn slip_direction(&self, tangential: f64) -> Option<f64> {
-        let holds = self.cross.abs() <= self.friction.static_coefficient() * self.along;
         let leading = if tangential == 0.0 { self.cross } else { tangential };
+        let holds = self.cross.abs() <= self.friction.static_coefficient(self.cross) * self.along;
         (tangential != 0.0 || !holds).then(|| leading.signum())
     }
 
@@ -297,7 +297,8 @@ impl HybridPhase<2, 3> for ImpactSlip<'_> {
     fn derivative(&self, impulse: f64, y: &[f64; 2]) -> [f64; 2] {
         let ScaledImpact { cross, along, friction, .. } = self.blow;
         [
-            self.direction * cross - friction.dynamic_coefficient(self.tip_speed(y[0])) * along,
+            self.direction * cross
+                - friction.dynamic_coefficient(self.tip_speed(y[0]), self.direction) * along,
             self.normal_velocity(impulse, y[0]),
         ]
     }

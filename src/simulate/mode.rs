@@ -1,6 +1,7 @@
 //! Modes of contact, and the next mode of a tip at rest on the glass, which is a pure function of the forces.
 
 use crate::model::FrictionResponse;
+use crate::model::friction::FrictionLaw;
 use serde::Serialize;
 
 /// Mode of contact of the tip.
@@ -65,27 +66,38 @@ pub fn holding_force(contact: &FrictionResponse) -> f64 {
     -contact.a_free / contact.kappa
 }
 
-/// Decides the next mode of a tip at rest; `mu` is the static friction coefficient `A + C`.
+/// Decides the next mode of a tip at rest.
 ///
-/// If `1 + sigma * mu * nu` is positive in both directions of slip (`sigma` = +1 and -1), exactly one mode is
-/// consistent: stick if the holding force is within the static limit and the glass presses on the tip,
-/// lift-off if the glass would have to pull, otherwise slip against the holding force. If it is not (the
+/// If `1 + sigma * mu * nu` is positive with the static limit `mu` of both directions of slip (`sigma` = +1
+/// and -1), the mode is stick if the holding force is within the static limit and the glass presses on the
+/// tip, lift-off if the glass would have to pull, otherwise slip against the holding force. If it is not (the
 /// Painlevé region), the consistency of every mode is tested.
-pub(crate) fn decide_mode_at_rest(contact: &FrictionResponse, mu: f64) -> RestDecision {
+///
+/// Between the limit of slip at zero speed and a larger static limit, slip is consistent too, but a tip at
+/// rest stays until the static limit is passed. This slip has a positive Painlevé indicator and counts as no
+/// second mode.
+pub(crate) fn decide_mode_at_rest(contact: &FrictionResponse, law: &FrictionLaw) -> RestDecision {
     let force = holding_force(contact);
     let normal = contact.n_free + contact.nu * force;
-    let sticks = normal > 0.0 && force.abs() <= mu * normal;
-    if (mu * contact.nu).abs() < 1.0 {
+    let towards = TipMode::slip_towards(-force);
+    let sticks = normal > 0.0 && force.abs() <= law.static_coefficient(towards.direction()) * normal;
+    let largest = law.static_coefficient(1.0).max(law.static_coefficient(-1.0));
+    if (largest * contact.nu).abs() < 1.0 {
         return RestDecision::Becomes(match () {
             () if sticks => TipMode::Stick,
             () if contact.n_free <= 0.0 => TipMode::Flight,
-            () => TipMode::slip_towards(-force),
+            () => towards,
         });
     }
+    let slips = |mode: TipMode| {
+        let (direction, mu) = (mode.direction(), law.limit_at_zero(mode.direction()));
+        let waits = sticks && law.static_ratio > 1.0 && 1.0 + direction * mu * contact.nu > 0.0;
+        (is_slip_consistent(contact, mu, direction) && !waits, mode)
+    };
     let consistent = [
         (sticks, TipMode::Stick),
-        (is_slip_consistent(contact, mu, 1.0), TipMode::SlipForward),
-        (is_slip_consistent(contact, mu, -1.0), TipMode::SlipBackward),
+        slips(TipMode::SlipForward),
+        slips(TipMode::SlipBackward),
         (contact.n_free < 0.0, TipMode::Flight),
     ];
     let mut modes = consistent.into_iter().filter(|(holds, _)| *holds).map(|(_, mode)| mode);
@@ -112,20 +124,27 @@ mod tests {
         FrictionResponse { free: [0.0; 2], per_force: [0.0; 2], a_free, kappa: 2.0, n_free, nu }
     }
 
+    fn coulomb(mu: f64) -> FrictionLaw {
+        FrictionLaw::exponential(0.0, 0.0, mu)
+    }
+
     #[test]
     fn the_holding_force_within_the_limit_sticks_and_beyond_it_slips_against_it() {
         // a force of 0.5 N holds the tip, and static friction can give up to 0.6 N
-        assert_eq!(decide_mode_at_rest(&contact(1.0, 1.0, 0.0), 0.6), RestDecision::Becomes(TipMode::Stick));
         assert_eq!(
-            decide_mode_at_rest(&contact(1.0, 1.0, 0.0), 0.4),
+            decide_mode_at_rest(&contact(1.0, 1.0, 0.0), &coulomb(0.6)),
+            RestDecision::Becomes(TipMode::Stick)
+        );
+        assert_eq!(
+            decide_mode_at_rest(&contact(1.0, 1.0, 0.0), &coulomb(0.4)),
             RestDecision::Becomes(TipMode::SlipForward)
         );
         assert_eq!(
-            decide_mode_at_rest(&contact(-1.0, 1.0, 0.0), 0.4),
+            decide_mode_at_rest(&contact(-1.0, 1.0, 0.0), &coulomb(0.4)),
             RestDecision::Becomes(TipMode::SlipBackward)
         );
         assert_eq!(
-            decide_mode_at_rest(&contact(1.0, -1.0, 0.0), 0.4),
+            decide_mode_at_rest(&contact(1.0, -1.0, 0.0), &coulomb(0.4)),
             RestDecision::Becomes(TipMode::Flight)
         );
     }
@@ -133,10 +152,31 @@ mod tests {
     #[test]
     fn without_a_consistent_mode_the_tip_jams_and_with_several_it_is_indeterminate() {
         assert_eq!(
-            decide_mode_at_rest(&contact(0.1, -1.0, 3.0), 1.0),
+            decide_mode_at_rest(&contact(0.1, -1.0, 3.0), &coulomb(1.0)),
             RestDecision::Becomes(TipMode::Flight)
         );
-        assert_eq!(decide_mode_at_rest(&contact(-1.0, -1.0, 3.0), 1.0), RestDecision::Indeterminate);
+        assert_eq!(
+            decide_mode_at_rest(&contact(-1.0, -1.0, 3.0), &coulomb(1.0)),
+            RestDecision::Indeterminate
+        );
+    }
+
+    /// A holding force of 0.5 N lies between the limit of slip, 0.4 N, and the static limit, 0.6 N: the tip
+    /// stays. In the Painlevé region too, unless the tip could also lift off.
+    #[test]
+    fn a_tip_at_rest_stays_until_the_static_limit_is_passed() {
+        let law = FrictionLaw { static_ratio: 1.5, ..coulomb(0.4) };
+        for nu in [0.0, 1.0, 2.0] {
+            // (the normal force in stick is 1 N in all of them)
+            let held = contact(1.0, 1.0 + 0.5 * nu, nu);
+            assert!(is_slip_consistent(&held, 0.4, 1.0), "{nu}");
+            assert_eq!(decide_mode_at_rest(&held, &law), RestDecision::Becomes(TipMode::Stick), "{nu}");
+        }
+        assert_eq!(decide_mode_at_rest(&contact(-1.0, -0.1, 2.2), &law), RestDecision::Indeterminate);
+        let steep = FrictionLaw { backward_ratio: 0.5, ..law };
+        let pushed = |a_free| decide_mode_at_rest(&contact(a_free, 1.0, 0.0), &steep);
+        assert_eq!(pushed(1.0), RestDecision::Becomes(TipMode::Stick));
+        assert_eq!(pushed(-1.0), RestDecision::Becomes(TipMode::SlipBackward));
     }
 
     proptest! {
@@ -161,7 +201,7 @@ mod tests {
             ];
             let modes: Vec<TipMode> = holds.iter().filter(|h| h.0).map(|h| h.1).collect();
             prop_assert_eq!(modes.len(), 1);
-            prop_assert_eq!(decide_mode_at_rest(&contact, mu), RestDecision::Becomes(modes[0]));
+            prop_assert_eq!(decide_mode_at_rest(&contact, &coulomb(mu)), RestDecision::Becomes(modes[0]));
         }
     }
 }

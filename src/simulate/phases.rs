@@ -2,6 +2,7 @@
 
 use super::drive::Drive;
 use super::mode::TipMode;
+use crate::model::friction::FrictionShape;
 use crate::model::series::{ContactMode, MotionSeries};
 use crate::model::shoulder::ShoulderContact;
 use crate::model::{FrictionResponse, HeadMotion, LinkDirections, Linkage, Pose};
@@ -12,7 +13,7 @@ use portable_math as math;
 
 /// Number of guards of a phase. A guard is a function of time and state; the phase ends when one falls to
 /// zero.
-pub const GUARDS: usize = 7;
+pub const GUARDS: usize = 8;
 /// Indices of the two guards of the neck's angle in all phases: the neck meets or leaves the forward or the
 /// backward side of the shoulder.
 pub(crate) const SHOULDER_GUARDS: [usize; 2] = [3, 4];
@@ -20,12 +21,16 @@ pub(crate) const SHOULDER_GUARDS: [usize; 2] = [3, 4];
 /// level, the hinge would be below the glass.
 pub(crate) const LEVEL_GUARDS: [usize; 2] = [5, 6];
 
-/// Index of a guard of slip: the tip's speed in the direction of slip reaches zero.
+/// Index of a guard of slip: the tip's speed in the direction of slip falls to the start of the piece of the
+/// friction law. In the first piece, the tip stops.
 pub(crate) const TIP_STOPS: usize = 0;
 /// Index of a guard of slip: the normal force reaches zero.
 pub const SLIP_CONTACT_LOST: usize = 1;
 /// Index of a guard of slip: the Painlevé indicator reaches zero.
 pub const JAMS: usize = 2;
+/// Index of a guard of slip: the tip's speed in the direction of slip rises to the end of the piece of the
+/// friction law.
+pub(crate) const LAW_PIECE_ENDS: usize = 7;
 /// Index of a guard of stick: the holding force reaches the static friction limit, and the tip starts to slip
 /// towards +v.
 pub(crate) const FORWARD_LIMIT: usize = 0;
@@ -62,6 +67,12 @@ impl DrivenBlade {
         let (directions, head) = (LinkDirections::from_pose(pose), self.drive.motion_at(t));
         let contact = self.linkage.friction_response(pose, &directions, &head, lean);
         ContactInstant { head, directions, contact }
+    }
+
+    /// Largest friction coefficients at rest before the tip slips towards +v and towards -v.
+    #[inline]
+    pub(super) fn static_limits(&self) -> [f64; 2] {
+        [1.0, -1.0].map(|direction| self.linkage.friction.static_coefficient(direction))
     }
 
     /// Guards of the two corners of the shoulder (the neck angles at which contact with the shoulder starts
@@ -131,6 +142,8 @@ pub struct SlipPhase<'a> {
     pub direction: f64,
     /// Side of the shoulder on which the neck leans.
     pub lean: ShoulderContact,
+    /// Piece of the friction law.
+    pub piece: usize,
 }
 
 /// Pose from the four states of slip.
@@ -145,7 +158,8 @@ impl SlipPhase<'_> {
     #[inline]
     pub(super) fn slip_forces(&self, pose: &Pose, at: &ContactInstant) -> (f64, TipForces) {
         let speed = self.direction * self.system.linkage.tip_velocity_m_per_s(pose, &at.directions, &at.head);
-        let mu = self.direction * self.system.linkage.friction.dynamic_coefficient(speed);
+        let law = &self.system.linkage.friction;
+        let mu = self.direction * law.dynamic_coefficient(speed, self.direction);
         let indicator = 1.0 + mu * at.contact.nu;
         let normal_n = at.contact.n_free / indicator;
         (speed, apply_friction(&at.contact, -mu * normal_n, normal_n, indicator))
@@ -179,7 +193,8 @@ impl HybridPhase<4, GUARDS> for SlipPhase<'_> {
         let [forward, backward] = self.system.corner_distances(y[0], self.lean);
         let LinkDirections { cos_theta, cos_phi, .. } = at.directions;
         // `n_free` has the sign of the normal force, but no pole where the indicator is zero
-        [speed, at.contact.n_free, forces.indicator, forward, backward, cos_theta, cos_phi]
+        let [from, to] = self.system.linkage.friction.piece_ends_m_per_s(self.piece);
+        [speed - from, at.contact.n_free, forces.indicator, forward, backward, cos_theta, cos_phi, to - speed]
     }
 
     fn scale(&self) -> [f64; 4] {
@@ -193,6 +208,7 @@ impl TaylorPhase<4, GUARDS> for SlipPhase<'_> {
 
     fn expand_series(&self, t: f64, y: &[f64; 4], motion: &mut TaylorMotion, out: &mut GuardedExpansion<4>) {
         let (pose, touch) = (pose_from_states(y), ContactMode::Slip(self.direction));
+        motion.law_piece = self.piece;
         self.system.expand_motion(t, &pose, touch, self.lean, out.order, motion);
         let corners = self.system.corner_signs(self.lean);
         for k in 0..=out.order {
@@ -202,14 +218,21 @@ impl TaylorPhase<4, GUARDS> for SlipPhase<'_> {
             // the indicator needs no series: the accelerations have a pole at its zero, and no step crosses a
             // pole
             let speed = self.direction * motion.tip_velocity[k];
-            out.guards[k] =
-                [speed, motion.normal_n(k), 0.0, corners[0] * theta, corners[1] * theta, cos_theta, cos_phi];
+            let [forward, backward] = corners.map(|sign| sign * theta);
+            out.guards[k] = [speed, motion.normal_n(k), 0.0, forward, backward, cos_theta, cos_phi, -speed];
         }
         out.guards[0][JAMS] = motion.indicator;
         let friction = &self.system.linkage.friction;
+        let [from, to] = friction.piece_ends_m_per_s(self.piece);
+        out.guards[0][TIP_STOPS] -= from;
+        out.guards[0][LAW_PIECE_ENDS] += to;
         let falls = friction.a > 0.0 && friction.b_s_per_m > 0.0;
         let exponent = |k: usize| friction.b_s_per_m * self.direction * motion.tip_velocity[k];
-        out.exponent = falls.then(|| std::array::from_fn(exponent));
+        out.exponent = match friction.shape {
+            FrictionShape::Exponential if falls => Some(std::array::from_fn(exponent)),
+            FrictionShape::Stribeck => Some(std::array::from_fn(|k| motion.law.argument(k))),
+            _ => None,
+        };
         let [forward, backward] = SHOULDER_GUARDS;
         [out.guards[0][forward], out.guards[0][backward]] = self.system.corner_distances(y[0], self.lean);
     }
@@ -318,7 +341,8 @@ impl HybridPhase<2, GUARDS> for StickPhase<'_> {
     fn guards(&self, t: f64, y: &[f64; 2]) -> [f64; GUARDS] {
         let (pose, at) = self.contact_instant(t, y);
         let forces = self.holding_forces(&at);
-        let limit = self.system.linkage.friction.static_coefficient() * forces.normal_n;
+        let [forwards, backwards] = self.system.static_limits();
+        let (normal, force) = (forces.normal_n, forces.friction_n);
         let [forward, backward] = self.system.corner_distances(pose.theta, self.lean);
         let LinkDirections { cos_theta, cos_phi, .. } = at.directions;
         let [neck, lip] = match self.follower {
@@ -326,7 +350,8 @@ impl HybridPhase<2, GUARDS> for StickPhase<'_> {
             Link::Neck => [cos_theta - Self::LEAST_COSINE, cos_phi],
         };
         // the force that prevents forward slip points backward
-        [limit + forces.friction_n, limit - forces.friction_n, forces.normal_n, forward, backward, neck, lip]
+        let limits = [forwards * normal + force, backwards * normal - force];
+        [limits[0], limits[1], normal, forward, backward, neck, lip, f64::INFINITY]
     }
 
     fn scale(&self) -> [f64; 2] {
@@ -342,14 +367,16 @@ impl TaylorPhase<2, GUARDS> for StickPhase<'_> {
         self.system.expand_motion(t, &pose, ContactMode::Stick, self.lean, out.order + 1, motion);
         let (leader, follower) = if self.follower == Link::Lip { (0, 1) } else { (1, 0) };
         let corners = self.system.corner_signs(self.lean);
-        let mu = self.system.linkage.friction.static_coefficient();
+        let [forwards, backwards] = self.system.static_limits();
         for k in 0..=out.order {
             let (theta, [cos_theta, cos_phi]) = (motion.angle[k][0], motion.cosines(k));
             let (normal, force) = (motion.normal_n(k), motion.friction_n[k]);
-            let ([forward, backward], limit) = (corners.map(|sign| sign * theta), mu * normal);
+            let [forward, backward] = corners.map(|sign| sign * theta);
+            let limits = [forwards * normal + force, backwards * normal - force];
             out.states[k] = [motion.angle[k][leader], motion.rate[k][leader]];
-            out.guards[k] = [limit + force, limit - force, normal, forward, backward, cos_theta, cos_phi];
+            out.guards[k] = [limits[0], limits[1], normal, forward, backward, cos_theta, cos_phi, 0.0];
         }
+        out.guards[0][LAW_PIECE_ENDS] = f64::INFINITY;
         let [forward, backward] = SHOULDER_GUARDS;
         [out.guards[0][forward], out.guards[0][backward]] =
             self.system.corner_distances(pose.theta, self.lean);

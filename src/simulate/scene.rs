@@ -19,7 +19,7 @@ use crate::simulate::scene::error::{SceneError, key_error};
 use crate::toml_file;
 use as_written::SceneFile;
 use linkage::{build_linkage, linkage_constants};
-use numbers::{SceneReader, check_complete, check_range, find_known_parameter};
+use numbers::{SceneReader, check_complete, check_law_key, check_range, find_known_parameter};
 pub use run::{MOST_EVALUATIONS, RunSettings, StartKind, check_tolerance};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -107,15 +107,15 @@ impl Scene {
         reader.read_table("blade", written.blade)?;
         let has_shoulder = written.shoulder.is_some();
         reader.read_table("shoulder", written.shoulder.unwrap_or_default())?;
-        reader.read_table("friction", written.friction)?;
+        let law = reader.read_friction(written.friction)?;
         let recorded = reader.read_drive(&written.drive)?;
         let delay_s = reader.read_delay_s(&written.drive)?;
         reader.read_number("contact.restitution", written.contact.restitution)?;
         let values = reader.values;
-        check_complete(file, &values, has_shoulder, recorded.is_some())?;
+        check_complete(file, &values, has_shoulder, recorded.is_some(), &law)?;
         let (start_s, start) = run::check_start(file, &written.start)?;
         let run = run::check_run(file, &written.run, start_s)?;
-        let linkage = build_linkage(file, &values, has_shoulder)?;
+        let linkage = build_linkage(file, &values, has_shoulder, law)?;
         run::check_work_limit(file, &run, start_s, time_scales_rad_per_s(&linkage).1)?;
         let drive = match recorded {
             Some((place, path)) => recorded_drive(&place, recording(&path), [start_s, run.stop_s])?,
@@ -163,7 +163,8 @@ impl Scene {
         check_range(&self.file, parameter, value)?;
         let mut scene = self.clone();
         scene.values = self.values_with(parameter, value);
-        scene.linkage = build_linkage(&self.file, &scene.values, self.has_shoulder)?;
+        scene.linkage =
+            build_linkage(&self.file, &scene.values, self.has_shoulder, self.linkage.friction.shape)?;
         if let Drive::Cosine { .. } = self.drive {
             scene.drive = cosine_drive(&scene.values, self.drive.delay_s());
         }
@@ -212,7 +213,8 @@ impl Scene {
 
     /// The linkage with one parameter set to any value, for finite differences; the value is not checked.
     pub(super) fn linkage_with(&self, parameter: &ModelParameter, value: f64) -> Linkage {
-        linkage_constants(&self.values_with(parameter, value), self.has_shoulder)
+        let law = self.linkage.friction.shape;
+        linkage_constants(&self.values_with(parameter, value), self.has_shoulder, law)
     }
 
     fn values_with(&self, parameter: &ModelParameter, value: f64) -> BTreeMap<&'static str, f64> {
@@ -229,6 +231,8 @@ impl Scene {
     /// [`SceneError::Key`] for an unknown name or a parameter of an absent part.
     pub(super) fn find_own_parameter(&self, name: &str) -> Result<&'static ModelParameter, SceneError> {
         let parameter = find_known_parameter(&self.file, name)?;
+        let law = &self.linkage.friction.shape;
+        check_law_key(&self.file, name, law)?;
         let (found, expected, advice) = if name.starts_with("shoulder.") && !self.has_shoulder {
             ("no [shoulder]", "a scene with a shoulder", "add a [shoulder] table to the scene")
         } else if matches!(self.drive, Drive::Recorded(_)) && name.starts_with("drive.") {

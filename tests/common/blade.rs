@@ -51,6 +51,12 @@ impl Parts {
 
     /// The scene of this blade; `rest` holds the tables behind `[friction]`.
     pub fn scene(&self, rest: &str) -> Scene {
+        let [a, b, c] = self.friction;
+        self.scene_with_friction(&format!("a = {a:e}\nb_s_per_m = {b:e}\nc = {c:e}\n"), rest)
+    }
+
+    /// The scene with other rows of `[friction]`.
+    pub fn scene_with_friction(&self, friction: &str, rest: &str) -> Scene {
         let mut text = "format = 1\ntitle = \"made of parts\"\n[blade]\n".to_owned();
         let rows = [
             ("head_mass_kg", self.m[0]),
@@ -76,8 +82,7 @@ impl Parts {
         if let Some([angle, stiffness, damping]) = self.shoulder {
             writeln!(text, "[shoulder]\ncontact_angle_rad = {angle:e}\nstiffness_n_m_per_rad = {stiffness:e}\ndamping_n_m_s_per_rad = {damping:e}").unwrap();
         }
-        let [a, b, c] = self.friction;
-        writeln!(text, "[friction]\na = {a:e}\nb_s_per_m = {b:e}\nc = {c:e}\n{rest}").unwrap();
+        writeln!(text, "[friction]\n{friction}\n{rest}").unwrap();
         Scene::parse("parts.toml", &text).unwrap()
     }
 }

@@ -207,7 +207,7 @@ fn slip_satisfies_the_equations_as_printed() {
         let velocity =
             case.linkage.tip_velocity_m_per_s(&case.pose, &LinkDirections::from_pose(&case.pose), &case.head);
         let Pose { theta, phi, theta_rate, phi_rate } = case.pose;
-        let slip = SlipPhase { system: &system, direction: velocity.signum(), lean: case.lean };
+        let slip = SlipPhase { system: &system, direction: velocity.signum(), lean: case.lean, piece: 0 };
         let [_, _, ddt, ddp] = slip.derivative(0.0, &[theta, phi, theta_rate, phi_rate]);
         // equation (4), and the normal force from the accelerations by the Lagrangian's constraint
         let [a, b, c] = case.parts.friction;

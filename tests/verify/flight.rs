@@ -342,7 +342,7 @@ fn assert_sound(what: &str, scene: &Scene, flown: &Flown, relative: f64) {
             impact.before.normal <= 0.0 && impact.after.normal >= 0.0 && impact.impulse_n_s[0] >= 0.0,
             "{what}: {impact:?}"
         );
-        let mu = scene.linkage.friction.static_coefficient();
+        let mu = scene.linkage.friction.static_coefficient(1.0);
         assert!(
             impact.impulse_n_s[1].abs() <= mu * impact.impulse_n_s[0] * (1.0 + 1e-9) + 1e-9 * size,
             "{what}: beyond the cone: {impact:?}"

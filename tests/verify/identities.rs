@@ -169,7 +169,7 @@ fn stick_holds_the_tip_and_its_friction_does_no_work() {
             );
             assert!(
                 sample.friction_n.abs()
-                    <= blade.friction.static_coefficient() * sample.normal_n * (1.0 + 1e-9),
+                    <= blade.friction.static_coefficient(1.0) * sample.normal_n * (1.0 + 1e-9),
                 "at {} s",
                 sample.time_s
             );
@@ -183,7 +183,7 @@ fn stick_holds_the_tip_and_its_friction_does_no_work() {
 /// The light blade without friction, pressed on lightly, its head at rest.
 fn frictionless() -> Scene {
     let mut scene = upright_light_blade().with_parameter("blade.preload_force_n", 0.02).unwrap();
-    scene.linkage.friction = FrictionLaw { a: 0.0, b_s_per_m: 0.0, c: 0.0 };
+    scene.linkage.friction = FrictionLaw::exponential(0.0, 0.0, 0.0);
     scene.drive = Drive::Uniform { speed_m_per_s: 0.0 };
     scene.run.stop_s = 0.05;
     scene
@@ -258,9 +258,9 @@ fn damped_modes_are_those_of_the_linearised_phases() {
     actual.drive = Drive::Uniform { speed_m_per_s: 0.0 };
     for scene in [frictionless(), actual] {
         let mut blade = scene.linkage;
-        blade.friction = FrictionLaw { a: 0.0, b_s_per_m: 0.0, c: 0.0 };
+        blade.friction = FrictionLaw::exponential(0.0, 0.0, 0.0);
         let system = DrivenBlade { linkage: blade, ..build_system(&scene) };
-        let slip = SlipPhase { system: &system, direction: 1.0, lean: ShoulderContact::Off };
+        let slip = SlipPhase { system: &system, direction: 1.0, lean: ShoulderContact::Off, piece: 0 };
         let found =
             oscillating(&matrix(jacobian(|y| slip.derivative(0.0, y), &[0.0; 4], [1e-6, 1e-6, 1e-2, 1e-2])));
         let expected = natural_modes(&blade, TipConstraint::Free, false);
@@ -310,7 +310,7 @@ fn a_deviation_from_steady_slip_grows_at_the_rate_of_its_eigenvalue() {
         let pose = steady_slip_pose(&scene.linkage, speed).unwrap();
         let rest = [pose.theta, pose.phi, 0.0, 0.0];
         let whole = build_system(&scene);
-        let slip = SlipPhase { system: &whole, direction: 1.0, lean: ShoulderContact::Off };
+        let slip = SlipPhase { system: &whole, direction: 1.0, lean: ShoulderContact::Off, piece: 0 };
         assert!(slip.derivative(0.0, &rest).iter().all(|d| d.abs() < 1e-6), "steady slip is an equilibrium");
         let a = matrix(jacobian(|y| slip.derivative(0.0, y), &rest, [1e-6, 1e-6, 1e-2, 1e-2]));
         let fastest = oscillating(&a).iter().map(|e| e.re).fold(1.0, f64::max);

@@ -16,7 +16,7 @@ const RELATIVE: f64 = 1e-12;
 const AGREEMENT: f64 = 20.0 * RELATIVE;
 
 fn coulomb(mu: f64, restitution: f64) -> ContactSurface {
-    ContactSurface { friction: FrictionLaw { a: 0.0, b_s_per_m: 0.0, c: mu }, restitution }
+    ContactSurface { friction: FrictionLaw::exponential(0.0, 0.0, mu), restitution }
 }
 
 fn hit(mass: InverseMass, surface: &ContactSurface, normal: f64, tangential: f64) -> ImpactOutcome {
@@ -140,7 +140,7 @@ fn a_jam_compresses_by_itself() {
 #[test]
 fn friction_that_falls_with_speed_follows_its_closed_form_and_the_tolerance() {
     let mass = InverseMass { nn: 3.0, nt: 0.8, tt: 4.0 };
-    let friction = FrictionLaw { a: 0.4, b_s_per_m: 2.0, c: 0.2 };
+    let friction = FrictionLaw::exponential(0.4, 2.0, 0.2);
     let (normal, tangential) = (-0.9, 2.0);
     let (linear, constant) = (mass.nt - mass.tt * friction.c, mass.tt * friction.a);
     let speed = |p: f64| {
@@ -191,12 +191,12 @@ fn step_by_step(mass: InverseMass, surface: &ContactSurface, before: TipVelocity
     let (mut impulse, mut taken, mut given) = (0.0, 0.0, 0.0);
     let mut compressing = true;
     loop {
-        let holds = mass.nt.abs() <= surface.friction.static_coefficient() * mass.tt;
+        let holds = mass.nt.abs() <= surface.friction.static_coefficient(1.0) * mass.tt;
         let towards = if tangential == 0.0 { mass.nt } else { tangential };
         let share = if tangential == 0.0 && holds {
             -mass.nt / mass.tt
         } else {
-            -towards.signum() * surface.friction.dynamic_coefficient(tangential.abs())
+            -towards.signum() * surface.friction.dynamic_coefficient(tangential.abs(), towards)
         };
         let (dn, dt) = (mass.nn + mass.nt * share, mass.nt + mass.tt * share);
         let stops = tangential != 0.0 && (tangential + h * dt) * tangential <= 0.0;
@@ -225,8 +225,7 @@ fn impacts_agree_with_small_steps_and_never_gain_energy() {
         let mut between = |low: f64, high: f64| rng.random_range(low..high);
         let (nn, tt) = (between(0.5, 4.0), between(0.5, 4.0));
         let nt = between(-0.95, 0.95) * (nn * tt).sqrt();
-        let friction =
-            FrictionLaw { a: between(0.0, 1.0), b_s_per_m: between(0.0, 8.0), c: between(0.0, 1.0) };
+        let friction = FrictionLaw::exponential(between(0.0, 1.0), between(0.0, 8.0), between(0.0, 1.0));
         let before = TipVelocity { normal: -between(0.05, 1.0), tangential: between(-2.0, 2.0) };
         let (mass, surface) =
             (InverseMass { nn, nt, tt }, ContactSurface { friction, restitution: [0.0, 0.4, 0.9][i % 3] });
@@ -254,7 +253,7 @@ fn impacts_agree_with_small_steps_and_never_gain_energy() {
         turned += usize::from(found.velocity.tangential * before.tangential < 0.0);
         slid += usize::from(found.velocity.tangential * before.tangential > 0.0);
         compressing_slip +=
-            usize::from(nn - before.tangential.signum() * friction.static_coefficient() * nt < 0.0);
+            usize::from(nn - before.tangential.signum() * friction.static_coefficient(1.0) * nt < 0.0);
     }
     assert!(
         stuck > 10 && turned > 4 && slid > 10 && compressing_slip > 5,
@@ -280,7 +279,7 @@ fn free_rod(mass_kg: f64, length_m: f64, mu: f64) -> Linkage {
         neck: none,
         lip: none,
         preload_displacement_m: 0.0,
-        friction: FrictionLaw { a: 0.0, b_s_per_m: 0.0, c: mu },
+        friction: FrictionLaw::exponential(0.0, 0.0, mu),
         shoulder: None,
     }
 }

@@ -29,7 +29,7 @@ fn reduced(friction: f64) -> Scene {
         neck: spring(SLACK_N_M_PER_RAD),
         lip: spring(SLACK_N_M_PER_RAD),
         preload_displacement_m: PRESS_N / SOFT_N_PER_M,
-        friction: FrictionLaw { a: 0.0, b_s_per_m: 0.0, c: friction },
+        friction: FrictionLaw::exponential(0.0, 0.0, friction),
         ..scene.linkage
     };
     scene

@@ -183,7 +183,7 @@ fn deflections_balance_the_moments() {
         near(slide.deflection_m, -(l1 * theta.sin() + l2 * phi.sin()), ROUNDING);
         // (1) to (3) at rest, with f = -mu N; the shoulder adds to the neck
         let normal = blade.head.stiffness * (blade.preload_displacement_m - slide.head_drop_m);
-        let friction = -blade.friction.dynamic_coefficient(slide.speed_m_per_s) * normal;
+        let friction = -blade.friction.dynamic_coefficient(slide.speed_m_per_s, 1.0) * normal;
         let neck = k1 * theta
             + blade.shoulder.map_or(0.0, |shoulder| {
                 shoulder.stiffness_n_m_per_rad

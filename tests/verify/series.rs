@@ -7,6 +7,7 @@ use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use wiperlab::model::Pose;
 use wiperlab::model::flight::FlightState;
+use wiperlab::model::friction::{FrictionLaw, FrictionShape, FrictionTable};
 use wiperlab::model::shoulder::ShoulderContact;
 use wiperlab::simulate::build_system;
 use wiperlab::simulate::flight::{FlightPhase, flight_state_vector};
@@ -90,17 +91,39 @@ fn assert_expands<const N: usize, P: TaylorPhase<N, GUARDS>>(
     }
 }
 
+/// One of the laws with the coefficients of an exponential, in turn, and in every second round with all
+/// further terms. No state reaches the knots of the table.
+fn law(i: usize, exponential: FrictionLaw) -> FrictionLaw {
+    let points = [(-20.0, 0.9), (20.0, 0.5), (60.0, 0.4)];
+    let law = match i % 5 {
+        0 => exponential,
+        1 => FrictionLaw { shape: FrictionShape::Stribeck, exponent: 2.0, ..exponential },
+        2 => FrictionLaw { shape: FrictionShape::Stribeck, exponent: 1.3, ..exponential },
+        3 => FrictionLaw { shape: FrictionShape::Rational, ..exponential },
+        _ => {
+            let shape = FrictionShape::Table(FrictionTable::from_points(&points).unwrap());
+            FrictionLaw { shape, ..FrictionLaw::exponential(1.0, 1.0, 0.0) }
+        }
+    };
+    match i % 10 {
+        0..5 => law,
+        _ => FrictionLaw { viscous_s_per_m: 0.3, static_ratio: 1.2, backward_ratio: 0.8, ..law },
+    }
+}
+
 #[test]
 fn slip_expands_to_its_own_motion() {
     let mut tested = 0;
-    for (i, case) in cases().enumerate() {
+    for (i, mut case) in cases().enumerate() {
         let head = case.system.drive.motion_at(case.t);
         let speed = case.system.linkage.tip_velocity_m_per_s(
             &case.pose,
             &wiperlab::model::LinkDirections::from_pose(&case.pose),
             &head,
         );
-        let slip = SlipPhase { system: &case.system, direction: speed.signum(), lean: case.lean };
+        case.system.linkage.friction = law(i, case.system.linkage.friction);
+        let piece = case.system.linkage.friction.piece_at(speed.abs());
+        let slip = SlipPhase { system: &case.system, direction: speed.signum(), lean: case.lean, piece };
         let y = [case.pose.theta, case.pose.phi, case.pose.theta_rate, case.pose.phi_rate];
         // the indicator is constant in the expansion, and near its zero the radius of the series is short; N
         // is taken for its sign alone

@@ -238,7 +238,7 @@ fn a_fast_tip_on_slippery_glass_turns_without_stopping() {
         assert_eq!(reversal.from.direction(), -reversal.to.direction());
         let [before, after] = [TipMode::SlipForward, TipMode::SlipBackward]
             .map(|mode| seen.samples.iter().find(|s| s.time_s == reversal.time_s && s.mode == mode).unwrap());
-        let limit = scene.linkage.friction.static_coefficient();
+        let limit = scene.linkage.friction.static_coefficient(1.0);
         for sample in [before, after] {
             assert!(
                 (sample.friction_n + sample.mode.direction() * limit * sample.normal_n).abs()
@@ -289,7 +289,7 @@ fn no_transition_is_missed_inside_a_piece() {
     let random: Vec<Scene> = (0..BLADES).map(|_| Parts::random(&mut rng).scene(STROKE)).collect();
     for scene in both().iter().chain(&random) {
         for relative in [1e-4, 1e-6, 1e-8] {
-            let static_limit = scene.linkage.friction.static_coefficient();
+            let static_limit = scene.linkage.friction.static_coefficient(1.0);
             let mut watch =
                 Watch { slack_m_per_s: 10.0 * relative, static_limit, looks: 0, missed: Vec::new() };
             run_scene_with(scene, SolverOptions::new(relative), &mut watch);
@@ -312,7 +312,7 @@ fn stick_that_the_shoulder_breaks_says_so() {
     scene.run.stop_s = 0.9;
     let seen = seen(&scene, 1e-8);
     let shoulder = scene.linkage.shoulder.unwrap();
-    let limit = scene.linkage.friction.static_coefficient();
+    let limit = scene.linkage.friction.static_coefficient(1.0);
     let mut broken = 0;
     for transition in &seen.transitions {
         let at = |mode: TipMode| {

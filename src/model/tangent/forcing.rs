@@ -56,9 +56,13 @@ impl<const K: usize> ReferenceMotion<'_, K> {
     /// Whether the motion depends on a constant of the linkage in the present mode of contact.
     pub(crate) fn depends_on(&self, constant: LinkageConstant) -> bool {
         match constant {
-            LinkageConstant::FrictionA | LinkageConstant::FrictionB | LinkageConstant::FrictionC => {
-                matches!(self.touch, ContactMode::Slip(_))
-            }
+            LinkageConstant::FrictionA
+            | LinkageConstant::FrictionB
+            | LinkageConstant::FrictionC
+            | LinkageConstant::FrictionExponent
+            | LinkageConstant::ViscousFriction => matches!(self.touch, ContactMode::Slip(_)),
+            LinkageConstant::BackwardRatio => self.touch.slip_direction() < 0.0,
+            LinkageConstant::StaticRatio => false,
             LinkageConstant::ContactAngle
             | LinkageConstant::ShoulderStiffness
             | LinkageConstant::ShoulderDamping => self.lean != ShoulderContact::Off,
@@ -70,10 +74,9 @@ impl<const K: usize> ReferenceMotion<'_, K> {
     #[inline(always)]
     pub(crate) fn constant_forcing(&self, at: &MotionSamples, constant: LinkageConstant) -> ForcingTerms {
         let mut direct = DirectForcing::default();
-        if let LinkageConstant::FrictionA | LinkageConstant::FrictionB | LinkageConstant::FrictionC = constant
-        {
-            // (a shortcut: these constants change only the friction force, and fits often vary all three)
-            direct.effect.force = self.friction_law_forcing(at, constant);
+        if let Some(force) = self.friction_law_forcing(at, constant) {
+            // (a shortcut: these constants change only the friction force, and fits often vary several)
+            direct.effect.force = force;
             let l = self.lengths();
             direct.effect.equations[0] = -l[0] * direct.effect.force;
             direct.effect.equations[1] = -l[1] * direct.effect.force;
@@ -168,15 +171,25 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         }
     }
 
-    /// Derivative of the friction force in slip with respect to a coefficient of the friction law.
+    /// Derivative of the friction force in slip with respect to a constant of the friction law; `None` for
+    /// another constant.
     #[inline(always)]
-    fn friction_law_forcing(&self, at: &MotionSamples, constant: LinkageConstant) -> LaneVector {
-        let direction = self.touch.slip_direction();
-        match constant {
-            LinkageConstant::FrictionA => -direction * at.normal * self.friction_decay(at, direction),
+    fn friction_law_forcing(&self, at: &MotionSamples, constant: LinkageConstant) -> Option<LaneVector> {
+        let (direction, law) = (self.touch.slip_direction(), &self.linkage.friction);
+        let factor = -direction * law.direction_factor(direction);
+        Some(match constant {
+            LinkageConstant::FrictionA => factor * at.normal * self.friction_decay(at, direction),
             LinkageConstant::FrictionB => self.sample_tip_velocity(at.x) * at.falling,
-            _ => -direction * at.normal,
-        }
+            LinkageConstant::FrictionC => factor * at.normal,
+            LinkageConstant::FrictionExponent => {
+                (factor * law.a) * at.normal * self.sample_varying_part(at, direction, 2)
+            }
+            LinkageConstant::ViscousFriction => {
+                (direction * factor) * at.normal * self.sample_tip_velocity(at.x)
+            }
+            LinkageConstant::BackwardRatio => (1.0 / law.backward_ratio) * at.friction,
+            _ => return None,
+        })
     }
 
     #[inline(always)]

@@ -2,6 +2,7 @@
 
 use super::lane_vector::LaneVector;
 use crate::model::Linkage;
+use crate::model::friction::FrictionLaw;
 
 /// Derivatives of every constant of a [`Linkage`], one lane per direction, in the unit of the constant per
 /// unit of the direction.
@@ -20,6 +21,10 @@ pub struct LinkageTangent {
     pub friction_a: LaneVector,
     pub friction_b_s_per_m: LaneVector,
     pub friction_c: LaneVector,
+    pub friction_exponent: LaneVector,
+    pub viscous_s_per_m: LaneVector,
+    pub static_ratio: LaneVector,
+    pub backward_ratio: LaneVector,
     pub shoulder: SpringTangent,
     pub contact_angle_rad: LaneVector,
 }
@@ -51,6 +56,10 @@ pub enum LinkageConstant {
     FrictionA,
     FrictionB,
     FrictionC,
+    FrictionExponent,
+    ViscousFriction,
+    StaticRatio,
+    BackwardRatio,
     ContactAngle,
     ShoulderStiffness,
     ShoulderDamping,
@@ -95,12 +104,27 @@ const CONSTANTS: &[ConstantRow] = constants! {
     FrictionA friction_a, friction.a;
     FrictionB friction_b_s_per_m, friction.b_s_per_m;
     FrictionC friction_c, friction.c;
+    FrictionExponent friction_exponent, friction.exponent;
+    ViscousFriction viscous_s_per_m, friction.viscous_s_per_m;
+    StaticRatio static_ratio, friction.static_ratio;
+    BackwardRatio backward_ratio, friction.backward_ratio;
     ContactAngle contact_angle_rad, shoulder?contact_angle_rad;
     ShoulderStiffness shoulder.stiffness, shoulder?stiffness_n_m_per_rad;
     ShoulderDamping shoulder.damping, shoulder?damping_n_m_s_per_rad;
 };
 
 impl LinkageTangent {
+    /// Derivatives of the largest friction coefficient at rest before the tip slips in a direction.
+    pub(crate) fn static_coefficient_change(&self, law: &FrictionLaw, direction: f64) -> LaneVector {
+        let factor = law.direction_factor(direction);
+        let own = law.varying_part_at_zero() * self.friction_a + self.friction_c;
+        let mut change = (law.static_ratio * factor) * own + law.limit_at_zero(direction) * self.static_ratio;
+        if direction < 0.0 {
+            change.add_scaled(law.static_coefficient(direction) / factor, &self.backward_ratio);
+        }
+        change
+    }
+
     /// Sets the derivatives in the direction `lane` to a finite difference: the sum of weight times constant
     /// over the linkages in `terms`. The weights add up to zero.
     pub(crate) fn set_direction(&mut self, lane: usize, terms: &[(f64, Linkage)]) {

@@ -3,7 +3,6 @@
 use super::lane_vector::{LANES, LaneVector};
 use super::{LaneVectorPair, ReferenceMotion, lanes_per_link, sum_over_links};
 use crate::model::series::ContactMode;
-use portable_math as math;
 use std::cell::OnceCell;
 use std::ops::Deref;
 
@@ -36,8 +35,8 @@ pub(crate) struct MotionSamples {
     pub(super) friction: LaneVector,
     /// Friction coefficient times the direction of slip, `sigma mu`; 0 unless the tip slips.
     pub(super) mu: LaneVector,
-    /// Normal force times the part of the friction coefficient that falls with speed, `N E`, N; 0 unless the
-    /// tip slips.
+    /// Normal force times the rate at which the friction coefficient falls with `b |v3'|`, N: `N E` for the
+    /// part `E` that falls exponentially; 0 unless the tip slips.
     pub(super) falling: LaneVector,
     /// Both angles, rad, computed on demand.
     angles: OnceCell<LaneVectorPair>,
@@ -141,13 +140,20 @@ impl<const K: usize> ReferenceMotion<'_, K> {
             ContactMode::Stick => [at.friction] = sum_horner(at.x, order - 1, |k| [motion.friction_n[k]]),
             ContactMode::Slip(direction) => {
                 let law = &self.linkage.friction;
+                let factor = law.direction_factor(direction);
+                let staying = LaneVector::splat(factor * law.c);
                 let [mu] = match law.a {
-                    0.0 => [LaneVector::splat(law.c)],
+                    0.0 if law.is_plain() => [staying],
                     _ => sum_horner(at.x, order, |k| [motion.left[k].slip[0]]),
                 };
                 at.mu = direction * mu;
                 at.friction = -at.mu * at.normal;
-                at.falling = (mu - LaneVector::splat(law.c)) * at.normal;
+                let falling = if law.is_plain() {
+                    mu - staying
+                } else {
+                    (-factor * law.a) * self.sample_varying_part(at, direction, 1)
+                };
+                at.falling = falling * at.normal;
             }
         }
     }
@@ -176,15 +182,21 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         ]
     }
 
-    /// Factor `e = exp(-b |v3'|)` of the friction law: the part of the friction coefficient that falls with
-    /// speed is `a e`.
+    /// Part `F` of the friction law (`which` 0), or its derivative by `b |v3'|` (1) or by the exponent (2).
+    pub(super) fn sample_varying_part(&self, at: &MotionSamples, direction: f64, which: usize) -> LaneVector {
+        let velocity = self.sample_tip_velocity(at.x);
+        LaneVector(velocity.0.map(|v| self.linkage.friction.varying_part(direction * v)[which]))
+    }
+
+    /// Part `F` of the friction law in slip: the part of the friction coefficient that changes with speed is
+    /// `a F`.
     pub(super) fn friction_decay(&self, at: &MotionSamples, direction: f64) -> LaneVector {
         let law = &self.linkage.friction;
-        if law.a == 0.0 {
-            let velocity = self.sample_tip_velocity(at.x);
-            return LaneVector(velocity.0.map(|v| math::exp(-law.b_s_per_m * direction * v)));
+        if law.a == 0.0 || !law.is_plain() {
+            return self.sample_varying_part(at, direction, 0);
         }
-        (1.0 / law.a) * (direction * at.mu - LaneVector::splat(law.c))
+        let factor = law.direction_factor(direction);
+        (1.0 / (factor * law.a)) * (direction * at.mu - LaneVector::splat(factor * law.c))
     }
 }
 

@@ -1,6 +1,7 @@
 //! Tables and types of scene.toml as written; the values are checked later.
 
 use super::contact::{ContactLossRule, JamRule, OutputTable};
+use crate::model::friction::LAW_KEYS;
 use crate::model::parameters::{PARAMETERS, ParameterRange};
 use crate::toml_file::table_schema;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
@@ -10,6 +11,8 @@ use std::collections::BTreeMap;
 use toml::Spanned;
 
 pub(super) type SceneNumbers = BTreeMap<String, Spanned<f64>>;
+/// Values of `[friction]`: numbers, the name of the law, and the points of a table.
+pub(super) type FrictionValues = BTreeMap<String, Spanned<toml::Value>>;
 
 /// A blade, its friction, the motion of its head, and the run to compute.
 #[derive(Deserialize, JsonSchema)]
@@ -27,9 +30,9 @@ pub(crate) struct SceneFile {
     #[schemars(schema_with = "shoulder")]
     #[serde(default)]
     pub(super) shoulder: Option<SceneNumbers>,
-    /// Coefficient of friction `A exp(-B |v|) + C` between lip and glass.
+    /// Coefficient of friction between lip and glass: `A exp(-B |v|) + C`, or another law.
     #[schemars(schema_with = "friction")]
-    pub(super) friction: SceneNumbers,
+    pub(super) friction: FrictionValues,
     /// Motion of the head: a cosine, or that of the head in a recording.
     pub(super) drive: DriveFile,
     /// What happens when contact is lost or the tip jams.
@@ -126,20 +129,31 @@ pub(crate) struct RunFile {
 }
 
 fn blade(_: &mut SchemaGenerator) -> Schema {
-    number_table_schema("blade")
+    number_table_schema("blade", [])
 }
 
 fn shoulder(_: &mut SchemaGenerator) -> Schema {
-    number_table_schema("shoulder")
+    number_table_schema("shoulder", [])
 }
 
 fn friction(_: &mut SchemaGenerator) -> Schema {
-    number_table_schema("friction")
+    let list = |description: &str| {
+        let numbers = json!({ "type": "number", "minimum": 0 });
+        json!({ "type": "array", "items": numbers, "description": description })
+    };
+    let words: Vec<&str> = LAW_KEYS.iter().map(|(law, _)| *law).collect();
+    let about = "Law between friction coefficient and speed; \"exponential\" if left out.";
+    let others = [
+        ("law", json!({ "type": "string", "enum": words, "description": about })),
+        ("speeds_m_per_s", list("Increasing speeds of the points of a table, m/s. For the law \"table\".")),
+        ("coefficients", list("Friction coefficients at these speeds. For the law \"table\".")),
+    ];
+    number_table_schema("friction", others)
 }
 
-/// Schema of a table of numbers, from the table of parameters. If a quantity has two keys, neither is
-/// required.
-fn number_table_schema(table: &str) -> Schema {
+/// Schema of a table of numbers, from the table of parameters, and of its other keys. If a quantity has two
+/// keys or belongs to a friction law, none is required.
+fn number_table_schema<const N: usize>(table: &str, others: [(&str, serde_json::Value); N]) -> Schema {
     let rows = || PARAMETERS.iter().filter_map(|row| Some((row.name.split_once('.')?, row)));
     let rows = || rows().filter(|((of, _), _)| *of == table);
     let keys = rows()
@@ -147,7 +161,7 @@ fn number_table_schema(table: &str) -> Schema {
             let unit = if row.unit == "1" { String::new() } else { format!(", {}", row.unit) };
             let mut schema = json!({
                 "type": "number",
-                "description": format!("{}{unit}. How to measure it: {}.", row.meaning, row.quantity.measurement_method()),
+                "description": format!("{}{unit}.{} How to measure it: {}.", row.meaning, laws_of(row.name), row.quantity.measurement_method()),
             });
             match row.range {
                 ParameterRange::Positive => schema["exclusiveMinimum"] = json!(0),
@@ -164,8 +178,15 @@ fn number_table_schema(table: &str) -> Schema {
         });
     let ways = |quantity| PARAMETERS.iter().filter(|row| row.quantity == quantity).count();
     let required: Vec<&str> = rows()
-        .filter(|(_, row)| row.default.is_none() && ways(row.quantity) == 1)
+        .filter(|(_, row)| row.default.is_none() && ways(row.quantity) == 1 && laws_of(row.name).is_empty())
         .map(|((_, key), _)| key)
         .collect();
-    table_schema(keys, &required)
+    table_schema(keys.chain(others.map(|(key, schema)| (key.to_owned(), schema))), &required)
+}
+
+/// Sentence on the friction laws that need a parameter; empty for a parameter of every law.
+fn laws_of(name: &str) -> String {
+    let laws = LAW_KEYS.iter().filter(|(_, keys)| keys.contains(&name));
+    let laws: Vec<String> = laws.map(|(law, _)| format!("\"{law}\"")).collect();
+    if laws.is_empty() { String::new() } else { format!(" For the law {}.", laws.join(" or ")) }
 }

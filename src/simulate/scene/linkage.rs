@@ -1,7 +1,7 @@
 //! Constants of the linkage from the numbers of a scene.
 
 use super::error::{SceneError, key_error};
-use crate::model::friction::FrictionLaw;
+use crate::model::friction::{FrictionLaw, FrictionShape};
 use crate::model::parameters::{
     PARAMETERS, ParameterQuantity as Quantity, damping_from_ratio, stiffness_from_frequency,
 };
@@ -12,7 +12,12 @@ use std::collections::BTreeMap;
 type SceneValues = BTreeMap<&'static str, f64>;
 
 /// Builds the linkage from the numbers of a complete scene.
-pub(super) fn build_linkage(file: &str, values: &SceneValues, shoulder: bool) -> Result<Linkage, SceneError> {
+pub(super) fn build_linkage(
+    file: &str,
+    values: &SceneValues,
+    shoulder: bool,
+    law: FrictionShape,
+) -> Result<Linkage, SceneError> {
     let number = |name: &str| values.get(name).copied().unwrap_or(0.0); // completeness was checked
     for (centre, length) in
         [("blade.neck_centre_m", "blade.neck_length_m"), ("blade.lip_centre_m", "blade.lip_length_m")]
@@ -23,7 +28,7 @@ pub(super) fn build_linkage(file: &str, values: &SceneValues, shoulder: bool) ->
             return Err(key_error(file, centre, number(centre), &expected, advice));
         }
     }
-    let linkage = linkage_constants(values, shoulder);
+    let linkage = linkage_constants(values, shoulder, law);
     let Linkage { m_theta, m_phi, m_c, .. } = linkage;
     if !(m_theta * m_phi - m_c * m_c > 0.0 && (m_theta * m_phi).is_finite()) {
         let found = "links whose inertia matrix is singular";
@@ -34,12 +39,13 @@ pub(super) fn build_linkage(file: &str, values: &SceneValues, shoulder: bool) ->
 }
 
 /// Constants of the linkage, in the notation of [`crate::model`].
-pub(super) fn linkage_constants(values: &SceneValues, has_shoulder: bool) -> Linkage {
+pub(super) fn linkage_constants(values: &SceneValues, has_shoulder: bool, law: FrictionShape) -> Linkage {
     let of = |quantity: Quantity| {
         let mut ways = PARAMETERS.iter().filter(|p| p.quantity == quantity);
         ways.find_map(|p| values.get(p.name).map(|&v| (p.name, v)))
     };
     let plain = |quantity: Quantity| of(quantity).map_or(0.0, |(_, v)| v);
+    let ratio = |quantity: Quantity| of(quantity).map_or(1.0, |(_, v)| v);
     // a value whose key has this ending is converted with `convert`
     let converted = |quantity: Quantity, ending: &str, convert: &dyn Fn(f64) -> f64| match of(quantity) {
         Some((name, value)) if name.ends_with(ending) => convert(value),
@@ -71,10 +77,24 @@ pub(super) fn linkage_constants(values: &SceneValues, has_shoulder: bool) -> Lin
             damping_n_m_s_per_rad: damping(Quantity::ShoulderDamping, stiffness, m_theta),
         }
     });
+    let [limit, level] = [Quantity::FrictionLimit, Quantity::CoulombLevel].map(plain);
+    let (a, b_s_per_m, c) = match law {
+        FrictionShape::Exponential => {
+            (plain(Quantity::FrictionA), plain(Quantity::FrictionB), plain(Quantity::FrictionC))
+        }
+        FrictionShape::Stribeck => (limit - level, 1.0 / plain(Quantity::StribeckSpeed), level),
+        FrictionShape::Rational => (limit, plain(Quantity::RationalDecay), 0.0),
+        FrictionShape::Table(_) => (1.0, 1.0, 0.0),
+    };
     let friction = FrictionLaw {
-        a: plain(Quantity::FrictionA),
-        b_s_per_m: plain(Quantity::FrictionB),
-        c: plain(Quantity::FrictionC),
+        a,
+        b_s_per_m,
+        c,
+        shape: law,
+        exponent: ratio(Quantity::StribeckExponent),
+        viscous_s_per_m: plain(Quantity::ViscousFriction),
+        static_ratio: ratio(Quantity::StaticRatio),
+        backward_ratio: ratio(Quantity::BackwardRatio),
     };
     let (m_a, m_b) = (m1 * g1 + m2 * l1, m2 * g2);
     Linkage {

@@ -1,11 +1,17 @@
 //! Numbers of a scene under the names of the parameter table.
 
-use super::as_written::{DriveFile, SceneNumbers};
+use super::as_written::{DriveFile, FrictionValues, SceneNumbers};
 use super::error::{SceneError, key_error};
+use crate::model::friction::{FrictionShape, FrictionTable, LAW_KEYS};
 use crate::model::parameters::{self, ModelParameter, PARAMETERS};
 use crate::toml_file;
 use std::collections::BTreeMap;
-use toml::Spanned;
+use toml::{Spanned, Value};
+
+/// A number of a file, written with or without a point.
+fn as_number(value: &Value) -> Option<f64> {
+    value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64))
+}
 
 /// Collects the numbers of a file under the names of the parameter table.
 pub(super) struct SceneReader<'a> {
@@ -24,6 +30,65 @@ impl SceneReader<'_> {
     pub(crate) fn read_table(&mut self, table: &str, numbers: SceneNumbers) -> Result<(), SceneError> {
         let mut numbers = numbers.into_iter();
         numbers.try_for_each(|(key, value)| self.read_number(&format!("{table}.{key}"), Some(value)))
+    }
+
+    /// Reads the friction: its numbers, and the law that they belong to.
+    pub(crate) fn read_friction(&mut self, written: FrictionValues) -> Result<FrictionShape, SceneError> {
+        let law = match written.get("law").and_then(|law| law.get_ref().as_str()) {
+            Some("stribeck") => FrictionShape::Stribeck,
+            Some("rational") => FrictionShape::Rational,
+            Some("table") => FrictionShape::Table(self.read_friction_table(&written)?),
+            _ => FrictionShape::Exponential,
+        };
+        for (key, value) in written.iter().filter(|(key, _)| *key != "law") {
+            let (place, name) = (self.place_of(value), format!("friction.{key}"));
+            if let Some(number) = as_number(value.get_ref()) {
+                self.read_number(&name, Some(Spanned::new(value.span(), number)))?;
+                check_law_key(&place, &name, &law)?;
+            } else if !matches!(law, FrictionShape::Table(_)) {
+                let found = format!("the law \"{}\"", law.name());
+                let advice = "leave it out, or choose law = \"table\"";
+                return Err(key_error(&place, &name, found, "points only for the law \"table\"", advice));
+            }
+        }
+        Ok(law)
+    }
+
+    fn read_friction_table(&self, written: &FrictionValues) -> Result<FrictionTable, SceneError> {
+        let keys = ["speeds_m_per_s", "coefficients"];
+        let refuse = |key: usize, found: String, expected: &str, advice: &str| {
+            let place =
+                written.get(keys[key]).map_or_else(|| self.file.to_owned(), |list| self.place_of(list));
+            Err(key_error(&place, &format!("friction.{}", keys[key]), found, expected, advice))
+        };
+        if let Some(key) = keys.iter().position(|key| !written.contains_key(*key)) {
+            let expected = "a list of numbers";
+            return refuse(
+                key,
+                "nothing".to_owned(),
+                expected,
+                "add the speeds and coefficients of the points",
+            );
+        }
+        let list = |key: &str| -> Vec<f64> {
+            let values = written.get(key).and_then(|list| list.get_ref().as_array());
+            values.into_iter().flatten().filter_map(as_number).collect()
+        };
+        let [speeds, coefficients] = keys.map(list);
+        let (count, most) = (speeds.len(), FrictionTable::MOST_POINTS);
+        let points: Vec<(f64, f64)> = speeds.iter().copied().zip(coefficients.iter().copied()).collect();
+        match (FrictionTable::from_points(&points), speeds.windows(2).find(|pair| pair[0] >= pair[1])) {
+            (_, Some(pair)) => {
+                let found = format!("{} after {}", pair[1], pair[0]);
+                refuse(0, found, "speeds that increase", "sort the points by speed")
+            }
+            (Some(table), _) if coefficients.len() == count => Ok(table),
+            _ if coefficients.len() != count => {
+                let (found, expected) = (coefficients.len().to_string(), format!("{count}, one a speed"));
+                refuse(1, found, &expected, "give both lists one length")
+            }
+            _ => refuse(0, count.to_string(), &format!("2 to {most} speeds"), "change the number of points"),
+        }
     }
 
     /// Reads the motion of the head. For a recorded head, returns the place of the key in the file and the
@@ -91,6 +156,21 @@ pub(super) fn check_range(place: &str, parameter: &ModelParameter, value: f64) -
     Err(key_error(place, parameter.name, value, &expected, "correct the value"))
 }
 
+/// Refuses a parameter of another friction law.
+pub(super) fn check_law_key(place: &str, name: &str, law: &FrictionShape) -> Result<(), SceneError> {
+    if law.has_parameter(name) {
+        return Ok(());
+    }
+    let law = law.name();
+    let own = LAW_KEYS.iter().find(|(other, _)| *other == law).map_or(&[][..], |(_, keys)| keys);
+    let keys = if own.is_empty() { "speeds_m_per_s and coefficients".to_owned() } else { own.join(", ") };
+    let others =
+        LAW_KEYS.iter().filter(|(_, keys)| keys.contains(&name)).map(|(law, _)| format!("\"{law}\""));
+    let advice = format!("leave it out, or choose law = {}", others.collect::<Vec<_>>().join(" or "));
+    let expected = format!("parameters of this law: {keys}");
+    Err(key_error(place, name, format!("the law \"{law}\""), &expected, &advice))
+}
+
 /// Refuses a scene that lacks a quantity without a default. The quantities of an absent shoulder or of a
 /// recorded drive are not required.
 pub(super) fn check_complete(
@@ -98,9 +178,12 @@ pub(super) fn check_complete(
     values: &BTreeMap<&'static str, f64>,
     has_shoulder: bool,
     recorded: bool,
+    law: &FrictionShape,
 ) -> Result<(), SceneError> {
     let absent = |p: &ModelParameter| {
-        (!has_shoulder && p.name.starts_with("shoulder.")) || (recorded && p.name.starts_with("drive."))
+        (!has_shoulder && p.name.starts_with("shoulder."))
+            || (recorded && p.name.starts_with("drive."))
+            || !law.has_parameter(p.name)
     };
     let needed = |p: &&ModelParameter| p.default.is_none() && !absent(p);
     for parameter in PARAMETERS.iter().filter(needed) {

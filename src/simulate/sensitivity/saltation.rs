@@ -41,7 +41,7 @@ impl FallingGuard<'_> {
     /// Terms of the guard; no terms for a guard without a derivative.
     fn guard_terms(&self) -> [Option<GuardTerm>; 2] {
         let TangentStretch { system, course, .. } = self.span;
-        let limit = Some((Channel::NormalForce, system.linkage.friction.static_coefficient()));
+        let [forwards, backwards] = system.static_limits().map(|limit| Some((Channel::NormalForce, limit)));
         if let Some(side) = SHOULDER_GUARDS.iter().position(|&corner| corner == self.guard) {
             return [Some((Channel::NeckAngle, system.corner_signs(course.lean)[side])), None];
         }
@@ -52,8 +52,8 @@ impl FallingGuard<'_> {
             }
             (TipMode::SlipForward | TipMode::SlipBackward, SLIP_CONTACT_LOST)
             | (TipMode::Stick, STICK_CONTACT_LOST) => [Some((Channel::NormalForce, 1.0)), None],
-            (TipMode::Stick, FORWARD_LIMIT) => [limit, Some((Channel::FrictionForce, 1.0))],
-            (TipMode::Stick, BACKWARD_LIMIT) => [limit, Some((Channel::FrictionForce, -1.0))],
+            (TipMode::Stick, FORWARD_LIMIT) => [forwards, Some((Channel::FrictionForce, 1.0))],
+            (TipMode::Stick, BACKWARD_LIMIT) => [backwards, Some((Channel::FrictionForce, -1.0))],
             _ => [None; 2],
         }
     }
@@ -107,7 +107,9 @@ impl FallingGuard<'_> {
                 }
                 Some((Channel::NeckAngle, _)) => block.guard -= own.contact_angle_rad,
                 Some((Channel::NormalForce, _)) if terms[1].is_some() => {
-                    block.guard += normal * (own.friction_a + own.friction_c);
+                    let law = &self.span.system.linkage.friction;
+                    let direction = if self.guard == FORWARD_LIMIT { 1.0 } else { -1.0 };
+                    block.guard += normal * own.static_coefficient_change(law, direction);
                 }
                 _ => {}
             }

@@ -244,7 +244,7 @@ pub(super) fn steady_slip_tangent(
     let linkage = &system.linkage;
     let angles = Vector2::new(pose.theta, pose.phi);
     let mu =
-        |linkage: &Linkage, speed: f64| speed.signum() * linkage.friction.dynamic_coefficient(speed.abs());
+        |linkage: &Linkage, v: f64| v.signum() * linkage.friction.dynamic_coefficient(v.abs(), v.signum());
     let column = |direction: Vector2<f64>| {
         let at = |x: f64| {
             Some(residual_moments(linkage, mu(linkage, speed), &(angles + x * direction), lean).into())

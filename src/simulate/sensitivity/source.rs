@@ -19,7 +19,7 @@ pub(super) enum TangentSource {
 }
 
 /// Maximum number of sources: the constants of the linkage and the changes of the head's motion.
-pub(super) const MOST_SOURCES: usize = 24;
+pub(super) const MOST_SOURCES: usize = 28;
 
 /// Taylor polynomial of the head's motion about the start of a piece.
 #[derive(Debug, Clone)]

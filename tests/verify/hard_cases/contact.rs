@@ -33,7 +33,7 @@ pub fn lip_alone(friction: f64) -> Scene {
         neck: Spring { stiffness: 1e18, damping: 0.0 },
         lip: Spring { damping: 0.0, ..scene.linkage.lip },
         preload_displacement_m: PRESS_N / SOFT_N_PER_M,
-        friction: FrictionLaw { a: 0.0, b_s_per_m: 0.0, c: friction },
+        friction: FrictionLaw::exponential(0.0, 0.0, friction),
         ..scene.linkage
     };
     scene
@@ -52,11 +52,20 @@ fn root(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
 
 /// The lip let go at 0.6 rad over a head at rest swings from turn to turn, each where its energy `k2 phi^2/2
 /// + N l2 (cos phi + sigma mu sin phi)` is that of the turn before, until the spring can no longer beat
-/// friction: `|k2 phi - N l2 sin phi| <= mu N l2 cos phi`.
+/// static friction: `|k2 phi - N l2 sin phi| <= mu_s N l2 cos phi`.
 #[test]
 fn coulomb_friction_alone_turns_and_stops_the_tip_at_the_exact_angles() {
-    const MU: f64 = 0.5;
-    let mut scene = lip_alone(MU);
+    let counts = [(1.0, 1.0), (2.5, 1.0), (1.0, 0.4), (2.5, 0.4)].map(|(static_ratio, backward_ratio)| {
+        let law = FrictionLaw::exponential(0.0, 0.0, 0.5);
+        assert_turns(FrictionLaw { static_ratio, backward_ratio, ..law })
+    });
+    assert!(counts[1] < counts[0] && counts[2] > counts[0] && counts[3] < counts[2], "{counts:?}");
+}
+
+/// Compares the turns under a law, whose number is returned.
+fn assert_turns(law: FrictionLaw) -> usize {
+    let mut scene = lip_alone(0.0);
+    scene.linkage.friction = law;
     scene.drive = Drive::Uniform { speed_m_per_s: 0.0 };
     scene.start = StartKind::State(Pose { phi: 0.6, ..AT_REST });
     scene.run.stop_s = 0.1;
@@ -64,19 +73,25 @@ fn coulomb_friction_alone_turns_and_stops_the_tip_at_the_exact_angles() {
     let mut turns = vec![0.6f64];
     loop {
         let phi = turns[turns.len() - 1];
-        if (k2 * phi - press * phi.sin()).abs() <= MU * press * phi.cos() {
+        let sigma = -phi.signum();
+        let mu = law.dynamic_coefficient(0.0, sigma);
+        if turns.len() > 1
+            && (k2 * phi - press * phi.sin()).abs() <= law.static_ratio * mu * press * phi.cos()
+        {
             break;
         }
-        let sigma = -phi.signum();
-        let energy = |p: f64| 0.5 * k2 * p * p + press * (p.cos() + sigma * MU * p.sin());
+        let energy = |p: f64| 0.5 * k2 * p * p + press * (p.cos() + sigma * mu * p.sin());
         // away from the turn itself: the other root lies beyond the place where the forces balance
-        let bottom = root(|p| k2 * p - press * (p.sin() - sigma * MU * p.cos()), -1.0, 1.0);
+        let bottom = root(|p| k2 * p - press * (p.sin() - sigma * mu * p.cos()), -1.0, 1.0);
         turns.push(root(|p| energy(p) - energy(phi), bottom, -phi.signum() * (phi.abs() + 0.1)));
     }
-    assert!(turns.len() > 5, "{turns:?}");
-    for (method, relative) in cases() {
+    // (a tip that is held early has turned over little energy, which Runge-Kutta at 1e-4 does not balance)
+    let loose = |method, relative| method != IntegrationMethod::Taylor && relative > 1e-5;
+    for (method, relative) in
+        cases().filter(|&(method, relative)| law.static_ratio == 1.0 || !loose(method, relative))
+    {
         let seen = ran(&scene, method, relative);
-        let what = format!("{method:?} at {relative:e}");
+        let what = format!("{method:?} at {relative:e}, {law:?}");
         seen.assert_sound(&what, relative);
         assert_eq!(seen.run.status, RunStatus::Completed, "{what}");
         assert_eq!(seen.transitions.len(), turns.len() - 1, "{what}: {:?}", seen.transitions);
@@ -92,6 +107,65 @@ fn coulomb_friction_alone_turns_and_stops_the_tip_at_the_exact_angles() {
                 (found - exact).abs() <= ERRORS * relative,
                 "{what}: turn {i} at {found} instead of {exact}"
             );
+        }
+    }
+    turns.len()
+}
+
+/// Under a head that moves evenly the lip alone is held until its force passes the static limit, slips at the
+/// lower friction of its direction until its tip is at rest again, and so on: the angle of each release
+/// follows from the forces, that of each stop from the energy `m phi'^2/2 + k2 phi^2/2 + N l2 (cos phi +
+/// sigma mu sin phi)` with `l2 cos phi phi' = -V` at both ends of the slip. The time of each stick is the
+/// way of the head.
+#[test]
+fn a_lip_alone_sticks_to_the_static_limit_and_slips_to_the_exact_angles() {
+    for (speed, backward_ratio, static_ratio) in
+        [(0.05, 1.0, 1.001), (0.05, 1.0, 2.0), (0.05, 0.5, 2.0), (-0.05, 0.5, 2.0)]
+    {
+        let mut scene = lip_alone(0.25);
+        (scene.linkage.friction.static_ratio, scene.linkage.friction.backward_ratio) =
+            (static_ratio, backward_ratio);
+        scene.drive = Drive::Uniform { speed_m_per_s: speed };
+        scene.run.stop_s = 0.1;
+        let blade = &scene.linkage;
+        let sigma = speed.signum();
+        let (k2, m, l2, press) = (blade.lip.stiffness, blade.m_phi, blade.l2_m, PRESS_N * blade.l2_m);
+        let (mu, limit) = (blade.friction.limit_at_zero(sigma), blade.friction.static_coefficient(sigma));
+        let pull = |p: f64, mu: f64| k2 * p - press * (p.sin() - sigma * mu * p.cos());
+        let turning = |p: f64| m * p.tan() * (speed / (l2 * p.cos())).powi(2);
+        let release = root(|p| pull(p, limit) + turning(p), -1.0, 1.0);
+        let kinetic = |p: f64| 0.5 * m * (speed / (l2 * p.cos())).powi(2);
+        let energy = |p: f64| kinetic(p) + 0.5 * k2 * p * p + press * (p.cos() + sigma * mu * p.sin());
+        let bottom = root(|p| pull(p, mu), -1.0, 1.0);
+        let stop = root(|p| energy(p) - energy(release), bottom, sigma * 1.2);
+        let stick_s = (l2 * (stop.sin() - release.sin()) / speed).abs();
+        // (a tolerance above the width of the cycle does not resolve it)
+        for (method, relative) in cases().filter(|(_, relative)| *relative < 1e-2 * (static_ratio - 1.0)) {
+            let what = format!("{method:?} at {relative:e}, {:?}", blade.friction);
+            let seen = ran(&scene, method, relative);
+            seen.assert_sound(&what, relative);
+            assert!(seen.transitions.len() > 10, "{what}: {:?}", seen.transitions);
+            // (the start moves with the head, so the tip slips first)
+            let cycles = &seen.transitions[1..];
+            for (i, transition) in cycles.iter().enumerate() {
+                let (cause, exact) = match i % 2 {
+                    0 => (TransitionCause::FrictionLimit, release),
+                    _ => (TransitionCause::TipStops, stop),
+                };
+                assert_eq!(transition.cause, cause, "{what}: transition {i}");
+                let found = seen.ends.iter().find(|s| s.time_s == transition.time_s).unwrap().pose.phi;
+                assert!(
+                    (found - exact).abs() <= ERRORS * relative,
+                    "{what}: {i} at {found} instead of {exact}"
+                );
+            }
+            let sticks =
+                cycles[1..].windows(2).filter(|pair| pair[1].cause == TransitionCause::FrictionLimit);
+            for pair in sticks {
+                let found = pair[1].time_s - pair[0].time_s;
+                let allowed = 2.0 * ERRORS * relative * l2 / speed.abs();
+                assert!((found - stick_s).abs() <= allowed, "{what}: {found} instead of {stick_s} s");
+            }
         }
     }
 }
@@ -257,7 +331,7 @@ fn beside_the_paradox(indicator: f64) -> Scene {
         (contact.nu < -1.0 && contact.n_free > 0.0).then_some((pose, contact.nu))
     });
     let (pose, nu) = pressed.next().expect("a pose beside the paradox");
-    scene.linkage.friction = FrictionLaw { a: 0.0, b_s_per_m: 0.0, c: (indicator - 1.0) / nu };
+    scene.linkage.friction = FrictionLaw::exponential(0.0, 0.0, (indicator - 1.0) / nu);
     scene.start = StartKind::State(pose);
     scene.run.stop_s = 0.02;
     scene

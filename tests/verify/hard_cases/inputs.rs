@@ -128,6 +128,81 @@ fn a_file_with_a_number_that_is_none_is_refused() {
     }
 }
 
+/// Each friction law is refused without its parameters, with those of another law, and with points that are no
+/// table; the message names file, line, key, what was found and what to do.
+#[test]
+fn a_friction_law_that_is_not_whole_is_refused() {
+    const LINE: &str = "a = 0.229\nb_s_per_m = 7.95\nc = 0.331\n";
+    let table = |speeds: &str, coefficients: &str| {
+        format!("law = \"table\"\nspeeds_m_per_s = {speeds}\ncoefficients = {coefficients}\n")
+    };
+    let stribeck = "law = \"stribeck\"\nlimit_at_zero = 0.4\ncoulomb_level = 0.3\nstribeck_exponent = 1.5\n";
+    for (written, message) in [
+        (
+            format!("{LINE}static_ratio = 0.9\n"),
+            "LINE+3:16: key `friction.static_ratio`: found 0.9, expected a number from 1 to 10",
+        ),
+        (format!("{LINE}viscous_s_per_m = nan\n"), "LINE+3:19: key `friction.viscous_s_per_m`: found nan"),
+        (
+            format!("{LINE}backward_ratio = 0\n"),
+            "LINE+3:18: key `friction.backward_ratio`: found 0, expected a number above 0",
+        ),
+        (
+            format!("{LINE}stribeck_exponent = 1.0\n"),
+            "LINE+3: key `friction.stribeck_exponent`: found the law \"exponential\", expected parameters of this law: friction.a, friction.b_s_per_m, friction.c; leave it out, or choose law = \"stribeck\"",
+        ),
+        (
+            format!("law = \"stribek\"\n{LINE}"),
+            "LINE:7: key `friction.law`: found the text \"stribek\", expected one of \"exponential\", \"stribeck\", \"rational\", \"table\"; did you mean `stribeck`?",
+        ),
+        (format!("law = \"rational\"\n{LINE}"), "LINE+1: key `friction.a`: found the law \"rational\""),
+        (stribeck.to_owned(), "key `friction.stribeck_speed_m_per_s`: found nothing"),
+        (
+            format!("{stribeck}stribeck_speed_m_per_s = -0.1\n"),
+            "LINE+4:26: key `friction.stribeck_speed_m_per_s`: found -0.1, expected a number above 0",
+        ),
+        ("a = 0.1\nc = 0.3\n".to_owned(), "key `friction.b_s_per_m`: found nothing"),
+        (
+            format!("{LINE}coefficients = [0.1, 0.2]\n"),
+            "LINE+3: key `friction.coefficients`: found the law \"exponential\", expected points only for the law \"table\"; leave it out, or choose law = \"table\"",
+        ),
+        (
+            "law = \"table\"\ncoefficients = [0.1, 0.2]\n".to_owned(),
+            "key `friction.speeds_m_per_s`: found nothing, expected a list of numbers",
+        ),
+        (
+            table("[0.0, 0.2, 0.1]", "[0.4, 0.3, 0.2]"),
+            "LINE+1: key `friction.speeds_m_per_s`: found 0.1 after 0.2, expected speeds that increase; sort the points by speed",
+        ),
+        (
+            table("[0.0, -0.1]", "[0.4, 0.3]"),
+            "LINE+1:24: key `friction.speeds_m_per_s[2]`: found -0.1, expected a number of 0 or more",
+        ),
+        (table("[0.1, 0.2]", "[0.4, inf]"), "LINE+2:22: key `friction.coefficients[2]`: found inf"),
+        (table("[0.1]", "[0.4]"), "LINE+1: key `friction.speeds_m_per_s`: found 1, expected 2 to 32 speeds"),
+        (
+            table("[0.1, 0.2, 0.3]", "[0.4, 0.3]"),
+            "LINE+2: key `friction.coefficients`: found 2, expected 3, one a speed; give both lists one length",
+        ),
+    ] {
+        assert!(LIGHT_BLADE.contains(LINE));
+        let text = LIGHT_BLADE.replacen(LINE, &written, 1);
+        let line = 1 + LIGHT_BLADE[..LIGHT_BLADE.find(LINE).unwrap()].matches('\n').count();
+        let expected = match message.strip_prefix("LINE") {
+            Some(rest) => {
+                let (more, rest) = rest.split_once(':').unwrap();
+                format!("light-blade.toml:{}:{rest}", line + more.parse::<usize>().unwrap_or(0))
+            }
+            None => message.to_owned(),
+        };
+        let error = Scene::parse("light-blade.toml", &text).expect_err(message).to_string();
+        assert!(error.contains(&expected), "{written}: {error}, expected {expected}");
+    }
+    let scene = upright_light_blade();
+    let error = scene.with_parameter("friction.coulomb_level", 0.2).unwrap_err().to_string();
+    assert!(error.contains("found the law \"exponential\""), "{error}");
+}
+
 /// Rates whose squares overflow, and angles at and beyond level.
 #[test]
 fn no_start_however_extreme_panics_or_goes_unnoticed() {
