@@ -144,8 +144,8 @@ pub(crate) struct LawCoefficient {
     slope: fn(&FrictionLaw, f64) -> f64,
 }
 
-/// The coefficients of `A exp(-B |v|) + C`.
-pub(crate) const COEFFICIENTS: [LawCoefficient; 3] = [
+/// The coefficients of `A exp(-B |v|) + C + V |v|`.
+pub(crate) const COEFFICIENTS: [LawCoefficient; 4] = [
     LawCoefficient { name: "friction.a", symbol: "A", slope: |law, v| math::exp(-law.b_s_per_m * v) },
     LawCoefficient {
         name: "friction.b_s_per_m",
@@ -153,6 +153,7 @@ pub(crate) const COEFFICIENTS: [LawCoefficient; 3] = [
         slope: |law, v| -law.a * v * math::exp(-law.b_s_per_m * v),
     },
     LawCoefficient { name: "friction.c", symbol: "C", slope: |_, _| 1.0 },
+    LawCoefficient { name: "friction.viscous_s_per_m", symbol: "V", slope: |_, v| v },
 ];
 
 /// Returns the half width of an interval of the coefficient of friction at a speed of the tip in m/s.
@@ -169,20 +170,20 @@ pub(crate) fn friction_half_95(job: &Job, result: &FitResult, law: &FrictionLaw)
         let found = result.parameters.get(coefficient.name).filter(|found| found.has_interval())?;
         Some((found.estimate - found.lower_95?).max(found.upper_95? - found.estimate))
     };
-    let [a, b, c] = COEFFICIENTS.each_ref().map(half);
-    let halves = [a?, b?, c?];
+    let [a, b, c, viscous] = COEFFICIENTS.each_ref().map(half);
+    let halves = [a?, b?, c?, viscous?];
     let correlation = |i: usize, j: usize| {
         if i == j || halves[i] == 0.0 || halves[j] == 0.0 {
             return Some(f64::from(u8::from(i == j)));
         }
         result.correlations.get(COEFFICIENTS[i].name)?.get(COEFFICIENTS[j].name).copied()
     };
-    let row = |i: usize| Some([correlation(i, 0)?, correlation(i, 1)?, correlation(i, 2)?]);
-    let (correlations, law) = ([row(0)?, row(1)?, row(2)?], *law);
+    let row = |i: usize| (0..halves.len()).map(|j| correlation(i, j)).collect::<Option<Vec<f64>>>();
+    let (correlations, law) = ([row(0)?, row(1)?, row(2)?, row(3)?], *law);
     let half = move |v: f64| {
-        let moved: [f64; 3] = array::from_fn(|i| (COEFFICIENTS[i].slope)(&law, v) * halves[i]);
-        let row = |i: usize| (0..3).map(|j| moved[i] * moved[j] * correlations[i][j]).sum::<f64>();
-        (0..3).map(row).sum::<f64>().max(0.0).sqrt()
+        let moved: [f64; 4] = array::from_fn(|i| (COEFFICIENTS[i].slope)(&law, v) * halves[i]);
+        let row = |i: usize| (0..4).map(|j| moved[i] * moved[j] * correlations[i][j]).sum::<f64>();
+        (0..4).map(row).sum::<f64>().max(0.0).sqrt()
     };
     COEFFICIENTS.iter().any(|c| is_fitted(job, c)).then(|| Box::new(half) as HalfInterval)
 }

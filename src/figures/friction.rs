@@ -192,8 +192,9 @@ fn claim_sentence(law: &FrictionLaw, fastest: f64) -> String {
 fn true_law(case: &ConditionComparison) -> Option<FrictionLaw> {
     let twin = case.measured.and_then(|m| m.file).and_then(|file| file.twin.as_ref())?;
     let known = twin.get("truth").and_then(toml::Value::as_table)?;
-    let [a, b_s_per_m, c] = COEFFICIENTS.map(|c| known.get(c.name).and_then(toml::Value::as_float));
-    Some(FrictionLaw::exponential(a?, b_s_per_m?, c?))
+    let [a, b_s_per_m, c, viscous] = COEFFICIENTS.map(|c| known.get(c.name).and_then(toml::Value::as_float));
+    let law = FrictionLaw::exponential(a?, b_s_per_m?, c?);
+    Some(FrictionLaw { viscous_s_per_m: viscous.unwrap_or(0.0), ..law })
 }
 
 /// Speeds, ascending, and friction coefficients of the model's slip states.
