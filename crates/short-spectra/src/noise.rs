@@ -2,6 +2,7 @@
 
 use portable_math as math;
 use std::array::from_fn;
+use std::ops::Range;
 
 /// Maximum number of coefficients of a process.
 pub const MOST_COEFFICIENTS: usize = 8;
@@ -126,6 +127,11 @@ pub struct Whitener {
     /// Order of the process, at least 1.
     order: usize,
     steps: Vec<WhiteningStep>,
+    /// Ranges of steps before which the last `order` frames are all present: there the filter is a sum over
+    /// these frames.
+    complete: Vec<Range<usize>>,
+    /// Standard deviation of the innovation of these steps.
+    innovation_sd: f64,
 }
 
 /// Step of the filter from one present frame to the next.
@@ -154,7 +160,9 @@ impl Whitener {
         let mut coefficients = [0.0; MOST_COEFFICIENTS];
         coefficients[..noise.coefficients().len()].copy_from_slice(noise.coefficients());
         let order = noise.coefficients().len().max(1);
-        let mut whitener = Self { coefficients, order, steps: Vec::with_capacity(places.len()) };
+        let steps = Vec::with_capacity(places.len());
+        let innovation_sd = noise.innovation_sd();
+        let mut whitener = Self { coefficients, order, steps, complete: Vec::new(), innovation_sd };
         let mut uncertain = PredictionCovariance::from_stationary(noise, order);
         let innovation = math::powi(noise.innovation_sd(), 2);
         let mut before = places.first().copied();
@@ -167,15 +175,50 @@ impl Whitener {
             let (sd, gain) = uncertain.observe_latest();
             whitener.steps.push(WhiteningStep { ahead, decay, sd, gain });
         }
+        whitener.complete = whitener.find_complete_steps();
         whitener
+    }
+
+    /// Ranges of steps before which the last `order` frames are all present, at whole numbers of frames.
+    fn find_complete_steps(&self) -> Vec<Range<usize>> {
+        let follows = |k: usize| self.steps[k].ahead == 1 && self.steps[k].decay == 1.0;
+        let mut complete = Vec::new();
+        let mut first = 0;
+        for k in 1..=self.steps.len() {
+            if k == self.steps.len() || !follows(k) {
+                if first + self.order < k {
+                    complete.push(first + self.order..k);
+                }
+                first = k;
+            }
+        }
+        complete
     }
 
     /// Whitens a column in place; the column has one value per present frame, in the unit of the noise.
     /// Whitened noise is independent from frame to frame and has unit variance.
     pub fn whiten_column(&self, column: &mut [f64]) {
+        let values = column.to_vec();
+        let mut next = 0;
         let mut memory = [0.0; MOST_COEFFICIENTS];
-        for (value, step) in column.iter_mut().zip(&self.steps) {
-            (0..step.ahead).for_each(|_| self.predict_next(&mut memory));
+        for complete in &self.complete {
+            self.filter_steps(next..complete.start, column, &mut memory);
+            let part = &mut column[complete.clone()];
+            for (lag, coefficient) in (1..).zip(&self.coefficients[..self.order]) {
+                let before = &values[complete.start - lag..complete.end - lag];
+                part.iter_mut().zip(before).for_each(|(x, past)| *x -= coefficient * past);
+            }
+            part.iter_mut().for_each(|x| *x /= self.innovation_sd);
+            (0..self.order).for_each(|lag| memory[lag] = values[complete.end - 1 - lag]);
+            next = complete.end;
+        }
+        self.filter_steps(next..self.steps.len(), column, &mut memory);
+    }
+
+    /// Whitens a part of a column in place. `memory` is the estimate of the last frames before it.
+    fn filter_steps(&self, part: Range<usize>, column: &mut [f64], memory: &mut NoiseMemory) {
+        for (value, step) in column[part.clone()].iter_mut().zip(&self.steps[part]) {
+            (0..step.ahead).for_each(|_| self.predict_next(memory));
             memory[0] *= step.decay;
             let innovation = *value - memory[0];
             memory.iter_mut().zip(&step.gain).for_each(|(past, gain)| *past += gain * innovation);
