@@ -20,14 +20,14 @@ const MOST_RESIDUAL: f64 = 0.25;
 const LEAST_SEPARATION: f64 = 0.5;
 /// Smallest range of a drift, in resolutions, that two steady lines cannot imitate: pairs up to 1.7
 /// resolutions apart looked like one component that drifts by up to five resolutions.
-const LEAST_CLEAR_DRIFT: f64 = 5.0;
+pub(super) const LEAST_CLEAR_DRIFT: f64 = 5.0;
 /// Damping ratio above which an oscillation is over within a cycle: at this ratio its amplitude falls to a
 /// quarter in one cycle.
 pub(super) const SINGLE_CYCLE_DAMPING: f64 = 0.22;
 /// Largest allowed median distance, in resolutions of the segments, of a drifting frequency from the value
 /// extrapolated with its rate. For noise in bands of 5 to 40 resolutions this distance is 0.35 or more, for a
 /// measured oscillation up to 0.26.
-const MOST_STRAY: f64 = 0.3;
+pub(super) const MOST_STRAY: f64 = 0.3;
 /// Ratio of an amplitude to its standard deviation from which the amplitude is significant.
 const LEAST_DEVIATIONS: f64 = 3.0;
 /// Properties of the camera and the motion that limit which frequencies can be trusted.

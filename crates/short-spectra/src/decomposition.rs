@@ -1,9 +1,11 @@
-//! One model for every record: a trend, oscillations with decay, onset and drift, harmonics, smooth steps and
-//! relaxations, frames that are left out at a price, and autoregressive noise. The posterior probability
+//! One model for every record: a trend, oscillations with decay, onset and drift or along a ridge, harmonics,
+//! smooth steps and relaxations, frames that are left out at a price, and autoregressive noise. The posterior probability
 //! decides which of these parts a record has (Djurić 1996, *IEEE Trans. Signal Process.* 44).
 
 mod atom;
 mod candidates;
+mod column_products;
+mod course;
 mod problem;
 mod reading;
 mod search;
@@ -25,7 +27,7 @@ use problem::{Explanation, NoisyRecord, Parts};
 use search::{PartSearch, Rival};
 
 /// Largest number of oscillations; it bounds the time of a search.
-const MOST_OSCILLATIONS: usize = 12;
+const MOST_OSCILLATIONS: usize = 8;
 /// Frames per oscillation: an oscillation with decay, onset and linear drift has six parameters, so this
 /// allows about three frames per parameter.
 const FRAMES_PER_OSCILLATION: usize = 16;
@@ -37,6 +39,7 @@ pub(crate) struct Decomposition {
     rivals: Vec<Rival>,
     /// Size, m, of one unit of the scaled values: the standard deviation of the record.
     scale_m: f64,
+    frame_rate_hz: f64,
 }
 
 /// What to look for in a record.
@@ -108,9 +111,15 @@ impl Decomposition {
         let mut white = NoisyRecord::new(samples.len(), used, values);
         white.least_variance = math::powi(ROUNDING * largest / scale_m, 2).max(1e-300);
         let Contest { problem, best: explanation, rivals, .. } = select_explanation(white, settings);
-        let mut found = Self { problem, explanation, rivals, scale_m };
+        let mut found = Self { problem, explanation, rivals, scale_m, frame_rate_hz: record.frame_rate_hz };
         found.add_rivals();
         Some(found)
+    }
+
+    /// Hz of one cycle per record, seconds of the whole record, and metres of a scaled value.
+    fn units(&self) -> (f64, f64, f64) {
+        let frames = self.problem.at.frames as f64;
+        (self.frame_rate_hz / frames, frames / self.frame_rate_hz, self.scale_m)
     }
 }
 
@@ -137,13 +146,17 @@ impl Contest {
         let mut search = PartSearch::new(problem, trend_grows, most_oscillations);
         search.bound = self.best.criterion;
         let mut found = search.find_parts(parts);
-        for _ in 0..Self::MOST_REPETITIONS {
+        for repetition in 0..Self::MOST_REPETITIONS {
+            if repetition > 0 && found.criterion > self.best.criterion + MOST_BEHIND {
+                break;
+            }
             let coloured = with_noise_of(&search.problem, &found.parts);
             if coloured.order == 0 && search.problem.order == 0 {
                 break;
             }
+            let (coloured, parts) = self.refine_courses(coloured, &found);
             let mut again = PartSearch::new(coloured, trend_grows, most_oscillations);
-            let next = again.find_parts(found.parts.clone());
+            let next = again.find_parts(parts);
             let falls = next.criterion < found.criterion - Self::LEAST_FALL;
             if falls {
                 std::mem::swap(&mut search, &mut again);
@@ -159,7 +172,70 @@ impl Contest {
             (self.problem, self.best) = (search.problem, found);
         }
     }
+
+    fn keep_rival(&mut self, explanation: &Explanation) {
+        self.rivals.push(Rival { atoms: explanation.parts.atoms.clone(), criterion: explanation.criterion });
+    }
+
+    /// An explanation in which one oscillation along a ridge takes the place of all oscillations in its range
+    /// of frequencies, with its noise, if it is more probable than `found`. Only a record with several
+    /// oscillations or with coloured noise may contain it: a few oscillations describe a frequency that
+    /// changes evenly.
+    fn follow_course(
+        &mut self,
+        problem: &NoisyRecord,
+        found: &Explanation,
+    ) -> Option<(NoisyRecord, Explanation)> {
+        let oscillations = found.parts.atoms.iter().filter(|a| a.oscillation().is_some()).count();
+        if oscillations < SEVERAL && with_noise_of(problem, &found.parts).order == 0 {
+            return None;
+        }
+        self.accept_course(problem, found, None)
+    }
+
+    /// The explanation with an oscillation along a ridge, if it is more probable than `found`.
+    fn accept_course(
+        &mut self,
+        problem: &NoisyRecord,
+        found: &Explanation,
+        replaced: Option<usize>,
+    ) -> Option<(NoisyRecord, Explanation)> {
+        let parts = course::unite_along_ridge(problem, found, replaced)?;
+        let problem = with_noise_of(problem, &parts);
+        let next = problem.fit_parts(&parts, FEW_ITERATIONS);
+        self.keep_rival(&next);
+        (next.criterion < found.criterion - Self::LEAST_FALL).then_some((problem, next))
+    }
+
+    /// Follows each course anew beside the other parts that are known now.
+    fn refine_courses(&mut self, problem: NoisyRecord, found: &Explanation) -> (NoisyRecord, Parts) {
+        let (mut problem, mut best) = (problem, found.clone());
+        for k in 0..best.parts.atoms.len() {
+            if best.parts.atoms.get(k).is_some_and(|atom| atom.course().is_some())
+                && let Some((coloured, next)) = self.accept_course(&problem, &best, Some(k))
+            {
+                (problem, best) = (coloured, next);
+            }
+        }
+        (problem, best.parts)
+    }
+
+    /// Looks for an oscillation along a ridge beside the parts that are known in the end.
+    fn add_course(&mut self) {
+        let (problem, best) = (self.problem.clone(), self.best.clone());
+        if let Some((problem, next)) = self.follow_course(&problem, &best) {
+            self.search_parts(problem, next.parts);
+        }
+    }
 }
+
+/// A search is not completed if the criterion of its explanation is higher than that of another one by more
+/// than this, nats: further oscillations do not make up for it.
+const MOST_BEHIND: f64 = 20.0;
+/// Number of oscillations from which a record may contain one along a ridge instead.
+const SEVERAL: usize = 4;
+/// Iterations of a fit of all parts after a change of the noise, which hardly moves them.
+const FEW_ITERATIONS: usize = 2;
 
 /// The most probable explanation. A first search in white noise finds the slow parts. The noise that these
 /// leave decides whether coloured noise is tried.
@@ -167,23 +243,33 @@ fn select_explanation(white: NoisyRecord, settings: DecompositionSettings) -> Co
     /// Largest number of oscillations in the first search: the slow parts are known before all oscillations
     /// are.
     const FIRST_LOOK: usize = 4;
-    /// If another explanation has a criterion below that of the first search by more than this, nats, that
-    /// search is not completed: further oscillations do not make up for it.
-    const CLEAR_LEAD: f64 = 20.0;
     let start = Parts { trend: settings.trend, atoms: Vec::new() };
     let jump = settings.trend_grows.then(|| find_jump(&white, &start)).flatten();
     let first_look = FIRST_LOOK.min(settings.most_oscillations);
     let bound = with_noise_of(&white, &start).fit_parts(&start, 0).criterion;
     let mut search = PartSearch::new(white, settings.trend_grows, first_look);
     search.bound = bound;
-    let first = search.find_parts(start);
+    let mut first = search.find_parts(start);
     let white = search.problem;
     let mut contest =
         Contest { settings, problem: white.clone(), best: first.clone(), rivals: search.rivals };
-    let slow: Vec<Atom> = first.parts.atoms.iter().filter(|a| a.oscillation().is_none()).cloned().collect();
-    let slow = Parts { trend: first.parts.trend, atoms: slow };
-    let (background, alone) = (with_background(&white, &slow), with_noise_of(&white, &slow));
-    let noise_alone = alone.fit_parts(&slow, 2);
+    let mut slow = slow_parts(&first.parts);
+    let mut alone = with_noise_of(&white, &slow);
+    let mut noise_alone = alone.fit_parts(&slow, FEW_ITERATIONS);
+    if let Some((problem, course)) = contest.follow_course(&white, &first) {
+        let least = first.criterion.min(noise_alone.criterion);
+        if course.criterion < least - MOST_BEHIND {
+            contest.keep_rival(&noise_alone);
+            slow = slow_parts(&course.parts);
+            alone = with_noise_of(&white, &slow);
+            noise_alone = alone.fit_parts(&slow, FEW_ITERATIONS);
+            (contest.problem, contest.best) = (problem, course.clone());
+            first = course;
+        } else {
+            contest.search_parts(problem, course.parts);
+        }
+    }
+    let background = with_background(&white, &slow);
     if background.order > 0 || noise_alone.criterion < first.criterion {
         contest.search_parts(background, slow);
         contest.search_parts(alone, noise_alone.parts);
@@ -191,10 +277,17 @@ fn select_explanation(white: NoisyRecord, settings: DecompositionSettings) -> Co
     if let Some((problem, parts)) = jump {
         contest.search_parts(problem, parts);
     }
-    if contest.best.criterion > first.criterion - CLEAR_LEAD {
+    if contest.best.criterion > first.criterion - MOST_BEHIND {
         contest.search_parts(white, first.parts);
     }
+    contest.add_course();
     contest
+}
+
+/// The parts without their oscillations.
+fn slow_parts(parts: &Parts) -> Parts {
+    let slow = parts.atoms.iter().filter(|a| a.oscillation().is_none());
+    Parts { trend: parts.trend, atoms: slow.cloned().collect() }
 }
 
 /// The problem in the noise that `parts` leave, without the lines of further oscillations. A running median

@@ -51,20 +51,6 @@ pub(super) struct DriftCourse {
 }
 
 impl DriftCourse {
-    /// Median distance, in resolutions of the segments, of a frequency from the value extrapolated from a
-    /// point half a segment away.
-    pub(super) fn median_stray(&self) -> f64 {
-        let ridge = &self.ridge;
-        let apart = ((INDEPENDENT_SEGMENTS * ridge.segment_s / ridge.hop_s).round() as usize).max(1);
-        let stray = |pair: &[RidgePoint]| {
-            let [a, b] = [&pair[0], &pair[pair.len() - 1]];
-            let led_hz = (b.time_s - a.time_s) * (a.rate_hz_per_s + b.rate_hz_per_s) / 2.0;
-            (b.frequency_hz - a.frequency_hz - led_hz).abs() * ridge.segment_s
-        };
-        let pairs = ridge.unbroken_parts().flat_map(|part| part.windows(apart + 1));
-        upper_median(pairs.map(stray).collect()).unwrap_or(0.0)
-    }
-
     /// The frequencies that the component covers in a spectrum, if it drifts.
     pub(super) fn drift_region(&self) -> Option<DriftRegion> {
         let FrequencyRange { low_hz, high_hz, .. } = self.range?;
@@ -79,11 +65,8 @@ pub(super) fn find_drift_course(
     fit: &ModelFit,
     band_hz: Option<(f64, f64)>,
 ) -> Option<DriftCourse> {
-    let (lowest, top) = natural_band_hz(search, fit);
-    let band = band_hz.map_or((lowest, top), |(low, high)| (low.max(lowest), high.min(top)));
-    if band.0 >= band.1 {
-        return None;
-    }
+    let peaks = prominent_peaks(search, fit);
+    let band = choose_ridge_band(search.samples.len(), search.frame_rate_hz, &peaks, band_hz)?;
     let record = remove_slow_parts(search, fit, band.0);
     let (followed_share, ridge) = select_best_ridge(&record, search.frame_rate_hz, band)?;
     let range = ridge.range_hz().filter(|range| {
@@ -95,7 +78,11 @@ pub(super) fn find_drift_course(
 /// The ridge for the segment length that shows the component best. If too few segments have a point of this
 /// ridge, shorter segments are tried, and the ridge with the largest share of segments is returned. The
 /// component may be weak or change fast in a part of the record.
-fn select_best_ridge(record: &[Option<f64>], frame_rate_hz: f64, band: (f64, f64)) -> Option<(f64, Ridge)> {
+pub(super) fn select_best_ridge(
+    record: &[Option<f64>],
+    frame_rate_hz: f64,
+    band: (f64, f64),
+) -> Option<(f64, Ridge)> {
     let cut = |segment_s: Option<f64>| {
         let settings = time_frequency::SpectrogramSettings { segment_s, band_hz: Some(band), overlap: None };
         let spectrogram = Spectrogram::new(record, frame_rate_hz, &settings).ok()?;
@@ -111,43 +98,40 @@ fn select_best_ridge(record: &[Option<f64>], frame_rate_hz: f64, band: (f64, f64
     Some(better.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or(best))
 }
 
-/// Band, Hz, in which the strongest component above the slow ones may lie. The shortest segment contains a
-/// few cycles at the lower end of the band, so the lower end must not lie far below the component.
-fn natural_band_hz(search: &ModelSelector, fit: &ModelFit) -> (f64, f64) {
-    let prominent = prominent_peaks(search, fit);
-    let slow_hz = dominant_slow_hz(&prominent);
-    let (low, top) = time_frequency::default_band_hz(search.samples.len(), search.frame_rate_hz, slow_hz);
-    let above = || prominent.iter().filter(|s| s.hz >= low);
-    let largest_m = above().map(|s| s.amplitude_m).fold(0.0, f64::max);
-    let strong = above().filter(|s| s.amplitude_m >= SLOW_COMPONENT.1 * largest_m);
-    let lowest_hz = strong.map(|s| s.hz).fold(f64::INFINITY, f64::min);
-    (if lowest_hz.is_finite() { low.max(lowest_hz / BAND_MARGIN) } else { low }, top)
+/// Band, Hz, in which the strongest component above the slow ones may lie; `components` are frequencies, Hz,
+/// with amplitudes. The shortest segment contains a few cycles at the lower end of the band, so the lower end
+/// must not lie far below the component. `None` if the band is empty.
+pub(super) fn choose_ridge_band(
+    frames: usize,
+    frame_rate_hz: f64,
+    components: &[(f64, f64)],
+    within_hz: Option<(f64, f64)>,
+) -> Option<(f64, f64)> {
+    let slow_hz = dominant_slow_hz(components);
+    let (low, top) = time_frequency::default_band_hz(frames, frame_rate_hz, slow_hz);
+    let above = || components.iter().filter(|(hz, _)| *hz >= low);
+    let largest = above().map(|(_, amplitude)| *amplitude).fold(0.0, f64::max);
+    let strong = above().filter(|(_, amplitude)| *amplitude >= SLOW_COMPONENT.1 * largest);
+    let lowest_hz = strong.map(|(hz, _)| *hz).fold(f64::INFINITY, f64::min);
+    let lowest_hz = if lowest_hz.is_finite() { low.max(lowest_hz / BAND_MARGIN) } else { low };
+    let (low, high) = within_hz.map_or((lowest_hz, top), |(low, high)| (low.max(lowest_hz), high.min(top)));
+    (low < high).then_some((low, high))
 }
 
-/// A fitted sinusoid, or a peak of the residual.
-struct ProminentPeak {
-    hz: f64,
-    amplitude_m: f64,
-}
-
-fn prominent_peaks(search: &ModelSelector, fit: &ModelFit) -> Vec<ProminentPeak> {
+/// Frequencies, Hz, and amplitudes, m, of the fitted sinusoids and of the peaks of the residual.
+fn prominent_peaks(search: &ModelSelector, fit: &ModelFit) -> Vec<(f64, f64)> {
     let model = &fit.model;
-    let sinusoid = |k: usize| ProminentPeak {
-        hz: model.terms()[k].cycles * search.resolution_hz(),
-        amplitude_m: model.amplitude_m(k),
-    };
+    let sinusoid = |k: usize| (model.terms()[k].cycles * search.resolution_hz(), model.amplitude_m(k));
     let sinusoids = model.oscillations().into_iter().map(sinusoid);
-    let left = fit.peaks.accepted.iter();
-    let left = left.map(|p| ProminentPeak { hz: p.frequency_hz, amplitude_m: p.amplitude_m });
+    let left = fit.peaks.accepted.iter().map(|p| (p.frequency_hz, p.amplitude_m));
     sinusoids.chain(left).collect()
 }
 
-/// Frequency, Hz, of the largest peak, if that peak is slow.
-fn dominant_slow_hz(standing: &[ProminentPeak]) -> Option<f64> {
-    let largest = standing.iter().max_by(|a, b| a.amplitude_m.total_cmp(&b.amplitude_m))?;
-    let mut above = standing.iter().filter(|s| s.hz > SLOW_COMPONENT.0 * largest.hz).peekable();
-    (above.peek().is_some() && above.all(|s| s.amplitude_m < SLOW_COMPONENT.1 * largest.amplitude_m))
-        .then_some(largest.hz)
+/// Frequency, Hz, of the largest component, if that component is slow.
+fn dominant_slow_hz(components: &[(f64, f64)]) -> Option<f64> {
+    let largest = components.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let mut above = components.iter().filter(|(hz, _)| *hz > SLOW_COMPONENT.0 * largest.0).peekable();
+    (above.peek().is_some() && above.all(|(_, m)| *m < SLOW_COMPONENT.1 * largest.1)).then_some(largest.0)
 }
 
 /// The record, m, without the trend, the relaxations and the sinusoids below a given frequency.
@@ -240,15 +224,7 @@ impl CycleCount {
 
     fn add_part(&mut self, part: &[RidgePoint]) {
         let (Some(first), Some(last)) = (part.first(), part.last()) else { return };
-        for pair in part.windows(2) {
-            let [a, b] = [&pair[0], &pair[1]];
-            let apart_s = b.time_s - a.time_s;
-            // cycles expected from a cubic through both frequencies with both rates
-            let expected = apart_s * (a.frequency_hz + b.frequency_hz) / 2.0
-                + apart_s * apart_s * (a.rate_hz_per_s - b.rate_hz_per_s) / 12.0;
-            let part_of_one = (b.phase_rad - a.phase_rad) / TAU;
-            self.cycles += part_of_one + (expected - part_of_one).round();
-        }
+        self.cycles += part.windows(2).map(|pair| count_cycles(&pair[0], &pair[1])).sum::<f64>();
         self.variance += phase_variance(first) + phase_variance(last);
         self.duration_s += last.time_s - first.time_s;
     }
@@ -271,4 +247,27 @@ impl CycleCount {
 fn phase_variance(point: &RidgePoint) -> f64 {
     let noise = math::powf(10.0, -point.snr_db / 20.0).max(point.residual_ratio);
     math::powi(noise * FRAC_1_SQRT_2 / TAU, 2) + CYCLE_INSTANT_SD * CYCLE_INSTANT_SD
+}
+
+/// Cycles from one point of a ridge to the next one of the same part.
+pub(super) fn count_cycles(a: &RidgePoint, b: &RidgePoint) -> f64 {
+    let apart_s = b.time_s - a.time_s;
+    // cycles expected from a cubic through both frequencies with both rates
+    let expected = apart_s * (a.frequency_hz + b.frequency_hz) / 2.0
+        + apart_s * apart_s * (a.rate_hz_per_s - b.rate_hz_per_s) / 12.0;
+    let part_of_one = (b.phase_rad - a.phase_rad) / TAU;
+    part_of_one + (expected - part_of_one).round()
+}
+
+/// Median distance, in resolutions of the segments, of a frequency from the value extrapolated from a point
+/// half a segment away.
+pub(super) fn median_stray(ridge: &Ridge) -> f64 {
+    let apart = ((INDEPENDENT_SEGMENTS * ridge.segment_s / ridge.hop_s).round() as usize).max(1);
+    let stray = |pair: &[RidgePoint]| {
+        let [a, b] = [&pair[0], &pair[pair.len() - 1]];
+        let led_hz = (b.time_s - a.time_s) * (a.rate_hz_per_s + b.rate_hz_per_s) / 2.0;
+        (b.frequency_hz - a.frequency_hz - led_hz).abs() * ridge.segment_s
+    };
+    let pairs = ridge.unbroken_parts().flat_map(|part| part.windows(apart + 1));
+    upper_median(pairs.map(stray).collect()).unwrap_or(0.0)
 }

@@ -4,7 +4,7 @@
 use super::{Oscillation, RemovedTrend, SpectralAnalysis};
 use crate::classification::{Evidence, RecordContext, classify_components};
 use crate::component::DecayingTone;
-use crate::frequency_drift::{DriftCourse, RidgeMean};
+use crate::frequency_drift::{DriftCourse, RidgeMean, median_stray};
 use crate::least_squares::{FreeSet, SineCovariance, SineTerm, TermDeviations, Tolerance};
 use crate::model_selection::{ModelFit, ModelSelector, SineModel};
 use crate::peaks::Peak;
@@ -297,7 +297,7 @@ impl<'a> FitReading<'a> {
         let evidence = Evidence {
             keeps_peak: true,
             followed_share: Some(course.followed_share),
-            median_stray: Some(course.median_stray()),
+            median_stray: Some(median_stray(&course.ridge)),
             drift: Some((range.high_hz - range.low_hz) / selector.resolution_hz()),
             ..Evidence::default()
         };

@@ -1,6 +1,7 @@
 //! The parts of a record other than its trend and noise. A part is a sum of columns, each times an amplitude.
 //! The columns depend on a few shape parameters.
 
+use super::course::CourseAtom;
 use crate::trend::LEGENDRE;
 use portable_math as math;
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -113,6 +114,8 @@ pub(crate) enum Atom {
         onset: f64,
         nepers: f64,
     },
+    /// An oscillation along a ridge.
+    Course(CourseAtom),
     /// From this position on, a cubic is added to the trend.
     Break {
         at: f64,
@@ -176,12 +179,6 @@ impl OscillationAtom {
         (0..POINTS).map(at).fold((f64::INFINITY, 0.0), |(low, high), c| (low.min(c), high.max(c)))
     }
 
-    /// Factor of the amplitude at position `s`: decay times polynomial.
-    pub(crate) fn envelope_at(&self, s: f64) -> f64 {
-        let decay = self.decay_at(s);
-        if self.envelope.is_empty() || decay == 0.0 { decay } else { decay * self.modulation_at(s) }
-    }
-
     /// Factor of the amplitude by decay since the onset; 0 before it.
     fn decay_at(&self, s: f64) -> f64 {
         if s < self.onset - 1e-12 {
@@ -203,22 +200,23 @@ impl OscillationAtom {
 
     /// Cosine and sine columns of the oscillation, then those of each multiple; one value per frame used.
     fn columns(&self, at: &FramePlaces) -> Vec<Vec<f64>> {
-        let mut columns = vec![Vec::with_capacity(at.places.len()); 2 * (1 + self.multiples.len())];
-        for s in &at.places {
-            let envelope = self.envelope_at(*s);
-            if envelope == 0.0 {
-                columns.iter_mut().for_each(|column| column.push(0.0));
-                continue;
-            }
-            let turn = self.phase_at(*s);
-            let (sine, cosine) = math::sin_cos(TAU * (turn - turn.floor()));
-            columns[0].push(envelope * cosine);
-            columns[1].push(envelope * sine);
+        let mut columns = vec![vec![0.0; at.places.len()]; 2 * (1 + self.multiples.len())];
+        let first = at.places.partition_point(|s| *s < self.onset - 1e-12);
+        let mut phasors = Phasors::new(self, at);
+        for (i, s) in at.places.iter().enumerate().skip(first) {
+            let (cosine, sine, decay) = phasors.at_frame(i);
+            let envelope = if self.envelope.is_empty() { decay } else { decay * self.modulation_at(*s) };
+            columns[0][i] = envelope * cosine;
+            columns[1][i] = envelope * sine;
+            // each multiple follows from the one before it by turns of the first phasor
+            let (mut turned, mut re, mut im) = (1, cosine, sine);
             for (k, multiple) in self.multiples.iter().enumerate() {
-                let turn = *multiple as f64 * turn;
-                let (sine, cosine) = math::sin_cos(TAU * (turn - turn.floor()));
-                columns[2 * k + 2].push(envelope * cosine);
-                columns[2 * k + 3].push(envelope * sine);
+                while turned < *multiple {
+                    (re, im) = (re * cosine - im * sine, re * sine + im * cosine);
+                    turned += 1;
+                }
+                columns[2 * k + 2][i] = envelope * re;
+                columns[2 * k + 3][i] = envelope * im;
             }
         }
         columns
@@ -264,10 +262,64 @@ impl OscillationAtom {
     }
 }
 
+/// Cosine and sine of the phase of an oscillation and its decay, frame by frame. From one frame to the next,
+/// a steady phase turns and a decay shrinks by constant factors. Every few frames both are computed anew, so
+/// that rounding errors do not grow.
+struct Phasors<'a> {
+    atom: &'a OscillationAtom,
+    at: &'a FramePlaces,
+    /// Cosine and sine of the turn over one frame, and the factor of the decay over it.
+    step: (f64, f64, f64),
+    latest: (f64, f64, f64),
+    /// Number of frames since both were computed anew.
+    since: usize,
+}
+
+impl<'a> Phasors<'a> {
+    /// Number of frames over which rounding errors of the recurrence may grow: to a few 1e-15.
+    const MOST_STEPS: usize = 32;
+
+    fn new(atom: &'a OscillationAtom, at: &'a FramePlaces) -> Self {
+        let frames = at.frames as f64;
+        let (sine, cosine) = math::sin_cos(TAU * atom.cycles / frames);
+        let shrink = atom.nepers.map_or(1.0, |nepers| math::exp(-nepers / frames));
+        Self { atom, at, step: (cosine, sine, shrink), latest: (1.0, 0.0, 1.0), since: Self::MOST_STEPS }
+    }
+
+    fn at_frame(&mut self, i: usize) -> (f64, f64, f64) {
+        let s = self.at.places[i];
+        let follows = i > 0 && (s - self.at.places[i - 1]) * (self.at.frames as f64) < 1.5;
+        let (cosine, sine, decay) = self.latest;
+        let (by_cosine, by_sine, shrink) = self.step;
+        self.since += 1;
+        let anew = !follows || self.since > Self::MOST_STEPS;
+        if anew {
+            self.since = 0;
+        }
+        let (cosine, sine) = if anew || !self.atom.phase.is_empty() {
+            let turn = self.atom.phase_at(s);
+            let (sine, cosine) = math::sin_cos(TAU * (turn - turn.floor()));
+            (cosine, sine)
+        } else {
+            (cosine * by_cosine - sine * by_sine, cosine * by_sine + sine * by_cosine)
+        };
+        let decay = if anew { self.atom.decay_at(s) } else { decay * shrink };
+        self.latest = (cosine, sine, decay);
+        self.latest
+    }
+}
+
 impl Atom {
     pub(crate) fn oscillation(&self) -> Option<&OscillationAtom> {
         match self {
             Self::Oscillation(oscillation) => Some(oscillation),
+            _ => None,
+        }
+    }
+
+    pub(crate) fn course(&self) -> Option<&CourseAtom> {
+        match self {
+            Self::Course(course) => Some(course),
             _ => None,
         }
     }
@@ -277,6 +329,7 @@ impl Atom {
             Self::Oscillation(o) => 2 * (1 + o.multiples.len()),
             Self::Step { .. } => 1,
             Self::Relaxation { onset, .. } => 1 + usize::from(*onset > 0.0),
+            Self::Course(course) => course.column_count(),
             Self::Break { .. } => 4,
         }
     }
@@ -294,6 +347,7 @@ impl Atom {
                 let decay = |s: f64| if s >= *onset { math::exp(-nepers * (s - onset)) } else { 0.0 };
                 if *onset > 0.0 { vec![each(&after), each(&decay)] } else { vec![each(&decay)] }
             }
+            Self::Course(course) => course.columns(at),
             Self::Break { at } => {
                 let power = |k: i32| move |s: f64| if s > *at { math::powi(s - at, k) } else { 0.0 };
                 (0..4).map(|k| each(&power(k))).collect()
@@ -322,7 +376,7 @@ impl Atom {
                 let k = columns.len() - 1;
                 vec![each(&|i, s| -(s - onset) * coefficients[k] * columns[k][i])]
             }
-            Self::Break { .. } => Vec::new(),
+            Self::Course(_) | Self::Break { .. } => Vec::new(),
         }
     }
 
@@ -337,7 +391,7 @@ impl Atom {
                 .collect(),
             Self::Step { centre, width, .. } => vec![*centre, *width],
             Self::Relaxation { nepers, .. } => vec![*nepers],
-            Self::Break { .. } => Vec::new(),
+            Self::Course(_) | Self::Break { .. } => Vec::new(),
         }
     }
 
@@ -356,7 +410,7 @@ impl Atom {
                 values.get(1).into_iter().for_each(|value| *width = *value);
             }
             Self::Relaxation { nepers, .. } => values.first().into_iter().for_each(|value| *nepers = *value),
-            Self::Break { .. } => {}
+            Self::Course(_) | Self::Break { .. } => {}
         }
         atom
     }
@@ -375,7 +429,7 @@ impl Atom {
             }
             Self::Step { width, .. } => vec![*width, 0.9 * width],
             Self::Relaxation { nepers, .. } => vec![0.9 * nepers],
-            Self::Break { .. } => Vec::new(),
+            Self::Course(_) | Self::Break { .. } => Vec::new(),
         }
     }
 
@@ -396,7 +450,7 @@ impl Atom {
                 *width > 1.0 / frames as f64 && *width < 0.3 && (-OUTSIDE..1.0 + OUTSIDE).contains(centre)
             }
             Self::Relaxation { nepers, .. } => (0.5..2.0 * MOST_NEPERS).contains(nepers),
-            Self::Break { .. } => true,
+            Self::Course(_) | Self::Break { .. } => true,
         }
     }
 
@@ -422,6 +476,7 @@ impl Atom {
                     1.5
                 }
             }
+            Self::Course(course) => course.price(),
             Self::Break { .. } => 2.0,
         }
     }

@@ -3,6 +3,7 @@
 //! method.
 
 use super::atom::{Atom, FramePlaces};
+use super::column_products::ColumnProducts;
 use crate::noise::{AutoregressiveNoise, Whitener};
 use crate::trend::Trend;
 use nalgebra::{DMatrix, DVector};
@@ -87,10 +88,15 @@ impl Basis {
     /// Adds a column without its projection onto the basis, scaled to unit length; a dependent column is not
     /// added.
     pub(crate) fn push_column(&mut self, mut column: Vec<f64>) {
+        /// Fraction of the squared length left below which rounding errors of the projection matter.
+        const LITTLE: f64 = 0.01;
         let before = dot(&column, &column);
         self.project_out(&mut column);
-        self.project_out(&mut column);
-        let left = dot(&column, &column);
+        let mut left = dot(&column, &column);
+        if left < LITTLE * before {
+            self.project_out(&mut column);
+            left = dot(&column, &column);
+        }
         if left > LEAST_INDEPENDENT * before && left > 0.0 {
             let norm = left.sqrt();
             column.iter_mut().for_each(|x| *x /= norm);
@@ -181,15 +187,20 @@ impl NoisyRecord {
         column
     }
 
-    /// Whitened columns of the trend.
-    fn trend_columns(&self, trend: Trend) -> Vec<Vec<f64>> {
+    /// Columns of the trend.
+    pub(crate) fn raw_trend_columns(&self, trend: Trend) -> Vec<Vec<f64>> {
         let mut columns = vec![Vec::with_capacity(self.len()); trend.column_count()];
         let mut row = [0.0; crate::trend::MOST_COLUMNS];
         for s in &self.at.places {
             trend.fill_row(2.0 * s - 1.0, &mut row);
             columns.iter_mut().zip(row).for_each(|(column, x)| column.push(x));
         }
-        columns.into_iter().map(|column| self.whiten_values(column)).collect()
+        columns
+    }
+
+    /// Whitened columns of the trend.
+    fn trend_columns(&self, trend: Trend) -> Vec<Vec<f64>> {
+        self.raw_trend_columns(trend).into_iter().map(|column| self.whiten_values(column)).collect()
     }
 
     /// Fixes the trend and atoms, and computes what they leave of the record.
@@ -308,9 +319,9 @@ impl NoisyRecord {
         const LOWER: f64 = 0.3;
         /// Steps tried with growing damping; if none of them lowers the sum of squares, the fit has ended.
         const TRIES: usize = 5;
-        /// Relative fall of the sum of squares below which the fit has ended: it changes the criterion of
-        /// 4,096 frames by 0.002 nats.
-        const SMALL: f64 = 1e-6;
+        /// Fall of the criterion, nats, below which the fit has ended.
+        const SMALL_FALL: f64 = 0.01;
+        let small = 2.0 * SMALL_FALL / self.len() as f64;
         let mut at = self.project_onto(fixed, &atoms);
         let mut damping = 1e-3;
         for _ in 0..iterations {
@@ -339,7 +350,7 @@ impl NoisyRecord {
                 if moved.iter().all(|atom| atom.is_usable(self.at.frames)) {
                     let next = self.project_onto(fixed, &moved);
                     if next.squares < at.squares {
-                        ended = at.squares - next.squares < SMALL * at.squares;
+                        ended = at.squares - next.squares < small * at.squares;
                         (atoms, at) = (moved, next);
                         damping *= LOWER;
                         break;
@@ -382,19 +393,6 @@ impl NoisyRecord {
             + 0.5 * n * math::ln((squares / n).max(self.least_variance))
             + 0.5 * determinant
             + self.log_frames() * price
-    }
-
-    /// Covariance of the shape parameters of all atoms, in the order of the atoms and of
-    /// [`Atom::parameters`], for noise of unit variance; `None` if it is singular.
-    pub(crate) fn shape_covariance(&self, explanation: &Explanation) -> Option<DMatrix<f64>> {
-        let fixed = self.fix_parts(explanation.parts.trend, &[]);
-        let at = self.project_onto(&fixed, &explanation.parts.atoms);
-        let jacobian = self.jacobian(&fixed, &explanation.parts.atoms, &at);
-        let n = jacobian.len();
-        let scales: Vec<f64> = jacobian.iter().map(|c| dot(c, c).sqrt().max(1e-300)).collect();
-        let normal = DMatrix::from_fn(n, n, |i, j| dot(&jacobian[i], &jacobian[j]) / (scales[i] * scales[j]));
-        let inverse = normal.cholesky()?.inverse();
-        Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] / (scales[i] * scales[j])))
     }
 
     /// Values in every frame of the record, used or not, in scaled units: those of the trend, and those of
@@ -442,26 +440,46 @@ impl NoisyRecord {
         self.used.iter().zip(&self.values).map(|(i, x)| x - model(*i)).collect()
     }
 
-    /// Fraction, 0 to 1, of the sum of squares left by fixed parts that these columns explain together. `-n/2
-    /// ln(1 - fraction)` is the logarithm of the likelihood ratio for `n` frames.
-    pub(crate) fn gain_of_columns(&self, fixed: &Fixed, columns: Vec<Vec<f64>>) -> f64 {
-        let mut basis = Basis::default();
-        let mut gain = 0.0;
-        for column in columns {
-            let mut column = self.whiten_values(column);
-            let before = dot(&column, &column);
-            fixed.basis.project_out(&mut column);
-            basis.project_out(&mut column);
-            let left = dot(&column, &column);
-            if left > 1e-12 * before {
-                let along = dot(&column, &fixed.residual);
-                gain += along * along / left;
-                let norm = left.sqrt();
-                column.iter_mut().for_each(|x| *x /= norm);
-                basis.columns.push(column);
-            }
+    /// Normal equations of these columns, beside fixed parts, for the residual of the fixed parts.
+    pub(crate) fn multiply_columns(&self, fixed: &Fixed, columns: Vec<Vec<f64>>) -> ColumnProducts {
+        /// Fraction of the squared length of a column that fixed parts must not explain, or it depends on
+        /// them: less is rounding error.
+        const LEAST_NEW: f64 = 1e-12;
+        let mut lengths = Vec::with_capacity(columns.len());
+        let projected: Vec<Vec<f64>> = columns
+            .into_iter()
+            .map(|column| {
+                let mut column = self.whiten_values(column);
+                let before = dot(&column, &column);
+                fixed.basis.project_out(&mut column);
+                let left = dot(&column, &column);
+                lengths.push(if left > LEAST_NEW * before { left.sqrt() } else { 0.0 });
+                column
+            })
+            .collect();
+        ColumnProducts::new(&projected, lengths, &fixed.residual)
+    }
+
+    /// Fall of the criterion, nats, if columns explain this much of the sum of squares of fixed parts.
+    pub(crate) fn likelihood_gain(&self, fixed: &Fixed, explained: f64) -> f64 {
+        let share = explained / dot(&fixed.residual, &fixed.residual).max(1e-300);
+        -0.5 * self.len() as f64 * math::ln_1p(-share.clamp(0.0, 1.0 - 1e-9))
+    }
+
+    /// Normal equations of the amplitudes and the shape parameters of all atoms around an explanation: for
+    /// each atom its columns, then its derivatives.
+    pub(crate) fn products_around(&self, explanation: &Explanation) -> ColumnProducts {
+        let fixed = self.fix_parts(explanation.parts.trend, &[]);
+        let mut columns = Vec::new();
+        let mut first = 0;
+        for atom in &explanation.parts.atoms {
+            let own = atom.columns(&self.at);
+            let amplitudes = &explanation.amplitudes[first..first + own.len()];
+            first += own.len();
+            let slopes = atom.derivatives(&self.at, &own, amplitudes);
+            columns.extend(own.into_iter().chain(slopes));
         }
-        gain / dot(&fixed.residual, &fixed.residual).max(1e-300)
+        self.multiply_columns(&fixed, columns)
     }
 
     /// Whitened residual of fixed parts, one value per frame used.

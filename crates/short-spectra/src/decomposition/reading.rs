@@ -2,11 +2,15 @@
 //! rivals, and the doubts that follow from the odds.
 
 use super::atom::{Atom, OscillationAtom};
+use super::course::CourseAtom;
 use super::problem::{self, Parts};
 use super::search::Rival;
 use super::{Decomposition, with_noise_of};
-use crate::classification::{Evidence, RecordContext, SINGLE_CYCLE_DAMPING, classify_components};
+use crate::classification::{
+    Evidence, LEAST_CLEAR_DRIFT, RecordContext, SINGLE_CYCLE_DAMPING, classify_components,
+};
 use crate::component::{Component, Estimator, Harmonic};
+use crate::periodogram::upper_median;
 use crate::record::SampledRecord;
 use crate::sampling::alias_hz;
 use crate::settings::SpectrumSettings;
@@ -30,14 +34,17 @@ const SLOW_CYCLES_PER_COLUMN: f64 = 0.75;
 /// Distance, in resolutions, below which two oscillations may be pieces of one: closer lines are not
 /// separated reliably.
 const LEAST_APART: f64 = 0.5;
+/// Distance, in resolutions, below which two oscillations belong to one cluster: their peaks in a Hann
+/// spectrum touch.
+const CLUSTER_REACH: f64 = 2.5;
+/// Ratio of amplitudes above which an oscillation that drifts across another one may be a piece of it: what
+/// a model leaves of an oscillation is up to a fifth of it.
+const MUCH_LARGER: f64 = 5.0;
+/// Number of oscillations of a cluster from which each is in doubt.
+const CLUSTER: usize = 3;
 /// An oscillation that begins or is over within the record is in doubt with this number of other such ones:
 /// together they describe noise or jumps as well.
 const CROWD: usize = 3;
-/// Number of cycles below which an oscillation may belong to the shaking of a camera, which has several slow
-/// lines.
-const SHAKE_CYCLES: f64 = 20.0;
-/// Number of other oscillations as slow as that from which each of them is in doubt.
-const SHAKE_PARTS: usize = 2;
 /// Smallest decay, nepers, between its onset and the end of the record of a late oscillation that is not in
 /// doubt: with less, two lines that beat explain it.
 const LEAST_DECAY: f64 = 2.0;
@@ -90,11 +97,53 @@ fn lobe_half_width(o: &OscillationAtom) -> f64 {
     (o.nepers.map_or(0.0, f64::abs) / TAU).max(1.0)
 }
 
+/// Standard deviation of the amplitude whose cosine and sine come first in a covariance.
+fn amplitude_sd(amplitudes: &[f64], covariance: &DMatrix<f64>) -> f64 {
+    let size = math::hypot(amplitudes[0], amplitudes[1]).max(1e-300);
+    let [a, b] = [amplitudes[0] / size, amplitudes[1] / size];
+    let [aa, ab, bb] = [covariance[(0, 0)], covariance[(0, 1)], covariance[(1, 1)]];
+    (a * a * aa + 2.0 * a * b * ab + b * b * bb).max(0.0).sqrt()
+}
+
 /// Greatest distance, resolutions, of two frequencies at the start, in the middle and at the end of the
 /// record: cycles that cross are close only where they cross.
 fn greatest_distance(a: &OscillationAtom, b: &OscillationAtom) -> f64 {
     let apart = |s: f64| (a.cycles_at(s) - b.cycles_at(s)).abs();
     [0.0, 0.5, 1.0].map(apart).into_iter().fold(0.0, f64::max)
+}
+
+/// A harmonic of a component.
+fn to_harmonic(of: &Component, multiple: usize, amplitude_m: f64, frame_rate_hz: f64) -> Component {
+    let times = multiple as f64;
+    let folds = times * of.range_hz.map_or(of.frequency_hz, |range| range.high_hz) > frame_rate_hz / 2.0;
+    Component {
+        frequency_hz: alias_hz(times * of.frequency_hz, frame_rate_hz),
+        frequency_sd_hz: times * of.frequency_sd_hz,
+        cramer_rao_hz: times * of.cramer_rao_hz,
+        amplitude_m,
+        snr_db: of.snr_db + 20.0 * math::log10(amplitude_m / of.amplitude_m),
+        damping_ratio: of.damping_ratio.map(|ratio| ratio / times),
+        damping_ratio_sd: of.damping_ratio_sd.map(|sd| sd / times),
+        range_hz: of.range_hz.filter(|_| !folds).map(|range| range.times(times)),
+        harmonic_of: Some(Harmonic { frequency_hz: of.frequency_hz, multiple }),
+        ..of.clone()
+    }
+}
+
+/// Reasons for which the range of an oscillation along a ridge is in doubt.
+fn list_course_doubts(course: &CourseAtom) -> Vec<String> {
+    let mut doubts = Vec::new();
+    let drift = course.range.high_hz - course.range.low_hz;
+    if drift < LEAST_CLEAR_DRIFT {
+        doubts.push(format!("it drifts by {drift:.1} resolutions: two that beat may look the same"));
+    }
+    doubts
+}
+
+/// Median distance, resolutions, of two frequencies over the record.
+fn median_distance(a: &OscillationAtom, b: &OscillationAtom) -> f64 {
+    let apart = |s: f64| (a.cycles_at(s) - b.cycles_at(s)).abs();
+    upper_median([0.0, 0.25, 0.5, 0.75, 1.0].map(apart).to_vec()).unwrap_or(0.0)
 }
 
 impl Decomposition {
@@ -131,24 +180,21 @@ impl Decomposition {
         for reading in self.read_oscillations() {
             let component = self.to_component(&reading, record, resolution_hz);
             let doubts = self.list_doubts(&reading, resolution_hz);
-            for (multiple, amplitudes) in reading.atom.multiples.iter().zip(&reading.amplitudes_m[1..]) {
-                let times = *multiple as f64;
-                let harmonic = Component {
-                    frequency_hz: alias_hz(times * component.frequency_hz, record.frame_rate_hz),
-                    frequency_sd_hz: times * component.frequency_sd_hz,
-                    cramer_rao_hz: times * component.cramer_rao_hz,
-                    amplitude_m: math::hypot(amplitudes[0], amplitudes[1]),
-                    snr_db: component.snr_db
-                        + 20.0
-                            * math::log10(math::hypot(amplitudes[0], amplitudes[1]) / component.amplitude_m),
-                    damping_ratio: component.damping_ratio.map(|ratio| ratio / times),
-                    damping_ratio_sd: component.damping_ratio_sd.map(|sd| sd / times),
-                    range_hz: None,
-                    harmonic_of: Some(Harmonic { frequency_hz: component.frequency_hz, multiple: *multiple }),
-                    ..component.clone()
-                };
-                read.push((harmonic, Vec::new()));
-            }
+            let multiples = reading.atom.multiples.iter().zip(&reading.amplitudes_m[1..]);
+            read.extend(multiples.map(|(multiple, [a, b])| {
+                (to_harmonic(&component, *multiple, math::hypot(*a, *b), record.frame_rate_hz), Vec::new())
+            }));
+            read.push((component, doubts));
+        }
+        for (course, amplitudes) in self.list_courses() {
+            let component = self.to_course_component(course, amplitudes[0]);
+            let doubts = list_course_doubts(course);
+            let multiples = course.multiples.iter().zip(amplitudes[1..].chunks(2));
+            read.extend(multiples.map(|(multiple, pair)| {
+                let ratio = math::hypot(pair[0], pair[1]) / amplitudes[0].abs();
+                let amplitude_m = ratio * component.amplitude_m;
+                (to_harmonic(&component, *multiple, amplitude_m, record.frame_rate_hz), Vec::new())
+            }));
             read.push((component, doubts));
         }
         read.sort_by(|a, b| b.0.amplitude_m.total_cmp(&a.0.amplitude_m));
@@ -157,6 +203,36 @@ impl Decomposition {
         let evidence: Vec<Evidence> = doubts.into_iter().map(evidence).collect();
         classify_components(&mut components, &evidence, &RecordContext::new(record, resolution_hz, settings));
         components
+    }
+
+    /// The oscillations along ridges with the amplitudes of their columns.
+    fn list_courses(&self) -> Vec<(&CourseAtom, &[f64])> {
+        let mut first = 0;
+        let mut found = Vec::new();
+        for atom in &self.explanation.parts.atoms {
+            let amplitudes = &self.explanation.amplitudes[first..first + atom.column_count()];
+            first += atom.column_count();
+            found.extend(atom.course().map(|course| (course, amplitudes)));
+        }
+        found
+    }
+
+    /// The component of an oscillation along a ridge, without a verdict.
+    fn to_course_component(&self, course: &CourseAtom, amplitude: f64) -> Component {
+        let (hz, _, metres) = self.units();
+        let metres = metres * amplitude.abs();
+        let mean = course.mean();
+        Component {
+            frequency_hz: mean.frequency_hz * hz,
+            frequency_sd_hz: mean.frequency_sd_hz * hz,
+            range_hz: Some(course.range.times(hz)),
+            amplitude_m: mean.amplitude_m * metres,
+            amplitude_sd_m: mean.amplitude_sd_m * metres,
+            snr_db: mean.snr_db,
+            cramer_rao_hz: mean.frequency_sd_hz * hz,
+            estimator: Estimator::Ridge,
+            ..Component::default()
+        }
     }
 
     /// The component of an oscillation, without a verdict.
@@ -238,15 +314,20 @@ impl Decomposition {
                     .to_owned(),
             );
         }
+        if self.count_cluster(o) >= CLUSTER {
+            doubts.push(
+                "it is one of several close together: one whose frequency and amplitude change looks the same"
+                    .to_owned(),
+            );
+        }
+        if self.crosses_larger(reading) {
+            doubts.push("it drifts across a much larger one: a piece of that looks the same".to_owned());
+        }
         if is_transient(o) && others().filter(|other| is_transient(other)).count() >= CROWD {
             doubts.push(
                 "it is one of several that begin or are over within the record: noise and jumps look the same"
                     .to_owned(),
             );
-        }
-        let slow = |o: &&OscillationAtom| o.cycles < SHAKE_CYCLES;
-        if slow(&o) && others().filter(slow).count() >= SHAKE_PARTS {
-            doubts.push("it is one of several slow ones: a camera that shakes looks the same".to_owned());
         }
         let lasts = o.nepers.map_or(0.0, |d| d * (1.0 - o.onset));
         if o.onset > 0.0 && lasts < LEAST_DECAY {
@@ -272,6 +353,49 @@ impl Decomposition {
         doubts
     }
 
+    /// Whether an oscillation drifts across the frequency of one that is more than `MUCH_LARGER` times as
+    /// large.
+    fn crosses_larger(&self, reading: &OscillationReading) -> bool {
+        let o = &reading.atom;
+        if o.phase.is_empty() {
+            return false;
+        }
+        let (low, high) = o.cycles_range();
+        let own_m = math::hypot(reading.amplitudes_m[0][0], reading.amplitudes_m[0][1]);
+        let mut first = 0;
+        self.explanation.parts.atoms.iter().any(|atom| {
+            let amplitudes = &self.explanation.amplitudes[first..first + atom.column_count()];
+            first += atom.column_count();
+            atom.oscillation().is_some_and(|other| {
+                let size_m = math::hypot(amplitudes[0], amplitudes[1]) * self.scale_m;
+                size_m > MUCH_LARGER * own_m && (low - 1.0..high + 1.0).contains(&other.mean_cycles())
+            })
+        })
+    }
+
+    /// Number of oscillations of which each is close to another one, with `o` among them.
+    fn count_cluster(&self, o: &OscillationAtom) -> usize {
+        let mut left: Vec<&OscillationAtom> = self
+            .explanation
+            .parts
+            .atoms
+            .iter()
+            .filter_map(Atom::oscillation)
+            .filter(|other| *other != o)
+            .collect();
+        let mut cluster = vec![o];
+        let mut next = 0;
+        while next < cluster.len() {
+            let from = cluster[next];
+            let (near, rest) =
+                left.into_iter().partition::<Vec<_>, _>(|other| median_distance(from, other) < CLUSTER_REACH);
+            cluster.extend(near);
+            left = rest;
+            next += 1;
+        }
+        cluster.len()
+    }
+
     /// Number of parameters of trend, parts and noise.
     fn parameter_count(&self) -> usize {
         let parts = &self.explanation.parts;
@@ -286,32 +410,34 @@ impl Decomposition {
         let shapes: usize = parts.atoms.iter().map(|a| a.parameters().len()).sum();
         let freedoms = (self.problem.len() as f64 - (linear + shapes) as f64).max(1.0);
         let variance = self.explanation.squares / freedoms;
-        let unknown = || DMatrix::from_diagonal_element(shapes, shapes, 1e6);
-        let covariance = self.problem.shape_covariance(&self.explanation).unwrap_or_else(unknown);
-        let (mut first, mut parameter) = (0, 0);
+        let covariance = self.problem.products_around(&self.explanation).covariance() * variance;
+        let (mut first, mut row) = (0, 0);
         let mut found = Vec::new();
         for atom in &parts.atoms {
-            let amplitudes = &self.explanation.amplitudes[first..first + atom.column_count()];
+            let (columns, parameters) = (atom.column_count(), atom.parameters().len());
+            let amplitudes = &self.explanation.amplitudes[first..first + columns];
             if let Some(o) = atom.oscillation() {
-                let count = atom.parameters().len();
-                let own = covariance.view((parameter, parameter), (count, count)) * variance;
+                let size = columns + parameters;
+                let own = covariance.view((row, row), (size, size)).into_owned();
                 found.push(self.read_oscillation(o, amplitudes, &own, variance));
             }
-            first += atom.column_count();
-            parameter += atom.parameters().len();
+            first += columns;
+            row += columns + parameters;
         }
         found
     }
 
-    /// Reads an oscillation. `covariance` is that of its shape parameters, and `variance` that of the
-    /// whitened residual.
+    /// Reads an oscillation. `all` is the covariance of its amplitudes and shape parameters, and `variance`
+    /// that of the whitened residual.
     fn read_oscillation(
         &self,
         o: &OscillationAtom,
         amplitudes: &[f64],
-        covariance: &DMatrix<f64>,
+        all: &DMatrix<f64>,
         variance: f64,
     ) -> OscillationReading {
+        let (linear, shapes) = (amplitudes.len(), all.nrows() - amplitudes.len());
+        let covariance = all.view((linear, linear), (shapes, shapes));
         let columns = Atom::Oscillation(o.clone()).columns(&self.problem.at);
         let mut value = vec![0.0; self.problem.len()];
         for (column, a) in columns.iter().zip(amplitudes).take(2) {
@@ -348,7 +474,7 @@ impl Decomposition {
             cycles_sd: math::hypot(own_cycles_sd, spread),
             own_cycles_sd,
             nepers_sd: o.nepers.map_or((12.0 / energy).sqrt(), |_| covariance[(1, 1)].max(0.0).sqrt()),
-            amplitude_sd_m: self.amplitude_sd(o, amplitudes, &columns) * variance.sqrt() * self.scale_m,
+            amplitude_sd_m: amplitude_sd(amplitudes, all) * self.scale_m,
             // (the energy is that of the oscillation over the variance of the noise; two resolutions hold
             // four of its degrees of freedom)
             snr_db: 10.0 * math::log10((energy / 4.0).max(1e-9)),
@@ -357,23 +483,6 @@ impl Decomposition {
             scatter,
             atom: o.clone(),
         }
-    }
-
-    /// Standard deviation of the amplitude, scaled, in noise of unit variance. The shape of the oscillation
-    /// is unknown; the other parts count as known.
-    fn amplitude_sd(&self, o: &OscillationAtom, amplitudes: &[f64], columns: &[Vec<f64>]) -> f64 {
-        let derivatives = Atom::Oscillation(o.clone()).derivatives(&self.problem.at, columns, amplitudes);
-        let free: Vec<Vec<f64>> = columns[..2]
-            .iter()
-            .chain(&derivatives)
-            .map(|column| self.problem.whiten_values(column.clone()))
-            .collect();
-        let n = free.len();
-        let normal = DMatrix::from_fn(n, n, |i, j| problem::dot(&free[i], &free[j]));
-        let size = math::hypot(amplitudes[0], amplitudes[1]).max(1e-300);
-        let Some(inverse) = normal.cholesky().map(|c| c.inverse()) else { return size };
-        let [a, b] = [amplitudes[0] / size, amplitudes[1] / size];
-        (a * a * inverse[(0, 0)] + 2.0 * a * b * inverse[(0, 1)] + b * b * inverse[(1, 1)]).max(0.0).sqrt()
     }
 
     /// Chi squared, per degree of freedom, of the frequencies that fit parts of the record best, each part

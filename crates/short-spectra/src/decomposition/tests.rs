@@ -140,3 +140,51 @@ fn a_record_without_variation_has_no_parts() {
     let settings = DecompositionSettings::new(100, Trend::Polynomial(4), true);
     assert!(Decomposition::from_record(&record(&samples), settings).is_none());
 }
+
+/// Gaps between the frames are short, long and at the start.
+#[test]
+fn columns_are_those_of_their_formula_also_beside_gaps() {
+    let used = (3..900).filter(|i| i % 7 != 2 && !(300..420).contains(i));
+    let at = FramePlaces { places: used.map(|i| (f64::from(i) + 0.5) / 900.0).collect(), frames: 900 };
+    let ring = OscillationAtom { nepers: Some(7.0), onset: 0.2, ..OscillationAtom::steady(131.3) };
+    let cycle = OscillationAtom { multiples: vec![2, 5], ..OscillationAtom::steady(40.7) };
+    for o in [ring, cycle] {
+        let columns = Atom::Oscillation(o.clone()).columns(&at);
+        for (i, s) in at.places.iter().enumerate() {
+            let decay = if *s < o.onset { 0.0 } else { (-o.nepers.unwrap_or(0.0) * (s - o.onset)).exp() };
+            for (k, multiple) in std::iter::once(&1).chain(&o.multiples).enumerate() {
+                let turn = TAU * *multiple as f64 * o.phase_at(*s);
+                let exact = [decay * turn.cos(), decay * turn.sin()];
+                for (column, exact) in columns[2 * k..].iter().zip(exact) {
+                    assert!((column[i] - exact).abs() < 1e-12, "{o:?} at {s}");
+                }
+            }
+        }
+    }
+}
+
+/// Frequency `780 + 90 sin(2 pi 3.7 t)` Hz beside a steady line.
+#[test]
+fn a_frequency_that_no_polynomial_follows_is_one_component_along_its_ridge() {
+    let frames = 2000;
+    let swing = |t: f64| 780.0 * t - 90.0 / (TAU * 3.7) * ((TAU * 3.7 * t).cos() - 1.0);
+    let mean_hz = swing(0.4) / 0.4;
+    let mut generator = Xoshiro256PlusPlus::seed_from_u64(11);
+    let mut draw = || 4e-7 * generator.sample::<f64, _>(StandardNormal);
+    let value = |t: f64| 3e-5 * (TAU * swing(t)).cos() + 4e-6 * (TAU * 1510.0 * t).cos();
+    let samples: Vec<Option<f64>> =
+        (0..frames).map(|i| Some(value(f64::from(i) / RATE_HZ) + draw())).collect();
+    let found = crate::decompose_record(&record(&samples), &SpectrumSettings::default()).unwrap();
+    let cycle = found.iter().find(|c| c.range_hz.is_some()).unwrap();
+    let range = cycle.range_hz.unwrap();
+    assert_eq!(
+        (cycle.estimator, cycle.verdict),
+        (crate::Estimator::Ridge, ComponentVerdict::Clear),
+        "{cycle:?}"
+    );
+    assert!((cycle.frequency_hz - mean_hz).abs() < 4.0 * cycle.frequency_sd_hz, "{cycle:?}, {mean_hz}");
+    assert!((range.low_hz - 690.0).abs() < 4.0 && (range.high_hz - 870.0).abs() < 4.0, "{range:?}");
+    let line = found.iter().find(|c| (c.frequency_hz - 1510.0).abs() < 1.0).unwrap();
+    assert!((line.frequency_hz - 1510.0).abs() < 4.0 * line.frequency_sd_hz, "{line:?}");
+    assert_eq!(found.len(), 2, "{found:?}");
+}

@@ -79,6 +79,18 @@ pub struct FrequencyRange {
     pub high_sd_hz: f64,
 }
 
+impl FrequencyRange {
+    /// The range with every frequency times `factor`.
+    pub(crate) fn times(self, factor: f64) -> Self {
+        Self {
+            low_hz: factor * self.low_hz,
+            low_sd_hz: factor * self.low_sd_hz,
+            high_hz: factor * self.high_hz,
+            high_sd_hz: factor * self.high_sd_hz,
+        }
+    }
+}
+
 impl Ridge {
     /// The parts of the ridge between its interruptions.
     pub fn unbroken_parts(&self) -> impl Iterator<Item = &[RidgePoint]> {
