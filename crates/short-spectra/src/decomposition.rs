@@ -1,6 +1,7 @@
-//! One model for every record: a trend, oscillations with decay, onset and drift or along a ridge, harmonics,
-//! smooth steps and relaxations, frames that are left out at a price, and autoregressive noise. The posterior probability
-//! decides which of these parts a record has (Djurić 1996, *IEEE Trans. Signal Process.* 44).
+//! One model for every record: a trend, oscillations with decay, onset and drift or along a ridge, their
+//! harmonics, smooth steps and relaxations, frames that are left out at a price, and autoregressive noise.
+//! The posterior probability decides which of these parts a record has (Djurić 1996, *IEEE Trans. Signal
+//! Process.* 44).
 
 mod atom;
 mod candidates;

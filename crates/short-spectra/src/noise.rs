@@ -198,27 +198,46 @@ impl Whitener {
     /// Whitens a column in place; the column has one value per present frame, in the unit of the noise.
     /// Whitened noise is independent from frame to frame and has unit variance.
     pub fn whiten_column(&self, column: &mut [f64]) {
+        // a constant order lets the compiler unroll the inner loops
+        match self.order {
+            1 => self.whiten_with_order::<1>(column),
+            2 => self.whiten_with_order::<2>(column),
+            3 => self.whiten_with_order::<3>(column),
+            4 => self.whiten_with_order::<4>(column),
+            5 => self.whiten_with_order::<5>(column),
+            6 => self.whiten_with_order::<6>(column),
+            7 => self.whiten_with_order::<7>(column),
+            _ => self.whiten_with_order::<MOST_COEFFICIENTS>(column),
+        }
+    }
+
+    fn whiten_with_order<const N: usize>(&self, column: &mut [f64]) {
         let values = column.to_vec();
         let mut next = 0;
-        let mut memory = [0.0; MOST_COEFFICIENTS];
+        let mut memory = [0.0; N];
         for complete in &self.complete {
             self.filter_steps(next..complete.start, column, &mut memory);
             let part = &mut column[complete.clone()];
-            for (lag, coefficient) in (1..).zip(&self.coefficients[..self.order]) {
+            for (lag, coefficient) in (1..=N).zip(&self.coefficients) {
                 let before = &values[complete.start - lag..complete.end - lag];
                 part.iter_mut().zip(before).for_each(|(x, past)| *x -= coefficient * past);
             }
             part.iter_mut().for_each(|x| *x /= self.innovation_sd);
-            (0..self.order).for_each(|lag| memory[lag] = values[complete.end - 1 - lag]);
+            memory = from_fn(|lag| values[complete.end - 1 - lag]);
             next = complete.end;
         }
         self.filter_steps(next..self.steps.len(), column, &mut memory);
     }
 
     /// Whitens a part of a column in place. `memory` is the estimate of the last frames before it.
-    fn filter_steps(&self, part: Range<usize>, column: &mut [f64], memory: &mut NoiseMemory) {
+    fn filter_steps<const N: usize>(&self, part: Range<usize>, column: &mut [f64], memory: &mut [f64; N]) {
+        let coefficients: [f64; N] = from_fn(|i| self.coefficients[i]);
         for (value, step) in column[part.clone()].iter_mut().zip(&self.steps[part]) {
-            (0..step.ahead).for_each(|_| self.predict_next(memory));
+            for _ in 0..step.ahead {
+                let next = coefficients.iter().zip(&*memory).map(|(a, b)| a * b).sum();
+                memory.copy_within(..N - 1, 1);
+                memory[0] = next;
+            }
             memory[0] *= step.decay;
             let innovation = *value - memory[0];
             memory.iter_mut().zip(&step.gain).for_each(|(past, gain)| *past += gain * innovation);
@@ -229,13 +248,6 @@ impl Whitener {
     /// Logarithm of the determinant of the covariance of the frames.
     pub fn log_determinant(&self) -> f64 {
         self.steps.iter().map(|step| 2.0 * math::ln(step.sd)).sum()
-    }
-
-    #[inline]
-    fn predict_next(&self, memory: &mut NoiseMemory) {
-        let next = (0..self.order).map(|i| self.coefficients[i] * memory[i]).sum();
-        memory.copy_within(..self.order - 1, 1);
-        memory[0] = next;
     }
 }
 

@@ -168,12 +168,14 @@ impl PartSearch {
     }
 
     /// Moves the onset of an oscillation, in steps that are halved down to one frame, as long as the sum of
-    /// squares falls.
+    /// squares falls; at most `MOST_MOVES` times with each step.
     fn place_onset(&self, fixed: &Fixed, atom: Atom, squares: f64) -> (Vec<Atom>, f64) {
         /// Iterations of the fit at each onset: the other parameters hardly depend on it.
         const ITERATIONS: usize = 2;
+        /// A step twice as long has already brought the onset within about two steps.
+        const MOST_MOVES: usize = 4;
         let frames = self.problem.at.frames as f64;
-        let mut best = (atom, squares);
+        let (mut best, mut moves) = ((atom, squares), 0);
         let nepers = best.0.oscillation().and_then(|o| o.nepers).unwrap_or(6.0).abs().max(6.0);
         let mut step = (frames / nepers / 3.0).ceil();
         while step >= 1.0 {
@@ -192,8 +194,10 @@ impl PartSearch {
                     break;
                 }
             }
-            if !moved {
+            moves += 1;
+            if !moved || moves == MOST_MOVES {
                 step = if step > 1.0 { (step / 2.0).floor() } else { 0.0 };
+                moves = 0;
             }
         }
         (vec![best.0], best.1)
