@@ -117,7 +117,8 @@ impl Decomposition {
         Some(found)
     }
 
-    /// Hz of one cycle per record, seconds of the whole record, and metres of a scaled value.
+    /// Frequency, Hz, of one cycle per record; duration of the record, s; size of a unit of the scaled
+    /// values, m.
     fn units(&self) -> (f64, f64, f64) {
         let frames = self.problem.at.frames as f64;
         (self.frame_rate_hz / frames, frames / self.frame_rate_hz, self.scale_m)
@@ -179,9 +180,8 @@ impl Contest {
     }
 
     /// An explanation in which one oscillation along a ridge takes the place of all oscillations in its range
-    /// of frequencies, with its noise, if it is more probable than `found`. Only a record with several
-    /// oscillations or with coloured noise may contain it: a few oscillations describe a frequency that
-    /// changes evenly.
+    /// of frequencies, with its noise, if it is more probable than `found`. It is tried only if `found` has
+    /// several oscillations or leaves coloured noise: otherwise a few oscillations describe the record.
     fn follow_course(
         &mut self,
         problem: &NoisyRecord,
@@ -194,7 +194,8 @@ impl Contest {
         self.accept_course(problem, found, None)
     }
 
-    /// The explanation with an oscillation along a ridge, if it is more probable than `found`.
+    /// The explanation with an oscillation along a ridge, if it is more probable than `found`. It takes the
+    /// place of the course with the index `replaced`, or of all oscillations in its range of frequencies.
     fn accept_course(
         &mut self,
         problem: &NoisyRecord,
@@ -208,7 +209,7 @@ impl Contest {
         (next.criterion < found.criterion - Self::LEAST_FALL).then_some((problem, next))
     }
 
-    /// Follows each course anew beside the other parts that are known now.
+    /// Follows each course anew, because its ridge is clearer without the other parts that are known now.
     fn refine_courses(&mut self, problem: NoisyRecord, found: &Explanation) -> (NoisyRecord, Parts) {
         let (mut problem, mut best) = (problem, found.clone());
         for k in 0..best.parts.atoms.len() {
@@ -221,7 +222,7 @@ impl Contest {
         (problem, best.parts)
     }
 
-    /// Looks for an oscillation along a ridge beside the parts that are known in the end.
+    /// Looks for an oscillation along a ridge in addition to the parts of the best explanation.
     fn add_course(&mut self) {
         let (problem, best) = (self.problem.clone(), self.best.clone());
         if let Some((problem, next)) = self.follow_course(&problem, &best) {
@@ -233,7 +234,7 @@ impl Contest {
 /// A search is not completed if the criterion of its explanation is higher than that of another one by more
 /// than this, nats: further oscillations do not make up for it.
 const MOST_BEHIND: f64 = 20.0;
-/// Number of oscillations from which a record may contain one along a ridge instead.
+/// A record with at least this number of oscillations may contain one along a ridge instead.
 const SEVERAL: usize = 4;
 /// Iterations of a fit of all parts after a change of the noise, which hardly moves them.
 const FEW_ITERATIONS: usize = 2;
@@ -285,7 +286,7 @@ fn select_explanation(white: NoisyRecord, settings: DecompositionSettings) -> Co
     contest
 }
 
-/// The parts without their oscillations.
+/// The parts without their oscillations; those along ridges stay.
 fn slow_parts(parts: &Parts) -> Parts {
     let slow = parts.atoms.iter().filter(|a| a.oscillation().is_none());
     Parts { trend: parts.trend, atoms: slow.cloned().collect() }

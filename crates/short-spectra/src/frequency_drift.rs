@@ -98,9 +98,10 @@ pub(super) fn select_best_ridge(
     Some(better.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or(best))
 }
 
-/// Band, Hz, in which the strongest component above the slow ones may lie; `components` are frequencies, Hz,
-/// with amplitudes. The shortest segment contains a few cycles at the lower end of the band, so the lower end
-/// must not lie far below the component. `None` if the band is empty.
+/// Band, Hz, in which the strongest component above the slow ones may lie, limited to `within_hz`.
+/// `components` are frequencies, Hz, with amplitudes in any unit. The shortest segment contains a few cycles
+/// at the lower end of the band, so the lower end must not lie far below the component. `None` if the band is
+/// empty.
 pub(super) fn choose_ridge_band(
     frames: usize,
     frame_rate_hz: f64,
@@ -259,8 +260,8 @@ pub(super) fn count_cycles(a: &RidgePoint, b: &RidgePoint) -> f64 {
     part_of_one + (expected - part_of_one).round()
 }
 
-/// Median distance, in resolutions of the segments, of a frequency from the value extrapolated from a point
-/// half a segment away.
+/// Median distance, in resolutions of the segments, of a frequency from the value extrapolated from the point
+/// half a segment before it; 0 if no part of the ridge is that long.
 pub(super) fn median_stray(ridge: &Ridge) -> f64 {
     let apart = ((INDEPENDENT_SEGMENTS * ridge.segment_s / ridge.hop_s).round() as usize).max(1);
     let stray = |pair: &[RidgePoint]| {

@@ -127,10 +127,10 @@ pub struct Whitener {
     /// Order of the process, at least 1.
     order: usize,
     steps: Vec<WhiteningStep>,
-    /// Ranges of steps before which the last `order` frames are all present: there the filter is a sum over
-    /// these frames.
+    /// Ranges of steps with `order` present frames directly before each: there the filter is a sum over these
+    /// frames.
     complete: Vec<Range<usize>>,
-    /// Standard deviation of the innovation of these steps.
+    /// Standard deviation of the innovation in these steps, in the unit of the noise.
     innovation_sd: f64,
 }
 
@@ -179,7 +179,7 @@ impl Whitener {
         whitener
     }
 
-    /// Ranges of steps before which the last `order` frames are all present, at whole numbers of frames.
+    /// Ranges of steps with `order` present frames directly before each, at distances of exactly one frame.
     fn find_complete_steps(&self) -> Vec<Range<usize>> {
         let follows = |k: usize| self.steps[k].ahead == 1 && self.steps[k].decay == 1.0;
         let mut complete = Vec::new();
@@ -229,7 +229,8 @@ impl Whitener {
         self.filter_steps(next..self.steps.len(), column, &mut memory);
     }
 
-    /// Whitens a part of a column in place. `memory` is the estimate of the last frames before it.
+    /// Whitens a part of a column in place. `memory` holds estimates of the noise in the last frames before
+    /// it, latest first, and afterwards in its own last frames.
     fn filter_steps<const N: usize>(&self, part: Range<usize>, column: &mut [f64], memory: &mut [f64; N]) {
         let coefficients: [f64; N] = from_fn(|i| self.coefficients[i]);
         for (value, step) in column[part.clone()].iter_mut().zip(&self.steps[part]) {

@@ -208,7 +208,7 @@ impl OscillationAtom {
             let envelope = if self.envelope.is_empty() { decay } else { decay * self.modulation_at(*s) };
             columns[0][i] = envelope * cosine;
             columns[1][i] = envelope * sine;
-            // each multiple follows from the one before it by turns of the first phasor
+            // the phase of each multiple is that of the one before it, turned by the phase of the oscillation
             let (mut turned, mut re, mut im) = (1, cosine, sine);
             for (k, multiple) in self.multiples.iter().enumerate() {
                 while turned < *multiple {
@@ -262,9 +262,9 @@ impl OscillationAtom {
     }
 }
 
-/// Cosine and sine of the phase of an oscillation and its decay, frame by frame. From one frame to the next,
-/// a steady phase turns and a decay shrinks by constant factors. Every few frames both are computed anew, so
-/// that rounding errors do not grow.
+/// Cosine and sine of the phase of an oscillation, and its decay, frame by frame. From one frame to the next,
+/// a phase without drift turns by a constant angle, and a decay shrinks by a constant factor. After a gap and
+/// after `MOST_STEPS` frames both are computed anew, so that rounding errors do not grow.
 struct Phasors<'a> {
     atom: &'a OscillationAtom,
     at: &'a FramePlaces,
@@ -276,7 +276,7 @@ struct Phasors<'a> {
 }
 
 impl<'a> Phasors<'a> {
-    /// Number of frames over which rounding errors of the recurrence may grow: to a few 1e-15.
+    /// Number of frames over which rounding errors of the recurrence grow to a few 1e-15.
     const MOST_STEPS: usize = 32;
 
     fn new(atom: &'a OscillationAtom, at: &'a FramePlaces) -> Self {
@@ -286,6 +286,7 @@ impl<'a> Phasors<'a> {
         Self { atom, at, step: (cosine, sine, shrink), latest: (1.0, 0.0, 1.0), since: Self::MOST_STEPS }
     }
 
+    /// Cosine, sine and decay in frame `i` of those used; the frame before it must come first.
     fn at_frame(&mut self, i: usize) -> (f64, f64, f64) {
         let s = self.at.places[i];
         let follows = i > 0 && (s - self.at.places[i - 1]) * (self.at.frames as f64) < 1.5;

@@ -16,8 +16,8 @@ pub(crate) struct ColumnProducts {
 }
 
 impl ColumnProducts {
-    /// The products of whitened columns without their projections onto fixed parts. `lengths` are those of
-    /// the columns, or 0 for columns that do not count.
+    /// The products of whitened columns from which the projections onto fixed parts are subtracted. `lengths`
+    /// are those of the columns, or 0 for columns that depend on the fixed parts.
     pub(crate) fn new(columns: &[Vec<f64>], lengths: Vec<f64>, residual: &[f64]) -> Self {
         let n = columns.len();
         let scaled = |i: usize, product: f64| if lengths[i] > 0.0 { product / lengths[i] } else { 0.0 };
@@ -36,7 +36,7 @@ impl ColumnProducts {
         DMatrix::from_fn(columns.len(), columns.len(), |i, j| self.matrix[(columns[i], columns[j])])
     }
 
-    /// Sum of squares of the residual that these columns explain together.
+    /// Sum of squares of the residual that these columns explain together; 0 if they are dependent.
     pub(crate) fn explained_squares(&self, columns: &[usize]) -> f64 {
         let along = DVector::from_fn(columns.len(), |i, _| self.along[columns[i]]);
         self.matrix_of(columns).cholesky().map_or(0.0, |factor| along.dot(&factor.solve(&along)))
@@ -44,8 +44,7 @@ impl ColumnProducts {
 
     /// Covariance of the coefficients of the columns for noise of unit variance.
     pub(crate) fn covariance(&self) -> DMatrix<f64> {
-        /// Variance, in units of the square of a scaled value, of a coefficient that the columns do not
-        /// determine.
+        /// Variance of a coefficient that the columns do not determine, in the square of its unit.
         const UNKNOWN: f64 = 1e6;
         let n = self.lengths.len();
         let Some(inverse) = self.matrix.clone().cholesky().map(|factor| factor.inverse()) else {
@@ -58,7 +57,7 @@ impl ColumnProducts {
     }
 
     /// Rise of the sum of squares, to second order, if the amplitudes or parameters `dropped` change from
-    /// `values` to 0 and those `kept` follow.
+    /// `values` to 0 and those `kept` are fitted again; infinite if the columns are dependent.
     pub(crate) fn squares_without(&self, dropped: &[usize], values: &[f64], kept: &[usize]) -> f64 {
         // in the Cholesky factor of the matrix with the dropped columns last, the last block is the factor of
         // their Schur complement

@@ -42,8 +42,8 @@ impl CourseAtom {
                 }
             };
             let reach = ridge.segment_s / 2.0;
-            // beyond the outermost point, a cubic with its phase, frequency and rate, and with the frequency
-            // at the end of the record, if that is known
+            // beyond the outermost point, the phase is a cubic with the phase, frequency and rate of that
+            // point, and with the frequency at the end of the record if that is known
             let beyond = |point: &RidgePoint, end: Option<&RidgeEnd>, cycles: f64| {
                 let (at, hz, rate, size) =
                     (point.time_s, point.frequency_hz, point.rate_hz_per_s, point.amplitude_m);
@@ -70,7 +70,7 @@ impl CourseAtom {
                 });
                 cycles += more;
             }
-            // the last segment ends less than a hop before the record
+            // the last segment ends less than a hop before the end of the record
             let until = last.time_s + reach;
             let until = if until + ridge.hop_s >= 1.0 { 1.0 } else { until };
             fill(last.time_s, until, &beyond(last, end, cycles));
@@ -104,11 +104,11 @@ impl CourseAtom {
         1 + 2 * self.multiples.len()
     }
 
-    /// Price in units of the logarithm of the number of frames. Each multiple costs as much as that of an
+    /// Price in units of the logarithm of the number of frames. A harmonic costs as much as one of another
     /// oscillation.
     pub(crate) fn price(&self) -> f64 {
-        /// Price of a segment: its Hann window tells two values of a complex amplitude apart, and each of the
-        /// four numbers costs 1/2.
+        /// Price of a segment: in its Hann window a complex amplitude takes about two independent values, and
+        /// each of these four numbers costs 1/2.
         const SEGMENT_PRICE: f64 = 2.0;
         let segments = self.ridge.points.len() as f64 * self.ridge.hop_s / self.ridge.segment_s;
         SEGMENT_PRICE * segments.max(1.0) + 1.5 * self.multiples.len() as f64
@@ -125,8 +125,8 @@ impl CourseAtom {
 }
 
 /// The parts of an explanation in which one oscillation along a ridge takes the place of all oscillations in
-/// its range of frequencies, or of the course with the index `replaced`. `None` without a ridge whose
-/// frequency changes by more than `LEAST_RANGE`.
+/// its range of frequencies, or of the course with the index `replaced`. `None` without a ridge that is
+/// followed through nearly the whole record and whose frequency changes by at least `LEAST_RANGE`.
 pub(super) fn unite_along_ridge(
     problem: &NoisyRecord,
     found: &Explanation,

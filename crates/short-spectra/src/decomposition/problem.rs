@@ -88,7 +88,8 @@ impl Basis {
     /// Adds a column without its projection onto the basis, scaled to unit length; a dependent column is not
     /// added.
     pub(crate) fn push_column(&mut self, mut column: Vec<f64>) {
-        /// Fraction of the squared length left below which rounding errors of the projection matter.
+        /// If less than this fraction of the squared length is left, rounding errors of the projection
+        /// matter, and it is repeated.
         const LITTLE: f64 = 0.01;
         let before = dot(&column, &column);
         self.project_out(&mut column);
@@ -440,10 +441,11 @@ impl NoisyRecord {
         self.used.iter().zip(&self.values).map(|(i, x)| x - model(*i)).collect()
     }
 
-    /// Normal equations of these columns, beside fixed parts, for the residual of the fixed parts.
+    /// Products of these columns, after the fixed parts are projected out, with each other and with the
+    /// residual of the fixed parts.
     pub(crate) fn multiply_columns(&self, fixed: &Fixed, columns: Vec<Vec<f64>>) -> ColumnProducts {
-        /// Fraction of the squared length of a column that fixed parts must not explain, or it depends on
-        /// them: less is rounding error.
+        /// A column depends on the fixed parts if they leave at most this fraction of its squared length,
+        /// which is rounding error.
         const LEAST_NEW: f64 = 1e-12;
         let mut lengths = Vec::with_capacity(columns.len());
         let projected: Vec<Vec<f64>> = columns
@@ -460,14 +462,15 @@ impl NoisyRecord {
         ColumnProducts::new(&projected, lengths, &fixed.residual)
     }
 
-    /// Fall of the criterion, nats, if columns explain this much of the sum of squares of fixed parts.
+    /// Fall of the criterion, nats, without the price of columns that explain this much of the sum of squares
+    /// that fixed parts leave.
     pub(crate) fn likelihood_gain(&self, fixed: &Fixed, explained: f64) -> f64 {
         let share = explained / dot(&fixed.residual, &fixed.residual).max(1e-300);
         -0.5 * self.len() as f64 * math::ln_1p(-share.clamp(0.0, 1.0 - 1e-9))
     }
 
-    /// Normal equations of the amplitudes and the shape parameters of all atoms around an explanation: for
-    /// each atom its columns, then its derivatives.
+    /// Products of the columns of all atoms of an explanation and of their derivatives by the shape
+    /// parameters: for each atom its columns, then its derivatives.
     pub(crate) fn products_around(&self, explanation: &Explanation) -> ColumnProducts {
         let fixed = self.fix_parts(explanation.parts.trend, &[]);
         let mut columns = Vec::new();

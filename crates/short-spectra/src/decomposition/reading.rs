@@ -37,10 +37,10 @@ const LEAST_APART: f64 = 0.5;
 /// Distance, in resolutions, below which two oscillations belong to one cluster: their peaks in a Hann
 /// spectrum touch.
 const CLUSTER_REACH: f64 = 2.5;
-/// Ratio of amplitudes above which an oscillation that drifts across another one may be a piece of it: what
-/// a model leaves of an oscillation is up to a fifth of it.
+/// An oscillation that drifts across one more than this many times as large may be a piece of it: a model
+/// leaves up to a fifth of an oscillation.
 const MUCH_LARGER: f64 = 5.0;
-/// Number of oscillations of a cluster from which each is in doubt.
+/// Each oscillation of a cluster of at least this many is in doubt.
 const CLUSTER: usize = 3;
 /// An oscillation that begins or is over within the record is in doubt with this number of other such ones:
 /// together they describe noise or jumps as well.
@@ -97,7 +97,8 @@ fn lobe_half_width(o: &OscillationAtom) -> f64 {
     (o.nepers.map_or(0.0, f64::abs) / TAU).max(1.0)
 }
 
-/// Standard deviation of the amplitude whose cosine and sine come first in a covariance.
+/// Standard deviation of an amplitude, in its unit, from those of cosine and sine, which come first in
+/// `amplitudes` and in `covariance`.
 fn amplitude_sd(amplitudes: &[f64], covariance: &DMatrix<f64>) -> f64 {
     let size = math::hypot(amplitudes[0], amplitudes[1]).max(1e-300);
     let [a, b] = [amplitudes[0] / size, amplitudes[1] / size];
@@ -112,7 +113,8 @@ fn greatest_distance(a: &OscillationAtom, b: &OscillationAtom) -> f64 {
     [0.0, 0.5, 1.0].map(apart).into_iter().fold(0.0, f64::max)
 }
 
-/// A harmonic of a component.
+/// A harmonic of a component. It has no range if its frequency would exceed half the frame rate, where
+/// frequencies fold.
 fn to_harmonic(of: &Component, multiple: usize, amplitude_m: f64, frame_rate_hz: f64) -> Component {
     let times = multiple as f64;
     let folds = times * of.range_hz.map_or(of.frequency_hz, |range| range.high_hz) > frame_rate_hz / 2.0;
@@ -130,7 +132,7 @@ fn to_harmonic(of: &Component, multiple: usize, amplitude_m: f64, frame_rate_hz:
     }
 }
 
-/// Reasons for which the range of an oscillation along a ridge is in doubt.
+/// Reasons for which an oscillation along a ridge is in doubt.
 fn list_course_doubts(course: &CourseAtom) -> Vec<String> {
     let mut doubts = Vec::new();
     let drift = course.range.high_hz - course.range.low_hz;
@@ -316,12 +318,13 @@ impl Decomposition {
         }
         if self.count_cluster(o) >= CLUSTER {
             doubts.push(
-                "it is one of several close together: one whose frequency and amplitude change looks the same"
-                    .to_owned(),
+                "it is one of several close together: a single one that changes looks the same".to_owned(),
             );
         }
         if self.crosses_larger(reading) {
-            doubts.push("it drifts across a much larger one: a piece of that looks the same".to_owned());
+            doubts.push(
+                "it drifts across a much larger one: a piece of the larger one looks the same".to_owned(),
+            );
         }
         if is_transient(o) && others().filter(|other| is_transient(other)).count() >= CROWD {
             doubts.push(
@@ -373,7 +376,7 @@ impl Decomposition {
         })
     }
 
-    /// Number of oscillations of which each is close to another one, with `o` among them.
+    /// Number of oscillations in the cluster of `o`, in which each is close to another one.
     fn count_cluster(&self, o: &OscillationAtom) -> usize {
         let mut left: Vec<&OscillationAtom> = self
             .explanation

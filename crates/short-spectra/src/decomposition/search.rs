@@ -57,7 +57,7 @@ pub(crate) struct PartSearch {
     pub rivals: Vec<Rival>,
     /// The problem before frames were left out as outliers, if any were.
     whole: Option<NoisyRecord>,
-    /// Groups of atoms for which divisions or unions were offered.
+    /// Groups of atoms for which changes that need a fit were offered.
     offered: Vec<Vec<Atom>>,
     /// Criterion of the best explanation that is known without this search, infinite if there is none. A
     /// search that gains too slowly to reach it ends.
@@ -168,11 +168,12 @@ impl PartSearch {
     }
 
     /// Moves the onset of an oscillation, in steps that are halved down to one frame, as long as the sum of
-    /// squares falls; at most `MOST_MOVES` times with each step.
+    /// squares falls. Each step is made at most `MOST_MOVES` times.
     fn place_onset(&self, fixed: &Fixed, atom: Atom, squares: f64) -> (Vec<Atom>, f64) {
         /// Iterations of the fit at each onset: the other parameters hardly depend on it.
         const ITERATIONS: usize = 2;
-        /// A step twice as long has already brought the onset within about two steps.
+        /// A few moves are enough: the step before this one, twice as long, has brought the onset within about
+        /// two steps.
         const MOST_MOVES: usize = 4;
         let frames = self.problem.at.frames as f64;
         let (mut best, mut moves) = ((atom, squares), 0);
@@ -237,7 +238,7 @@ impl PartSearch {
             if best.as_ref().is_none_or(|best| found.criterion < best.criterion) {
                 best = Some(found);
             }
-            // several changes together that gain more than the best one alone need no comparison
+            // if several changes together gain more than the best one alone, it need not be fitted
             if is_combined && best.as_ref().is_some_and(|b| b.criterion < most - NEARLY_AS_GOOD) {
                 break;
             }
@@ -337,9 +338,9 @@ fn atoms_without(atoms: &[Atom], replaced: &[usize]) -> Vec<Atom> {
 }
 
 /// The parts after all changes that lower the criterion by much and concern different frequencies: they can
-/// be made at once. `changes` are sorted by their criterion; `None` if there is only one such change.
+/// be made at once. `changes` are sorted by their criterion; `None` if there are fewer than two such changes.
 fn combine_changes(current: &Explanation, changes: &[FittedChange]) -> Option<Parts> {
-    /// Smallest gain, nats, of a change that is made with others.
+    /// Smallest gain, nats, of a change that is made together with others.
     const LEAST: f64 = 10.0;
     /// Smallest distance, resolutions, of frequencies at which changes hardly affect each other.
     const APART: f64 = 4.0;

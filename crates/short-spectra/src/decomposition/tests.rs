@@ -143,7 +143,7 @@ fn a_record_without_variation_has_no_parts() {
 
 /// Gaps between the frames are short, long and at the start.
 #[test]
-fn columns_are_those_of_their_formula_also_beside_gaps() {
+fn columns_are_those_of_their_formula_also_around_gaps() {
     let used = (3..900).filter(|i| i % 7 != 2 && !(300..420).contains(i));
     let at = FramePlaces { places: used.map(|i| (f64::from(i) + 0.5) / 900.0).collect(), frames: 900 };
     let ring = OscillationAtom { nepers: Some(7.0), onset: 0.2, ..OscillationAtom::steady(131.3) };
@@ -163,7 +163,7 @@ fn columns_are_those_of_their_formula_also_beside_gaps() {
     }
 }
 
-/// Frequency `780 + 90 sin(2 pi 3.7 t)` Hz beside a steady line.
+/// The frequency is `780 + 90 sin(2 pi 3.7 t)` Hz, and the record also has a steady line.
 #[test]
 fn a_frequency_that_no_polynomial_follows_is_one_component_along_its_ridge() {
     let frames = 2000;

@@ -224,7 +224,7 @@ impl PartSearch {
         Change { gain, trend, replaced, fitted, is_fitted: true }
     }
 
-    /// Whether a group of atoms has not been offered yet in nearly the same shape.
+    /// Whether no group with nearly the same atoms was offered before; the group then counts as offered.
     fn is_new_group(&mut self, group: &[Atom]) -> bool {
         let is_old = self.offered.iter().any(|old| is_similar(old, group));
         if !is_old {

@@ -15,13 +15,13 @@ impl PartSearch {
         current
     }
 
-    /// The explanation without one atom or one parameter of an atom; `None` if nothing can be dropped so that
-    /// the criterion falls. The sum of squares to second order shows which variants are worth a fit; that
-    /// with the lowest criterion comes first.
+    /// The explanation without one atom or one parameter of an atom; `None` if the criterion falls with none
+    /// of them. The sum of squares to second order shows which variants are worth a fit. The variant with the
+    /// lowest estimated criterion is fitted first.
     fn drop_part(&mut self, current: &Explanation, with_onsets: bool) -> Option<Explanation> {
         /// Largest estimated rise of the criterion, nats, with which a fit is tried.
         const WORTH_A_FIT: f64 = 1.0;
-        /// Largest fall of the criterion, nats, that is expected of a fit with another onset.
+        /// Largest fall of the criterion, nats, that a fit with another onset is expected to bring.
         const MOST_FALL: f64 = 120.0;
         let products = self.problem.products_around(current);
         // parts, estimated criterion, and whether the onset changes
@@ -43,8 +43,8 @@ impl PartSearch {
                 let parts = Parts { trend: current.parts.trend, atoms };
                 let Some(dropped) = variant.dropped else {
                     if with_onsets {
-                        // an onset that is wrong by a few frames distorts the shapes of the other parts, so
-                        // the fit without it starts further from its minimum
+                        // an onset that is wrong by a few frames distorts the shapes of the other parts, so a
+                        // fit with another onset starts far from its minimum
                         let quick = self.problem.fit_parts(&parts, 0);
                         tried.push((parts, quick.criterion - MOST_FALL, true));
                     }
@@ -78,12 +78,12 @@ impl PartSearch {
     }
 }
 
-/// A simpler atom.
+/// An atom without one of its properties, or no atom.
 struct SimplerVariant {
     /// `None` if the atom is removed.
     atom: Option<Atom>,
-    /// Which of the columns and parameters of the atom become 0, counted through both; `None` if the onset
-    /// changes, which no parameter describes.
+    /// Indices of those that become 0, in the list of the columns and then the parameters of the atom; `None`
+    /// if the onset changes, which is not a parameter.
     dropped: Option<Vec<usize>>,
 }
 
