@@ -1,6 +1,6 @@
 //! Friction between lip tip and glass, equations (4) and (5), and the laws that a scene may choose instead.
 //!
-//! At the tip speed `s` in the direction of slip the coefficient is
+//! At the speed `s` of the tip in the direction of slip, the coefficient is
 //!
 //! ```text
 //! mu(s) = r (a F(w) + c + viscous s),   r = 1 forward, backward_ratio backward
@@ -8,10 +8,11 @@
 //! Stribeck:    F = exp(-w),      w = (b s)^n    table:    F = w, a cubic of s between two points
 //! ```
 //!
-//! A table has `a = b = 1` and `c = 0`. A tip at rest holds up to `static_ratio` times `mu(0)`. Speeds at
-//! which the formula of a law changes are its knots: the points of a table, and a small speed below which a
-//! parabola replaces a broken power, whose derivatives at rest do not exist. The coefficient is continuous
-//! there, and a Taylor series ends there.
+//! A table has `a = b = 1` and `c = 0`. A tip at rest holds up to `static_ratio` times `mu(0)`. The knots of
+//! a law are the speeds at which its formula changes, and the pieces lie between them. The points of a table
+//! are knots. A Stribeck law has one at a small speed, unless `n` is 1 or 2: below it a parabola replaces the
+//! power, which has no Taylor series at rest if `n` is not whole. The coefficient is continuous at a knot,
+//! but a Taylor series is valid only up to it.
 
 use portable_math as math;
 use serde::Serialize;
@@ -24,7 +25,7 @@ pub enum FrictionShape {
     /// Equation (4).
     #[default]
     Exponential,
-    /// Stribeck's curve, with the exponent of the speed as a parameter.
+    /// Stribeck's curve, with a free exponent of the speed.
     Stribeck,
     /// The coefficient falls as `1 / (1 + b s)`.
     Rational,
@@ -32,7 +33,7 @@ pub enum FrictionShape {
     Table(FrictionTable),
 }
 
-/// Keys of a scene that only some laws have: each law with its own.
+/// Name of each law in a scene, with the names of the parameters that not every law has.
 pub(crate) const LAW_KEYS: [(&str, &[&str]); 4] = [
     ("exponential", &["friction.a", "friction.b_s_per_m", "friction.c"]),
     (
@@ -60,7 +61,7 @@ impl FrictionShape {
         }
     }
 
-    /// Whether a parameter belongs to this law, or is none of a particular law.
+    /// Whether a parameter belongs to this law or to every law.
     pub(crate) fn has_parameter(&self, name: &str) -> bool {
         let mut laws = LAW_KEYS.iter().filter(|(_, keys)| keys.contains(&name)).peekable();
         laws.peek().is_none() || laws.any(|(law, _)| *law == self.name())
@@ -89,7 +90,7 @@ pub struct FrictionLaw {
     /// Ratio of the largest coefficient at rest to that of slip at zero speed; at least 1.
     #[serde(skip_serializing_if = "is_one")]
     pub static_ratio: f64,
-    /// Ratio of the coefficient of slip towards -v, and its limit at rest, to that towards +v.
+    /// Ratio of the coefficients towards -v, of slip and at rest, to those towards +v.
     #[serde(skip_serializing_if = "is_one")]
     pub backward_ratio: f64,
 }
@@ -109,8 +110,8 @@ fn is_zero(x: &f64) -> bool {
 }
 
 impl FrictionLaw {
-    /// Value of `b s` below which a parabola through zero replaces a broken power, with the power's value and
-    /// slope there. It differs from the power by less than `0.4 LOW^n`.
+    /// Value of `b s` below which a parabola through zero replaces the power of a Stribeck law. Value and
+    /// slope are those of the power here, and below the parabola differs from it by less than `0.4 LOW^n`.
     const LOW: f64 = 1e-3;
 
     /// The law of equation (4) without further terms.
@@ -121,8 +122,8 @@ impl FrictionLaw {
         Self { a, b_s_per_m, c, shape, exponent, viscous_s_per_m, static_ratio, backward_ratio }
     }
 
-    /// Coefficient of dynamic friction at the tip speed in the direction of slip (+1 or -1), m/s (equation
-    /// (4) without the sign). Slightly negative speeds continue the law.
+    /// Coefficient of dynamic friction, without the sign of equation (4), at a speed, m/s, in a direction of
+    /// slip, +1 or -1. The first piece goes on at slightly negative speeds, which trial steps may reach.
     #[inline]
     #[must_use]
     pub fn dynamic_coefficient(&self, speed_m_per_s: f64, direction: f64) -> f64 {
@@ -133,14 +134,14 @@ impl FrictionLaw {
         self.direction_factor(direction) * (self.a * varying + self.c + self.viscous_s_per_m * speed_m_per_s)
     }
 
-    /// Limit of the dynamic coefficient at zero speed.
+    /// Limit of the dynamic coefficient at zero speed, in a direction of slip, +1 or -1.
     #[inline]
     #[must_use]
     pub fn limit_at_zero(&self, direction: f64) -> f64 {
         self.direction_factor(direction) * (self.a * self.varying_part_at_zero() + self.c)
     }
 
-    /// Largest coefficient at rest before the tip slips in a direction (equation (5)).
+    /// Largest coefficient at rest before the tip slips in a direction, +1 or -1 (equation (5)).
     #[inline]
     #[must_use]
     pub fn static_coefficient(&self, direction: f64) -> f64 {
@@ -206,7 +207,8 @@ impl FrictionLaw {
         [w, slope, by_exponent]
     }
 
-    /// Start of a piece and polynomial of `w` in `b s` beyond the start; `None` for a broken power.
+    /// Value of `b s` at the start of a piece, and coefficients of `w` as a cubic of `b s` minus that value;
+    /// `None` where `w` is a power.
     fn polynomial(&self, piece: usize) -> Option<(f64, [f64; 4])> {
         match &self.shape {
             FrictionShape::Exponential | FrictionShape::Rational => Some((0.0, [0.0, 1.0, 0.0, 0.0])),
@@ -236,7 +238,7 @@ impl FrictionLaw {
     #[must_use]
     pub fn piece_at(&self, speed_m_per_s: f64) -> usize {
         let mut piece = 0;
-        // (a diverging trial step has an infinite speed, and the last piece ends there)
+        // (the speed of a diverging trial step can be infinite, as the end of the last piece is)
         while self.knot_m_per_s(piece) <= speed_m_per_s.min(f64::MAX) {
             piece += 1;
         }
@@ -358,7 +360,8 @@ impl FrictionTable {
 /// speed; `K` is the number of coefficients.
 #[derive(Debug, Clone)]
 pub struct FrictionSeries<const K: usize> {
-    /// Polynomial of the argument of `F` within the piece of the law; `None` for a power.
+    /// Coefficients of the argument of `F` as a cubic within the piece of the law; `None` where it is a
+    /// power.
     polynomial: Option<[f64; 4]>,
     /// Coefficients of `b s` beyond the start of the piece, of its square, of the argument of `F`, and of
     /// `F`.
@@ -377,8 +380,8 @@ fn sum(first: usize, last: usize, f: impl Fn(usize) -> f64) -> f64 {
 }
 
 impl<const K: usize> FrictionSeries<K> {
-    /// Starts the series in a piece of the law, from the speed in the direction of slip, m/s; returns the
-    /// coefficient of friction in the forward direction.
+    /// Starts the series in a piece of the law, from the speed in the direction of slip, m/s. Returns the
+    /// friction coefficient in the forward direction.
     pub fn start_series(&mut self, law: &FrictionLaw, piece: usize, speed_m_per_s: f64) -> f64 {
         let x = law.b_s_per_m * speed_m_per_s;
         let polynomial = law.polynomial(piece);
@@ -393,8 +396,8 @@ impl<const K: usize> FrictionSeries<K> {
         law.a * varying + law.c + law.viscous_s_per_m * speed_m_per_s
     }
 
-    /// Computes coefficient `k >= 1` from that of the speed and from the coefficients below `k`; returns
-    /// coefficient `k` of the coefficient of friction in the forward direction.
+    /// Computes coefficient `k >= 1` of the series from coefficient `k` of the speed and from all lower ones.
+    /// Returns coefficient `k` of the friction coefficient in the forward direction.
     pub fn advance_series(&mut self, law: &FrictionLaw, k: usize, speed: f64) -> f64 {
         let (order, n) = (k as f64, law.exponent);
         self.rows[k] = [law.b_s_per_m * speed, 0.0, 0.0, 0.0];

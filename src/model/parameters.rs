@@ -162,8 +162,8 @@ table! {
     "friction.b_s_per_m" "B" "s/m" FrictionB None, NotNegative, Log, "decay of friction with speed";
     "friction.c" "C" "1" FrictionC None, NotNegative, Linear, "part of the friction coefficient that stays";
     "friction.limit_at_zero" "mu0" "1" FrictionLimit None, NotNegative, Linear, "friction coefficient of slip at zero speed";
-    "friction.coulomb_level" "muC" "1" CoulombLevel None, NotNegative, Linear, "friction coefficient that a Stribeck law approaches";
-    "friction.stribeck_speed_m_per_s" "vS" "m/s" StribeckSpeed None, Positive, Log, "speed at which a Stribeck law has fallen to 1/e of its way";
+    "friction.coulomb_level" "muC" "1" CoulombLevel None, NotNegative, Linear, "friction coefficient that a Stribeck law approaches at high speed";
+    "friction.stribeck_speed_m_per_s" "vS" "m/s" StribeckSpeed None, Positive, Log, "speed at which the falling part of a Stribeck law is down to 1/e";
     "friction.stribeck_exponent" "n" "1" StribeckExponent None, Within(0.25, 4.0), Linear, "exponent of the speed in a Stribeck law";
     "friction.rational_s_per_m" "R" "s/m" RationalDecay None, NotNegative, Log, "decay of a rational law with speed";
     "friction.static_ratio" "rs" "1" StaticRatio Some(1.0), Within(1.0, 10.0), Linear, "ratio of the limit at rest to the friction of slip at zero speed";

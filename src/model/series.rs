@@ -13,8 +13,9 @@
 //! flight:   N = f = 0,   M u'' = m_a q1' + m_b q2' + k0 (h_d - u) - c0 u'
 //! ```
 //!
-//! Each coefficient costs eight products of series, and friction adds two. The highest coefficients enter
-//! linearly; their matrix depends only on the angles at the instant and is inverted once.
+//! Each coefficient costs eight products of series; the friction of equation (4) adds two, other laws more.
+//! The highest coefficients enter linearly; their matrix depends only on the angles at the instant and is
+//! inverted once.
 
 use super::friction::FrictionSeries;
 use super::{LinkDirections, Linkage, Pose, ShoulderContact};
@@ -90,7 +91,7 @@ pub struct MotionSeries<const K: usize> {
     pub indicator: f64,
     /// Order of the last expansion.
     pub order: usize,
-    /// Piece of the friction law in slip; the caller sets it.
+    /// Piece of the friction law in slip; the caller sets it before an expansion.
     pub law_piece: usize,
     /// Series of the friction law in slip, unless the law is that of equation (4) without further terms.
     pub(crate) law: FrictionSeries<K>,
@@ -126,7 +127,7 @@ impl<const K: usize> Default for MotionSeries<K> {
     }
 }
 
-/// Friction coefficient that does not change: slip without falling friction, stick, and flight.
+/// No friction coefficient that changes: slip at a constant coefficient, stick, and flight.
 const CONSTANT: u8 = 0;
 /// Friction coefficient of equation (4), without further terms.
 const EXPONENTIAL: u8 = 1;
@@ -396,7 +397,7 @@ impl<const K: usize> MotionSeries<K> {
         self.tip_velocity[k + 1] = tip;
         let mut falling = 0.0;
         if LAW == EXPONENTIAL {
-            // the part E of mu = E + c that falls with speed satisfies E' = -b sigma v3'' E
+            // the part E of mu = E + r c, r the factor of the direction, satisfies E' = -b sigma v3'' E
             let sum = sums.slip[1] + next * tip * (mu - at.staying);
             falling = -linkage.friction.b_s_per_m * direction * sum * share;
         } else if LAW == ANY_LAW {

@@ -15,8 +15,9 @@
 //! flight: dN = df = 0, and the gap between tip and glass is a third unknown
 //! ```
 //!
-//! `F` is the part of the friction law that changes with speed, and `E` is minus `a` times its derivative by
-//! `b |v3'|`, which is `a F` for an exponential.
+//! `a F` is the part of the friction coefficient that changes with speed, and `E` is minus its derivative by
+//! `b |v3'|`. For an exponential, `E = a F`. Viscous friction, the exponent and the ratio of the directions
+//! add further terms to `df` in slip.
 //!
 //! The coefficients of the unknowns, and the terms from a change of one constant, are the same for all
 //! directions.

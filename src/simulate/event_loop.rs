@@ -38,7 +38,7 @@ pub(super) struct EventLoop<'a> {
     work: WorkCounters,
     transitions: u64,
     lean: ShoulderContact,
-    /// Piece of the friction law in slip.
+    /// Piece of the friction law in the present or next phase of slip.
     law_piece: usize,
     /// First trial step, s, of the next phase of stick, of slip and of flight.
     steps: [Option<f64>; 3],
@@ -269,8 +269,8 @@ impl<'a> EventLoop<'a> {
     }
 
     /// Decides the next phase when the holding force reaches the static friction limit in stick. If slip
-    /// follows, the tip's velocity has a double zero at the start of slip, or a simple one if friction falls
-    /// from a static limit above that of slip. The normal force jumps with it, and may vanish.
+    /// follows, the tip's velocity has a double zero at the start of slip. If friction falls because the
+    /// static limit is above that of slip, the zero is simple, and the normal force jumps and may vanish.
     fn release_tip(&mut self, mode: TipMode, pose: Pose) -> NextPhase {
         let at = self.system.contact_instant(self.t, &pose, self.lean);
         let law = &self.system.linkage.friction;
@@ -369,7 +369,8 @@ impl<'a> EventLoop<'a> {
         SlipPhase { system: self.system, direction: mode.direction(), lean: self.lean, piece: self.law_piece }
     }
 
-    /// Enters the next piece of the friction law, if a guard has found its start or end in slip.
+    /// Enters the piece of the friction law above or below the present one, if the guard is that of an end of
+    /// the piece and the tip does not stop there. Returns whether it is.
     fn enter_law_piece(&mut self, guard: usize) -> bool {
         let [from, _] = self.system.linkage.friction.piece_ends_m_per_s(self.law_piece);
         match guard {

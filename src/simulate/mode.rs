@@ -68,14 +68,14 @@ pub fn holding_force(contact: &FrictionResponse) -> f64 {
 
 /// Decides the next mode of a tip at rest.
 ///
-/// If `1 + sigma * mu * nu` is positive with the static limit `mu` of both directions of slip (`sigma` = +1
-/// and -1), the mode is stick if the holding force is within the static limit and the glass presses on the
-/// tip, lift-off if the glass would have to pull, otherwise slip against the holding force. If it is not (the
-/// Painlevé region), the consistency of every mode is tested.
+/// Let `mu` be the larger of the static coefficients of both directions. If `mu |nu| < 1`, the mode is stick
+/// if the holding force is within the static limit and the glass presses on the tip, lift-off if the glass
+/// would have to pull, otherwise slip against the holding force. If not (the Painlevé region), the
+/// consistency of every mode is tested.
 ///
-/// Between the limit of slip at zero speed and a larger static limit, slip is consistent too, but a tip at
-/// rest stays until the static limit is passed. This slip has a positive Painlevé indicator and counts as no
-/// second mode.
+/// If the holding force is between the limit of slip at zero speed and a larger static limit, slip is
+/// consistent too, but a tip at rest stays until the static limit is passed. So slip with a positive Painlevé
+/// indicator does not count as a second mode.
 pub(crate) fn decide_mode_at_rest(contact: &FrictionResponse, law: &FrictionLaw) -> RestDecision {
     let force = holding_force(contact);
     let normal = contact.n_free + contact.nu * force;

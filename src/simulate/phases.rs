@@ -22,7 +22,7 @@ pub(crate) const SHOULDER_GUARDS: [usize; 2] = [3, 4];
 pub(crate) const LEVEL_GUARDS: [usize; 2] = [5, 6];
 
 /// Index of a guard of slip: the tip's speed in the direction of slip falls to the start of the piece of the
-/// friction law. In the first piece, the tip stops.
+/// friction law. If the piece starts at zero speed, the tip stops.
 pub(crate) const TIP_STOPS: usize = 0;
 /// Index of a guard of slip: the normal force reaches zero.
 pub const SLIP_CONTACT_LOST: usize = 1;

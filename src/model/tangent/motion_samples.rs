@@ -35,8 +35,8 @@ pub(crate) struct MotionSamples {
     pub(super) friction: LaneVector,
     /// Friction coefficient times the direction of slip, `sigma mu`; 0 unless the tip slips.
     pub(super) mu: LaneVector,
-    /// Normal force times the rate at which the friction coefficient falls with `b |v3'|`, N: `N E` for the
-    /// part `E` that falls exponentially; 0 unless the tip slips.
+    /// Normal force times the fall of the friction coefficient per unit of `b |v3'|`, without viscous
+    /// friction, N: `N E`; 0 unless the tip slips.
     pub(super) falling: LaneVector,
     /// Both angles, rad, computed on demand.
     angles: OnceCell<LaneVectorPair>,
@@ -182,7 +182,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         ]
     }
 
-    /// Part `F` of the friction law (`which` 0), or its derivative by `b |v3'|` (1) or by the exponent (2).
+    /// Part `F` of the friction law (`which` 0), its derivative by `b |v3'|` (1), or that by the exponent (2).
     pub(super) fn sample_varying_part(&self, at: &MotionSamples, direction: f64, which: usize) -> LaneVector {
         let velocity = self.sample_tip_velocity(at.x);
         LaneVector(velocity.0.map(|v| self.linkage.friction.varying_part(direction * v)[which]))

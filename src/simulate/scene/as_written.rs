@@ -145,14 +145,17 @@ fn friction(_: &mut SchemaGenerator) -> Schema {
     let about = "Law between friction coefficient and speed; \"exponential\" if left out.";
     let others = [
         ("law", json!({ "type": "string", "enum": words, "description": about })),
-        ("speeds_m_per_s", list("Increasing speeds of the points of a table, m/s. For the law \"table\".")),
-        ("coefficients", list("Friction coefficients at these speeds. For the law \"table\".")),
+        (
+            "speeds_m_per_s",
+            list("Speeds of the 2 to 32 points of a table, increasing, m/s. For the law \"table\"."),
+        ),
+        ("coefficients", list("Friction coefficients at `speeds_m_per_s`. For the law \"table\".")),
     ];
     number_table_schema("friction", others)
 }
 
-/// Schema of a table of numbers, from the table of parameters, and of its other keys. If a quantity has two
-/// keys or belongs to a friction law, none is required.
+/// Schema of a table of numbers, from the table of parameters, and of its other keys. A key is not required
+/// if its quantity has two keys or belongs to a particular friction law.
 fn number_table_schema<const N: usize>(table: &str, others: [(&str, serde_json::Value); N]) -> Schema {
     let rows = || PARAMETERS.iter().filter_map(|row| Some((row.name.split_once('.')?, row)));
     let rows = || rows().filter(|((of, _), _)| *of == table);
@@ -184,7 +187,7 @@ fn number_table_schema<const N: usize>(table: &str, others: [(&str, serde_json::
     table_schema(keys.chain(others.map(|(key, schema)| (key.to_owned(), schema))), &required)
 }
 
-/// Sentence on the friction laws that need a parameter; empty for a parameter of every law.
+/// Sentence that names the friction laws with a parameter; empty for a parameter of every law.
 fn laws_of(name: &str) -> String {
     let laws = LAW_KEYS.iter().filter(|(_, keys)| keys.contains(&name));
     let laws: Vec<String> = laws.map(|(law, _)| format!("\"{law}\"")).collect();

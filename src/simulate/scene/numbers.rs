@@ -8,7 +8,7 @@ use crate::toml_file;
 use std::collections::BTreeMap;
 use toml::{Spanned, Value};
 
-/// A number of a file, written with or without a point.
+/// The number in a value of a file, written with or without a decimal point.
 fn as_number(value: &Value) -> Option<f64> {
     value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64))
 }
@@ -48,7 +48,7 @@ impl SceneReader<'_> {
             } else if !matches!(law, FrictionShape::Table(_)) {
                 let found = format!("the law \"{}\"", law.name());
                 let advice = "leave it out, or choose law = \"table\"";
-                return Err(key_error(&place, &name, found, "points only for the law \"table\"", advice));
+                return Err(key_error(&place, &name, found, "the law \"table\"", advice));
             }
         }
         Ok(law)
@@ -84,8 +84,9 @@ impl SceneReader<'_> {
             }
             (Some(table), _) if coefficients.len() == count => Ok(table),
             _ if coefficients.len() != count => {
-                let (found, expected) = (coefficients.len().to_string(), format!("{count}, one a speed"));
-                refuse(1, found, &expected, "give both lists one length")
+                let (found, expected) =
+                    (coefficients.len().to_string(), format!("{count}, one for each speed"));
+                refuse(1, found, &expected, "give both lists the same length")
             }
             _ => refuse(0, count.to_string(), &format!("2 to {most} speeds"), "change the number of points"),
         }

@@ -128,8 +128,8 @@ fn a_file_with_a_number_that_is_none_is_refused() {
     }
 }
 
-/// Each friction law is refused without its parameters, with those of another law, and with points that are no
-/// table; the message names file, line, key, what was found and what to do.
+/// A friction law is refused without its parameters, with those of another law, and with points that make no
+/// table. The message names file, line and key, and says what was found and what to do.
 #[test]
 fn a_friction_law_that_is_not_whole_is_refused() {
     const LINE: &str = "a = 0.229\nb_s_per_m = 7.95\nc = 0.331\n";
@@ -164,7 +164,7 @@ fn a_friction_law_that_is_not_whole_is_refused() {
         ("a = 0.1\nc = 0.3\n".to_owned(), "key `friction.b_s_per_m`: found nothing"),
         (
             format!("{LINE}coefficients = [0.1, 0.2]\n"),
-            "LINE+3: key `friction.coefficients`: found the law \"exponential\", expected points only for the law \"table\"; leave it out, or choose law = \"table\"",
+            "LINE+3: key `friction.coefficients`: found the law \"exponential\", expected the law \"table\"; leave it out, or choose law = \"table\"",
         ),
         (
             "law = \"table\"\ncoefficients = [0.1, 0.2]\n".to_owned(),
@@ -182,7 +182,7 @@ fn a_friction_law_that_is_not_whole_is_refused() {
         (table("[0.1]", "[0.4]"), "LINE+1: key `friction.speeds_m_per_s`: found 1, expected 2 to 32 speeds"),
         (
             table("[0.1, 0.2, 0.3]", "[0.4, 0.3]"),
-            "LINE+2: key `friction.coefficients`: found 2, expected 3, one a speed; give both lists one length",
+            "LINE+2: key `friction.coefficients`: found 2, expected 3, one for each speed; give both lists the same length",
         ),
     ] {
         assert!(LIGHT_BLADE.contains(LINE));
