@@ -1,8 +1,8 @@
-//! The integrator, its events and the friction laws against stick-slip oscillators with exact answers: a mass
-//! on a belt under every friction law, Den Hartog's forced oscillator with Coulomb friction, and a discontinuous linear
-//! system that switches at a known instant.
+//! The integrator, its events and the friction laws against stick-slip oscillators with known answers: a mass
+//! on a belt under every friction law, Den Hartog's forced oscillator with Coulomb friction, and a
+//! discontinuous linear system that switches at a known instant.
 //!
-//! All are dimensionless with unit mass, stiffness and static friction; times are compared absolutely, so an
+//! All are dimensionless with unit mass and stiffness; times are compared absolutely, so an
 //! error is in units of the reciprocal angular frequency and the tolerance is that of one step.
 
 use hybrid_ode::polynomial::TERMS;
@@ -195,7 +195,8 @@ impl Belt {
     /// Every cycle of every tolerance has these durations of slip and stick. The stick starts where the slip
     /// ended, so it inherits the slip's error in place, which the belt's speed turns into time.
     fn assert_cycles(&self, slip: f64, stick: f64, knots: usize) {
-        // (infinitely steep friction at rest draws out the errors of Runge-Kutta steps by more)
+        // (friction that is very steep near rest multiplies errors of Runge-Kutta steps beyond what is
+        // allowed)
         let steep = self.law.exponent < 1.0;
         for (method, relative) in cases().filter(|(method, _)| !steep || matches!(method, Method::Taylor)) {
             for (cycle, found) in self.cycles(method, relative, knots).into_iter().enumerate() {
@@ -232,8 +233,8 @@ fn a_belt_with_static_above_kinetic_friction() {
     coulomb_belt().assert_cycles(slip, 5.0, 0);
 }
 
-/// Friction that rises with the sliding speed from 0.5 by 0.1 damps a linear oscillator while the mass slides.
-/// Points on a line are the same law, whose two knots within the speeds of a slip are passed up and down.
+/// Friction `0.5 + 0.1 v` at the sliding speed `v` damps a linear oscillator while the mass slides. Points on
+/// this line are the same law. Each slip passes two of them, first up and then down.
 #[test]
 fn a_belt_with_viscous_friction_and_with_points_on_a_line() {
     let rise = 0.1;
@@ -290,8 +291,9 @@ fn a_belt_with_rational_friction() {
     Belt { speed: 0.2, law }.assert_cycles(4.295_999_525_480_15, 7.705_031_769_350_42, 0);
 }
 
-/// Stribeck's curve from 1 to 0.5 over the speed 0.5, with a static limit of 1.2: durations recomputed by
-/// Runge-Kutta steps of 1e-4. The broken powers pass their knot near rest twice.
+/// Stribeck's curve falls from 1 to 0.5 over the speed 0.5, below a static limit of 1.2. The durations are
+/// those of separate Runge-Kutta steps of 1e-4. With exponents that are not whole, each slip passes the knot
+/// near rest twice.
 #[test]
 fn a_belt_with_stribeck_friction_of_any_exponent() {
     for (exponent, slip, stick, knots) in [

@@ -175,8 +175,8 @@ fn every_direction(scene: &Scene) -> Vec<TangentDirection> {
 }
 
 /// The worst error of all derivatives by a direction against differences, relative to the larger of the
-/// derivative and what is usual of its channel, each with the relative step that shows it best; `None` where
-/// all steps but the smallest change the list of transitions, whose differences are mostly noise.
+/// derivative and what is usual of its channel, each with the relative step that shows it best; `None`
+/// unless two steps or more keep the list of transitions: differences of the smallest are mostly noise.
 fn worst(scene: &Scene) -> Option<f64> {
     const STEPS: [f64; 4] = [3e-4, 1e-4, 3e-5, 3e-6];
     /// Usual sizes of the channels and of a time, SI.
@@ -234,7 +234,7 @@ fn windows(each: usize, length_s: f64) -> HashMap<&'static str, Vec<Scene>> {
     windows_with(|parts| parts.scene(STROKE), each, length_s)
 }
 
-/// The same of scenes that are made of random parts in another way.
+/// The same for the scenes that `scene` makes of random parts.
 fn windows_with(
     scene: impl Fn(&Parts) -> Scene,
     each: usize,
@@ -285,8 +285,8 @@ fn derivatives_are_those_of_differences_through_every_transition() {
     }
 }
 
-/// The same for every friction law and its parameters, with a static limit above that of slip, friction that
-/// rises with speed and differs by direction. Knots of the laws lie between the transitions.
+/// The same for every friction law and its parameters, with a static limit above that of slip, and with
+/// friction that rises with speed and differs by direction. Knots of the laws lie between the transitions.
 #[test]
 fn derivatives_are_those_of_differences_for_every_friction_law() {
     const FURTHER: &str = "static_ratio = 1.3\nviscous_s_per_m = 0.2\nbackward_ratio = 0.8";

@@ -91,8 +91,8 @@ fn assert_expands<const N: usize, P: TaylorPhase<N, GUARDS>>(
     }
 }
 
-/// One of the laws with the coefficients of an exponential, in turn, and in every second round with all
-/// further terms. No state reaches the knots of the table.
+/// Each law in turn, with the coefficients of an exponential or with points; in every second round with all
+/// further terms. No state reaches the last two knots of the table.
 fn law(i: usize, exponential: FrictionLaw) -> FrictionLaw {
     let points = [(-20.0, 0.9), (20.0, 0.5), (60.0, 0.4)];
     let law = match i % 5 {

@@ -62,7 +62,7 @@ fn coulomb_friction_alone_turns_and_stops_the_tip_at_the_exact_angles() {
     assert!(counts[1] < counts[0] && counts[2] > counts[0] && counts[3] < counts[2], "{counts:?}");
 }
 
-/// Compares the turns under a law, whose number is returned.
+/// Compares the turns under a law, and returns their number.
 fn assert_turns(law: FrictionLaw) -> usize {
     let mut scene = lip_alone(0.0);
     scene.linkage.friction = law;
@@ -85,7 +85,8 @@ fn assert_turns(law: FrictionLaw) -> usize {
         let bottom = root(|p| k2 * p - press * (p.sin() - sigma * mu * p.cos()), -1.0, 1.0);
         turns.push(root(|p| energy(p) - energy(phi), bottom, -phi.signum() * (phi.abs() + 0.1)));
     }
-    // (a tip that is held early has turned over little energy, which Runge-Kutta at 1e-4 does not balance)
+    // (a tip that is held early has lost little energy, and the errors of Runge-Kutta at 1e-4 are too large
+    // for its balance)
     let loose = |method, relative| method != IntegrationMethod::Taylor && relative > 1e-5;
     for (method, relative) in
         cases().filter(|&(method, relative)| law.static_ratio == 1.0 || !loose(method, relative))
@@ -112,11 +113,11 @@ fn assert_turns(law: FrictionLaw) -> usize {
     turns.len()
 }
 
-/// Under a head that moves evenly the lip alone is held until its force passes the static limit, slips at the
-/// lower friction of its direction until its tip is at rest again, and so on: the angle of each release
-/// follows from the forces, that of each stop from the energy `m phi'^2/2 + k2 phi^2/2 + N l2 (cos phi +
-/// sigma mu sin phi)` with `l2 cos phi phi' = -V` at both ends of the slip. The time of each stick is the
-/// way of the head.
+/// Under a head that moves at the speed `V` the lip alone sticks until the holding force passes the static
+/// limit, and slips at the lower friction of its direction until its tip is at rest again. The angle of each
+/// release follows from the forces. That of each stop follows from the energy `m phi'^2/2 + k2 phi^2/2 + N l2
+/// (cos phi + sigma mu sin phi)`, with `l2 cos phi phi' = -V` at both ends of the slip. In each stick the
+/// head moves the way between the two positions of the lip.
 #[test]
 fn a_lip_alone_sticks_to_the_static_limit_and_slips_to_the_exact_angles() {
     for (speed, backward_ratio, static_ratio) in
