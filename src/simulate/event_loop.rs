@@ -270,15 +270,19 @@ impl<'a> EventLoop<'a> {
 
     /// Decides the next phase when the holding force reaches the static friction limit in stick. If slip
     /// follows, the tip's velocity has a double zero at the start of slip. If friction falls because the
-    /// static limit is above that of slip, the zero is simple, and the normal force jumps and may vanish.
+    /// static limit is above that of slip, the zero is simple, and the normal force jumps. If it vanishes,
+    /// the tip loses contact.
     fn release_tip(&mut self, mode: TipMode, pose: Pose) -> NextPhase {
         let at = self.system.contact_instant(self.t, &pose, self.lean);
         let law = &self.system.linkage.friction;
         self.law_piece = law.piece_at(0.0);
         let (_, forces) = self.slip_phase(mode).slip_forces(&pose, &at);
         let falls = law.static_ratio > 1.0;
-        if forces.indicator <= 0.0 || (falls && forces.normal_n <= 0.0) {
+        if forces.indicator <= 0.0 {
             return self.resolve_jam(&pose, TipMode::Stick);
+        }
+        if falls && forces.normal_n <= 0.0 {
+            return self.lose_contact(&pose, Some((TipMode::Stick, None)));
         }
         self.recent.note_event(self.t);
         self.record_transition(TipMode::Stick, mode, TransitionCause::FrictionLimit);
