@@ -182,7 +182,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         ]
     }
 
-    /// Part `F` of the friction law (`which` 0), its derivative by `b |v3'|` (1), or that by the exponent (2).
+    /// Part `F` of the friction law (`which` 0), its derivative by `b |v3'|` (1) or by the exponent (2).
     pub(super) fn sample_varying_part(&self, at: &MotionSamples, direction: f64, which: usize) -> LaneVector {
         let velocity = self.sample_tip_velocity(at.x);
         LaneVector(velocity.0.map(|v| self.linkage.friction.varying_part(direction * v)[which]))

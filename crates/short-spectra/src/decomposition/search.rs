@@ -172,7 +172,7 @@ impl PartSearch {
     fn place_onset(&self, fixed: &Fixed, atom: Atom, squares: f64) -> (Vec<Atom>, f64) {
         /// Iterations of the fit at each onset: the other parameters hardly depend on it.
         const ITERATIONS: usize = 2;
-        /// A few moves are enough: the step before this one, twice as long, has brought the onset within about
+        /// A few moves are enough: the step before, twice as long, has brought the onset within about
         /// two steps.
         const MOST_MOVES: usize = 4;
         let frames = self.problem.at.frames as f64;
