@@ -12,7 +12,7 @@ use wiperlab::model::{LinkDirections, Linkage, Pose, Spring};
 use wiperlab::simulate::mode::TipMode;
 use wiperlab::simulate::scene::contact::{ContactLossRule, JamRule};
 use wiperlab::simulate::scene::{Drive, Scene, StartKind};
-use wiperlab::simulate::{IntegrationMethod, RunStatus, TransitionCause};
+use wiperlab::simulate::{IntegrationMethod, ModelSample, RunStatus, TransitionCause};
 
 const AT_REST: Pose = Pose { theta: 0.0, phi: 0.0, theta_rate: 0.0, phi_rate: 0.0 };
 /// Force with which the head presses, N, whatever its height: its spring is very long and very soft.
@@ -387,6 +387,41 @@ fn beyond_the_paradox_the_tip_jams() {
             assert!(struck.run.status == RunStatus::Completed, "{what}: {:?}", struck.run);
             let energy = struck.audit.energy_residual_relative();
             assert!(energy <= ENERGY * relative, "{what}: energy residual {energy:e}");
+        }
+    }
+}
+
+/// A blade that would lift off without friction, held at the static limit. Friction alone presses the tip on:
+/// when it falls at the release, the normal force would be negative, so the tip leaves the glass.
+#[test]
+fn a_tip_that_only_friction_presses_on_leaves_the_glass_at_its_release() {
+    let pose = Pose { theta: -0.9, phi: -0.18, theta_rate: 0.0, phi_rate: 0.0 };
+    for (slip, static_ratio) in [(0.1, 4.0), (0.3, 4.0), (0.3, 10.0)] {
+        let mut scene = upright_light_blade();
+        let law = FrictionLaw::exponential(0.0, 0.0, slip);
+        scene.linkage.friction = FrictionLaw { static_ratio, ..law };
+        (scene.drive, scene.start) = (Drive::Uniform { speed_m_per_s: 0.0 }, StartKind::State(pose));
+        scene.loss = ContactLossRule::Fly;
+        scene.run.stop_s = 4e-3;
+        for (method, relative) in cases() {
+            let what = format!("{slip} times {static_ratio}, {method:?} at {relative:e}");
+            let seen = ran(&scene, method, relative);
+            seen.assert_sound(&what, relative);
+            let leaves =
+                seen.transitions.iter().find(|t| (t.from, t.to) == (TipMode::Stick, TipMode::Flight));
+            let leaves = leaves.unwrap_or_else(|| panic!("{what}: {:?}", seen.transitions));
+            let held = |s: &&ModelSample| s.mode == TipMode::Stick && s.time_s <= leaves.time_s;
+            let last = seen.ends.iter().rev().find(held).unwrap();
+            let ratio = last.friction_n.abs() / last.normal_n / (slip * static_ratio);
+            assert!((ratio - 1.0).abs() < 1e3 * relative, "{what}: {ratio} of the limit");
+            let head = scene.drive.motion_at(leaves.time_s);
+            let directions = LinkDirections::from_pose(&last.pose);
+            let contact =
+                scene.linkage.friction_response(&last.pose, &directions, &head, ShoulderContact::Off);
+            // the normal force of slip is `n_free` over an indicator, at least `1 - |nu|` times the friction
+            assert!(contact.n_free < 0.0 && contact.nu.abs() * slip < 1.0, "{what}: {contact:?}");
+            let flown = seen.ends.iter().filter(|s| s.mode == TipMode::Flight);
+            assert!(flown.map(|s| s.tip_height_m).fold(0.0, f64::max) > 0.0, "{what}");
         }
     }
 }
