@@ -30,6 +30,25 @@ pub(crate) struct Explanation {
     pub amplitudes: Vec<f64>,
 }
 
+impl Explanation {
+    /// The atoms, each with the amplitudes of its columns.
+    pub(crate) fn atoms_with_amplitudes(&self) -> impl Iterator<Item = (&Atom, &[f64])> {
+        pair_with_amplitudes(&self.parts.atoms, &self.amplitudes)
+    }
+}
+
+/// Atoms, each with the amplitudes of its columns, from the amplitudes of the columns of all of them.
+fn pair_with_amplitudes<'a>(
+    atoms: &'a [Atom],
+    amplitudes: &'a [f64],
+) -> impl Iterator<Item = (&'a Atom, &'a [f64])> {
+    atoms.iter().scan(amplitudes, |left, atom| {
+        let (own, others) = left.split_at(atom.column_count());
+        *left = others;
+        Some((atom, own))
+    })
+}
+
 /// The frames used of a record, scaled to unit standard deviation, with the colour of their noise.
 #[derive(Debug, Clone)]
 pub(crate) struct NoisyRecord {
@@ -298,12 +317,8 @@ impl NoisyRecord {
         /// exceed it.
         const MOST: f64 = 2.0;
         let largest = self.values.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-        let mut first = 0;
-        atoms.iter().any(|atom| {
-            let own = &amplitudes[first..first + atom.column_count()];
-            first += atom.column_count();
-            atom.oscillation().is_some() && own.iter().any(|a| a.abs() > MOST * largest)
-        })
+        pair_with_amplitudes(atoms, amplitudes)
+            .any(|(atom, own)| atom.oscillation().is_some() && own.iter().any(|a| a.abs() > MOST * largest))
     }
 
     /// Levenberg-Marquardt iterations for the shape parameters, with the least squares of the amplitudes in
@@ -403,20 +418,16 @@ impl NoisyRecord {
             places: (0..self.at.frames).map(|i| (i as f64 + 0.5) / self.at.frames as f64).collect(),
             frames: self.at.frames,
         };
-        let mut first = 0;
         let mut atoms = Vec::new();
         let mut rest = self.values.clone();
-        for atom in &explanation.parts.atoms {
-            let sum = |at: &FramePlaces| {
+        for (atom, amplitudes) in explanation.atoms_with_amplitudes() {
+            let sum = |at: &FramePlaces| -> Vec<f64> {
                 let columns = atom.columns(at);
-                let amplitudes = &explanation.amplitudes[first..first + columns.len()];
                 let value = |i: usize| columns.iter().zip(amplitudes).map(|(c, a)| c[i] * a).sum();
-                ((0..at.places.len()).map(value).collect::<Vec<f64>>(), columns.len())
+                (0..at.places.len()).map(value).collect()
             };
-            let (here, count) = sum(&self.at);
-            rest.iter_mut().zip(&here).for_each(|(x, y)| *x -= y);
-            atoms.push(sum(&all).0);
-            first += count;
+            rest.iter_mut().zip(sum(&self.at)).for_each(|(x, y)| *x -= y);
+            atoms.push(sum(&all));
         }
         // the trend is fitted to what the atoms leave
         let columns = self.trend_columns(explanation.parts.trend);
@@ -474,11 +485,8 @@ impl NoisyRecord {
     pub(crate) fn products_around(&self, explanation: &Explanation) -> ColumnProducts {
         let fixed = self.fix_parts(explanation.parts.trend, &[]);
         let mut columns = Vec::new();
-        let mut first = 0;
-        for atom in &explanation.parts.atoms {
+        for (atom, amplitudes) in explanation.atoms_with_amplitudes() {
             let own = atom.columns(&self.at);
-            let amplitudes = &explanation.amplitudes[first..first + own.len()];
-            first += own.len();
             let slopes = atom.derivatives(&self.at, &own, amplitudes);
             columns.extend(own.into_iter().chain(slopes));
         }

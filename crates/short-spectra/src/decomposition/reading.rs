@@ -208,15 +208,9 @@ impl Decomposition {
     }
 
     /// The oscillations along ridges with the amplitudes of their columns.
-    fn list_courses(&self) -> Vec<(&CourseAtom, &[f64])> {
-        let mut first = 0;
-        let mut found = Vec::new();
-        for atom in &self.explanation.parts.atoms {
-            let amplitudes = &self.explanation.amplitudes[first..first + atom.column_count()];
-            first += atom.column_count();
-            found.extend(atom.course().map(|course| (course, amplitudes)));
-        }
-        found
+    fn list_courses(&self) -> impl Iterator<Item = (&CourseAtom, &[f64])> {
+        let atoms = self.explanation.atoms_with_amplitudes();
+        atoms.filter_map(|(atom, amplitudes)| Some((atom.course()?, amplitudes)))
     }
 
     /// The component of an oscillation along a ridge, without a verdict.
@@ -365,10 +359,7 @@ impl Decomposition {
         }
         let (low, high) = o.cycles_range();
         let own_m = math::hypot(reading.amplitudes_m[0][0], reading.amplitudes_m[0][1]);
-        let mut first = 0;
-        self.explanation.parts.atoms.iter().any(|atom| {
-            let amplitudes = &self.explanation.amplitudes[first..first + atom.column_count()];
-            first += atom.column_count();
+        self.explanation.atoms_with_amplitudes().any(|(atom, amplitudes)| {
             atom.oscillation().is_some_and(|other| {
                 let size_m = math::hypot(amplitudes[0], amplitudes[1]) * self.scale_m;
                 size_m > MUCH_LARGER * own_m && (low - 1.0..high + 1.0).contains(&other.mean_cycles())
@@ -414,18 +405,15 @@ impl Decomposition {
         let freedoms = (self.problem.len() as f64 - (linear + shapes) as f64).max(1.0);
         let variance = self.explanation.squares / freedoms;
         let covariance = self.problem.products_around(&self.explanation).covariance() * variance;
-        let (mut first, mut row) = (0, 0);
+        let mut row = 0;
         let mut found = Vec::new();
-        for atom in &parts.atoms {
-            let (columns, parameters) = (atom.column_count(), atom.parameters().len());
-            let amplitudes = &self.explanation.amplitudes[first..first + columns];
+        for (atom, amplitudes) in self.explanation.atoms_with_amplitudes() {
+            let size = amplitudes.len() + atom.parameters().len();
             if let Some(o) = atom.oscillation() {
-                let size = columns + parameters;
                 let own = covariance.view((row, row), (size, size)).into_owned();
                 found.push(self.read_oscillation(o, amplitudes, &own, variance));
             }
-            first += columns;
-            row += columns + parameters;
+            row += size;
         }
         found
     }

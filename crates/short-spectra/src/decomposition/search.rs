@@ -20,11 +20,6 @@ const JOINT_ITERATIONS: usize = 4;
 /// Largest number of changes in a round that are fitted while the other parts stay: those with the largest
 /// estimated gain, because estimates are much faster than fits.
 const TRIED_CHANGES: usize = 5;
-/// Largest number of these changes for which all parts are then fitted together.
-const JOINTLY_FITTED: usize = 1;
-/// All parts are fitted together only for changes whose criterion is within this distance, nats, of the best
-/// change of the round: a joint fit rarely gains more.
-const NEARLY_AS_GOOD: f64 = 8.0;
 /// Smallest fall of the criterion, nats, that counts as a gain; smaller ones come from unfinished iterations.
 const LEAST_GAIN: f64 = 0.02;
 /// All parts are not fitted together for a change that raises the criterion by more than this, nats, while
@@ -226,24 +221,18 @@ impl PartSearch {
         self.rivals
             .extend(tried.iter().map(|t| Rival { atoms: t.parts.atoms.clone(), criterion: t.criterion }));
         tried.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
-        let most = tried.first().map_or(0.0, |best| best.criterion) + NEARLY_AS_GOOD;
-        let hopeful = |t: &&FittedChange| t.criterion < most && t.criterion < current.criterion + HOPELESS;
-        let combined = combine_changes(current, &tried);
-        let mut best: Option<Explanation> = None;
-        let single = tried.iter().take_while(hopeful).take(JOINTLY_FITTED).map(|t| &t.parts);
-        for parts in combined.iter().chain(single) {
-            let found = self.problem.fit_parts(parts, JOINT_ITERATIONS);
+        let best = tried.first().filter(|best| best.criterion < current.criterion + HOPELESS)?;
+        // if several changes together gain more than the best one alone, it need not be fitted
+        if let Some(parts) = combine_changes(current, &tried) {
+            let found = self.problem.fit_parts(&parts, JOINT_ITERATIONS);
             self.keep_rival(&found);
-            let is_combined = combined.is_some() && best.is_none();
-            if best.as_ref().is_none_or(|best| found.criterion < best.criterion) {
-                best = Some(found);
-            }
-            // if several changes together gain more than the best one alone, it need not be fitted
-            if is_combined && best.as_ref().is_some_and(|b| b.criterion < most - NEARLY_AS_GOOD) {
-                break;
+            if found.criterion < best.criterion {
+                return Some(found);
             }
         }
-        best
+        let found = self.problem.fit_parts(&best.parts, JOINT_ITERATIONS);
+        self.keep_rival(&found);
+        Some(found)
     }
 
     /// Uses frames again that were left out as outliers and that the parts now explain, if the criterion

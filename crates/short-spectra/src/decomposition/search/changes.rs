@@ -55,13 +55,10 @@ impl PartSearch {
     pub(super) fn list_enrichments(&mut self, current: &Explanation, fixed: &Fixed) -> Vec<Change> {
         let atoms = &current.parts.atoms;
         let mut changes = Vec::new();
-        let mut first = 0;
-        for (k, atom) in atoms.iter().enumerate() {
-            let amplitudes = current.amplitudes[first..first + atom.column_count()].to_vec();
-            first += atom.column_count();
+        for (k, (atom, amplitudes)) in current.atoms_with_amplitudes().enumerate() {
             changes.extend(self.list_course_harmonics(current, fixed, k));
             let Some(o) = atom.oscillation() else { continue };
-            for (gain, variant) in self.list_richer_variants(fixed, atom, o, &amplitudes) {
+            for (gain, variant) in self.list_richer_variants(fixed, atom, o, amplitudes) {
                 let trend = current.parts.trend;
                 changes.push(Change {
                     gain,
@@ -323,7 +320,7 @@ impl PartSearch {
             vec![self.fit_change(current, others, near.to_vec(), group.iter().map(decaying).collect())];
         if group.len() > 2 {
             let mut largest: Vec<&OscillationAtom> = group.clone();
-            let size = |o: &OscillationAtom| self.amplitude_of(current, o);
+            let size = |o: &OscillationAtom| amplitude_of(current, o);
             largest.sort_by(|a, b| size(b).total_cmp(&size(a)));
             let pair = largest[..2].iter().map(|o| Atom::Oscillation(OscillationAtom::steady(o.cycles)));
             changes.push(self.fit_change(current, others, near.to_vec(), pair.collect()));
@@ -339,18 +336,12 @@ impl PartSearch {
         }
         changes
     }
+}
 
-    /// Amplitude of an oscillation of an explanation, in scaled units; 0 if it is not a part of it.
-    fn amplitude_of(&self, current: &Explanation, o: &OscillationAtom) -> f64 {
-        let mut first = 0;
-        for atom in &current.parts.atoms {
-            if atom.oscillation() == Some(o) {
-                return math::hypot(current.amplitudes[first], current.amplitudes[first + 1]);
-            }
-            first += atom.column_count();
-        }
-        0.0
-    }
+/// Amplitude of an oscillation of an explanation, in scaled units; 0 if it is not a part of it.
+fn amplitude_of(current: &Explanation, o: &OscillationAtom) -> f64 {
+    let own = current.atoms_with_amplitudes().find(|(atom, _)| atom.oscillation() == Some(o));
+    own.map_or(0.0, |(_, amplitudes)| math::hypot(amplitudes[0], amplitudes[1]))
 }
 
 /// Whether two groups have atoms of the same kind with nearly the same frequencies.

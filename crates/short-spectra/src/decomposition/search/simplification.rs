@@ -29,13 +29,9 @@ impl PartSearch {
         let mut first = 0;
         let sizes = current.parts.atoms.iter().map(|a| a.column_count() + a.parameters().len());
         let total: usize = sizes.sum();
-        let mut amplitude = 0;
-        for (k, atom) in current.parts.atoms.iter().enumerate() {
-            let count = atom.column_count();
-            let size = count + atom.parameters().len();
-            let amplitudes = &current.amplitudes[amplitude..amplitude + count];
-            amplitude += count;
+        for (k, (atom, amplitudes)) in current.atoms_with_amplitudes().enumerate() {
             let values = [amplitudes, &atom.parameters()].concat();
+            let size = values.len();
             for variant in simpler_variants(atom) {
                 let mut atoms = current.parts.atoms.clone();
                 let is_removed = variant.atom.is_none();
