@@ -418,7 +418,7 @@ fn a_tip_that_only_friction_presses_on_leaves_the_glass_at_its_release() {
             let directions = LinkDirections::from_pose(&last.pose);
             let contact =
                 scene.linkage.friction_response(&last.pose, &directions, &head, ShoulderContact::Off);
-            // the normal force of slip is `n_free` over an indicator, at least `1 - |nu|` times the friction
+            // in slip the normal force is `n_free` over the Painlevé indicator, which is positive here
             assert!(contact.n_free < 0.0 && contact.nu.abs() * slip < 1.0, "{what}: {contact:?}");
             let flown = seen.ends.iter().filter(|s| s.mode == TipMode::Flight);
             assert!(flown.map(|s| s.tip_height_m).fold(0.0, f64::max) > 0.0, "{what}");
