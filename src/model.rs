@@ -24,12 +24,14 @@ pub mod plausibility;
 pub mod section;
 pub mod series;
 pub mod shoulder;
+mod slider;
 pub mod tangent;
 
 use friction::FrictionLaw;
 use portable_math as math;
 use serde::Serialize;
 use shoulder::{Shoulder, ShoulderContact};
+pub(crate) use slider::Slider;
 
 /// Inertial and elastic constants of a blade; the paper's letters, SI units.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

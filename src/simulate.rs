@@ -240,23 +240,23 @@ pub fn run_scene_with(scene: &Scene, effort: SolverOptions, observer: &mut impl 
 pub fn build_system(scene: &Scene) -> DrivenBlade {
     /// The angles of a wiper blade in use are 0.1 to 1 rad.
     const ANGLE_SCALE: f64 = 0.1;
-    let (slowest, _) = time_scales_rad_per_s(&scene.linkage);
-    DrivenBlade {
-        linkage: scene.linkage,
-        drive: scene.drive.clone(),
-        angle_scale: ANGLE_SCALE,
-        rate_scale: ANGLE_SCALE * slowest,
-    }
+    let (linkage, (slowest, _)) = (scene.linkage, time_scales_rad_per_s(&scene.linkage));
+    let angle_scale = linkage
+        .slider()
+        .map_or(ANGLE_SCALE, |slider| linkage.slider_pose(slider.deflection_scale_m(), 0.0).phi);
+    DrivenBlade { linkage, drive: scene.drive.clone(), angle_scale, rate_scale: angle_scale * slowest }
 }
 
-fn initial_pose(scene: &Scene) -> Option<Pose> {
+/// The pose in which a scene starts; `None` for a start in steady slip that does not exist.
+pub(crate) fn initial_pose(scene: &Scene) -> Option<Pose> {
+    let head_speed = || scene.drive.motion_at(scene.start_s).velocity_m_per_s;
     match scene.start {
         StartKind::Upright => Some(Pose { theta: 0.0, phi: 0.0, theta_rate: 0.0, phi_rate: 0.0 }),
         StartKind::State(pose) | StartKind::Airborne(FlightState { pose, .. }) => Some(pose),
-        StartKind::SteadySlide => {
-            let speed = scene.drive.motion_at(scene.start_s).velocity_m_per_s;
-            equilibrium::steady_slip_pose(&scene.linkage, speed)
+        StartKind::Slider { deflection_m, tip_velocity_m_per_s } => {
+            Some(scene.linkage.slider_pose(deflection_m, tip_velocity_m_per_s - head_speed()))
         }
+        StartKind::SteadySlide => equilibrium::steady_slip_pose(&scene.linkage, head_speed()),
     }
 }
 

@@ -154,7 +154,7 @@ fn draw_once(
     let step_s = 1.0 / (filming.frame_rate_hz * filming.steps[0] as f64);
     let count = ((filmed.run.stop_s - filmed.start_s) / step_s) as usize;
     let of_library = run_library(&filmed, flies, step_s, count)?;
-    let height_m = filmed.linkage.l1_m + filmed.linkage.l2_m;
+    let height_m = filmed.linkage.upright_height_m();
     let lean = |place: &Place| (place.tip_x_m - place.head_x_m) / height_m;
     let flips = lean(&of_library[0]) * lean(&of_library[count - 1]) < 0.0;
     let flown = of_library.iter().filter(|place| place.tip_height_m > filming.noise_m).count();

@@ -152,6 +152,9 @@ impl Observer for StopFlag<'_> {
 const COLUMNS: &str = "time_s,tip_x_m,tip_y_m,head_x_m,head_y_m,neck_angle_rad,lip_angle_rad,neck_rate_rad_per_s,\
                        lip_rate_rad_per_s,head_drop_m,tip_velocity_m_per_s,normal_force_n,friction_force_n";
 
+/// Names of the numeric columns of a run of a slider.
+const SLIDER_COLUMNS: &str = "time_s,tip_x_m,tip_y_m,head_x_m,head_y_m,deflection_m,tip_velocity_m_per_s,normal_force_n,friction_force_n";
+
 /// Results of a run: columns of the samples, contact mode of each sample, columns of the transitions, and the
 /// summary as JSON.
 type RunArrays<'py> = (Bound<'py, PyDict>, Vec<&'static str>, Bound<'py, PyDict>, String);
@@ -168,17 +171,19 @@ pub fn simulate_scene<'py>(
     let given = times_s.map(|times| times.as_array().iter().copied().collect());
     let times: Vec<f64> = given.unwrap_or_else(|| sample_times(&scene.inner).collect());
     let scene = Arc::clone(&scene.inner);
+    let is_slider = scene.linkage.is_slider();
+    let names = if is_slider { SLIDER_COLUMNS } else { COLUMNS };
     let (columns, modes, transitions, summary) = workers::run_interruptible(py, None, move |stop| {
-        let mut columns: Vec<Vec<f64>> =
-            COLUMNS.split(',').map(|_| Vec::with_capacity(times.len())).collect();
+        let mut columns: Vec<Vec<f64>> = names.split(',').map(|_| Vec::with_capacity(times.len())).collect();
         let mut modes = Vec::with_capacity(times.len());
         let sampler = SampleObserver::new(times.into_iter(), |sample: &ModelSample| {
             let ModelSample { time_s, pose, head_drop_m, tip_velocity_m_per_s, normal_n, friction_n, .. } =
                 *sample;
             let [tip_x, tip_y, head_x, head_y] = recorded_points_m(&scene.linkage, sample);
             let angles = [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate];
-            let rest = [head_drop_m, tip_velocity_m_per_s, normal_n, friction_n];
-            let row = [time_s, tip_x, tip_y, head_x, head_y].into_iter().chain(angles).chain(rest);
+            let own = if is_slider { vec![tip_x - head_x] } else { [&angles[..], &[head_drop_m]].concat() };
+            let rest = [tip_velocity_m_per_s, normal_n, friction_n];
+            let row = [time_s, tip_x, tip_y, head_x, head_y].into_iter().chain(own).chain(rest);
             columns.iter_mut().zip(row).for_each(|(column, value)| column.push(value));
             modes.push(sample.mode.name());
         });
@@ -192,7 +197,7 @@ pub fn simulate_scene<'py>(
     })?;
     let summary = summary.map_err(|error| errors::internal_error(py, error))?;
     let samples = PyDict::new(py);
-    for (name, column) in COLUMNS.split(',').zip(columns) {
+    for (name, column) in names.split(',').zip(columns) {
         samples.set_item(name, PyArray1::from_vec(py, column))?;
     }
     let events = PyDict::new(py);

@@ -215,8 +215,7 @@ impl Inspection {
         let kept =
             file.iter().filter_map(|file| file.source.as_ref()).flat_map(|source| source.findings.clone());
         let motion = quality::measure_motion(recording, &measurements, &instants);
-        let height =
-            |scene: &Scene| quality::check_scene_height(&motion, scene.linkage.l1_m + scene.linkage.l2_m);
+        let height = |scene: &Scene| quality::check_scene_height(&motion, scene.linkage.upright_height_m());
         let import: Vec<QualityFinding> =
             scene.and_then(height).into_iter().chain(more).chain(kept).collect();
         let findings = quality::collect_findings(recording, &measurements, &optics, &instants, &import);

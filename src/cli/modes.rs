@@ -19,11 +19,24 @@ impl ModesArgs {
     pub(crate) fn run(&self, global: &GlobalArgs) -> Outcome {
         let scene = read_scene(&self.scene)?;
         let blade = &scene.linkage;
+        if blade.is_slider() && self.figures.folder.is_some() {
+            let problem = "found it with a slider, whose one mode has no shape to draw; leave it out";
+            return Err(Failure::at("--figures", problem));
+        }
         self.figures.check_folder(&FIGURES, self.overwrite)?;
         print_warnings(&self.scene, &scene.find_implausible(), global);
-        let names = body_frequencies(blade);
         print_line!("{}", scene.title());
         print_line!("");
+        if blade.is_slider() {
+            print_line!("mode of the slider on its spring, no friction; while it sticks it has none");
+            print_line!("  undamped Hz    damped Hz     ratio");
+            for mode in natural_modes(blade, TipConstraint::Free, false) {
+                let [undamped, damped, ratio] = mode_numbers(&mode);
+                print_line!("  {undamped:>11} {damped:>12} {ratio:>9}");
+            }
+            return Ok(CommandOutcome::Done);
+        }
+        let names = body_frequencies(blade);
         print_line!("natural frequencies of the single parts");
         print_line!("  head  sqrt(k0/M)/2pi        {:10.3} Hz", names.head_hz);
         print_line!("  neck  sqrt(k1/m_theta)/2pi  {:10.3} Hz", names.neck_hz);
@@ -47,11 +60,19 @@ impl ModesArgs {
 /// File names of the figures.
 const FIGURES: [&str; 2] = ["tip-compliance", "mode-shapes"];
 
-fn print_mode(tip: &str, mode: &NaturalMode) {
+/// Undamped and damped frequency, Hz, and damping ratio as texts.
+fn mode_numbers(mode: &NaturalMode) -> [String; 3] {
     let number = |value: Option<f64>, digits: usize, none: &str| {
         value.map_or(none.to_owned(), |v| format!("{v:.digits$}"))
     };
-    let undamped = number(mode.frequency_hz, 3, "unstable");
-    let (damped, ratio) = (number(mode.damped_frequency_hz, 3, "-"), number(mode.damping_ratio, 4, "-"));
+    [
+        number(mode.frequency_hz, 3, "unstable"),
+        number(mode.damped_frequency_hz, 3, "-"),
+        number(mode.damping_ratio, 4, "-"),
+    ]
+}
+
+fn print_mode(tip: &str, mode: &NaturalMode) {
+    let [undamped, damped, ratio] = mode_numbers(mode);
     print_line!("  {tip:12} {undamped:>12} {damped:>12} {ratio:>9} {:>9.3}", mode.lip_over_neck);
 }

@@ -27,9 +27,14 @@ const COLUMNS: [(Channel, &str); 7] = [
     (Channel::TipVelocity, "tip_velocity_m_per_s"),
 ];
 
+/// Columns of a slider that have derivatives.
+const SLIDER_COLUMNS: [(Channel, &str); 2] =
+    [(Channel::TipX, "tip_x_m"), (Channel::TipVelocity, "tip_velocity_m_per_s")];
+
 /// Parameters with respect to which a run is differentiated.
 pub(crate) struct SensitivityRequest {
     names: Vec<String>,
+    columns: &'static [(Channel, &'static str)],
     seeds: TangentSeeds,
 }
 
@@ -60,7 +65,8 @@ impl SensitivityRequest {
         let directions: Vec<TangentDirection> =
             names.iter().map(|name| TangentDirection::from_name(name)).collect();
         let seeds = TangentSeeds::new(scene, &directions).map_err(Failure::input)?;
-        Ok(Some(Self { names: names.to_vec(), seeds }))
+        let columns = if scene.linkage.is_slider() { &SLIDER_COLUMNS[..] } else { &COLUMNS };
+        Ok(Some(Self { names: names.to_vec(), columns, seeds }))
     }
 
     /// Runs the scene again with derivatives, and writes these row by row.
@@ -74,10 +80,11 @@ impl SensitivityRequest {
         let by = |column: &str| -> String {
             self.names.iter().fold(String::new(), |row, name| row + &format!(",d_{column}_d_{name}"))
         };
-        let columns: String = COLUMNS.iter().map(|(_, column)| by(column)).collect();
+        let columns: String = self.columns.iter().map(|(_, column)| by(column)).collect();
         let [samples, events] = SENSITIVITY_FILES;
         let events_header = format!("{EVENTS_HEADER}{}", by("time_s"));
         let mut rows = SensitivityTables {
+            columns: self.columns,
             samples: StreamedTable::new(place.create_file(samples)?, &format!("time_s{columns}"), 1),
             events: StreamedTable::new(place.create_file(events)?, &events_header, 1),
             times: times.peekable(),
@@ -90,6 +97,7 @@ impl SensitivityRequest {
 
 /// Writes derivatives to the tables of samples and of events.
 struct SensitivityTables<I: Iterator<Item = f64>> {
+    columns: &'static [(Channel, &'static str)],
     samples: StreamedTable,
     events: StreamedTable,
     times: Peekable<I>,
@@ -100,13 +108,13 @@ struct SensitivityTables<I: Iterator<Item = f64>> {
 
 impl<I: Iterator<Item = f64>> TangentObserver for SensitivityTables<I> {
     fn observe_segment(&mut self, piece: &TangentSegment<'_>) {
-        let Self { samples, times, row, .. } = self;
+        let Self { columns, samples, times, row, .. } = self;
         while let Some(t) = times.next_if(|&t| t <= piece.end_s) {
             let weights = piece.weights_at(t.max(piece.start_s));
             samples.add_row(|text| {
                 let _ = write!(text, "{t}"); // writing to a String cannot fail
-                for (channel, _) in COLUMNS {
-                    piece.channel_derivatives(channel, &weights, row);
+                for (channel, _) in *columns {
+                    piece.channel_derivatives(*channel, &weights, row);
                     push_numbers(text, row.len(), piece.is_known.then_some(row));
                 }
                 text.push('\n');

@@ -9,8 +9,8 @@ use super::sensitivities::{self, SensitivityRequest};
 use crate::figures::motion;
 use crate::recording::files::{HEADER, push_trace_row};
 use crate::simulate::outputs::{
-    EVENTS_HEADER, EnergyAudit, STATE_HEADER, SampleObserver, SimulationSummary, push_event_row,
-    push_state_row, recorded_points_m, sample_times,
+    EVENTS_HEADER, EnergyAudit, SampleObserver, SimulationSummary, push_event_row, push_state_row,
+    recorded_points_m, sample_times, state_header,
 };
 use crate::simulate::scene::Scene;
 use crate::simulate::scene::contact::OutputTable;
@@ -90,13 +90,13 @@ fn run_to_files(
     };
     // a trace with only one row would have no frame rate
     let mut trace = table(OutputTable::Trace, "trace.csv", HEADER, 2)?;
-    let mut state = table(OutputTable::State, "state.csv", STATE_HEADER, 1)?;
+    let mut state = table(OutputTable::State, "state.csv", state_header(scene), 1)?;
     let mut events = table(OutputTable::Events, "events.csv", EVENTS_HEADER, 1)?;
     let wanted = trace.is_some() || state.is_some();
     let sampler = SampleObserver::new(sample_times(scene).take_while(|_| wanted), |sample: &ModelSample| {
         let points_m = recorded_points_m(&scene.linkage, sample).map(Some);
         trace.iter_mut().for_each(|table| table.add_row(|row| push_trace_row(row, sample.time_s, points_m)));
-        state.iter_mut().for_each(|table| table.add_row(|row| push_state_row(row, sample)));
+        state.iter_mut().for_each(|table| table.add_row(|row| push_state_row(row, &scene.linkage, sample)));
     });
     let mut audit = EnergyAudit::default();
     let late = "the run did not stop in time, and nothing of it is written";

@@ -129,7 +129,7 @@ const RECORDED_START: [&str; 2] =
 const STEADY_START: [&str; 2] =
     ["The run starts where the tip slides evenly, in the equilibrium of that speed.", "steady-slide"];
 
-fn add_run(
+pub(super) fn add_run(
     text: CommentedToml,
     [comment, kind]: [&str; 2],
     [start_s, stop_s]: [f64; 2],
@@ -148,7 +148,7 @@ fn add_run(
 // The scene of a fit, with the estimates of its parameters.
 
 /// Names of the tables of numbers, in the order of a scene.
-const TABLES: [&str; 3] = ["blade", "shoulder", "friction"];
+const TABLES: [&str; 4] = ["blade", "slider", "shoulder", "friction"];
 /// Number of significant digits of a prior and of the ends of an interval.
 const DIGITS: usize = 4;
 
@@ -231,11 +231,13 @@ fn write_scene_toml(
         }
     }
     text = add_drive(text.add_table("drive"), scene, recording, &note)?;
-    text = text.add_table("contact").add_word("loss", scene.loss).add_word("jam", scene.jam);
+    if !scene.linkage.is_slider() {
+        text = text.add_table("contact").add_word("loss", scene.loss).add_word("jam", scene.jam);
+    }
     if let Some((_, restitution)) = scene.written_values().find(|(name, _)| *name == "contact.restitution") {
         text = text.add_number("restitution", restitution);
     }
-    text = add_start(text.add_table("start").add_number("time_s", scene.start_s), scene.start)?;
+    text = add_start(text.add_table("start").add_number("time_s", scene.start_s), scene)?;
     let run = &scene.run;
     text = text.add_table("run").add_numbers(&[
         ("stop_s", run.stop_s),
@@ -268,7 +270,7 @@ fn add_drive(
 ) -> Option<CommentedToml> {
     match &scene.drive {
         Drive::Recorded(_) => Some(text.add_text("recording", recording?)),
-        Drive::Uniform { .. } => None,
+        Drive::Uniform { speed_m_per_s } => Some(text.add_number("speed_m_per_s", *speed_m_per_s)),
         Drive::Cosine { amplitude_m, frequency_hz, delay_s } => {
             let text = text
                 .add_comments(note("drive.amplitude_m"))
@@ -280,8 +282,11 @@ fn add_drive(
     }
 }
 
-fn add_start(text: CommentedToml, start: StartKind) -> Option<CommentedToml> {
-    match start {
+fn add_start(text: CommentedToml, scene: &Scene) -> Option<CommentedToml> {
+    match scene.start {
+        StartKind::Upright | StartKind::State(_) if scene.linkage.is_slider() => {
+            add_slider_start(text, scene.slider_state()?)
+        }
         StartKind::Upright => Some(text.add_text("kind", "upright")),
         StartKind::SteadySlide => Some(text.add_text("kind", "steady-slide")),
         StartKind::State(pose) => Some(text.add_text("kind", "state").add_numbers(&[
@@ -290,8 +295,22 @@ fn add_start(text: CommentedToml, start: StartKind) -> Option<CommentedToml> {
             ("neck_rate_rad_per_s", pose.theta_rate),
             ("lip_rate_rad_per_s", pose.phi_rate),
         ])),
+        StartKind::Slider { deflection_m, tip_velocity_m_per_s } => {
+            add_slider_start(text, [deflection_m, tip_velocity_m_per_s])
+        }
         StartKind::Airborne(_) => None,
     }
+}
+
+/// Adds the deflection of a slider, m, and its velocity, m/s.
+fn add_slider_start(
+    text: CommentedToml,
+    [deflection_m, velocity_m_per_s]: [f64; 2],
+) -> Option<CommentedToml> {
+    Some(
+        text.add_text("kind", "state")
+            .add_numbers(&[("deflection_m", deflection_m), ("tip_velocity_m_per_s", velocity_m_per_s)]),
+    )
 }
 
 #[cfg(test)]

@@ -91,7 +91,7 @@ fn draw_receptance_panel(blade: &Linkage, sides: &[bool], (low, high): (f64, f64
 fn draw_mode_shape(blade: &Linkage, on_shoulder: bool, number: usize, mode: &NaturalMode) -> Panel {
     let largest = mode.lip_over_neck.abs().max(1.0);
     let (neck, lip) = (SWING / largest, SWING * mode.lip_over_neck / largest);
-    let half_mm = HALF_WIDTH * 1e3 * (blade.l1_m + blade.l2_m);
+    let half_mm = HALF_WIDTH * 1e3 * blade.upright_height_m();
     let line = |sign: f64| {
         let (l1, l2) = (1e3 * blade.l1_m, 1e3 * blade.l2_m);
         let head = (0.0, l1 + l2);

@@ -37,7 +37,11 @@ fn motion_traces(motion: &RunMotion) -> MotionTraces {
         tip_x_m: column(|s| s.tip_x_m),
         head_x_m: column(|s| s.head_x_m),
         deflection_m: column(|s| s.tip_x_m - s.head_x_m),
-        head_drop_m: column(|s| s.head_drop_m),
+        head_drop_m: if motion.linkage.is_slider() {
+            vec![None; motion.samples.len()]
+        } else {
+            column(|s| s.head_drop_m)
+        },
     }
 }
 

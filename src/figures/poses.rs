@@ -98,7 +98,7 @@ fn first_slip(motion: &RunMotion, released: usize) -> Option<usize> {
 
 /// Head, hinge and tip: each with its position along the sweep and its height above the glass, m.
 pub(crate) fn joint_positions(linkage: &Linkage, sample: &ModelSample) -> [(f64, f64); 3] {
-    let head = (sample.head_x_m, linkage.l1_m + linkage.l2_m - sample.head_drop_m);
+    let head = (sample.head_x_m, linkage.upright_height_m() - sample.head_drop_m);
     let below = |(x, y): (f64, f64), angle: f64, length: f64| {
         (x + length * math::sin(angle), y - length * math::cos(angle))
     };
@@ -283,7 +283,7 @@ impl ArrowScale {
 }
 
 fn draw_panel(shown: &PoseSequence, longest: &ArrowScale, pose: &ReversalPose, first: bool) -> Panel {
-    let length_m = shown.linkage.l1_m + shown.linkage.l2_m;
+    let length_m = shown.linkage.upright_height_m();
     let unit_mm = 1e3 * length_m;
     // positions along the sweep relative to the head, and heights above the glass, in lengths of the upright
     // blade

@@ -7,13 +7,12 @@ use crate::model::Pose;
 use crate::model::modes::{TipConstraint, natural_modes, time_scales_rad_per_s};
 use crate::recording::Recording;
 use crate::simulate::drive::Drive;
-use crate::simulate::equilibrium::steady_slip_pose;
 use crate::simulate::outputs::LargestTilt;
 use crate::simulate::scene::{Scene, StartKind};
 use crate::simulate::twin::{
     Camera, TrackingModel, TwinView, TwinViewError, add_tracking_noise, film_scene, film_scene_with_observer,
 };
-use crate::simulate::{Observer, RunResult, RunStatus, SolverOptions};
+use crate::simulate::{Observer, RunResult, RunStatus, SolverOptions, initial_pose};
 use portable_math::StandardNormal;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -259,7 +258,10 @@ impl Model for SceneModel {
         match self.conditions.get(condition).map(|condition| &condition.scene) {
             Some(Scene { drive: Drive::Recorded(head), start_s, .. }) => start_s - head.span_s()[0],
             // a run that starts in the air or in a given pose cannot start earlier
-            Some(Scene { start: StartKind::Airborne(_) | StartKind::State(_), .. }) => 0.0,
+            Some(Scene {
+                start: StartKind::Airborne(_) | StartKind::State(_) | StartKind::Slider { .. },
+                ..
+            }) => 0.0,
             _ => f64::INFINITY,
         }
     }
@@ -267,14 +269,7 @@ impl Model for SceneModel {
 
 /// The pose in which a scene starts; `None` for a start in the air.
 fn start_pose(scene: &Scene) -> Option<Pose> {
-    match scene.start {
-        StartKind::SteadySlide => {
-            steady_slip_pose(&scene.linkage, scene.drive.motion_at(scene.start_s).velocity_m_per_s)
-        }
-        StartKind::State(pose) => Some(pose),
-        StartKind::Upright => Some(Pose { theta: 0.0, phi: 0.0, theta_rate: 0.0, phi_rate: 0.0 }),
-        StartKind::Airborne(_) => None,
-    }
+    initial_pose(scene).filter(|_| !matches!(scene.start, StartKind::Airborne(_)))
 }
 
 fn view_failure(scene: &Scene, error: &TwinViewError) -> RunFailure {

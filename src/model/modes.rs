@@ -57,9 +57,13 @@ pub(crate) fn body_frequencies(blade: &Linkage) -> BodyFrequencies {
 }
 
 /// Modes about the upright position, in order of rising frequency. With `on_shoulder`, stiffness and damping
-/// of the shoulder are added to those of the neck.
+/// of the shoulder are added to those of the neck. A slider has one mode while it slides and none while it is
+/// held.
 #[must_use]
 pub fn natural_modes(blade: &Linkage, tip: TipConstraint, on_shoulder: bool) -> Vec<NaturalMode> {
+    if let Some(slider) = blade.slider() {
+        return Vec::from_iter((tip == TipConstraint::Free).then(|| slider.mode()));
+    }
     let (m, c, k) = linearised_matrices(blade, on_shoulder);
     match tip {
         TipConstraint::Free => free_modes(&m, &c, &k),
@@ -86,9 +90,13 @@ pub fn tip_compliance(blade: &Linkage, on_shoulder: bool, frequency_hz: f64) -> 
     (d * (l1 * l1) - b * (2.0 * l1 * l2) + a * (l2 * l2)) / (a * d - b * b)
 }
 
-/// Lower and higher natural angular frequency of the links, without preload and damping, rad/s.
+/// Lower and higher natural angular frequency of the links, without preload and damping, rad/s. For a slider,
+/// both are the rate of its fastest motion.
 #[must_use]
 pub fn time_scales_rad_per_s(blade: &Linkage) -> (f64, f64) {
+    if let Some(slider) = blade.slider() {
+        return (slider.rate_rad_per_s(), slider.rate_rad_per_s());
+    }
     let unloaded = Linkage { preload_displacement_m: 0.0, ..*blade };
     let (m, _, k) = linearised_matrices(&unloaded, false);
     let (low, high) = squared_frequencies(&m, &k);
@@ -150,7 +158,7 @@ fn damped_pairs(m: &Matrix2<f64>, c: &Matrix2<f64>, k: &Matrix2<f64>) -> Vec<(f6
     if pairs.len() == 2 { pairs } else { Vec::new() }
 }
 
-fn single_mode(m: f64, c: f64, k: f64, lip_over_neck: f64) -> NaturalMode {
+pub(super) fn single_mode(m: f64, c: f64, k: f64, lip_over_neck: f64) -> NaturalMode {
     let stable = k > 0.0;
     let ratio = c / (2.0 * (k.max(0.0) * m).sqrt());
     let oscillates = stable && ratio < 1.0;

@@ -89,7 +89,12 @@ pub enum ParameterQuantity {
     BackwardRatio,
     DriveAmplitude,
     DriveFrequency,
+    DriveSpeed,
     Restitution,
+    SliderMass,
+    SliderStiffness,
+    SliderDamping,
+    NormalForce,
 }
 
 /// One row of the table of parameters.
@@ -171,7 +176,12 @@ table! {
     "friction.backward_ratio" "rb" "1" BackwardRatio Some(1.0), Positive, Log, "ratio of friction towards -v to friction towards +v";
     "drive.amplitude_m" "a" "m" DriveAmplitude None, Positive, Log, "half the stroke of the head";
     "drive.frequency_hz" "f" "Hz" DriveFrequency None, Positive, Log, "strokes there and back a second";
+    "drive.speed_m_per_s" "vd" "m/s" DriveSpeed None, Within(-100.0, 100.0), Linear, "constant speed of the head";
     "contact.restitution" "e" "1" Restitution Some(0.0), Within(0.0, 1.0), Linear, "normal restitution of a landing";
+    "slider.mass_kg" "m" "kg" SliderMass None, Positive, Log, "mass of the slider";
+    "slider.stiffness_n_per_m" "k" "N/m" SliderStiffness None, NotNegative, Log, "stiffness of the spring between head and slider";
+    "slider.damping_n_s_per_m" "d" "N s/m" SliderDamping Some(0.0), NotNegative, Log, "damping between head and slider";
+    "slider.normal_force_n" "N" "N" NormalForce None, Positive, Log, "constant force of the slider on the surface";
 }
 
 /// Finds the row of the parameter with this name.
@@ -236,6 +246,9 @@ pub(crate) fn damping_from_ratio(ratio: f64, stiffness: f64, inertia: f64) -> f6
 pub(crate) fn convert_value(name: &str, blade: &Linkage) -> Option<f64> {
     let (mass, theta, phi) = (blade.mass_kg, blade.m_theta, blade.m_phi);
     let (table, key) = name.split_once('.')?;
+    if let Some(slider) = blade.slider() {
+        return (name == "slider.damping_n_s_per_m").then_some(slider.spring.damping);
+    }
     let (part, kind) = if table == "shoulder" { (table, key) } else { key.split_once('_')? };
     let (Spring { stiffness, damping }, inertia) = match part {
         "head" | "preload" => (blade.head, mass),
@@ -321,8 +334,13 @@ impl ParameterQuantity {
             }
             Self::BackwardRatio => "side force at the same steady speed in both directions",
             Self::DriveAmplitude => "half the way of the head from one end of the stroke to the other",
+            Self::DriveSpeed => "from the positions of the head over time",
             Self::DriveFrequency => "one over the time of a stroke there and back",
             Self::Restitution => "0 for a lip that does not bounce",
+            Self::SliderMass => "weigh everything that moves with the slider",
+            Self::SliderStiffness => "pull the slider off the surface and read force over way",
+            Self::SliderDamping => "from a ring-down off the surface: twice the mass times the rate of decay",
+            Self::NormalForce => "weight and load of the slider, or the reading of a force sensor below it",
         }
     }
 }

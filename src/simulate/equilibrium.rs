@@ -81,7 +81,14 @@ pub(super) fn shoulder_contact(linkage: &Linkage, theta: f64) -> ShoulderContact
 
 /// The equilibrium for one coefficient of friction. Each iteration keeps the side of the shoulder fixed,
 /// because Newton's steps could otherwise cycle across the kink at the corner of the shoulder.
-fn solve_for_load(linkage: &Linkage, mu: f64, angles: Pair) -> Option<Pair> {
+pub(super) fn solve_for_load(linkage: &Linkage, mu: f64, angles: Pair) -> Option<Pair> {
+    if let Some(slider) = linkage.slider() {
+        let deflection_m = -mu * slider.normal_force_n / slider.spring.stiffness;
+        return deflection_m.is_finite().then(|| {
+            let pose = linkage.slider_pose(deflection_m, 0.0);
+            Vector2::new(pose.theta, pose.phi)
+        });
+    }
     let here = shoulder_contact(linkage, angles[0]);
     let sides = [here, ShoulderContact::Off, ShoulderContact::Forward, ShoulderContact::Backward];
     sides.into_iter().find_map(|side| {
@@ -144,6 +151,10 @@ fn moment_jacobian(linkage: &Linkage, mu: f64, angles: &Pair, side: ShoulderCont
 /// Angles of neck and lip of a blade at rest, with whatever friction force equilibrium requires, for which
 /// the tip is at the distance `lean` from the head along the sweep. They are used if the drop is not tracked.
 pub(crate) fn equilibrium_angles(linkage: &Linkage, lean: f64) -> Option<[f64; 2]> {
+    if linkage.is_slider() {
+        let Pose { theta, phi, .. } = linkage.slider_pose(lean, 0.0);
+        return Some([theta, phi]);
+    }
     /// Largest neck angle, rad, that is tried.
     const LARGEST_RAD: f64 = 0.7;
     /// Number of neck angles that are tried.

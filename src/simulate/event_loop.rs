@@ -11,7 +11,7 @@ use super::phases::{
     DrivenBlade, GUARDS, JAMS, LAW_PIECE_ENDS, LEVEL_GUARDS, SHOULDER_GUARDS, SLIP_CONTACT_LOST,
     STICK_CONTACT_LOST, SlipPhase, StickPhase, TIP_STOPS, TaylorMotion, mode_after_release, pose_from_states,
 };
-use super::scene::{Scene, StartKind};
+use super::scene::{Drive, Scene, StartKind};
 use super::solution_segment::{SegmentSolution, SolutionSegment};
 use super::{Impact, IntegrationMethod, Observer, RunResult, RunStatus, SolverOptions, Transition};
 use super::{TransitionCause, initial_pose};
@@ -210,11 +210,12 @@ impl<'a> EventLoop<'a> {
         }
         let phase = StickPhase::from_pose(self.system, self.t, pose, self.lean);
         let start = PhaseStart { t: self.t, y: phase.free_states(pose), zero_order, step: self.steps[0] };
+        let most_s = self.longest_stick_step_s();
         let (watch, drive, stop) = (&mut *self.watch, &self.system.drive, self.scene.run.stop_s);
         let end = integrate_phase(
             &phase,
             start,
-            |t| drive.horizon(t, stop),
+            |t| drive.horizon(t, stop).min(t + most_s),
             &self.effort,
             &mut self.rooms.0,
             &mut self.work,
@@ -230,6 +231,21 @@ impl<'a> EventLoop<'a> {
             self.watch.watch_guard(guard, &self.rooms.0.tape);
         }
         self.decide_after_stick(end.cause, pose)
+    }
+
+    /// Longest step of stick, s. While a slider sticks, no state changes, so that error control does not limit
+    /// the steps of a method without series, and its guards would be seen too rarely.
+    fn longest_stick_step_s(&self) -> f64 {
+        /// Fraction of the shorter of the periods of slider and drive.
+        const SHARE: f64 = 0.02;
+        if self.effort.method == IntegrationMethod::Taylor || !self.system.linkage.is_slider() {
+            return f64::INFINITY;
+        }
+        let drive_s = match self.system.drive {
+            Drive::Cosine { frequency_hz, .. } => 1.0 / frequency_hz,
+            _ => f64::INFINITY,
+        };
+        SHARE * drive_s.min(self.shortest_period_s)
     }
 
     /// Integrates stick by the fixed-step scheme.

@@ -262,7 +262,9 @@ impl SimulationSummary {
 /// Names of the parts of the model that the scene uses.
 pub(crate) fn model_parts(scene: &Scene) -> Vec<&'static str> {
     let Linkage { head, neck, lip, friction, shoulder, .. } = &scene.linkage;
+    let is_slider = scene.linkage.is_slider();
     let parts = [
+        (is_slider, "slider"),
         (true, "stick"),
         (true, "slip"),
         (scene.loss == ContactLossRule::Fly, "flight"),
@@ -272,16 +274,25 @@ pub(crate) fn model_parts(scene: &Scene) -> Vec<&'static str> {
         (shoulder.is_some_and(|s| s.damping_n_m_s_per_rad > 0.0), "shoulder damping"),
         (head.damping > 0.0, "head damping"),
         (neck.damping > 0.0, "neck damping"),
-        (lip.damping > 0.0, "lip damping"),
+        (lip.damping > 0.0 && !is_slider, "lip damping"),
+        (lip.damping > 0.0 && is_slider, "slider damping"),
         (matches!(scene.drive, Drive::Cosine { .. }), "cosine drive"),
+        (matches!(scene.drive, Drive::Uniform { .. }), "constant speed"),
         (matches!(scene.drive, Drive::Recorded(_)), "recorded drive"),
         (scene.start == StartKind::SteadySlide, "steady-slide start"),
     ];
     parts.into_iter().filter(|(active, _)| *active).map(|(_, name)| name).collect()
 }
 
-pub(crate) const STATE_HEADER: &str = "time_s,neck_angle_rad,lip_angle_rad,neck_rate_rad_per_s,lip_rate_rad_per_s,head_drop_m,tip_velocity_m_per_s,normal_force_n,friction_force_n,mode";
+/// Header of `state.csv` of a slider.
+const SLIDER_HEADER: &str = "time_s,deflection_m,tip_velocity_m_per_s,normal_force_n,friction_force_n,mode";
+const BLADE_HEADER: &str = "time_s,neck_angle_rad,lip_angle_rad,neck_rate_rad_per_s,lip_rate_rad_per_s,head_drop_m,tip_velocity_m_per_s,normal_force_n,friction_force_n,mode";
 pub(crate) const EVENTS_HEADER: &str = "time_s,from,to,cause";
+
+/// Header of `state.csv` of a scene.
+pub(crate) fn state_header(scene: &Scene) -> &'static str {
+    if scene.linkage.is_slider() { SLIDER_HEADER } else { BLADE_HEADER }
+}
 
 /// Times of the sampled outputs of a scene, s.
 pub fn sample_times(scene: &Scene) -> impl Iterator<Item = f64> + use<> {
@@ -293,23 +304,29 @@ pub fn sample_times(scene: &Scene) -> impl Iterator<Item = f64> + use<> {
 
 /// Coordinates of a sample as in a recording, m: tip x, tip y, head x, head y.
 ///
-/// The origin is the position of the head of the upright blade; the glass is at `y = -(l1 + l2)`.
+/// The origin is the position of the head of the upright blade; the glass is at `y = -(l1 + l2)`. The heights
+/// of a slider are zero.
 #[must_use]
 pub fn recorded_points_m(linkage: &Linkage, sample: &ModelSample) -> [f64; 4] {
-    let glass_y_m = -(linkage.l1_m + linkage.l2_m);
+    if linkage.is_slider() {
+        return [sample.tip_x_m, 0.0, sample.head_x_m, 0.0];
+    }
+    let glass_y_m = -linkage.upright_height_m();
     [sample.tip_x_m, glass_y_m + sample.tip_height_m, sample.head_x_m, -sample.head_drop_m]
 }
 
 /// Appends a sample as a row of `state.csv`.
-pub fn push_state_row(text: &mut String, sample: &ModelSample) {
+pub fn push_state_row(text: &mut String, linkage: &Linkage, sample: &ModelSample) {
     let ModelSample { time_s, pose, head_drop_m, tip_velocity_m_per_s, normal_n, friction_n, mode, .. } =
         sample;
-    let [theta, phi, dt, dp] = [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate];
+    let _ = if linkage.is_slider() {
+        write!(text, "{time_s},{:e}", sample.tip_x_m - sample.head_x_m)
+    } else {
+        let [theta, phi, dt, dp] = [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate];
+        write!(text, "{time_s},{theta:e},{phi:e},{dt:e},{dp:e},{head_drop_m:e}")
+    };
     let mode = mode.name();
-    let _ = writeln!(
-        text,
-        "{time_s},{theta:e},{phi:e},{dt:e},{dp:e},{head_drop_m:e},{tip_velocity_m_per_s:e},{normal_n:e},{friction_n:e},{mode}"
-    );
+    let _ = writeln!(text, ",{tip_velocity_m_per_s:e},{normal_n:e},{friction_n:e},{mode}");
 }
 
 /// Appends a transition as a row of `events.csv`; the time has 17 significant digits.

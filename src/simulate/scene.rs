@@ -1,4 +1,4 @@
-//! Scenes: a blade, its friction, its drive and the settings of a run, read from `scene.toml` and validated.
+//! Scenes: a blade or a slider, its friction, its drive and the settings of a run, read from `scene.toml` and validated.
 
 mod as_written;
 pub mod contact;
@@ -11,7 +11,7 @@ pub use super::drive::Drive;
 use super::drive::{HeadSpline, UNCERTAIN_END_S, even_motion_start_s, smooth_head_motion};
 use crate::model::Linkage;
 use crate::model::modes::time_scales_rad_per_s;
-use crate::model::parameters::{self, ModelParameter, PARAMETERS};
+use crate::model::parameters::{self, ModelParameter, PARAMETERS, ParameterQuantity};
 use crate::model::plausibility::{self, PlausibilityFinding};
 use crate::recording::Recording;
 use crate::simulate::scene::contact::{ContactLossRule, JamRule};
@@ -19,7 +19,10 @@ use crate::simulate::scene::error::{SceneError, key_error};
 use crate::toml_file;
 use as_written::SceneFile;
 use linkage::{build_linkage, linkage_constants};
-use numbers::{SceneReader, check_complete, check_law_key, check_range, find_known_parameter};
+use numbers::{
+    SceneReader, check_complete, check_law_key, check_range, find_known_parameter, of_other_mechanism,
+};
+use run::foreign_key;
 pub use run::{MOST_EVALUATIONS, RunSettings, StartKind, check_tolerance};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -104,30 +107,42 @@ impl Scene {
         let written: SceneFile = toml_file::parse_toml(file, text)?;
         toml_file::check_format(file, written.format)?;
         let mut reader = SceneReader { file, text, values: BTreeMap::new() };
-        reader.read_table("blade", written.blade)?;
+        let is_slider = written.slider.is_some();
+        let tables_of_blade = [("blade", written.blade.is_some()), ("shoulder", written.shoulder.is_some())];
+        let tables_of_blade = tables_of_blade.into_iter().chain([("contact", written.contact.is_some())]);
+        if let Some((table, _)) = tables_of_blade.into_iter().find(|(_, given)| is_slider && *given) {
+            return Err(foreign_key(file, table, is_slider));
+        }
+        if !is_slider && written.blade.is_none() {
+            let advice = "add the table of the blade, or of a slider";
+            return Err(key_error(file, "blade", "nothing", "[blade] or [slider]", advice));
+        }
+        reader.read_table("blade", written.blade.unwrap_or_default())?;
+        reader.read_table("slider", written.slider.unwrap_or_default())?;
         let has_shoulder = written.shoulder.is_some();
         reader.read_table("shoulder", written.shoulder.unwrap_or_default())?;
+        let contact = written.contact.unwrap_or_default();
         let law = reader.read_friction(written.friction)?;
         let recorded = reader.read_drive(&written.drive)?;
         let delay_s = reader.read_delay_s(&written.drive)?;
-        reader.read_number("contact.restitution", written.contact.restitution)?;
+        reader.read_number("contact.restitution", contact.restitution)?;
         let values = reader.values;
-        check_complete(file, &values, has_shoulder, recorded.is_some(), &law)?;
-        let (start_s, start) = run::check_start(file, &written.start)?;
+        check_complete(file, &values, [is_slider, has_shoulder, recorded.is_some()], &law)?;
+        let (start_s, start) = run::check_start(file, &written.start, is_slider)?;
         let run = run::check_run(file, &written.run, start_s)?;
         let linkage = build_linkage(file, &values, has_shoulder, law)?;
         run::check_work_limit(file, &run, start_s, time_scales_rad_per_s(&linkage).1)?;
         let drive = match recorded {
             Some((place, path)) => recorded_drive(&place, recording(&path), [start_s, run.stop_s])?,
-            None => cosine_drive(&values, delay_s),
+            None => written_drive(&values, delay_s),
         };
         Ok(Self {
             file: file.to_owned(),
             title: written.title,
             values,
             has_shoulder,
-            loss: written.contact.loss,
-            jam: written.contact.jam,
+            loss: contact.loss,
+            jam: contact.jam,
             drive,
             start_s,
             start,
@@ -165,8 +180,8 @@ impl Scene {
         scene.values = self.values_with(parameter, value);
         scene.linkage =
             build_linkage(&self.file, &scene.values, self.has_shoulder, self.linkage.friction.shape)?;
-        if let Drive::Cosine { .. } = self.drive {
-            scene.drive = cosine_drive(&scene.values, self.drive.delay_s());
+        if !matches!(self.drive, Drive::Recorded(_)) {
+            scene.drive = written_drive(&scene.values, self.drive.delay_s());
         }
         Ok(scene)
     }
@@ -233,14 +248,43 @@ impl Scene {
         let parameter = find_known_parameter(&self.file, name)?;
         let law = &self.linkage.friction.shape;
         check_law_key(&self.file, name, law)?;
-        let (found, expected, advice) = if name.starts_with("shoulder.") && !self.has_shoulder {
-            ("no [shoulder]", "a scene with a shoulder", "add a [shoulder] table to the scene")
-        } else if matches!(self.drive, Drive::Recorded(_)) && name.starts_with("drive.") {
-            ("a recorded drive", "a scene whose head moves as a cosine", "leave the parameter out")
-        } else {
-            return Ok(parameter);
+        let (table, is_slider) = (name.split('.').next().unwrap_or_default(), self.linkage.is_slider());
+        if of_other_mechanism(table, is_slider) {
+            return Err(self.foreign_key(name));
+        }
+        let is_speed = parameter.quantity == ParameterQuantity::DriveSpeed;
+        let (found, expected, advice) = match (table, &self.drive) {
+            ("shoulder", _) if !self.has_shoulder => {
+                ("no [shoulder]", "a scene with a shoulder", "add a [shoulder] table to the scene")
+            }
+            ("drive", Drive::Recorded(_)) => {
+                ("a recorded drive", "a scene whose head moves as a cosine", "leave the parameter out")
+            }
+            ("drive", Drive::Cosine { .. }) if is_speed => (
+                "a head that moves as a cosine",
+                "a scene with drive.speed_m_per_s",
+                "leave the parameter out",
+            ),
+            ("drive", Drive::Uniform { .. }) if !is_speed => (
+                "a head of constant speed",
+                "a scene whose head moves as a cosine",
+                "leave the parameter out",
+            ),
+            _ => return Ok(parameter),
         };
         Err(key_error(&self.file, name, found, expected, advice))
+    }
+
+    /// Position of a slider less that of its head, m, and its velocity, m/s, at the start.
+    pub(crate) fn slider_state(&self) -> Option<[f64; 2]> {
+        let (pose, head) = (super::initial_pose(self)?, self.drive.motion_at(self.start_s));
+        let arm_m = self.linkage.l2_m;
+        Some([arm_m * pose.phi, arm_m * pose.phi_rate + head.velocity_m_per_s])
+    }
+
+    /// Error of a key that belongs to the other mechanism, blade or slider.
+    pub(super) fn foreign_key(&self, key: &str) -> SceneError {
+        foreign_key(&self.file, key, self.linkage.is_slider())
     }
 
     /// Names and values of all parameters that the scene file gives, under the names that the file uses.
@@ -270,7 +314,11 @@ fn find_written_key(values: &BTreeMap<&'static str, f64>, name: &'static str) ->
     ways.find(|way| values.contains_key(way)).unwrap_or(name)
 }
 
-fn cosine_drive(values: &BTreeMap<&'static str, f64>, delay_s: f64) -> Drive {
+/// Motion of a head that is not recorded.
+fn written_drive(values: &BTreeMap<&'static str, f64>, delay_s: f64) -> Drive {
+    if let Some(&speed_m_per_s) = values.get("drive.speed_m_per_s") {
+        return Drive::Uniform { speed_m_per_s };
+    }
     let number = |name: &str| values.get(name).copied().unwrap_or(0.0); // completeness was checked
     let (amplitude_m, frequency_hz) = (number("drive.amplitude_m"), number("drive.frequency_hz"));
     Drive::Cosine { amplitude_m, frequency_hz, delay_s }

@@ -58,7 +58,7 @@ pub enum TwinViewError {
 /// Runs a scene and records it without noise from `start_s` to `stop_s`, in the scene's time.
 ///
 /// The origin is the position of the head of the upright blade; the glass is at `y = -(l1 + l2)`. A frame
-/// averages over the part of its exposure between `start_s` and `stop_s`.
+/// averages over the part of its exposure between `start_s` and `stop_s`. A slider has no heights.
 ///
 /// # Errors
 /// [`TwinViewError`]. A run that stops early but after at least two frames produces a shorter recording.
@@ -88,13 +88,14 @@ pub fn film_scene_with_observer(
     let half_s = 0.5 * camera.exposure_s;
     let open = (0..frames)
         .map(|i| [grid.time_s(i) - half_s, grid.time_s(i) + half_s].map(|t| t.clamp(start_s, stop_s)));
-    let glass_y_m = -(scene.linkage.l1_m + scene.linkage.l2_m);
+    let glass_y_m = -scene.linkage.upright_height_m();
+    let height = |y_m: f64| (!scene.linkage.is_slider()).then_some(y_m);
     let mut traces = Traces::default();
     let shutters = ShutterObserver::new(open, |place| {
         traces.tip_x_m.push(Some(place.tip_x_m));
-        traces.tip_y_m.push(Some(glass_y_m + place.tip_height_m));
+        traces.tip_y_m.push(height(glass_y_m + place.tip_height_m));
         traces.head_x_m.push(Some(place.head_x_m));
-        traces.head_y_m.push(Some(-place.head_drop_m));
+        traces.head_y_m.push(height(-place.head_drop_m));
     });
     let mut observers = ((shutters, StickIntervals::default()), observer);
     let run = run_scene_with(scene, effort, &mut observers);

@@ -87,7 +87,7 @@ fn streamed(scene: &Scene, method: IntegrationMethod) -> (u64, u64, AllocationIn
         let sampler = SampleObserver::new(times, |sample| {
             samples.add(|text| {
                 push_trace_row(text, sample.time_s, recorded_points_m(&scene.linkage, sample).map(Some));
-                push_state_row(text, sample);
+                push_state_row(text, &scene.linkage, sample);
             });
         });
         let run = run_scene_with(

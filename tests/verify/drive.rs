@@ -214,7 +214,7 @@ fn what_a_recording_cannot_drive_is_refused() {
     });
     assert_eq!(
         both,
-        "scene.toml:29: key `drive.recording`: found also `drive.amplitude_m`, expected a recording, or amplitude_m and frequency_hz; remove one: both say how the head moves"
+        "scene.toml:29: key `drive.recording`: found also `drive.amplitude_m`, expected a recording, a constant speed, or amplitude_m and frequency_hz; remove one: both say how the head moves"
     );
     let alone = Scene::parse("scene.toml", &text).unwrap_err().to_string();
     assert!(

@@ -55,6 +55,7 @@ mod sensitivity;
 mod series;
 mod shutter;
 mod slack;
+mod slider;
 mod spectrum;
 mod strokes;
 mod sweep;

@@ -96,18 +96,28 @@ fn plain(scene: &Scene, tolerance: f64) -> (Vec<f64>, Vec<f64>) {
 /// A scene moved along a direction, how much later its clock then is, and the scale of the direction.
 fn moved(scene: &Scene, direction: &TangentDirection, step: f64) -> (Scene, f64) {
     let mut moved = scene.clone();
+    match (direction, &mut moved.start) {
+        (TangentDirection::Deflection, StartKind::Slider { deflection_m: value, .. })
+        | (TangentDirection::TipVelocity, StartKind::Slider { tip_velocity_m_per_s: value, .. }) => {
+            *value += step;
+            return (moved, 0.0);
+        }
+        _ => {}
+    }
     let mut pose = |change: &dyn Fn(&mut Pose)| {
         let StartKind::State(pose) = &mut moved.start else { panic!("a scene that starts in a state") };
         change(pose);
     };
     match direction {
+        TangentDirection::Deflection | TangentDirection::TipVelocity => panic!("a slider"),
         TangentDirection::NeckAngle => pose(&|p| p.theta += step),
         TangentDirection::LipAngle => pose(&|p| p.phi += step),
         TangentDirection::NeckRate => pose(&|p| p.theta_rate += step),
         TangentDirection::LipRate => pose(&|p| p.phi_rate += step),
         TangentDirection::DriveScale => {
-            let amplitude = scene.value("drive.amplitude_m").unwrap();
-            return (scene.with_parameter("drive.amplitude_m", amplitude * (1.0 + step)).unwrap(), 0.0);
+            let names = ["drive.amplitude_m", "drive.speed_m_per_s"];
+            let (name, value) = names.iter().find_map(|name| Some((name, scene.value(name)?))).unwrap();
+            return (scene.with_parameter(name, value * (1.0 + step)).unwrap(), 0.0);
         }
         TangentDirection::DriveDelay => {
             moved.start_s -= step;
@@ -126,7 +136,10 @@ fn scale(scene: &Scene, direction: &TangentDirection) -> f64 {
         TangentDirection::NeckAngle | TangentDirection::LipAngle => 0.1,
         TangentDirection::NeckRate | TangentDirection::LipRate => 100.0,
         TangentDirection::DriveScale => 1.0,
-        TangentDirection::DriveDelay => 1e-3,
+        // (a slider is slower than a blade)
+        TangentDirection::DriveDelay if scene.linkage.is_slider() => 0.1,
+        TangentDirection::DriveDelay | TangentDirection::Deflection => 1e-3,
+        TangentDirection::TipVelocity => 1e-2,
         TangentDirection::Parameter(name) => scene.value(name).unwrap(),
     }
 }
@@ -170,6 +183,9 @@ fn every_direction(scene: &Scene) -> Vec<TangentDirection> {
             TangentDirection::LipRate,
         ]);
     }
+    if matches!(scene.start, StartKind::Slider { .. }) {
+        directions.extend([TangentDirection::Deflection, TangentDirection::TipVelocity]);
+    }
     directions.extend([TangentDirection::DriveScale, TangentDirection::DriveDelay]);
     directions
 }
@@ -177,7 +193,7 @@ fn every_direction(scene: &Scene) -> Vec<TangentDirection> {
 /// The worst error of all derivatives by a direction against differences, relative to the larger of the
 /// derivative and what is usual of its channel, each with the relative step that shows it best; `None`
 /// unless two steps or more keep the list of transitions: differences of the smallest are mostly noise.
-fn worst(scene: &Scene) -> Option<f64> {
+pub(crate) fn worst(scene: &Scene) -> Option<f64> {
     const STEPS: [f64; 4] = [3e-4, 1e-4, 3e-5, 3e-6];
     /// Usual sizes of the channels and of a time, SI.
     const SIZES: [f64; 7] = [0.1, 0.1, 100.0, 100.0, 1e-3, 1e-4, 1e-2];

@@ -37,7 +37,7 @@ pub(super) fn linkage_points_mm(linkage: &Linkage, sample: &ModelSample) -> [(f6
 
 /// Length of the straight blade, mm.
 pub(super) fn blade_length_mm(linkage: &Linkage) -> f64 {
-    MM * (linkage.l1_m + linkage.l2_m)
+    MM * linkage.upright_height_m()
 }
 
 /// The panel with the glass, a scale bar and the poses of [`key_poses`].

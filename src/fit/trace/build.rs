@@ -224,7 +224,7 @@ fn camera_unknowns(film: usize, source: &TraceSource<'_>, data: &CameraObservati
     let zero = |what, start| CameraPrior {
         what,
         mean: 0.0,
-        size: if doubt.offset_sd_m > 0.0 { linkage.l1_m + linkage.l2_m } else { 0.0 },
+        size: if doubt.offset_sd_m > 0.0 { linkage.upright_height_m() } else { 0.0 },
         is_flat: true,
         start,
     };

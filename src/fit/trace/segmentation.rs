@@ -182,7 +182,7 @@ fn recorded_motion(
 ) -> Option<RecordedMotion> {
     let start_s = film.times_s[frame] - film.lead_s();
     let head = scene.drive.motion_at(start_s - view.clock_s);
-    let (scale, upright_m) = (1.0 + view.scale, scene.linkage.l1_m + scene.linkage.l2_m);
+    let (scale, upright_m) = (1.0 + view.scale, scene.linkage.upright_height_m());
     let (lean, lean_rate) = fit_parabola(film, frame, |k| {
         let head = film.head_m[k] * if film.own_head { 1.0 } else { scale };
         let bent = film.own_head.then(|| view.curvature_per_m * upright_m * (film.head_m[k] - film.centre_m));

@@ -146,16 +146,17 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         form
     }
 
-    /// Linear form of friction in stick, from the equation of the neck.
+    /// Linear form of friction in stick, from the equation of the neck; that of a slider is from the equation
+    /// of the lip.
     fn stick_friction_form(&self, matrices: &TangentMatrices) -> LinearForm {
-        let mut form = LinearForm::default();
-        let share = 1.0 / self.linkage.l1_m;
+        let (mut form, link) = (LinearForm::default(), usize::from(self.linkage.is_slider()));
+        let share = 1.0 / self.lengths()[link];
         for j in 0..2 {
-            form.second[j] = share * matrices.mass[0][j];
-            form.rate[j] = share * matrices.damping[0][j];
-            form.value[j] = share * matrices.stiffness[0][j];
+            form.second[j] = share * matrices.mass[link][j];
+            form.rate[j] = share * matrices.damping[link][j];
+            form.value[j] = share * matrices.stiffness[link][j];
         }
-        form.forcing.equations[0] = LaneVector::splat(share);
+        form.forcing.equations[link] = LaneVector::splat(share);
         form
     }
 

@@ -11,6 +11,8 @@ const NO_ROWS: &str = ": found no rows of numbers, expected the header \
 
 /// First columns in the header of every `trace.csv`; the confidences may follow.
 pub const HEADER: &str = "time_s,tip_x_m,tip_y_m,head_x_m,head_y_m";
+/// Header of a recording without heights; its missing columns are empty.
+const HEADER_ALONG: &str = "time_s,tip_x_m,head_x_m";
 const CONFIDENCES: [&str; 2] = ["tip_confidence", "head_confidence"];
 const POSITIONS: usize = 4;
 /// Number of rows in a block of text (about half a megabyte); [`BLOCKS`] blocks are written in parallel.
@@ -101,11 +103,13 @@ impl<'a> TraceTable<'a> {
         if text.trim().is_empty() {
             return Err(FilesError::refuse(file, NO_ROWS));
         }
-        if !expected.eq(header.split(',')) {
+        let along = header == HEADER_ALONG;
+        if !along && !expected.eq(header.split(',')) {
             let found: String = header.chars().take(80).collect();
             let problem = format!(
                 ":1:1: found the header `{found}`, expected `{HEADER}` and optionally \
-                 `,tip_confidence,head_confidence`; any other table is read by `wiperlab import --columns`"
+                 `,tip_confidence,head_confidence`, or `{HEADER_ALONG}` without heights; any other table is \
+                 read by `wiperlab import --columns`"
             );
             return Err(FilesError::refuse(file, problem));
         }
@@ -118,6 +122,11 @@ impl<'a> TraceTable<'a> {
         let mut table = Self { text, confidences, times_s: Vec::with_capacity(rows), columns };
         for (line, row) in numbered_rows(text) {
             table.add_row(file, line, row, &names)?;
+        }
+        if along {
+            let nothing = vec![None; table.times_s.len()];
+            table.columns.insert(1, nothing.clone());
+            table.columns.push(nothing);
         }
         if table.times_s.len() < 2 { Err(FilesError::refuse(file, NO_ROWS)) } else { Ok(table) }
     }

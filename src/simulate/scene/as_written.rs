@@ -14,7 +14,7 @@ pub(super) type SceneNumbers = BTreeMap<String, Spanned<f64>>;
 /// Values of `[friction]`: numbers, the name of the law, and the points of a table.
 pub(super) type FrictionValues = BTreeMap<String, Spanned<toml::Value>>;
 
-/// A blade, its friction, the motion of its head, and the run to compute.
+/// A blade or a slider, its friction, the motion of its head, and the run to compute.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(title = "scene.toml")]
@@ -25,7 +25,12 @@ pub(crate) struct SceneFile {
     pub(super) title: String,
     /// Masses, lengths, stiffnesses and dampings, all for one length of blade.
     #[schemars(schema_with = "blade")]
-    pub(super) blade: SceneNumbers,
+    #[serde(default)]
+    pub(super) blade: Option<SceneNumbers>,
+    /// A mass on a spring that rubs on a surface, in place of a blade.
+    #[schemars(schema_with = "slider")]
+    #[serde(default)]
+    pub(super) slider: Option<SceneNumbers>,
     /// Shoulder that stiffens the neck beyond an angle; left out for a blade without a shoulder.
     #[schemars(schema_with = "shoulder")]
     #[serde(default)]
@@ -33,11 +38,11 @@ pub(crate) struct SceneFile {
     /// Coefficient of friction between lip and glass: `A exp(-B |v|) + C`, or another law.
     #[schemars(schema_with = "friction")]
     pub(super) friction: FrictionValues,
-    /// Motion of the head: a cosine, or that of the head in a recording.
+    /// Motion of the head: a cosine, a constant speed, or that of the head in a recording.
     pub(super) drive: DriveFile,
     /// What happens when contact is lost or the tip jams.
     #[serde(default)]
-    pub(super) contact: ContactFile,
+    pub(super) contact: Option<ContactFile>,
     /// Start of the run: its time and the state of the blade.
     #[serde(default)]
     pub(super) start: StartFile,
@@ -45,7 +50,7 @@ pub(crate) struct SceneFile {
     pub(super) run: RunFile,
 }
 
-/// Motion of the head: `amplitude_m` and `frequency_hz`, or `recording`.
+/// Motion of the head: `amplitude_m` and `frequency_hz`, `speed_m_per_s`, or `recording`.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct DriveFile {
@@ -59,6 +64,9 @@ pub(crate) struct DriveFile {
     /// Time at which the head starts from one end of its stroke, s; 0 if left out.
     #[schemars(with = "Option<f64>")]
     pub(super) delay_s: Option<Spanned<f64>>,
+    /// Constant speed of the head, m/s; the head is at `speed_m_per_s t`.
+    #[schemars(with = "Option<f64>")]
+    pub(super) speed_m_per_s: Option<Spanned<f64>>,
     /// Folder of a recording whose head drives the scene, or its trace.csv; relative to this file.
     #[schemars(with = "Option<String>")]
     pub(super) recording: Option<Spanned<String>>,
@@ -80,28 +88,29 @@ pub(crate) struct ContactFile {
 }
 
 /// State at the start of a run.
-#[derive(Deserialize, Default, JsonSchema)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum StartWord {
-    /// Upright and at rest.
-    #[default]
+    /// A blade, upright and at rest.
     Upright,
+    /// A slider at rest with its spring relaxed.
+    Relaxed,
     /// In the equilibrium of steady slip at the head's speed.
     SteadySlide,
-    /// In a state given by four angles and rates.
+    /// In a given state: four angles and rates of a blade, or deflection and velocity of a slider.
     State,
 }
 
-/// Start of the run: its time and the state of the blade.
+/// Start of the run: its time and the state of the blade or slider.
 #[derive(Deserialize, Default, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct StartFile {
     /// Start of the run, s; 0 if left out.
     #[serde(default)]
     pub(super) time_s: f64,
-    /// State at the start; "upright" if left out.
+    /// State at the start; if left out, "upright" for a blade and "relaxed" for a slider.
     #[serde(default)]
-    pub(super) kind: StartWord,
+    pub(super) kind: Option<StartWord>,
     /// Angle of the neck from the vertical, rad; only with kind = "state".
     pub(super) neck_angle_rad: Option<f64>,
     /// Angle of the lip from the vertical, rad; only with kind = "state".
@@ -110,6 +119,10 @@ pub(crate) struct StartFile {
     pub(super) neck_rate_rad_per_s: Option<f64>,
     /// Rate of the lip's angle, rad/s; only with kind = "state".
     pub(super) lip_rate_rad_per_s: Option<f64>,
+    /// Position of a slider less that of its head, m; only with kind = "state".
+    pub(super) deflection_m: Option<f64>,
+    /// Velocity of a slider, m/s; only with kind = "state".
+    pub(super) tip_velocity_m_per_s: Option<f64>,
 }
 
 /// How long the simulation runs, and which tables it writes.
@@ -130,6 +143,10 @@ pub(crate) struct RunFile {
 
 fn blade(_: &mut SchemaGenerator) -> Schema {
     number_table_schema("blade", [])
+}
+
+fn slider(_: &mut SchemaGenerator) -> Schema {
+    number_table_schema("slider", [])
 }
 
 fn shoulder(_: &mut SchemaGenerator) -> Schema {

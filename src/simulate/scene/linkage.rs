@@ -6,7 +6,7 @@ use crate::model::parameters::{
     PARAMETERS, ParameterQuantity as Quantity, damping_from_ratio, stiffness_from_frequency,
 };
 use crate::model::shoulder::Shoulder;
-use crate::model::{Linkage, Spring};
+use crate::model::{Linkage, Slider, Spring};
 use std::collections::BTreeMap;
 
 type SceneValues = BTreeMap<&'static str, f64>;
@@ -54,6 +54,13 @@ pub(super) fn linkage_constants(values: &SceneValues, has_shoulder: bool, law: F
     let damping = |quantity: Quantity, stiffness: f64, inertia: f64| {
         converted(quantity, "_ratio", &|ratio| damping_from_ratio(ratio, stiffness, inertia))
     };
+    let friction = friction_law(&plain, &ratio, law);
+    if values.contains_key("slider.mass_kg") {
+        let spring =
+            Spring { stiffness: plain(Quantity::SliderStiffness), damping: plain(Quantity::SliderDamping) };
+        let (mass_kg, normal_force_n) = (plain(Quantity::SliderMass), plain(Quantity::NormalForce));
+        return Linkage::from_slider(Slider { mass_kg, spring, normal_force_n }, friction);
+    }
     let (m1, m2) = (plain(Quantity::NeckMass), plain(Quantity::LipMass));
     let (l1, l2) = (plain(Quantity::NeckLength), plain(Quantity::LipLength));
     let (g1, g2) = (plain(Quantity::NeckCentre), plain(Quantity::LipCentre));
@@ -77,25 +84,6 @@ pub(super) fn linkage_constants(values: &SceneValues, has_shoulder: bool, law: F
             damping_n_m_s_per_rad: damping(Quantity::ShoulderDamping, stiffness, m_theta),
         }
     });
-    let [limit, level] = [Quantity::FrictionLimit, Quantity::CoulombLevel].map(plain);
-    let (a, b_s_per_m, c) = match law {
-        FrictionShape::Exponential => {
-            (plain(Quantity::FrictionA), plain(Quantity::FrictionB), plain(Quantity::FrictionC))
-        }
-        FrictionShape::Stribeck => (limit - level, 1.0 / plain(Quantity::StribeckSpeed), level),
-        FrictionShape::Rational => (limit, plain(Quantity::RationalDecay), 0.0),
-        FrictionShape::Table(_) => (1.0, 1.0, 0.0),
-    };
-    let friction = FrictionLaw {
-        a,
-        b_s_per_m,
-        c,
-        shape: law,
-        exponent: ratio(Quantity::StribeckExponent),
-        viscous_s_per_m: plain(Quantity::ViscousFriction),
-        static_ratio: ratio(Quantity::StaticRatio),
-        backward_ratio: ratio(Quantity::BackwardRatio),
-    };
     let (m_a, m_b) = (m1 * g1 + m2 * l1, m2 * g2);
     Linkage {
         mass_kg: mass,
@@ -112,5 +100,32 @@ pub(super) fn linkage_constants(values: &SceneValues, has_shoulder: bool, law: F
         preload_displacement_m: preload,
         friction,
         shoulder,
+    }
+}
+
+/// The friction law; `plain` and `ratio` give the value of a quantity, 0 or 1 if it is absent.
+fn friction_law(
+    plain: &dyn Fn(Quantity) -> f64,
+    ratio: &dyn Fn(Quantity) -> f64,
+    law: FrictionShape,
+) -> FrictionLaw {
+    let [limit, level] = [Quantity::FrictionLimit, Quantity::CoulombLevel].map(plain);
+    let (a, b_s_per_m, c) = match law {
+        FrictionShape::Exponential => {
+            (plain(Quantity::FrictionA), plain(Quantity::FrictionB), plain(Quantity::FrictionC))
+        }
+        FrictionShape::Stribeck => (limit - level, 1.0 / plain(Quantity::StribeckSpeed), level),
+        FrictionShape::Rational => (limit, plain(Quantity::RationalDecay), 0.0),
+        FrictionShape::Table(_) => (1.0, 1.0, 0.0),
+    };
+    FrictionLaw {
+        a,
+        b_s_per_m,
+        c,
+        shape: law,
+        exponent: ratio(Quantity::StribeckExponent),
+        viscous_s_per_m: plain(Quantity::ViscousFriction),
+        static_ratio: ratio(Quantity::StaticRatio),
+        backward_ratio: ratio(Quantity::BackwardRatio),
     }
 }

@@ -3,7 +3,7 @@
 use super::as_written::{DriveFile, FrictionValues, SceneNumbers};
 use super::error::{SceneError, key_error};
 use crate::model::friction::{FrictionShape, FrictionTable, LAW_KEYS};
-use crate::model::parameters::{self, ModelParameter, PARAMETERS};
+use crate::model::parameters::{self, ModelParameter, PARAMETERS, ParameterQuantity};
 use crate::toml_file;
 use std::collections::BTreeMap;
 use toml::{Spanned, Value};
@@ -93,22 +93,30 @@ impl SceneReader<'_> {
     }
 
     /// Reads the motion of the head. For a recorded head, returns the place of the key in the file and the
-    /// path of the recording. For a cosine, reads its numbers and returns `None`.
+    /// path of the recording. For another motion, reads its numbers and returns `None`.
     pub(crate) fn read_drive(&mut self, written: &DriveFile) -> Result<Option<(String, String)>, SceneError> {
-        let numbers = [("amplitude_m", &written.amplitude_m), ("frequency_hz", &written.frequency_hz)];
-        let Some(recording) = &written.recording else {
-            let read =
-                |(key, value): (_, &Option<_>)| self.read_number(&format!("drive.{key}"), value.clone());
-            return numbers.into_iter().try_for_each(read).map(|()| None);
-        };
-        let place = self.place_of(recording);
-        let mut all = numbers.into_iter().chain([("delay_s", &written.delay_s)]);
-        if let Some((key, _)) = all.find(|(_, value)| value.is_some()) {
-            let (found, advice) = (format!("also `drive.{key}`"), "remove one: both say how the head moves");
-            let expected = "a recording, or amplitude_m and frequency_hz";
-            return Err(key_error(&place, "drive.recording", found, expected, advice));
+        let numbers = [
+            ("amplitude_m", &written.amplitude_m),
+            ("frequency_hz", &written.frequency_hz),
+            ("delay_s", &written.delay_s),
+            ("speed_m_per_s", &written.speed_m_per_s),
+        ];
+        let recording = written.recording.as_ref().map(|path| ("recording", self.place_of(path)));
+        let speed = written.speed_m_per_s.as_ref().map(|speed| ("speed_m_per_s", self.place_of(speed)));
+        if let Some((key, place)) = recording.clone().or(speed) {
+            let mut others = numbers.into_iter().filter(|(other, value)| *other != key && value.is_some());
+            if let Some((other, _)) = others.next() {
+                let (found, advice) =
+                    (format!("also `drive.{other}`"), "remove one: both say how the head moves");
+                let expected = "a recording, a constant speed, or amplitude_m and frequency_hz";
+                return Err(key_error(&place, &format!("drive.{key}"), found, expected, advice));
+            }
         }
-        Ok(Some((place, recording.get_ref().clone())))
+        if let (Some((_, place)), Some(path)) = (recording, &written.recording) {
+            return Ok(Some((place, path.get_ref().clone())));
+        }
+        let read = |(key, value): (_, &Option<_>)| self.read_number(&format!("drive.{key}"), value.clone());
+        numbers.into_iter().filter(|(key, _)| *key != "delay_s").try_for_each(read).map(|()| None)
     }
 
     /// Time at which the cosine motion of the head starts, s; 0 if left out.
@@ -172,18 +180,30 @@ pub(super) fn check_law_key(place: &str, name: &str, law: &FrictionShape) -> Res
     Err(key_error(place, name, format!("the law \"{law}\""), &expected, &advice))
 }
 
-/// Refuses a scene that lacks a quantity without a default. The quantities of an absent shoulder or of a
-/// recorded drive are not required.
+/// Whether a table belongs to a blade in a scene of a slider, or to a slider in a scene of a blade.
+pub(super) fn of_other_mechanism(table: &str, is_slider: bool) -> bool {
+    match table {
+        "slider" => !is_slider,
+        "blade" | "shoulder" | "contact" => is_slider,
+        _ => false,
+    }
+}
+
+/// Refuses a scene that lacks a quantity without a default. The quantities of an absent part or of another
+/// motion of the head are not required.
 pub(super) fn check_complete(
     file: &str,
     values: &BTreeMap<&'static str, f64>,
-    has_shoulder: bool,
-    recorded: bool,
+    [is_slider, has_shoulder, recorded]: [bool; 3],
     law: &FrictionShape,
 ) -> Result<(), SceneError> {
+    let constant_speed = values.contains_key("drive.speed_m_per_s");
     let absent = |p: &ModelParameter| {
-        (!has_shoulder && p.name.starts_with("shoulder."))
-            || (recorded && p.name.starts_with("drive."))
+        let table = p.name.split('.').next().unwrap_or_default();
+        let is_speed = p.quantity == ParameterQuantity::DriveSpeed;
+        (!has_shoulder && table == "shoulder")
+            || (table == "drive" && (recorded || constant_speed || is_speed))
+            || of_other_mechanism(table, is_slider)
             || !law.has_parameter(p.name)
     };
     let needed = |p: &&ModelParameter| p.default.is_none() && !absent(p);

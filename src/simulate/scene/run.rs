@@ -100,46 +100,95 @@ pub fn check_tolerance(relative: f64) -> Result<(), String> {
     holds.then_some(()).ok_or_else(|| format!("a number from {least:e} to {most:e}"))
 }
 
-/// State of the blade at the start of a run.
+/// State at the start of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub enum StartKind {
-    /// Upright and at rest.
+    /// A blade, upright and at rest relative to its head.
     Upright,
     /// In the equilibrium of steady slip at the head's speed.
     SteadySlide,
     /// In a given state.
     State(Pose),
+    /// A slider in a given state; the kind "relaxed" is that with zeros.
+    Slider {
+        /// Position of the tip less that of the head, m.
+        deflection_m: f64,
+        /// Velocity of the tip, m/s.
+        tip_velocity_m_per_s: f64,
+    },
     /// In a given state off the glass, for tests with exact solutions; a scene file cannot select it.
     Airborne(FlightState),
 }
 
-pub(super) fn check_start(file: &str, written: &StartFile) -> Result<(f64, StartKind), SceneError> {
-    let numbers = [
+/// Checks the start of a blade or, if `is_slider` is true, of a slider.
+pub(super) fn check_start(
+    file: &str,
+    written: &StartFile,
+    is_slider: bool,
+) -> Result<(f64, StartKind), SceneError> {
+    let of_blade = [
         ("start.neck_angle_rad", written.neck_angle_rad),
         ("start.lip_angle_rad", written.lip_angle_rad),
         ("start.neck_rate_rad_per_s", written.neck_rate_rad_per_s),
         ("start.lip_rate_rad_per_s", written.lip_rate_rad_per_s),
     ];
-    for (key, value) in numbers.into_iter().chain([("start.time_s", Some(written.time_s))]) {
+    let of_slider = [
+        ("start.deflection_m", written.deflection_m),
+        ("start.tip_velocity_m_per_s", written.tip_velocity_m_per_s),
+    ];
+    let time = ("start.time_s", Some(written.time_s));
+    for (key, value) in of_blade.into_iter().chain(of_slider).chain([time]) {
         if let Some(value) = value.filter(|v| !v.is_finite()) {
             return Err(key_error(file, key, value, "a finite number", "correct the value"));
         }
     }
+    let (own, other): (&[_], &[_]) =
+        if is_slider { (&of_slider, &of_blade) } else { (&of_blade, &of_slider) };
+    if let Some((key, _)) = other.iter().find(|(_, value)| value.is_some()) {
+        return Err(foreign_key(file, key, is_slider));
+    }
+    let number = |key, value: Option<f64>| {
+        let advice = "start.kind = \"state\" needs all numbers of the state";
+        value.ok_or_else(|| key_error(file, key, "nothing", "a number", advice))
+    };
     let kind = match written.kind {
-        StartWord::State => {
-            let advice = "start.kind = \"state\" needs all four";
-            let [theta, phi, theta_rate, phi_rate] = numbers
-                .map(|(key, value)| value.ok_or_else(|| key_error(file, key, "nothing", "a number", advice)));
+        Some(StartWord::State) if is_slider => {
+            let [deflection_m, tip_velocity_m_per_s] = of_slider.map(|(key, value)| number(key, value));
+            StartKind::Slider { deflection_m: deflection_m?, tip_velocity_m_per_s: tip_velocity_m_per_s? }
+        }
+        Some(StartWord::State) => {
+            let [theta, phi, theta_rate, phi_rate] = of_blade.map(|(key, value)| number(key, value));
             StartKind::State(Pose { theta: theta?, phi: phi?, theta_rate: theta_rate?, phi_rate: phi_rate? })
         }
-        _ if numbers.iter().any(|(_, v)| v.is_some()) => {
+        _ if own.iter().any(|(_, v)| v.is_some()) => {
             let advice = "set start.kind = \"state\" or remove them";
-            return Err(key_error(file, "start.kind", "angles or rates without it", "\"state\"", advice));
+            return Err(key_error(file, "start.kind", "numbers of a state without it", "\"state\"", advice));
         }
-        StartWord::Upright => StartKind::Upright,
-        StartWord::SteadySlide => StartKind::SteadySlide,
+        Some(StartWord::SteadySlide) => StartKind::SteadySlide,
+        Some(StartWord::Upright) if is_slider => {
+            let expected = "\"relaxed\", \"steady-slide\" or \"state\": a slider has no angles";
+            return Err(key_error(file, "start.kind", "\"upright\"", expected, "correct it"));
+        }
+        Some(StartWord::Relaxed) if !is_slider => {
+            let expected = "\"upright\", \"steady-slide\" or \"state\"; \"relaxed\" is a start of a slider";
+            return Err(key_error(file, "start.kind", "\"relaxed\"", expected, "correct it"));
+        }
+        None | Some(StartWord::Upright | StartWord::Relaxed) if is_slider => {
+            StartKind::Slider { deflection_m: 0.0, tip_velocity_m_per_s: 0.0 }
+        }
+        None | Some(StartWord::Upright | StartWord::Relaxed) => StartKind::Upright,
     };
     Ok((written.time_s, kind))
+}
+
+/// Error of a key of a blade in a scene of a slider, or of a key of a slider in a scene of a blade.
+pub(super) fn foreign_key(file: &str, key: &str, is_slider: bool) -> SceneError {
+    let (found, expected) = if is_slider {
+        ("a key of a blade", "the keys of a slider, because the scene has [slider]")
+    } else {
+        ("a key of a slider", "the keys of a blade, because the scene has [blade]")
+    };
+    key_error(file, key, found, expected, "leave it out")
 }
 
 /// Refuses a start in steady slip if the head is at rest or if the blade has no such equilibrium.
@@ -157,7 +206,16 @@ pub(super) fn check_steady_start(
     let found = format!(
         "\"steady-slide\" at start.time_s = {start_s}, where the head moves at {speed} m/s and no equilibrium of steady slip is found"
     );
-    let advice = "start at a time when the head moves, start \"upright\", or lower friction or preload";
-    let expected = "a blade that slides steadily, pressed onto the glass, its links short of level";
+    let (advice, expected) = if linkage.is_slider() {
+        (
+            "start at a time when the head moves, or start \"relaxed\"",
+            "a slider that slides steadily on its spring",
+        )
+    } else {
+        (
+            "start at a time when the head moves, start \"upright\", or lower friction or preload",
+            "a blade that slides steadily, pressed onto the glass, its links short of level",
+        )
+    };
     Err(key_error(file, "start.kind", found, expected, advice))
 }

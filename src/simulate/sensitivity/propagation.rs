@@ -103,9 +103,13 @@ impl<'a, O> TangentPropagator<'a, O> {
         for (block, seed) in self.blocks.iter_with_seeds() {
             // reset: a value of an earlier run may be NaN, and the product of zero and NaN is NaN
             *block = TangentBlock { state: seed.start, ..TangentBlock::default() };
+            let d_speed = seed.head_velocity(system, scene.start_s);
+            if let StartKind::Slider { .. } = scene.start {
+                // the velocity of the tip does not change with that of the head
+                block.state.rate[1] += (-1.0 / scene.linkage.l2_m) * d_speed;
+            }
             let Some(pose) = pose else { continue };
             let lean = shoulder_contact(&scene.linkage, pose.theta);
-            let d_speed = seed.head_velocity(system, scene.start_s);
             match steady_slip_tangent(system, seed, lean, &pose, head.velocity_m_per_s, d_speed) {
                 Some(moved) => {
                     block.state.angle[0] += moved[0];

@@ -6,7 +6,7 @@ use crate::model::parameters::{ModelParameter, ParameterQuantity};
 use crate::model::shoulder::ShoulderContact;
 use crate::model::tangent::{LANES, LaneVector, LinkageTangent, StateTangent};
 use crate::model::{Linkage, Pose};
-use crate::simulate::equilibrium::residual_moments;
+use crate::simulate::equilibrium::{residual_moments, solve_for_load};
 use crate::simulate::phases::DrivenBlade;
 use crate::simulate::scene::Scene;
 use crate::simulate::scene::error::SceneError;
@@ -119,7 +119,13 @@ impl BlockSeed {
     }
 
     fn set_direction(&mut self, scene: &Scene, by: &TangentDirection, lane: usize) -> Result<(), SceneError> {
+        let per_length = 1.0 / scene.linkage.l2_m;
         match by {
+            TangentDirection::Deflection | TangentDirection::TipVelocity if !scene.linkage.is_slider() => {
+                return Err(scene.foreign_key(by.name()));
+            }
+            TangentDirection::Deflection => self.start.angle[1][lane] = per_length,
+            TangentDirection::TipVelocity => self.start.rate[1][lane] = per_length,
             TangentDirection::NeckAngle => self.start.angle[0][lane] = 1.0,
             TangentDirection::LipAngle => self.start.angle[1][lane] = 1.0,
             TangentDirection::NeckRate => self.start.rate[0][lane] = 1.0,
@@ -153,7 +159,9 @@ impl BlockSeed {
     fn set_parameter(&mut self, scene: &Scene, parameter: &ModelParameter, lane: usize) {
         let value = scene.value(parameter.name).or(parameter.default).unwrap_or(0.0);
         match parameter.quantity {
-            ParameterQuantity::DriveAmplitude => self.drive_mut().scale[lane] = 1.0 / value,
+            ParameterQuantity::DriveAmplitude | ParameterQuantity::DriveSpeed => {
+                self.drive_mut().scale[lane] = 1.0 / value
+            }
             ParameterQuantity::DriveFrequency => {
                 // a change of frequency stretches the time axis of the cosine about the time at which the
                 // cosine starts
@@ -198,6 +206,10 @@ pub enum TangentDirection {
     NeckRate,
     /// Angular rate of the lip at the start, rad/s.
     LipRate,
+    /// Position of a slider less that of its head at the start, m.
+    Deflection,
+    /// Velocity of a slider at the start, m/s.
+    TipVelocity,
     /// Factor on the head's motion; 1 in the scene itself.
     DriveScale,
     /// Delay of the head's motion, s; 0 in the scene itself.
@@ -205,11 +217,13 @@ pub enum TangentDirection {
 }
 
 /// Names and units of the directions other than parameters.
-const NAMED_DIRECTIONS: [(TangentDirection, &str, &str); 6] = [
+const NAMED_DIRECTIONS: [(TangentDirection, &str, &str); 8] = [
     (TangentDirection::NeckAngle, "start.neck_angle_rad", "rad"),
     (TangentDirection::LipAngle, "start.lip_angle_rad", "rad"),
     (TangentDirection::NeckRate, "start.neck_rate_rad_per_s", "rad/s"),
     (TangentDirection::LipRate, "start.lip_rate_rad_per_s", "rad/s"),
+    (TangentDirection::Deflection, "start.deflection_m", "m"),
+    (TangentDirection::TipVelocity, "start.tip_velocity_m_per_s", "m/s"),
     (TangentDirection::DriveScale, "drive.scale", "1"),
     (TangentDirection::DriveDelay, "drive.delay_s", "s"),
 ];
@@ -219,6 +233,14 @@ impl TangentDirection {
     pub(crate) fn from_name(name: &str) -> Self {
         let other = NAMED_DIRECTIONS.iter().find(|(_, other, _)| *other == name);
         other.map_or_else(|| Self::Parameter(name.to_owned()), |(direction, ..)| direction.clone())
+    }
+
+    /// Name of the direction.
+    fn name(&self) -> &str {
+        match self {
+            Self::Parameter(name) => name,
+            _ => NAMED_DIRECTIONS.iter().find(|(other, ..)| other == self).map_or("", |(_, name, _)| name),
+        }
     }
 
     /// Names of the directions other than parameters.
@@ -251,13 +273,23 @@ pub(super) fn steady_slip_tangent(
         };
         central_difference(DIFFERENCE_STEP, at).map(|column: [f64; 2]| Vector2::from(column))
     };
-    let jacobian = Matrix2::from_columns(&[column(Vector2::x())?, column(Vector2::y())?]).lu();
+    // (the angles of a slider are an explicit function of the parameters)
+    let jacobian = if linkage.is_slider() {
+        -Matrix2::identity()
+    } else {
+        Matrix2::from_columns(&[column(Vector2::x())?, column(Vector2::y())?])
+    };
+    let jacobian = jacobian.lu();
     let mut moved = [LaneVector::ZERO; 2];
     for lane in 0..LANES {
         let at = |x: f64| {
             let own = seed.linkage.as_ref();
             let linkage = own.map_or(*linkage, |own| own.displace_linkage(linkage, lane, x));
-            Some(residual_moments(&linkage, mu(&linkage, speed + x * d_speed[lane]), &angles, lean).into())
+            let mu = mu(&linkage, speed + x * d_speed[lane]);
+            if linkage.is_slider() {
+                return solve_for_load(&linkage, mu, angles).map(Into::into);
+            }
+            Some(residual_moments(&linkage, mu, &angles, lean).into())
         };
         let step = DIFFERENCE_STEP / seed.relative[lane].max((d_speed[lane] / speed).abs());
         if step.is_finite() {

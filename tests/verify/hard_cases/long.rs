@@ -80,7 +80,7 @@ fn files(scene: &Scene, method: IntegrationMethod) -> String {
     let run = run_scene_with(
         scene,
         SolverOptions { method, ..SolverOptions::new(1e-8) },
-        &mut (SampleObserver::new(times, |s| push_state_row(&mut text, s)), &mut list),
+        &mut (SampleObserver::new(times, |s| push_state_row(&mut text, &scene.linkage, s)), &mut list),
     );
     list.0.iter().for_each(|t| push_event_row(&mut text, t));
     format!("{text}{run:?}")

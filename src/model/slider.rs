@@ -1,0 +1,122 @@
+//! A slider, a mass on a spring that rubs on a surface, as the limit of a blade:
+//!
+//! ```text
+//! m x'' = k (v - x) + d (v' - x') + f,   |f| <= mu N,   N constant
+//! ```
+//!
+//! A point mass at the end of a long arm moves on a circle that is straight as far as the mass goes. So a
+//! slider is a blade whose neck does not turn and has no length, and whose lip is an arm of [`ARM_M`] with all
+//! the mass at its tip, the stiffness `k l2^2` and the damping `d l2^2` at its hinge. Equations, series,
+//! events, derivatives and fits are those of the blade. With `y = x - v`, the difference is `(y / l2)^2` in the
+//! sine of the angle and `N / (k l2)` in the stiffness. Both are below the last bit of a number, and conversion
+//! from length to angle has no rounding error, because the arm is a power of two.
+//!
+//! The normal force of a slider does not depend on its motion: `m_b = M l2` makes `n` and so the `nu` of
+//! [`super::FrictionResponse`] zero. So a slider has no Painlevé paradox and cannot lose contact.
+
+use super::friction::FrictionLaw;
+use super::modes::{NaturalMode, single_mode};
+use super::{Linkage, Pose, Spring};
+
+/// Length of the arm, m.
+const ARM_M: f64 = (1u64 << 60) as f64;
+/// Moment of inertia of the neck, kg m2, and its stiffness, N m/rad: 2^240. The arm moves the neck by less than
+/// `2^-80` of the arm's own angle.
+const NECK: f64 = ARM_M * ARM_M * ARM_M * ARM_M;
+/// Stiffness of the support, N/m: 2^30, so that the energy of the preload is small.
+const SUPPORT_N_PER_M: f64 = (1u64 << 30) as f64;
+
+/// Constants of a slider.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Slider {
+    /// Mass, kg.
+    pub mass_kg: f64,
+    /// Spring between head and mass, N/m and N s/m.
+    pub spring: Spring,
+    /// Force that presses the mass onto the surface, N.
+    pub normal_force_n: f64,
+}
+
+impl Linkage {
+    /// The linkage of a slider.
+    pub(crate) fn from_slider(slider: Slider, friction: FrictionLaw) -> Self {
+        let Slider { mass_kg, spring: Spring { stiffness, damping }, normal_force_n } = slider;
+        Self {
+            mass_kg,
+            l1_m: 0.0,
+            l2_m: ARM_M,
+            m_a: 0.0,
+            m_b: mass_kg * ARM_M,
+            m_c: 0.0,
+            m_theta: NECK,
+            m_phi: mass_kg * ARM_M * ARM_M,
+            head: Spring { stiffness: SUPPORT_N_PER_M, damping: 0.0 },
+            neck: Spring { stiffness: NECK, damping: 0.0 },
+            lip: Spring { stiffness: stiffness * ARM_M * ARM_M, damping: damping * ARM_M * ARM_M },
+            preload_displacement_m: normal_force_n / SUPPORT_N_PER_M,
+            friction,
+            shoulder: None,
+        }
+    }
+
+    /// The slider with this linkage; `None` for a blade.
+    pub(crate) fn slider(&self) -> Option<Slider> {
+        let Spring { stiffness, damping } = self.lip;
+        let per_square = 1.0 / (ARM_M * ARM_M);
+        self.is_slider().then(|| Slider {
+            mass_kg: self.mass_kg,
+            spring: Spring { stiffness: stiffness * per_square, damping: damping * per_square },
+            normal_force_n: self.preload_displacement_m * self.head.stiffness,
+        })
+    }
+
+    /// Whether this is the linkage of a slider: its neck has no length.
+    #[must_use]
+    pub fn is_slider(&self) -> bool {
+        self.l1_m == 0.0
+    }
+
+    /// Pose of a slider at a distance from the head, m, that changes at a rate, m/s.
+    pub(crate) fn slider_pose(&self, deflection_m: f64, rate_m_per_s: f64) -> Pose {
+        Pose {
+            theta: 0.0,
+            phi: deflection_m / self.l2_m,
+            theta_rate: 0.0,
+            phi_rate: rate_m_per_s / self.l2_m,
+        }
+    }
+
+    /// Usual angles of neck and lip, rad, in units of those of a blade. The neck of a slider does not turn.
+    pub(crate) fn angle_units(&self) -> [f64; 2] {
+        let lip = |slider: Slider| self.slider_pose(slider.deflection_scale_m(), 0.0).phi;
+        self.slider().map_or([1.0; 2], |slider| [0.0, lip(slider)])
+    }
+
+    /// Height of the head of the upright blade above the glass, m; zero for a slider.
+    #[must_use]
+    pub fn upright_height_m(&self) -> f64 {
+        if self.is_slider() { 0.0 } else { self.l1_m + self.l2_m }
+    }
+}
+
+impl Slider {
+    /// Rate of the fastest motion, rad/s: of the undamped oscillation, or of the decay of the velocity by the
+    /// damper. It is 1 for a mass without spring and damper, whose motion has no scale.
+    pub(crate) fn rate_rad_per_s(&self) -> f64 {
+        let Spring { stiffness, damping } = self.spring;
+        let rate = (stiffness / self.mass_kg).sqrt().max(damping / self.mass_kg);
+        if rate > 0.0 { rate } else { 1.0 }
+    }
+
+    /// Deflection, m, below which the tolerance of a run is absolute: that of a spring with the natural
+    /// frequency [`Self::rate_rad_per_s`] under the normal force.
+    pub(crate) fn deflection_scale_m(&self) -> f64 {
+        let rate = self.rate_rad_per_s();
+        self.normal_force_n / (self.mass_kg * rate * rate)
+    }
+
+    /// Mode of the mass on its spring, without friction.
+    pub(crate) fn mode(&self) -> NaturalMode {
+        single_mode(self.mass_kg, self.spring.damping, self.spring.stiffness, 0.0)
+    }
+}
