@@ -8,6 +8,7 @@
 mod findings;
 mod job;
 mod scene;
+mod slider;
 mod stroke;
 
 use crate::text::{make_printable, wrap_words};
@@ -15,6 +16,7 @@ pub(crate) use findings::DraftFindings;
 pub(crate) use job::write_job;
 pub(crate) use scene::{FittedScene, YOURS_MARK, write_fitted_scene, write_scene, write_scene_alone};
 use serde::Serialize;
+pub(crate) use slider::KnownSlider;
 pub(crate) use stroke::KnownStroke;
 
 /// Maximum width of a comment line, in characters.

@@ -2,7 +2,7 @@
 
 use super::load::load_recording;
 use super::prelude::*;
-use crate::draft::{self, KnownStroke};
+use crate::draft::{self, KnownSlider, KnownStroke};
 use crate::simulate::scene::Scene;
 
 const SCENE: &str = "scene.toml";
@@ -27,6 +27,19 @@ pub(crate) struct InitArgs {
     /// Write a scene for a blade whose neck has no shoulder to lean on
     #[arg(long)]
     pub no_shoulder: bool,
+    /// Write files for a slider, a mass on a spring that rubs on a surface, in place of a blade
+    #[arg(
+        long,
+        requires_all = ["recording", "mass_kg", "normal_force_n"],
+        conflicts_with_all = ["no_shoulder", "amplitude_m", "frequency_hz"]
+    )]
+    pub slider: bool,
+    /// Mass of the slider, kg
+    #[arg(long, value_name = "N", requires = "slider", allow_negative_numbers = true)]
+    pub mass_kg: Option<f64>,
+    /// Force that presses the slider onto the surface, N
+    #[arg(long, value_name = "N", requires = "slider", allow_negative_numbers = true)]
+    pub normal_force_n: Option<f64>,
     /// Amplitude of the head, half its stroke, m, if the head was not tracked; otherwise estimated
     #[arg(long, value_name = "M", requires = "recording", allow_negative_numbers = true)]
     pub amplitude_m: Option<f64>,
@@ -75,6 +88,12 @@ impl InitArgs {
         let found = draft::DraftFindings::from_recording(&loaded.recording, exposure_s, self.known_stroke()?)
             .map_err(|error| Failure::at(path.display(), error))?;
         let seen = files::relative_path(&self.out, path)?;
+        let said = || loaded.recording.describe_resampling().into_iter().chain(found.describe()).collect();
+        if let Some(slider) = self.known_slider()? {
+            let written = slider.write_files(&found, &loaded.recording, [&seen, SCENE]);
+            let [scene, job] = written.map_err(|error| Failure::at(path.display(), error))?;
+            return Ok((vec![(SCENE, scene), (JOB, job)], said()));
+        }
         let scene = draft::write_scene(&found, &seen, !self.no_shoulder).map_err(Failure::internal)?;
         let file = self.out.join(SCENE).display().to_string();
         Scene::parse_with_recording(&file, &scene, |_| Ok(loaded.recording.clone()))
@@ -82,17 +101,19 @@ impl InitArgs {
                 Failure::at(path.display(), format!("found {:.4} s, too short or too slow a motion for a run to start in; expected a head that moves by several millimetres; film more of the stroke ({error})", found.length_s()))
             })?;
         let job = draft::write_job(&found, &loaded.recording, [&seen, SCENE], !self.no_shoulder);
-        let said = loaded.recording.describe_resampling().into_iter().chain(found.describe());
-        Ok((vec![(SCENE, scene), (JOB, job)], said.collect()))
+        Ok((vec![(SCENE, scene), (JOB, job)], said()))
+    }
+
+    /// Mass and load of a slider; `None` for a blade.
+    fn known_slider(&self) -> Outcome<Option<KnownSlider>> {
+        check_positive([("--mass-kg", self.mass_kg), ("--normal-force-n", self.normal_force_n)])?;
+        let numbers = self.mass_kg.zip(self.normal_force_n).filter(|_| self.slider);
+        Ok(numbers.map(|(mass_kg, normal_force_n)| KnownSlider { mass_kg, normal_force_n }))
     }
 
     /// Amplitude and frequency of the stroke, as far as the options give them.
     fn known_stroke(&self) -> Outcome<KnownStroke> {
-        let typed = [("--amplitude-m", self.amplitude_m), ("--frequency-hz", self.frequency_hz)];
-        let is_wrong = |value: &f64| !(value.is_finite() && *value > 0.0);
-        if let Some((option, value)) = typed.into_iter().find_map(|(o, x)| Some((o, x.filter(is_wrong)?))) {
-            return Err(Failure::at(option, format!("found {value}, expected a number above 0")));
-        }
+        check_positive([("--amplitude-m", self.amplitude_m), ("--frequency-hz", self.frequency_hz)])?;
         Ok(KnownStroke { amplitude_m: self.amplitude_m, frequency_hz: self.frequency_hz })
     }
 
@@ -100,12 +121,23 @@ impl InitArgs {
         words.iter().for_each(|line| print_line!("found: {line}"));
         let [scene, job, run] = [SCENE, JOB, "run"].map(|name| self.out.join(name).display().to_string());
         print_line!("written to {}", self.out.display());
-        let mark = draft::YOURS_MARK;
-        print_line!("next: replace the numbers marked {mark} in {scene}; they are those of an example");
+        if !self.slider {
+            let mark = draft::YOURS_MARK;
+            print_line!("next: replace the numbers marked {mark} in {scene}; they are those of an example");
+        }
         if self.scene {
             print_line!("then: wiperlab simulate {scene} --out {run}");
         } else {
             print_line!("then: wiperlab fit {job}");
         }
     }
+}
+
+/// Refuses an option whose value is not above 0.
+fn check_positive(typed: [(&str, Option<f64>); 2]) -> Outcome<()> {
+    let is_wrong = |value: &f64| !(value.is_finite() && *value > 0.0);
+    if let Some((option, value)) = typed.into_iter().find_map(|(o, x)| Some((o, x.filter(is_wrong)?))) {
+        return Err(Failure::at(option, format!("found {value}, expected a number above 0")));
+    }
+    Ok(())
 }

@@ -40,6 +40,12 @@ pub(crate) struct DraftComponent {
 #[error("{0}")]
 pub(crate) struct DraftError(String);
 
+impl DraftError {
+    pub(super) fn new(problem: &str) -> Self {
+        Self(problem.to_owned())
+    }
+}
+
 /// Findings in a recording on which a draft is based.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct DraftFindings {

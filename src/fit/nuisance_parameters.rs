@@ -124,11 +124,19 @@ pub(crate) fn default_prior_sd(parameter: &ModelParameter) -> Option<f64> {
     const SIMILAR: f64 = 0.1;
     /// The damping of rubber varies with its age and temperature, by a factor of 1.5; the value is ln 1.5.
     const DAMPING: f64 = 0.405;
+    /// Mass and load of a slider are weighed, and are those of the model.
+    const WEIGHED_WHOLE: f64 = 0.01;
+    /// The stiffness of the spring of a slider is read off its force over its way.
+    const PULLED: f64 = 0.05;
     let frequency_sd = match parameter.quantity {
+        Q::SliderMass | Q::NormalForce => return Some(WEIGHED_WHOLE),
+        Q::SliderStiffness => return Some(PULLED),
         Q::HeadMass | Q::NeckMass | Q::LipMass | Q::Preload => return Some(WEIGHED),
         Q::NeckInertia | Q::LipInertia | Q::NeckCentre | Q::LipCentre => return Some(COMPUTED),
         Q::NeckLength | Q::LipLength => return Some(READ),
-        Q::HeadDamping | Q::NeckDamping | Q::LipDamping | Q::ShoulderDamping => return Some(DAMPING),
+        Q::HeadDamping | Q::NeckDamping | Q::LipDamping | Q::ShoulderDamping | Q::SliderDamping => {
+            return Some(DAMPING);
+        }
         Q::ShoulderAngle => return Some(SIMILAR),
         Q::LipStiffness => HEARD,
         Q::HeadStiffness | Q::NeckStiffness | Q::ShoulderStiffness => SIMILAR,

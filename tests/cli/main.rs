@@ -40,6 +40,7 @@ mod results;
 mod same_bits;
 mod shards;
 mod simulate;
+mod slider;
 mod spectrum;
 mod submit;
 mod sweep;

@@ -255,7 +255,8 @@ fn rescue_candidates(
         states.extend(weakest_direction_states(point, segment).unwrap_or_default());
     }
     states.extend(follows);
-    states.extend(RATES.map(|[neck, lip]| seen + LinkState::new(0.0, 0.0, neck * per_s, lip * per_s)));
+    let units = point.scene.linkage.angle_units().map(|unit| unit * per_s);
+    states.extend(RATES.map(|[neck, lip]| seen + LinkState::new(0.0, 0.0, neck * units[0], lip * units[1])));
     states
 }
 

@@ -1,7 +1,7 @@
 //! Normal equations of all segments, and a step of the outer search.
 
 use super::iterate::{Iterate, SegmentState};
-use super::model::TraceModel;
+use super::model::{TraceModel, TraceRecording};
 use super::segment_simulation::{LinkState, RecordingModel};
 use super::variable_projection::{ProjectedSegment, project_out_state};
 use nalgebra::{DMatrix, DVector};
@@ -122,9 +122,14 @@ pub(super) fn carry_states(
         let Some(part) = part else { continue };
         let follow = &part.move_by_unknown * moved;
         let step = -LinkState::from_fn(|i, _| part.move_held[i] + follow[i]);
-        let angle = ANGLE / step[0].abs().max(step[1].abs()).max(1e-9);
-        let longest = RATE / model.recordings[segment.recording].observation.first_segment_s;
-        let rate = longest / step[2].abs().max(step[3].abs()).max(1e-9);
+        let TraceRecording { scene, observation } = &model.recordings[segment.recording];
+        let [neck, lip] = scene.linkage.angle_units();
+        let size = |i: usize| {
+            let of_neck = if neck > 0.0 { step[i].abs() } else { 0.0 };
+            of_neck.max(step[i + 1].abs() / lip)
+        };
+        let angle = ANGLE / size(0).max(1e-9);
+        let rate = RATE / observation.first_segment_s / size(2).max(1e-9);
         segment.start = (segment.start_state() + step * angle.min(rate).min(1.0)).into();
     }
     segments

@@ -213,9 +213,10 @@ impl<'a> RecordingModel<'a> {
 
     /// Scales of the four numbers of a starting state, rad and rad/s.
     pub(super) fn state_steps(&self) -> [f64; 4] {
-        let [neck, lip, neck_rate, lip_rate] = STATE_STEPS;
         let per_s = 1.0 / self.observation.first_segment_s;
-        [neck, lip, neck_rate * per_s, lip_rate * per_s]
+        let [neck, lip] = self.scene.linkage.angle_units();
+        let units = [neck, lip, neck * per_s, lip * per_s];
+        std::array::from_fn(|i| STATE_STEPS[i] * units[i])
     }
 
     /// The state of the blade at the start of the next segment, right after the frames `frames`; `None` if
@@ -343,7 +344,10 @@ impl<'a> RecordingModel<'a> {
         let rows = residuals.len();
         let mut by_state = DMatrix::zeros(rows, STATES);
         for (i, column) in by_state.as_mut_slice().chunks_mut(rows.max(1)).enumerate() {
-            self.add_run_derivative(&shot, i, 1.0, column);
+            // (the state of the neck of a slider stays zero)
+            if self.scene.linkage.angle_units()[i % 2] > 0.0 {
+                self.add_run_derivative(&shot, i, 1.0, column);
+            }
         }
         let mut by_unknown = DMatrix::zeros(rows, effects.len());
         for (effect, column) in effects.iter().zip(by_unknown.as_mut_slice().chunks_mut(rows.max(1))) {
@@ -401,7 +405,7 @@ impl<'a> RecordingModel<'a> {
     /// the middle along the glass, m. The head is above the glass and appears nearer to the centre of the
     /// arc. If the recorded head drives the model, the distance from head to tip is larger by as much.
     fn bend_by_curvature(&self, along: f64, drop: f64) -> [f64; 2] {
-        let height = self.scene.linkage.l1_m + self.scene.linkage.l2_m - drop;
+        let height = self.scene.linkage.upright_height_m() - drop;
         [if self.observation.own_head { height * along } else { 0.0 }, -0.5 * along * along]
     }
 

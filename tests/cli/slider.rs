@@ -1,0 +1,77 @@
+//! A slider from its synthetic recording to the fit of its friction, and a study of a slider.
+
+use crate::small_fit::Project;
+use serde_json::Value;
+
+fn project() -> Project {
+    let project = Project::of("blade");
+    project.write("data/scenes/slider-frame.toml", include_str!("../../data/scenes/slider-frame.toml"));
+    project.write("data/twins/slider-frame.toml", include_str!("../../data/twins/slider-frame.toml"));
+    project
+}
+
+fn run(project: &Project, arguments: &[&str]) -> String {
+    let (code, said, err) = project.run(arguments);
+    assert_eq!(code, 0, "{arguments:?}\n{said}{err}");
+    said
+}
+
+#[test]
+fn a_first_fit_of_a_slider_finds_its_friction() {
+    let project = project();
+    run(&project, &["twin", "data/twins/slider-frame.toml", "--out", "rec"]);
+    let trace = project.read("rec/trace.csv");
+    let heights = trace.lines().skip(1).all(|row| row.split(',').nth(2) == Some("") && row.ends_with(','));
+    assert!(heights && trace.lines().count() == 2502);
+    // the same without the columns of heights
+    let along: String = trace
+        .lines()
+        .map(|row| row.split(',').collect::<Vec<_>>())
+        .map(|cells| format!("{},{},{}\n", cells[0], cells[1], cells[3]))
+        .collect();
+    project.write("along.csv", &along);
+    let init = [
+        "init",
+        "along.csv",
+        "--slider",
+        "--mass-kg",
+        "3.0799",
+        "--normal-force-n",
+        "2.4525",
+        "--out",
+        "fit",
+    ];
+    run(&project, &init);
+    let said = run(&project, &["fit", "fit/job.toml"]);
+    let result: Value = serde_json::from_str(&project.read("fit/result.json")).unwrap();
+    assert_eq!(result["misfit"]["explained"], true, "{said}{}", result["misfit"]["reasons"]);
+    for (name, truth, width) in [
+        ("friction.c", 0.28, 0.15),
+        ("slider.stiffness_n_per_m", 1191.0, 0.1),
+        ("slider.damping_n_s_per_m", 0.669, 0.1),
+    ] {
+        let found = |key: &str| result["parameters"][name][key].as_f64().unwrap();
+        let (low, high) = (found("lower_95"), found("upper_95"));
+        assert!(low < truth && truth < high && high - low < width * truth, "{name}: {low} to {high}");
+    }
+}
+
+#[test]
+fn a_study_varies_the_numbers_of_a_slider() {
+    let project = project();
+    let study = "format = 1\ntitle = \"Load and stiffness\"\nscene = \"data/scenes/slider-frame.toml\"\n\
+                 [camera]\nframe_rate_hz = 250.0\nexposure_s = 0.0\n\
+                 [[axis]]\nname = \"slider.normal_force_n\"\nfrom = 1.0\nto = 6.0\npoints = 3\n\
+                 [[axis]]\nname = \"slider.stiffness_n_per_m\"\nfrom = 600.0\nto = 1200.0\npoints = 2\n\
+                 [[map]]\nname = \"stick fraction\"\nkind = \"stick-fraction\"\n";
+    project.write("study.toml", study);
+    run(&project, &["sweep", "study.toml", "--out", "study"]);
+    let table = project.read("study/sweep.csv");
+    assert_eq!(table.lines().filter(|row| row.contains("completed")).count(), 6, "{table}");
+}
+
+#[test]
+fn the_mode_of_a_slider_is_that_of_the_mass_on_its_spring() {
+    let said = run(&project(), &["modes", "data/scenes/slider-frame.toml"]);
+    assert!(said.contains("3.130        3.130    0.0055"), "{said}");
+}
