@@ -40,8 +40,8 @@ impl KnownSlider {
             .filter(|k| k.is_finite() && *k > 0.0)
     }
 
-    /// The scene and the job for a recording; `paths` are the paths of the recording, relative to both, and of
-    /// the scene, relative to the job.
+    /// The scene and the job for a recording; `path` is that of the recording, relative to both, and `scene`
+    /// that of the scene, relative to the job.
     ///
     /// # Errors
     /// [`DraftError`] if the head was not tracked or does not move relative to the slider.

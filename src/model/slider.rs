@@ -5,11 +5,11 @@
 //! ```
 //!
 //! A point mass at the end of a long arm moves on a circle that is straight as far as the mass goes. So a
-//! slider is a blade whose neck does not turn and has no length, and whose lip is an arm of [`ARM_M`] with all
-//! the mass at its tip, the stiffness `k l2^2` and the damping `d l2^2` at its hinge. Equations, series,
-//! events, derivatives and fits are those of the blade. With `y = x - v`, the difference is `(y / l2)^2` in the
-//! sine of the angle and `N / (k l2)` in the stiffness. Both are below the last bit of a number, and conversion
-//! from length to angle has no rounding error, because the arm is a power of two.
+//! slider is a blade whose neck does not turn and has no length, and whose lip is an arm of [`ARM_M`] with
+//! all the mass at its tip, the stiffness `k l2^2` and the damping `d l2^2` at its hinge. Equations, series,
+//! events, derivatives and fits are those of the blade. With `y = x - v`, the difference is `(y / l2)^2` in
+//! the sine of the angle and `N / (k l2)` in the stiffness. Both are below the last bit of a number, and
+//! conversion from length to angle has no rounding error, because the arm is a power of two.
 //!
 //! The normal force of a slider does not depend on its motion: `m_b = M l2` makes `n` and so the `nu` of
 //! [`super::FrictionResponse`] zero. So a slider has no Painlevé paradox and cannot lose contact.
@@ -20,8 +20,8 @@ use super::{Linkage, Pose, Spring};
 
 /// Length of the arm, m.
 const ARM_M: f64 = (1u64 << 60) as f64;
-/// Moment of inertia of the neck, kg m2, and its stiffness, N m/rad: 2^240. The arm moves the neck by less than
-/// `2^-80` of the arm's own angle.
+/// Moment of inertia of the neck, kg m2, and its stiffness, N m/rad: 2^240. The arm moves the neck by less
+/// than `2^-80` of the arm's own angle.
 const NECK: f64 = ARM_M * ARM_M * ARM_M * ARM_M;
 /// Stiffness of the support, N/m: 2^30, so that the energy of the preload is small.
 const SUPPORT_N_PER_M: f64 = (1u64 << 30) as f64;

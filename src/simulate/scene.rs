@@ -1,4 +1,5 @@
-//! Scenes: a blade or a slider, its friction, its drive and the settings of a run, read from `scene.toml` and validated.
+//! Scenes: a blade or a slider, its friction, its drive and the settings of a run, read from `scene.toml` and
+//! validated.
 
 mod as_written;
 pub mod contact;

@@ -1,5 +1,5 @@
-//! Sliders against motions that are known in closed form: the free decay of a Coulomb oscillator, Den Hartog's
-//! forced oscillator without and with stops, a block on a shaken table, stick-slip at constant pull, and the
+//! Sliders against motions that are known in closed form: the free decay of a Coulomb oscillator, Den
+//! Hartog's forced oscillator without and with stops, a block on a shaken table, stick-slip at constant pull, and the
 //! onset of stick-slip under friction that falls with speed.
 
 use crate::scenes::{Seen, committed, seen};
@@ -314,7 +314,8 @@ fn errors_of_instants_follow_the_tolerance_with_either_integrator() {
 }
 
 /// Pulled at constant speed, with a static limit above that of slip: the mass slips for
-/// `2 (pi - atan(B w / V)) / w` and sticks for `2 B / V`, with `B` half the jump of friction over the stiffness.
+/// `2 (pi - atan(B w / V)) / w` and sticks for `2 B / V`, with `B` the jump of friction
+/// over the stiffness.
 #[test]
 fn a_slider_pulled_at_constant_speed_sticks_and_slips_with_the_known_period() {
     const CYCLES: usize = 50;
@@ -337,8 +338,8 @@ fn a_slider_pulled_at_constant_speed_sticks_and_slips_with_the_known_period() {
     assert!(error < INSTANT_S, "{error:e} s");
 }
 
-/// Friction that falls with speed takes `N a b exp(-b V)` off the damping. So steady sliding is stable above a
-/// speed, and below it a small disturbance grows at half that rate over the mass, up to stick-slip.
+/// Friction that falls with speed takes `N a b exp(-b V)` off the damping. So steady sliding is stable above
+/// a speed, and below it a small disturbance grows at half that rate over the mass, up to stick-slip.
 #[test]
 fn stick_slip_sets_in_where_falling_friction_outweighs_the_damper() {
     let rig = Rig { d: 0.669, ..FRAME };
