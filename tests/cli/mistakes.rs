@@ -152,7 +152,7 @@ const MISTAKES: [(&str, &str, &str, &[&str]); 48] = [
         SCENE,
         "kind = \"upright\"",
         "kind = \"steady slide\"",
-        &["`start.kind`", "\"steady slide\"", "\"upright\", \"steady-slide\", \"state\""],
+        &["`start.kind`", "\"steady slide\"", "\"relaxed\", \"steady-slide\", \"state\""],
     ),
     (
         SCENE,

@@ -212,7 +212,7 @@ fn bad_scenes_are_refused_with_place_and_remedy() {
     refused(
         &swap("kind = \"upright\"", "kind = \"state\""),
         &[],
-        &["key `start.neck_angle_rad`: found nothing", "needs all four"],
+        &["key `start.neck_angle_rad`: found nothing", "needs all numbers of the state"],
     );
     refused(
         &swap("stop_s = 0.25", "stop_s = -1.0"),
