@@ -30,6 +30,7 @@ mod sensitivities;
 mod shards;
 mod simulate;
 mod spectrum;
+mod stability;
 mod submit;
 mod sweep;
 mod twin;
@@ -94,6 +95,8 @@ pub(crate) enum Command {
     Blade(blade::BladeArgs),
     /// Natural frequencies and modes of a scene's blade
     Modes(modes::ModesArgs),
+    /// Speeds at which steady sliding of a scene's blade is unstable, and what changes them
+    Stability(stability::StabilityArgs),
     /// Compare speed and error of every integration method on a scene
     Accuracy(accuracy::AccuracyArgs),
     /// A synthetic recording: a scene seen by a camera
@@ -142,6 +145,7 @@ impl Command {
             Self::Simulate(args) => args.run(global),
             Self::Blade(args) => args.run(global),
             Self::Modes(args) => args.run(global),
+            Self::Stability(args) => args.run(global),
             Self::Accuracy(args) => args.run(global),
             Self::Twin(args) => args.run(global),
             Self::Sweep(args) => args.run(global),

@@ -20,6 +20,7 @@ pub mod residuals;
 pub mod ring_down;
 pub mod spectrogram;
 pub mod spectrum;
+pub mod stability;
 pub mod stick_slip;
 pub mod sweep_map;
 pub mod sweep_sheet;

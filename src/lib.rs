@@ -9,6 +9,7 @@
 //! | model | [`model`], [`hybrid_ode`], [`simulate`] | a scene | motion, transitions, summary |
 //! | dimensions | [`model::section`], [`model::plausibility`] | the section of a blade, a scene | a first `[blade]` table, numbers to check, doubts |
 //! | check the model | [`simulate::accuracy`] | a scene | error against work of every method |
+//! | stability | [`stability`] | a scene | speeds at which steady sliding is unstable, effects of changes |
 //! | camera | [`simulate::twin`] | a scene | a synthetic recording |
 //! | read | [`feature`] | a recording | frequencies, durations, deflections, or why they are missing |
 //! | fit | [`fit`] | a job, recordings | estimates, intervals, verdicts |
@@ -106,6 +107,7 @@ pub mod prelude;
 pub mod recording;
 pub mod report;
 pub mod simulate;
+pub mod stability;
 pub mod sweep;
 pub mod text;
 pub mod toml_file;

@@ -27,15 +27,62 @@ pub fn steady_slip_pose(linkage: &Linkage, speed_m_per_s: f64) -> Option<Pose> {
     let head = HeadMotion { position_m: 0.0, velocity_m_per_s: speed_m_per_s, acceleration_m_per_s2: 0.0 };
     let direction = speed_m_per_s.signum();
     let mu = direction * linkage.friction.dynamic_coefficient(speed_m_per_s.abs(), direction);
-    let mut angles = Vector2::zeros();
-    for step in 1..=LOAD_STEPS {
-        angles = solve_for_load(linkage, mu * f64::from(step) / f64::from(LOAD_STEPS), angles)?;
-    }
-    let pose = pose_at_rest(&angles);
+    let pose = StaticPose::UPRIGHT.change_friction(linkage, mu)?.pose();
     let (d, lean) = (LinkDirections::from_pose(&pose), shoulder_contact(linkage, pose.theta));
     let is_pressed = linkage.friction_response(&pose, &d, &head, lean).n_free > 0.0;
-    let is_upright = angles.iter().all(|a| a.abs() < std::f64::consts::FRAC_PI_2);
-    (is_pressed && is_upright).then_some(pose)
+    (is_pressed && is_upright(&pose)).then_some(pose)
+}
+
+/// Whether both links are above level.
+pub(crate) fn is_upright(pose: &Pose) -> bool {
+    [pose.theta, pose.phi].iter().all(|angle| angle.abs() < std::f64::consts::FRAC_PI_2)
+}
+
+/// A static equilibrium with its coefficient of friction, from which others are reached in small steps.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct StaticPose {
+    /// Coefficient of friction, with the sign of the tip's velocity.
+    mu: f64,
+    angles: Pair,
+}
+
+impl StaticPose {
+    /// The upright blade, which is in equilibrium without friction.
+    pub(crate) const UPRIGHT: Self = Self { mu: 0.0, angles: Vector2::new(0.0, 0.0) };
+
+    /// The equilibrium that the blade reaches when the friction changes slowly to another coefficient, which
+    /// has the sign of the tip's velocity. `None` if the equilibrium is lost on the way.
+    pub(crate) fn change_friction(&self, linkage: &Linkage, mu: f64) -> Option<Self> {
+        let largest = mu.abs().max(self.mu.abs()).max(f64::MIN_POSITIVE);
+        let steps = (f64::from(LOAD_STEPS) * ((mu - self.mu).abs() / largest)).ceil().max(1.0);
+        let angles = (1..=steps as u32).try_fold(self.angles, |angles, step| {
+            solve_for_load(linkage, self.mu + (mu - self.mu) * f64::from(step) / steps, angles)
+        })?;
+        Some(Self { mu, angles })
+    }
+
+    /// An equilibrium that Newton's iteration finds from a grid of angles, the least inclined first. A blade
+    /// that snaps over while friction grows has such an equilibrium beyond the snap.
+    pub(crate) fn search_grid(linkage: &Linkage, mu: f64) -> Option<Self> {
+        /// Angles of both links, rad, against the direction of slip.
+        const GRID: [f64; 6] = [0.0, 0.15, 0.3, 0.5, 0.8, 1.2];
+        let starts = GRID.into_iter().flat_map(|lip| GRID.map(|neck| Vector2::new(neck, lip)));
+        let mut found = starts.filter_map(|start| solve_for_load(linkage, mu, -mu.signum() * start));
+        let angles = found.find(|angles| is_upright(&pose_at_rest(angles)))?;
+        Some(Self { mu, angles })
+    }
+
+    /// The equilibrium for the same friction with the neck on the given side of the shoulder; `None` if there
+    /// is none.
+    pub(crate) fn lean_on_side(&self, linkage: &Linkage, side: ShoulderContact) -> Option<Self> {
+        let found = solve_newton(linkage, self.mu, self.angles, side)?;
+        (shoulder_contact(linkage, found[0]) == side).then_some(Self { angles: found, ..*self })
+    }
+
+    /// The pose, at rest relative to the head.
+    pub(crate) fn pose(&self) -> Pose {
+        pose_at_rest(&self.angles)
+    }
 }
 
 /// Largest coefficient of friction that is tried; it is reached from 0 in [`FRICTIONS`] equal steps.
@@ -75,7 +122,7 @@ fn pose_at_rest(angles: &Pair) -> Pose {
 }
 
 /// Side of the shoulder on which the neck leans at an angle, rad.
-pub(super) fn shoulder_contact(linkage: &Linkage, theta: f64) -> ShoulderContact {
+pub(crate) fn shoulder_contact(linkage: &Linkage, theta: f64) -> ShoulderContact {
     linkage.shoulder.map_or(ShoulderContact::Off, |s| s.contact_at(theta))
 }
 
@@ -91,7 +138,8 @@ pub(super) fn solve_for_load(linkage: &Linkage, mu: f64, angles: Pair) -> Option
     }
     let here = shoulder_contact(linkage, angles[0]);
     let sides = [here, ShoulderContact::Off, ShoulderContact::Forward, ShoulderContact::Backward];
-    sides.into_iter().find_map(|side| {
+    let count = if linkage.shoulder.is_some() { sides.len() } else { 1 };
+    sides.into_iter().take(count).find_map(|side| {
         solve_newton(linkage, mu, angles, side).filter(|found| shoulder_contact(linkage, found[0]) == side)
     })
 }

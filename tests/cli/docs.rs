@@ -228,6 +228,7 @@ pages! {
     hard_cases: "docs/hard-cases.md",
     install: "docs/install.md",
     reports: "docs/reports.md",
+    stability: "docs/stability.md",
     sweeps: "docs/sweeps.md",
     fuzz: "fuzz/README.md",
 }

@@ -4,7 +4,7 @@ use crate::small_fit::Project;
 use std::process::{Command, Stdio};
 
 /// Every command.
-const COMMANDS: [&str; 18] = [
+const COMMANDS: [&str; 19] = [
     "accuracy",
     "blade",
     "collect",
@@ -20,6 +20,7 @@ const COMMANDS: [&str; 18] = [
     "report",
     "simulate",
     "spectrum",
+    "stability",
     "submit",
     "sweep",
     "twin",

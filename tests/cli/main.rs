@@ -42,6 +42,7 @@ mod shards;
 mod simulate;
 mod slider;
 mod spectrum;
+mod stability;
 mod submit;
 mod sweep;
 mod traces;

@@ -75,3 +75,12 @@ fn the_mode_of_a_slider_is_that_of_the_mass_on_its_spring() {
     let said = run(&project(), &["modes", "data/scenes/slider-frame.toml"]);
     assert!(said.contains("3.130        3.130    0.0055"), "{said}");
 }
+
+#[test]
+fn the_stability_of_a_slider_is_refused_and_nothing_is_written() {
+    let project = project();
+    let (code, out, err) = project.run(&["stability", "data/scenes/slider-frame.toml", "--out", "none"]);
+    assert_eq!((code, out.as_str()), (2, ""), "{err}");
+    assert!(err.contains("slider-frame.toml") && err.contains("found a slider, expected a blade"), "{err}");
+    assert!(!project.path("none").exists());
+}

@@ -13,7 +13,7 @@ use names::{defined_functions, defined_types, looks_like_participle};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The layers of `src`; a layer uses only layers above it.
-const LAYERS: [&str; 16] = [
+const LAYERS: [&str; 17] = [
     "text",
     "toml_file",
     "camera",
@@ -21,6 +21,7 @@ const LAYERS: [&str; 16] = [
     "recording",
     "import",
     "simulate",
+    "stability",
     "feature",
     "checkpoint",
     "fit",

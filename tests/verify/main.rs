@@ -21,6 +21,8 @@ mod scenes;
 mod score;
 #[path = "../../crates/short-spectra/examples/spectra/signal.rs"]
 mod signal;
+#[path = "../../examples/sliding/growth.rs"]
+mod sliding_growth;
 #[path = "../common/thorough.rs"]
 mod thorough;
 
@@ -57,6 +59,7 @@ mod shutter;
 mod slack;
 mod slider;
 mod spectrum;
+mod stability;
 mod strokes;
 mod sweep;
 mod tilt;

@@ -135,6 +135,7 @@ pub(crate) enum OutputCommand {
     Report,
     Simulate,
     Spectrum,
+    Stability,
     Submit,
     Sweep,
     Twin,

@@ -1,0 +1,158 @@
+//! `wiperlab stability`.
+
+use super::load::{print_warnings, read_scene};
+use super::prelude::*;
+use crate::figures::stability::draw_figure;
+use crate::stability::outputs::{write_stability_csv, write_stability_json};
+use crate::stability::speed_intervals::{SlidingState, SpeedInterval};
+use crate::stability::steady_sliding::Instability;
+use crate::stability::study::{StabilityStudy, StudyRange, default_top_speed};
+use crate::text::format_digits;
+
+#[derive(Debug, Args)]
+pub(crate) struct StabilityArgs {
+    /// Scene of the blade (scene.toml)
+    pub scene: PathBuf,
+    /// Folder for stability.csv, stability.json and stability.svg
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Speeds of the head, m/s; 0 stands for the limit of slow sliding (default: from 0 to twice the top
+    /// speed of the scene's drive)
+    #[arg(long, value_name = "FROM..TO", value_parser = parse_range, allow_hyphen_values = true)]
+    pub speed_m_per_s: Option<NumberRange>,
+    /// Preloads, N (default: the preload of the scene alone)
+    #[arg(long, value_name = "FROM..TO", value_parser = parse_range, allow_hyphen_values = true)]
+    pub preload_n: Option<NumberRange>,
+    /// Number of speeds, and of preloads
+    #[arg(long, value_name = "N", default_value_t = 100,
+          value_parser = clap::value_parser!(u16).range(2..=1000))]
+    pub points: u16,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
+}
+
+/// Two numbers, the second above the first.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct NumberRange([f64; 2]);
+
+fn parse_range(text: &str) -> Result<NumberRange, String> {
+    let numbers = text.split_once("..").and_then(|(from, to)| Some([from.parse().ok()?, to.parse().ok()?]));
+    let is_range = |[from, to]: &[f64; 2]| *from >= 0.0 && from < to && to.is_finite();
+    numbers.filter(is_range).map(NumberRange).ok_or_else(|| {
+        "expected FROM..TO, two numbers of 0 or more with FROM below TO, such as 0..0.5".to_owned()
+    })
+}
+
+const TABLE: &str = "stability.csv";
+const SUMMARY: &str = "stability.json";
+/// File names of the outputs.
+const OUTPUTS: [&str; 5] =
+    [TABLE, SUMMARY, "stability.svg", "paper/stability-85mm.svg", "paper/stability-170mm.svg"];
+/// Number of changes that are printed.
+const PRINTED_CHANGES: usize = 5;
+
+impl StabilityArgs {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Outcome {
+        let scene = read_scene(&self.scene)?;
+        if scene.linkage.is_slider() {
+            let problem =
+                "found a slider, expected a blade; `wiperlab simulate` shows whether a slider sticks";
+            return Err(Failure::at(self.scene.display(), problem));
+        }
+        let writer = global.write_policy(OutputCommand::Stability, self.overwrite);
+        OutputFolder::check(&self.out, &writer, &OUTPUTS)?;
+        print_warnings(&self.scene, &scene.find_implausible(), global);
+        let top = default_top_speed(&scene);
+        let speeds_m_per_s = self.speed_m_per_s.map_or([0.0, top], |range| range.0);
+        if speeds_m_per_s[1] <= speeds_m_per_s[0] {
+            let expected = "a drive that moves the head; name speeds with --speed-m-per-s 0..0.5";
+            return Err(Failure::at(
+                self.scene.display(),
+                format!("found a head at rest, expected {expected}"),
+            ));
+        }
+        let preloads_n = self.preload_n.map(|range| range.0);
+        let range = StudyRange { speeds_m_per_s, preloads_n, points: usize::from(self.points) };
+        let study = StabilityStudy::from_scene(&scene, range).map_err(Failure::input)?;
+        if let Some(reason) = study.why_impossible() {
+            let [from, to] = speeds_m_per_s;
+            let advice = "expected a blade that slides steadily; change preload, friction or speeds";
+            return Err(Failure::at(
+                self.scene.display(),
+                format!(
+                    "at no speed from {from} to {to} m/s can the blade slide steadily: {}; {advice}",
+                    reason.meaning()
+                ),
+            ));
+        }
+        let json = serde_json::to_vec_pretty(&write_stability_json(&study)).map_err(Failure::internal)?;
+        let mut outputs =
+            vec![(TABLE.to_owned(), write_stability_csv(&study).into_bytes()), (SUMMARY.to_owned(), json)];
+        outputs.extend(files::figure_files("stability", &draw_figure(scene.title(), &study)));
+        files::write_outputs(&self.out, &writer, &outputs)?;
+        if !global.quiet {
+            print_study(scene.title(), &study);
+            print_line!("written to {}", self.out.display());
+        }
+        Ok(CommandOutcome::Done)
+    }
+}
+
+fn print_study(title: &str, study: &StabilityStudy) {
+    print_line!("{title}");
+    for survey in &study.own {
+        let direction = match study.own.len() {
+            1 => "both directions",
+            _ if survey.direction < 0.0 => "backward",
+            _ => "forward",
+        };
+        print_line!("");
+        print_line!("steady sliding, {direction}, preload {} N", format_digits(survey.preload_n, 3));
+        survey.intervals.iter().for_each(print_interval);
+    }
+    print_line!("");
+    match study.unstable_range() {
+        None => print_line!("no instability of steady sliding at these speeds"),
+        Some([onset, end]) => {
+            print_line!("unstable between {} and {} m/s", format_digits(onset, 4), format_digits(end, 4));
+            if end == study.range.speeds_m_per_s[1] {
+                print_line!("the range ends there; name higher speeds with --speed-m-per-s");
+            }
+            print_line!("not computed: the speed up to which a stick-slip cycle goes on; it can be higher");
+        }
+    }
+    if !study.changes.is_empty() {
+        print_line!("");
+        print_line!("what moves the end of the instability most; a damping of 0 changes to a ratio of 0.001");
+    }
+    for change in study.changes.iter().take(PRINTED_CHANGES) {
+        let shown = |moved: Option<f64>| moved.map_or_else(|| "-".to_owned(), |v| format!("{v:+.2e} m/s"));
+        let meaning = change.parameter.meaning.split(',').next().unwrap_or_default();
+        let size = if change.value == 0.0 { "ratio 0.001" } else { "+1 %" };
+        print_line!(
+            "  {meaning:52} {size:>11}: onset {:>14}, end {:>14}",
+            shown(change.onset_m_per_s),
+            shown(change.end_m_per_s)
+        );
+    }
+}
+
+fn print_interval(interval: &SpeedInterval) {
+    let [from, to] = interval.speeds_m_per_s.map(|speed| format_digits(speed, 4));
+    let words = match (interval.state, interval.modes.zip(interval.instabilities())) {
+        (SlidingState::Unstable, Some((modes, kinds))) => {
+            // the growth vanishes at the upper end, so the lower end says more
+            let (growth, (kind, band)) = (format_digits(modes[0].growth_per_s, 3), kinds[0]);
+            let hz = format_digits(modes[0].frequency_hz, 4);
+            match kind {
+                Instability::Divergence => format!("unstable: divergence, {growth} 1/s"),
+                Instability::Flutter => {
+                    format!("unstable: flutter at {hz} Hz ({}), {growth} 1/s", band.name())
+                }
+            }
+        }
+        (SlidingState::Impossible(reason), _) => format!("impossible: {}", reason.meaning()),
+        _ => "stable".to_owned(),
+    };
+    print_line!("  {from:>8} to {to:>8} m/s  {words}");
+}

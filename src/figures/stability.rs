@@ -1,0 +1,136 @@
+//! Growth of the small vibrations of steady sliding: against speed, or over speed and preload.
+
+use super::sweep_map::colour_limits;
+use crate::stability::speed_intervals::unstable_range;
+use crate::stability::steady_sliding::{NoSliding, NoiseBand, SlidingMode};
+use crate::stability::study::{StabilityStudy, StudyPoint};
+use crate::text::format_digits;
+use plain_charts::{
+    AxisScale, COLUMN_WIDTH_MM, ChartAxis, Colour, ColourMap, Figure, Hatch, HatchPattern, HeatMap, Mark,
+    Panel, Series, cell_edges,
+};
+
+/// Height of the panel, mm.
+const PANEL_MM: f64 = 56.0;
+
+/// The map of the growth over speed and preload, or its curves against speed for the scene's preload alone.
+#[must_use]
+pub fn draw_figure(title: &str, study: &StabilityStudy) -> Figure {
+    let panel = if study.by_preload.is_empty() { draw_curves(study) } else { draw_map(study) };
+    Figure {
+        title: claim_sentence(study),
+        subtitle: format!("{title}; small vibrations of steady sliding, without stick-slip"),
+        watermarked: false,
+        description: format!(
+            "Growth of the vibrations of steady sliding from {} to {} m/s; hatched where the blade cannot slide \
+             steadily.",
+            study.range.speeds_m_per_s[0], study.range.speeds_m_per_s[1]
+        ),
+        width_mm: COLUMN_WIDTH_MM,
+        panels: vec![panel],
+        ..Figure::default()
+    }
+}
+
+fn claim_sentence(study: &StabilityStudy) -> String {
+    let Some([onset, end]) = study.unstable_range() else {
+        return "Steady sliding is stable at all speeds where it is possible".to_owned();
+    };
+    let intervals = study.own.iter().flat_map(|survey| &survey.intervals);
+    let modes = intervals.filter_map(|interval| Some(interval.modes?[0]));
+    let band = modes
+        .reduce(|a, b| if b.growth_per_s > a.growth_per_s { b } else { a })
+        .filter(|mode| mode.frequency_hz > 0.0)
+        .map(|mode| format!(" ({})", NoiseBand::from_frequency(mode.frequency_hz).name()));
+    let [onset, end] = [onset, end].map(|speed| format_digits(speed, 3));
+    format!("Steady sliding is unstable between {onset} and {end} m/s{}", band.unwrap_or_default())
+}
+
+fn speed_axis(study: &StabilityStudy) -> ChartAxis {
+    let [from, to] = study.range.speeds_m_per_s;
+    ChartAxis::linear("speed of the head, m/s").with_range(from, to)
+}
+
+/// Points of sliding towards +v.
+fn forward_points(study: &StabilityStudy) -> Vec<&StudyPoint> {
+    let length = study.points.len() / study.own.len().max(1);
+    study.points.iter().take(length).collect()
+}
+
+/// One curve for each mode, in rising order of frequency.
+fn draw_curves(study: &StabilityStudy) -> Panel {
+    const STYLES: [(Colour, Mark); 4] = [
+        (Colour::Blue, Mark::Line),
+        (Colour::Vermilion, Mark::Line),
+        (Colour::Green, Mark::Dashed),
+        (Colour::Orange, Mark::Dotted),
+    ];
+    let points = forward_points(study);
+    let modes = |point: &StudyPoint| {
+        point.slide.map_or_else(|_| Vec::new(), |slide| slide.modes().collect::<Vec<SlidingMode>>())
+    };
+    let count = points.iter().map(|point| modes(point).len()).max().unwrap_or(0);
+    let curves = STYLES.iter().enumerate().take(count).map(|(i, (colour, mark))| {
+        let found: Vec<_> =
+            points.iter().map(|point| (point.speed_m_per_s, modes(point).get(i).copied())).collect();
+        let named = found.iter().find_map(|(_, mode)| *mode).map_or(0.0, |mode| mode.frequency_hz);
+        let label = format!("mode {}, {} Hz", i + 1, format_digits(named, 3));
+        let curve = found.into_iter().map(|(speed, mode)| mode.map(|mode| (speed, mode.growth_per_s)));
+        Series::new(label, *colour, *mark, curve)
+    });
+    let [from, to] = study.range.speeds_m_per_s;
+    let zero = Series::new("", Colour::Grey, Mark::Line, [(from, 0.0), (to, 0.0)]);
+    let series: Vec<Series> = std::iter::once(zero).chain(curves).collect();
+    Panel::new(speed_axis(study), ChartAxis::linear("growth, 1/s"), PANEL_MM, series)
+}
+
+/// Growth of the leading mode as colours, with the ends of the unstable range as a line.
+fn draw_map(study: &StabilityStudy) -> Panel {
+    let (points, rows) = (forward_points(study), study.range.points);
+    let growth = |point: &StudyPoint| point.slide.ok().map(|slide| slide.leading_mode().growth_per_s);
+    let at = |speed: usize, preload: usize| points[preload * rows + speed];
+    let all: Vec<Option<f64>> = points.iter().map(|point| growth(point)).collect();
+    let largest = all.iter().flatten().fold(0.0, |largest: f64, value| largest.max(value.abs()));
+    // colours are symmetric about zero growth, so that their change of hue is the boundary
+    let limit = colour_limits(&all).map_or(largest, |(low, high)| low.abs().max(high.abs()));
+    let preloads: Vec<f64> = (0..rows).map(|row| at(0, row).preload_n).collect();
+    let speeds: Vec<f64> = (0..rows).map(|column| at(column, 0).speed_m_per_s).collect();
+    let values = (0..rows).map(|column| (0..rows).map(|row| growth(at(column, row))).collect());
+    let heat = HeatMap {
+        label: "growth, 1/s".to_owned(),
+        x: speeds.clone(),
+        y: preloads.clone(),
+        values: values.collect(),
+        range: Some((-limit, limit)),
+        colour_map: ColourMap::Diverging,
+        ..HeatMap::default()
+    };
+    let [x, y] = [&speeds, &preloads].map(|middles| cell_edges(middles, AxisScale::Linear));
+    let cells = |reason: NoSliding| -> Vec<[f64; 4]> {
+        let all = (0..rows).flat_map(|column| (0..rows).map(move |row| (column, row)));
+        let missing = all.filter(|(column, row)| at(*column, *row).slide.err() == Some(reason));
+        missing.map(|(column, row)| [x[column], x[column + 1], y[row], y[row + 1]]).collect()
+    };
+    let reasons = [
+        (NoSliding::NoEquilibrium, "no equilibrium", HatchPattern::Level),
+        (NoSliding::ContactLost, "contact lost", HatchPattern::Rising),
+        (NoSliding::Jammed, "jammed", HatchPattern::Falling),
+    ];
+    let hatches = reasons
+        .into_iter()
+        .map(|(reason, label, pattern)| Hatch { label: label.to_owned(), pattern, cells: cells(reason) })
+        .filter(|hatch| !hatch.cells.is_empty());
+    let [_, top] = study.range.speeds_m_per_s;
+    let ends = study.by_preload.iter().take(rows).map(|survey| {
+        let [_, end] = unstable_range(&survey.intervals)?;
+        (end < top).then_some((end, survey.preload_n))
+    });
+    let boundary = Series::new("end of the instability", Colour::Black, Mark::Line, ends);
+    let preload_axis = ChartAxis::linear("preload, N").with_range(y[0], y[rows]);
+    let speed_axis = speed_axis(study).with_range(x[0], x[rows]);
+    Panel {
+        heat_map: Some(heat),
+        hatches: hatches.collect(),
+        ..Panel::new(speed_axis, preload_axis, PANEL_MM, [boundary])
+    }
+}

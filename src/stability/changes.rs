@@ -1,0 +1,195 @@
+//! What a change of the blade does to the speeds at which steady sliding is unstable.
+
+use super::speed_intervals::{SlidingState, unstable_range};
+use super::steady_sliding::SlideFinder;
+use super::study::{PRELOAD, SlidingSurvey};
+use crate::model::Linkage;
+use crate::model::parameters::{ModelParameter, PARAMETERS, find_parameter};
+use crate::simulate::scene::Scene;
+use crate::simulate::scene::error::SceneError;
+
+/// Masses, stiffnesses, dampings and the preload: what is changed one at a time, all else staying as it is.
+/// The numbers of the friction law follow.
+const PARTS: [&str; 13] = [
+    "blade.head_mass_kg",
+    "blade.neck_mass_kg",
+    "blade.lip_mass_kg",
+    "blade.head_stiffness_n_per_m",
+    "blade.neck_stiffness_n_m_per_rad",
+    "blade.lip_stiffness_n_m_per_rad",
+    "shoulder.stiffness_n_m_per_rad",
+    "blade.head_damping_n_s_per_m",
+    "blade.neck_damping_n_m_s_per_rad",
+    "blade.lip_damping_n_m_s_per_rad",
+    "shoulder.damping_n_m_s_per_rad",
+    PRELOAD,
+    "shoulder.contact_angle_rad",
+];
+
+/// Step of a change, as a fraction of the value.
+const SHARE: f64 = 0.01;
+/// Step of a damping that is zero, as a damping ratio.
+const DAMPING_STEP: f64 = 1e-3;
+
+/// Effect of a change of one parameter.
+#[derive(Debug, Clone, Copy)]
+pub struct ParameterChange {
+    /// The parameter.
+    pub parameter: &'static ModelParameter,
+    /// Its value, in its SI unit.
+    pub value: f64,
+    /// The change, in the same unit: 1 % of the value, or a damping ratio of 0.001 for a part without
+    /// damping.
+    pub step: f64,
+    /// Change of the lowest speed at which steady sliding is unstable, m/s per step; `None` if this speed is
+    /// an end of the range.
+    pub onset_m_per_s: Option<f64>,
+    /// Change of the highest speed at which steady sliding is unstable, m/s per step; `None` if this speed
+    /// is an end of the range.
+    pub end_m_per_s: Option<f64>,
+}
+
+impl ParameterChange {
+    fn size(&self) -> f64 {
+        [self.onset_m_per_s, self.end_m_per_s].into_iter().flatten().map(f64::abs).fold(0.0, f64::max)
+    }
+}
+
+/// The scene with masses, stiffnesses, dampings and preload in physical units, so that each can change
+/// without the others.
+///
+/// # Errors
+/// As [`Scene::with_parameter`].
+pub fn write_in_physical_units(scene: &Scene) -> Result<Scene, SceneError> {
+    let convert = |converted: Scene, name: &&str| match scene.value(name) {
+        Some(value) => converted.with_parameter(name, value),
+        None => Ok(converted),
+    };
+    PARTS.iter().try_fold(scene.clone(), convert)
+}
+
+/// Effects of all parameters on the unstable range, the most effective first. Effects on the direction with
+/// the higher end are taken.
+pub(super) fn rank_changes(
+    scene: &Scene,
+    own: &[SlidingSurvey],
+    speeds_m_per_s: [f64; 2],
+) -> Result<Vec<ParameterChange>, SceneError> {
+    let ranges = own.iter().filter_map(|survey| Some((survey.direction, unstable_range(&survey.intervals)?)));
+    let Some((direction, [onset, end])) = ranges.max_by(|a, b| a.1[1].total_cmp(&b.1[1])) else {
+        return Ok(Vec::new());
+    };
+    let [lowest, highest] = speeds_m_per_s;
+    let boundaries = [(onset, 1.0, onset > lowest), (end, -1.0, end < highest)];
+    let physical = write_in_physical_units(scene)?;
+    let laws = PARAMETERS.iter().map(|row| row.name).filter(|name| name.starts_with("friction."));
+    let mut changes = Vec::new();
+    for name in PARTS.into_iter().chain(laws) {
+        let (Some(parameter), Some(value)) = (find_parameter(name), physical.value(name)) else { continue };
+        let Some(step) = change_step(&physical, name, value) else { continue };
+        let change = |(speed, inwards, is_found): (f64, f64, bool)| {
+            is_found.then(|| speed_change(&physical, name, [value, step], direction, [speed, inwards]))?
+        };
+        let [onset_m_per_s, end_m_per_s] = boundaries.map(change);
+        changes.push(ParameterChange { parameter, value, step, onset_m_per_s, end_m_per_s });
+    }
+    changes.retain(|change| change.size() > 0.0);
+    changes.sort_by(|a, b| b.size().total_cmp(&a.size()));
+    Ok(changes)
+}
+
+/// The change of a parameter whose effect is computed; `None` for a number that is zero and no damping.
+fn change_step(scene: &Scene, name: &str, value: f64) -> Option<f64> {
+    if value != 0.0 {
+        return Some(SHARE * value);
+    }
+    let part = name.split_once("_damping_").or_else(|| name.split_once(".damping_"))?.0;
+    let ratio = if part == "shoulder" { "shoulder.damping_ratio" } else { &format!("{part}_damping_ratio") };
+    scene.with_parameter(ratio, DAMPING_STEP).ok()?.value(name)
+}
+
+/// Change of a boundary of the unstable range, m/s per step of a parameter, from the boundaries of two blades
+/// that differ by a fraction of the step. `inwards` is +1 if the speeds above the boundary are unstable, and
+/// -1 if those below are.
+fn speed_change(
+    scene: &Scene,
+    name: &str,
+    [value, step]: [f64; 2],
+    direction: f64,
+    [speed, inwards]: [f64; 2],
+) -> Option<f64> {
+    /// Fraction of the step: the error of the difference is about the square of 1e-3.
+    const FRACTION: f64 = 0.1;
+    let find = |factor: f64| {
+        let changed = scene.with_parameter(name, value + factor * step).ok()?;
+        find_boundary(&changed.linkage, direction, speed, inwards)
+    };
+    // a value of zero or at the end of its range cannot fall
+    let (ahead, behind) = (find(FRACTION)?, find(-FRACTION));
+    let (before, width) = behind.map_or((speed, FRACTION), |behind| (behind, 2.0 * FRACTION));
+    Some((ahead - before) / width)
+}
+
+/// The boundary of instability next to a speed, m/s.
+fn find_boundary(linkage: &Linkage, direction: f64, speed: f64, inwards: f64) -> Option<f64> {
+    let mut finder = SlideFinder::new(linkage, direction);
+    let mut width = 0.01;
+    while width < 0.5 {
+        let [inside, outside] = [speed * (1.0 + inwards * width), speed * (1.0 - inwards * width)];
+        let [state, beyond] = [inside, outside].map(|at| finder.sliding_state(at));
+        if state == SlidingState::Unstable && beyond != SlidingState::Unstable {
+            return Some(finder.bisect_state(state, [inside, outside]).0[0]);
+        }
+        width *= 2.0;
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stability::study::{StabilityStudy, StudyRange};
+
+    fn study(scene: &Scene) -> StabilityStudy {
+        let range = StudyRange { speeds_m_per_s: [0.0, 1.0], preloads_n: None, points: 40 };
+        StabilityStudy::from_scene(scene, range).unwrap()
+    }
+
+    /// A small part of each change, made in the scene, moves the end as stated. The part is smaller than the
+    /// differences that the changes come from, so that those are checked too.
+    #[test]
+    fn a_changed_blade_has_the_end_that_was_stated() {
+        const PART: f64 = 0.02;
+        for text in [
+            include_str!("../../data/scenes/actual-blade.toml"),
+            include_str!("../../data/scenes/light-blade.toml"),
+        ] {
+            let scene = Scene::parse("s", text).unwrap();
+            let own = study(&scene);
+            let [_, end] = own.unstable_range().unwrap();
+            assert!(own.changes.len() >= 12, "{}", own.changes.len());
+            let physical = write_in_physical_units(&scene).unwrap();
+            for change in &own.changes {
+                let name = change.parameter.name;
+                let changed = physical.with_parameter(name, change.value + PART * change.step).unwrap();
+                let moved = (study(&changed).unstable_range().unwrap()[1] - end) / PART;
+                let stated = change.end_m_per_s.unwrap();
+                let allowed = 0.01 * stated.abs() + 1e-8;
+                assert!((moved - stated).abs() < allowed, "{name}: {moved:e} m/s, stated {stated:e} m/s");
+            }
+        }
+    }
+
+    /// A blade without damping is told what damping does: the step is a damping ratio of 0.001.
+    #[test]
+    fn a_blade_without_damping_learns_what_damping_does() {
+        let text = include_str!("../../data/scenes/light-blade.toml");
+        let scene = Scene::parse("s", text).unwrap().with_parameter("blade.neck_damping_ratio", 0.0).unwrap();
+        let changes = study(&scene).changes;
+        let neck = changes.iter().find(|c| c.parameter.name == "blade.neck_damping_n_m_s_per_rad").unwrap();
+        let ratio = scene.with_parameter("blade.neck_damping_n_m_s_per_rad", neck.step).unwrap();
+        assert_eq!(neck.value, 0.0);
+        assert!((ratio.value("blade.neck_damping_ratio").unwrap() - DAMPING_STEP).abs() < 1e-12);
+        assert!(neck.end_m_per_s.unwrap() < 0.0, "{neck:?}");
+    }
+}

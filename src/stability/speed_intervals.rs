@@ -1,0 +1,166 @@
+//! Intervals of speed in which steady sliding is stable, unstable or impossible.
+
+use super::steady_sliding::{Instability, NoSliding, NoiseBand, SlideFinder, SlidingMode};
+use serde::Serialize;
+
+/// What happens to steady sliding at the speeds of an interval.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SlidingState {
+    /// Every small vibration decays.
+    Stable,
+    /// A small vibration grows.
+    Unstable,
+    /// The blade cannot slide steadily.
+    Impossible(NoSliding),
+}
+
+/// An interval of speed with one state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpeedInterval {
+    /// Lowest and highest speed, m/s.
+    pub speeds_m_per_s: [f64; 2],
+    /// State of steady sliding.
+    pub state: SlidingState,
+    /// The mode that grows fastest, just inside the lowest and the highest speed; `None` unless the state is
+    /// unstable.
+    pub modes: Option<[SlidingMode; 2]>,
+}
+
+impl SpeedInterval {
+    /// Kind and band of the instability just inside the lowest and the highest speed.
+    #[must_use]
+    pub fn instabilities(&self) -> Option<[(Instability, NoiseBand); 2]> {
+        let both = |mode: SlidingMode| (mode.instability(), NoiseBand::from_frequency(mode.frequency_hz));
+        self.modes.map(|modes| modes.map(both))
+    }
+}
+
+/// A mode counts as growing if its rate, relative to the highest natural frequency of the links, is above
+/// this value. It is far above the rounding errors of an undamped mode.
+const NEUTRAL: f64 = 1e-9;
+
+impl SlideFinder {
+    /// Growth of the leading mode at a speed, m/s, less that of a neutral mode, 1/s.
+    fn excess_per_s(&mut self, speed_m_per_s: f64) -> Result<f64, NoSliding> {
+        let mode = self.find_slide(speed_m_per_s)?.leading_mode();
+        Ok(mode.growth_per_s - NEUTRAL * self.fastest_rad_per_s)
+    }
+
+    /// State of steady sliding at a speed, m/s.
+    pub fn sliding_state(&mut self, speed_m_per_s: f64) -> SlidingState {
+        state_from_excess(self.excess_per_s(speed_m_per_s))
+    }
+
+    /// Finds where a state ends between two speeds, m/s, of which the first has this state and the second
+    /// another. Returns a speed at which it still holds, one next to it at which it has ended, and the state
+    /// there.
+    pub(super) fn bisect_state(
+        &mut self,
+        state: SlidingState,
+        [mut inside, mut outside]: [f64; 2],
+    ) -> ([f64; 2], SlidingState) {
+        /// Relative width at which bisection ends; it is above the rounding errors of the growth.
+        const WIDTH: f64 = 1e-11;
+        let mut after = self.sliding_state(outside);
+        while (outside - inside).abs() > WIDTH * outside.abs().max(inside.abs()) {
+            let middle = 0.5 * (inside + outside);
+            let found = self.sliding_state(middle);
+            if found == state {
+                inside = middle;
+            } else {
+                (outside, after) = (middle, found);
+            }
+        }
+        ([inside, outside], after)
+    }
+
+    /// Divides a range of speed, m/s, into intervals of one state. States are compared at `points` equally
+    /// spaced speeds, and where the growth has an extremum between them.
+    #[must_use]
+    pub fn find_intervals(&mut self, [from, to]: [f64; 2], points: usize) -> Vec<SpeedInterval> {
+        let last = points.max(2) - 1;
+        let speed = |i: usize| if i == last { to } else { from + (to - from) * i as f64 / last as f64 };
+        let mut samples: Vec<(f64, Result<f64, NoSliding>)> =
+            (0..=last).map(|i| (speed(i), self.excess_per_s(speed(i)))).collect();
+        let hidden: Vec<_> = samples.windows(3).filter_map(|three| self.find_hidden_state(three)).collect();
+        samples.extend(hidden);
+        samples.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut found = Vec::new();
+        let mut start = from;
+        for pair in samples.windows(2) {
+            let [(a, before), (b, after)] = [pair[0], pair[1]];
+            let (mut state, mut at) = (state_from_excess(before), a);
+            let last = state_from_excess(after);
+            // more than one state may end between two neighbours
+            while state != last && at < b {
+                let ([end, next], beyond) = self.bisect_state(state, [at, b]);
+                found.push(self.describe_interval([start, end], state));
+                (start, at) = (next, next);
+                state = if next < b { beyond } else { last };
+            }
+        }
+        let state = samples.last().map_or(SlidingState::Stable, |(_, excess)| state_from_excess(*excess));
+        found.push(self.describe_interval([start, to], state));
+        found
+    }
+
+    fn describe_interval(&mut self, speeds_m_per_s: [f64; 2], state: SlidingState) -> SpeedInterval {
+        let mut mode = |speed| self.find_slide(speed).ok().map(|slide| slide.leading_mode());
+        let modes = match state {
+            SlidingState::Unstable => mode(speeds_m_per_s[0]).zip(mode(speeds_m_per_s[1])),
+            _ => None,
+        };
+        SpeedInterval { speeds_m_per_s, state, modes: modes.map(|(low, high)| [low, high]) }
+    }
+
+    /// Where the growth has an extremum between three equally spaced speeds of one state: a speed of another
+    /// state, if there is one.
+    fn find_hidden_state(
+        &mut self,
+        three: &[(f64, Result<f64, NoSliding>)],
+    ) -> Option<(f64, Result<f64, NoSliding>)> {
+        /// Steps of the golden-section search; they reduce the interval to 1e-5 of its length.
+        const STEPS: usize = 24;
+        const GOLDEN: f64 = 0.618_033_988_749_894_9;
+        let [left, middle, right] = [three[0].1.ok()?, three[1].1.ok()?, three[2].1.ok()?];
+        let sign = if middle <= 0.0 { 1.0 } else { -1.0 };
+        let is_one_state = [left, middle, right].iter().all(|excess| (*excess > 0.0) == (middle > 0.0));
+        if !is_one_state || sign * middle < sign * left || sign * middle < sign * right {
+            return None;
+        }
+        let [mut low, mut high] = [three[0].0, three[2].0];
+        for _ in 0..STEPS {
+            let inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
+            let [a, b] = [self.excess_per_s(inner[0]).ok()?, self.excess_per_s(inner[1]).ok()?];
+            let (best, excess) = if sign * a > sign * b { (inner[0], a) } else { (inner[1], b) };
+            if (excess > 0.0) != (middle > 0.0) {
+                return Some((best, Ok(excess)));
+            }
+            if sign * a > sign * b {
+                high = inner[1];
+            } else {
+                low = inner[0];
+            }
+        }
+        None
+    }
+}
+
+fn state_from_excess(excess: Result<f64, NoSliding>) -> SlidingState {
+    match excess {
+        Ok(excess) if excess > 0.0 => SlidingState::Unstable,
+        Ok(_) => SlidingState::Stable,
+        Err(reason) => SlidingState::Impossible(reason),
+    }
+}
+
+/// The lowest and the highest speed, m/s, at which steady sliding is unstable; `None` if it is stable
+/// wherever it is possible.
+#[must_use]
+pub fn unstable_range(intervals: &[SpeedInterval]) -> Option<[f64; 2]> {
+    let mut unstable = intervals.iter().filter(|interval| interval.state == SlidingState::Unstable);
+    let first = unstable.next()?;
+    let last = unstable.next_back().unwrap_or(first);
+    Some([first.speeds_m_per_s[0], last.speeds_m_per_s[1]])
+}

@@ -1,0 +1,311 @@
+//! Steady sliding of a blade and the eigenvalues of its small vibrations.
+//!
+//! At a constant speed of the head the blade can slide in an equilibrium. The first variation of the motion
+//! about it ([`crate::model::tangent`]) has constant coefficients, `M y'' + D y' + K y = 0`. Its eigenvalues
+//! give growth and frequency of each mode. `D` includes the slope of the friction law, and `M` and `K` are
+//! not symmetric, because friction follows the normal force.
+
+use crate::model::modes::time_scales_rad_per_s;
+use crate::model::series::{ContactMode, MotionSeries};
+use crate::model::shoulder::ShoulderContact;
+use crate::model::tangent::{LaneVector, ReferenceMotion};
+use crate::model::{HeadMotion, LinkDirections, Linkage, Pose};
+use crate::simulate::equilibrium::{StaticPose, is_upright, shoulder_contact};
+use nalgebra::{Complex, Matrix2, Matrix4, Schur};
+use serde::Serialize;
+use std::f64::consts::TAU;
+
+/// Why a blade cannot slide steadily.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum NoSliding {
+    /// No equilibrium with both links above level exists.
+    NoEquilibrium,
+    /// The glass would have to pull the tip.
+    ContactLost,
+    /// The Painlevé condition fails: the tip jams.
+    Jammed,
+}
+
+impl NoSliding {
+    /// Meaning as part of a sentence.
+    #[must_use]
+    pub fn meaning(self) -> &'static str {
+        match self {
+            Self::NoEquilibrium => "no equilibrium has both links above level",
+            Self::ContactLost => "contact is lost: the glass would have to pull the tip",
+            Self::Jammed => "the Painlevé condition fails: no normal force is admissible and the tip jams",
+        }
+    }
+}
+
+/// Growth and frequency of a mode of small vibrations about steady sliding.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SlidingMode {
+    /// Rate of growth, 1/s; negative for a mode that decays.
+    pub growth_per_s: f64,
+    /// Frequency, Hz; 0 for a mode that does not oscillate.
+    pub frequency_hz: f64,
+}
+
+impl SlidingMode {
+    /// The instability of a growing mode.
+    #[must_use]
+    pub fn instability(&self) -> Instability {
+        if self.frequency_hz > 0.0 { Instability::Flutter } else { Instability::Divergence }
+    }
+}
+
+/// Kind of an instability.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Instability {
+    /// A growing oscillation.
+    Flutter,
+    /// A growing deflection that does not oscillate.
+    Divergence,
+}
+
+/// Band of the noise of wipers (Goto, Takahashi and Oya 2001, Analysis of Wiper Vibration).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum NoiseBand {
+    /// Vibration below 100 Hz.
+    Chatter,
+    /// Noise at the reversal, near 500 Hz.
+    ReversalNoise,
+    /// Squeal, near 1 kHz.
+    Squeal,
+}
+
+impl NoiseBand {
+    /// The band of a frequency, Hz.
+    #[must_use]
+    pub fn from_frequency(frequency_hz: f64) -> Self {
+        /// Upper limit of chatter, Hz.
+        const CHATTER_HZ: f64 = 100.0;
+        /// Geometric mean of 500 Hz and 1 kHz, the middles of the other two bands.
+        const SQUEAL_HZ: f64 = 707.0;
+        match frequency_hz {
+            f if f < CHATTER_HZ => Self::Chatter,
+            f if f < SQUEAL_HZ => Self::ReversalNoise,
+            _ => Self::Squeal,
+        }
+    }
+
+    /// Name in words.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Chatter => "chatter",
+            Self::ReversalNoise => "reversal noise",
+            Self::Squeal => "squeal",
+        }
+    }
+}
+
+/// An equilibrium of steady sliding.
+#[derive(Debug, Clone, Copy)]
+pub struct SteadySlide {
+    /// The pose, at rest relative to the head.
+    pub pose: Pose,
+    /// Side of the shoulder on which the neck leans.
+    pub shoulder: ShoulderContact,
+    /// Normal force on the tip, N.
+    pub normal_n: f64,
+    /// Eigenvalues in rising order of frequency, 1/s.
+    eigenvalues: [Complex<f64>; 4],
+}
+
+impl SteadySlide {
+    /// The modes in rising order of frequency; a pair of conjugate eigenvalues is one mode.
+    pub fn modes(&self) -> impl Iterator<Item = SlidingMode> {
+        let upper = self.eigenvalues.into_iter().filter(|e| e.im >= 0.0);
+        upper.map(|e| SlidingMode { growth_per_s: e.re, frequency_hz: e.im / TAU })
+    }
+
+    /// The mode that grows fastest.
+    #[must_use]
+    pub fn leading_mode(&self) -> SlidingMode {
+        let first = SlidingMode { growth_per_s: f64::NEG_INFINITY, frequency_hz: 0.0 };
+        self.modes().fold(first, |best, mode| if mode.growth_per_s > best.growth_per_s { mode } else { best })
+    }
+}
+
+/// Finds the equilibria of steady sliding of a blade in one direction. The search starts from the equilibrium
+/// that it found last.
+#[derive(Debug, Clone)]
+pub struct SlideFinder {
+    linkage: Linkage,
+    direction: f64,
+    last: StaticPose,
+    /// Least coefficient of friction at which the equilibrium that starts upright is known to be lost.
+    lost_from: f64,
+    /// Highest natural angular frequency of the links, rad/s.
+    pub(super) fastest_rad_per_s: f64,
+}
+
+impl SlideFinder {
+    /// A finder for a blade that slides in a direction, +1 or -1.
+    #[must_use]
+    pub fn new(linkage: &Linkage, direction: f64) -> Self {
+        let (_, fastest_rad_per_s) = time_scales_rad_per_s(linkage);
+        Self {
+            linkage: *linkage,
+            direction,
+            last: StaticPose::UPRIGHT,
+            lost_from: f64::INFINITY,
+            fastest_rad_per_s,
+        }
+    }
+
+    /// The equilibrium at a speed, m/s, that the blade reaches when friction grows slowly from zero. The
+    /// speed has no sign; 0 stands for the limit of slow sliding.
+    ///
+    /// # Errors
+    /// [`NoSliding`] if the blade cannot slide steadily at this speed.
+    pub fn find_slide(&mut self, speed_m_per_s: f64) -> Result<SteadySlide, NoSliding> {
+        let found = self.find_static_pose(speed_m_per_s).ok_or(NoSliding::NoEquilibrium)?;
+        self.last = found;
+        self.linearise(&found, speed_m_per_s)
+    }
+
+    /// The equilibria at a speed, m/s, with the neck on the other sides of the shoulder.
+    #[must_use]
+    pub fn find_other_slides(&mut self, speed_m_per_s: f64) -> Vec<SteadySlide> {
+        if self.linkage.shoulder.is_none() {
+            return Vec::new();
+        }
+        let Some(found) = self.find_static_pose(speed_m_per_s) else { return Vec::new() };
+        let own = shoulder_contact(&self.linkage, found.pose().theta);
+        let sides = [ShoulderContact::Off, ShoulderContact::Forward, ShoulderContact::Backward];
+        let others = sides.into_iter().filter(|side| *side != own);
+        let others = others.filter_map(|side| found.lean_on_side(&self.linkage, side));
+        others.filter_map(|pose| self.linearise(&pose, speed_m_per_s).ok()).collect()
+    }
+
+    fn find_static_pose(&mut self, speed_m_per_s: f64) -> Option<StaticPose> {
+        let law = &self.linkage.friction;
+        let mu = self.direction * law.dynamic_coefficient(speed_m_per_s, self.direction);
+        if let Some(near) = self.last.change_friction(&self.linkage, mu) {
+            return Some(near);
+        }
+        if mu.abs() < self.lost_from {
+            if let Some(reached) = StaticPose::UPRIGHT.change_friction(&self.linkage, mu) {
+                return Some(reached);
+            }
+            self.lost_from = mu.abs();
+        }
+        StaticPose::search_grid(&self.linkage, mu)
+    }
+
+    fn linearise(&self, at: &StaticPose, speed_m_per_s: f64) -> Result<SteadySlide, NoSliding> {
+        let (linkage, direction, pose) = (&self.linkage, self.direction, at.pose());
+        if !is_upright(&pose) {
+            return Err(NoSliding::NoEquilibrium);
+        }
+        let (directions, shoulder) =
+            (LinkDirections::from_pose(&pose), shoulder_contact(linkage, pose.theta));
+        let velocity_m_per_s = direction * speed_m_per_s;
+        let head = HeadMotion { position_m: 0.0, velocity_m_per_s, acceleration_m_per_s2: 0.0 };
+        let response = linkage.friction_response(&pose, &directions, &head, shoulder);
+        let mu = direction * linkage.friction.dynamic_coefficient(speed_m_per_s, direction);
+        let normal_n =
+            linkage.head.stiffness * (linkage.preload_displacement_m - linkage.head_drop_m(&directions));
+        if normal_n <= 0.0 {
+            return Err(NoSliding::ContactLost);
+        }
+        if 1.0 + mu * response.nu <= 0.0 {
+            return Err(NoSliding::Jammed);
+        }
+        let mut motion = MotionSeries::<3>::default();
+        motion.head_velocity[0] = velocity_m_per_s;
+        motion.law_piece = linkage.friction.piece_at(speed_m_per_s);
+        let touch = ContactMode::Slip(direction);
+        motion.expand(linkage, touch, shoulder, &pose, 1);
+        let reference = ReferenceMotion { linkage, touch, lean: shoulder, motion: &motion };
+        let matrices = reference.tangent_matrices(&reference.sample_motion(LaneVector::ZERO));
+        let square = |rows: &[[LaneVector; 3]; 3]| Matrix2::from_fn(|i, j| rows[i][j][0]);
+        let [mass, damping, stiffness] = [&matrices.mass, &matrices.damping, &matrices.stiffness].map(square);
+        let eigenvalues = solve_eigenvalues(&mass, &damping, &stiffness, self.fastest_rad_per_s);
+        let eigenvalues = eigenvalues.ok_or(NoSliding::Jammed)?;
+        Ok(SteadySlide { pose, shoulder, normal_n, eigenvalues })
+    }
+}
+
+/// Eigenvalues of `M y'' + D y' + K y = 0`, 1/s, in rising order of frequency; `None` if they are not finite.
+/// `scale` is an angular frequency, 1/s, in whose unit the entries of the matrices are of one size.
+fn solve_eigenvalues(
+    mass: &Matrix2<f64>,
+    damping: &Matrix2<f64>,
+    stiffness: &Matrix2<f64>,
+    scale: f64,
+) -> Option<[Complex<f64>; 4]> {
+    /// Steps of the QR iteration; four eigenvalues take about ten.
+    const MOST_STEPS: usize = 400;
+    let inverse = mass.try_inverse()?;
+    let mut state = Matrix4::zeros();
+    state.fixed_view_mut::<2, 2>(0, 2).copy_from(&Matrix2::identity());
+    state.fixed_view_mut::<2, 2>(2, 0).copy_from(&(-inverse * stiffness / (scale * scale)));
+    state.fixed_view_mut::<2, 2>(2, 2).copy_from(&(-inverse * damping / scale));
+    if !state.iter().all(|entry| entry.is_finite()) {
+        return None;
+    }
+    let found = Schur::try_new(state, f64::EPSILON, MOST_STEPS)?.complex_eigenvalues() * Complex::from(scale);
+    let mut found = [found[0], found[1], found[2], found[3]];
+    found.sort_by(|a, b| a.im.abs().total_cmp(&b.im.abs()).then(a.re.total_cmp(&b.re)));
+    Some(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::friction::FrictionLaw;
+    use crate::simulate::scene::Scene;
+
+    fn light_blade() -> Linkage {
+        Scene::parse("s", include_str!("../../data/scenes/light-blade.toml")).unwrap().linkage
+    }
+
+    /// With friction that tends to zero but keeps its slope, the blade stays upright and its matrices are
+    /// those of a mass on a belt: a heavy neck on a stiff spring stays still, so the lip alone vibrates with
+    /// `m_phi phi'' + (c2 + mu' N l2^2) phi' + (k2 - N l2) phi = 0`.
+    #[test]
+    fn the_lip_alone_grows_as_a_mass_on_a_belt() {
+        let mut blade = light_blade();
+        blade.m_c = 0.0;
+        (blade.neck.stiffness, blade.m_theta) = (1e9 * blade.neck.stiffness, 1e9 * blade.m_theta);
+        let (steepness, speed) = (1e7, 2e-8);
+        for slope in [0.0, 0.001, 0.01, 0.1] {
+            blade.friction = FrictionLaw::exponential(slope / steepness, steepness, 0.0);
+            let slide = SlideFinder::new(&blade, 1.0).find_slide(speed).unwrap();
+            let normal_n = blade.head.stiffness * blade.preload_displacement_m;
+            let law_slope = -slope * (-steepness * speed).exp();
+            let per_rate = blade.l2_m * blade.l2_m * law_slope * normal_n;
+            let growth = -(per_rate + blade.lip.damping) / (2.0 * blade.m_phi);
+            let squared = (blade.lip.stiffness - normal_n * blade.l2_m) / blade.m_phi - growth * growth;
+            let scale = squared.sqrt();
+            let distance = |mode: &SlidingMode| (mode.frequency_hz * TAU - scale).abs();
+            let mode = slide.modes().min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap();
+            assert!((mode.growth_per_s - growth).abs() < 1e-7 * scale, "{slope}: {mode:?}, {growth}");
+            assert!((mode.frequency_hz * TAU - scale).abs() < 1e-7 * scale, "{slope}: {mode:?}, {scale}");
+        }
+    }
+
+    /// The same equilibrium and eigenvalues follow from any earlier search, and from the mirrored blade.
+    #[test]
+    fn a_search_does_not_depend_on_the_earlier_one_and_both_directions_mirror() {
+        let text = include_str!("../../data/scenes/actual-blade.toml");
+        let blade = Scene::parse("s", text).unwrap().linkage;
+        let mut moved = SlideFinder::new(&blade, 1.0);
+        for speed in [0.4, 0.0, 0.3, 0.01, 0.2] {
+            let near = moved.find_slide(speed).unwrap().leading_mode();
+            for direction in [1.0, -1.0] {
+                let fresh = SlideFinder::new(&blade, direction).find_slide(speed).unwrap().leading_mode();
+                let scale = moved.fastest_rad_per_s;
+                assert!((near.growth_per_s - fresh.growth_per_s).abs() < 1e-10 * scale);
+                assert!((near.frequency_hz - fresh.frequency_hz).abs() < 1e-10 * scale);
+            }
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! The stability of a scene's blade over speed and preload.
+
+use super::changes::{ParameterChange, rank_changes};
+use super::speed_intervals::{SpeedInterval, unstable_range};
+use super::steady_sliding::{NoSliding, SlideFinder, SteadySlide};
+use crate::model::Linkage;
+use crate::simulate::drive::Drive;
+use crate::simulate::scene::Scene;
+use crate::simulate::scene::error::SceneError;
+use std::f64::consts::TAU;
+
+/// Name of the parameter that a preload sets.
+pub(super) const PRELOAD: &str = "blade.preload_force_n";
+
+/// Speeds and preloads of a study.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StudyRange {
+    /// Lowest and highest speed of the head, m/s; 0 stands for the limit of slow sliding.
+    pub speeds_m_per_s: [f64; 2],
+    /// Lowest and highest preload, N; `None` for the preload of the scene alone.
+    pub preloads_n: Option<[f64; 2]>,
+    /// Number of speeds, and of preloads.
+    pub points: usize,
+}
+
+/// Steady sliding at one speed and preload.
+#[derive(Debug, Clone)]
+pub struct StudyPoint {
+    /// Speed of the head, m/s, negative for sliding towards -v.
+    pub speed_m_per_s: f64,
+    /// Preload, N.
+    pub preload_n: f64,
+    /// The equilibrium that a blade reaches, or why it reaches none.
+    pub slide: Result<SteadySlide, NoSliding>,
+    /// Equilibria with the neck on other sides of the shoulder.
+    pub others: Vec<SteadySlide>,
+}
+
+/// Steady sliding in one direction with one preload.
+#[derive(Debug, Clone)]
+pub struct SlidingSurvey {
+    /// Direction of sliding, +1 or -1.
+    pub direction: f64,
+    /// Preload, N.
+    pub preload_n: f64,
+    /// Intervals of speed.
+    pub intervals: Vec<SpeedInterval>,
+}
+
+/// The stability of a blade.
+#[derive(Debug, Clone)]
+pub struct StabilityStudy {
+    /// Speeds and preloads.
+    pub range: StudyRange,
+    /// Preload of the scene, N.
+    pub preload_n: f64,
+    /// Whether the blade has a shoulder.
+    pub has_shoulder: bool,
+    /// The blade with the scene's preload: towards +v, then towards -v if friction differs there.
+    pub own: Vec<SlidingSurvey>,
+    /// The blade with every preload of the range, in both directions as far as they differ.
+    pub by_preload: Vec<SlidingSurvey>,
+    /// All points, by direction, preload and speed.
+    pub points: Vec<StudyPoint>,
+    /// What changes of the blade do to the instability, the most effective first.
+    pub changes: Vec<ParameterChange>,
+}
+
+/// Twice the highest speed of the head in a scene's run, m/s: the range of a study that names none.
+#[must_use]
+pub fn default_top_speed(scene: &Scene) -> f64 {
+    /// Instants at which the speed of a recorded head is compared.
+    const INSTANTS: u32 = 2000;
+    let length_s = scene.run.stop_s - scene.start_s;
+    let instants = (0..=INSTANTS).map(|i| scene.start_s + length_s * f64::from(i) / f64::from(INSTANTS));
+    2.0 * match scene.drive {
+        Drive::Cosine { amplitude_m, frequency_hz, .. } => TAU * frequency_hz * amplitude_m,
+        _ => instants.map(|t| scene.drive.motion_at(t).velocity_m_per_s.abs()).fold(0.0, f64::max),
+    }
+}
+
+impl StabilityStudy {
+    /// Studies the blade of a scene.
+    ///
+    /// # Errors
+    /// [`SceneError`] if the scene cannot have a preload of the range.
+    pub fn from_scene(scene: &Scene, range: StudyRange) -> Result<Self, SceneError> {
+        let own_n = scene.value(PRELOAD).unwrap_or(0.0);
+        let directions: &[f64] =
+            if scene.linkage.friction.backward_ratio == 1.0 { &[1.0] } else { &[1.0, -1.0] };
+        let last = range.points.max(2) - 1;
+        let spread = |[from, to]: [f64; 2], i: usize| {
+            if i == last { to } else { from + (to - from) * i as f64 / last as f64 }
+        };
+        let blades: Vec<(f64, Linkage)> = match range.preloads_n {
+            None => vec![(own_n, scene.linkage)],
+            Some(ends) => (0..=last)
+                .map(|i| {
+                    let preload_n = spread(ends, i);
+                    Ok((preload_n, scene.with_parameter(PRELOAD, preload_n)?.linkage))
+                })
+                .collect::<Result<_, SceneError>>()?,
+        };
+        let survey = |direction: f64, preload_n: f64, linkage: &Linkage| SlidingSurvey {
+            direction,
+            preload_n,
+            intervals: SlideFinder::new(linkage, direction)
+                .find_intervals(range.speeds_m_per_s, range.points),
+        };
+        let own: Vec<SlidingSurvey> =
+            directions.iter().map(|&direction| survey(direction, own_n, &scene.linkage)).collect();
+        let (mut points, mut by_preload) = (Vec::new(), Vec::new());
+        for &direction in directions {
+            for (preload_n, linkage) in &blades {
+                if range.preloads_n.is_some() {
+                    by_preload.push(survey(direction, *preload_n, linkage));
+                }
+                let mut finder = SlideFinder::new(linkage, direction);
+                points.extend((0..=last).map(|i| {
+                    let speed = spread(range.speeds_m_per_s, i);
+                    let slide = finder.find_slide(speed);
+                    let others = if slide.is_ok() { finder.find_other_slides(speed) } else { Vec::new() };
+                    let speed_m_per_s = if speed == 0.0 { 0.0 } else { direction * speed };
+                    StudyPoint { speed_m_per_s, preload_n: *preload_n, slide, others }
+                }));
+            }
+        }
+        let changes = rank_changes(scene, &own, range.speeds_m_per_s)?;
+        let has_shoulder = scene.linkage.shoulder.is_some();
+        Ok(Self { range, preload_n: own_n, has_shoulder, own, by_preload, points, changes })
+    }
+
+    /// The lowest and the highest speed, m/s, at which steady sliding of the scene's blade is unstable in
+    /// any direction.
+    #[must_use]
+    pub fn unstable_range(&self) -> Option<[f64; 2]> {
+        let ranges = self.own.iter().filter_map(|survey| unstable_range(&survey.intervals));
+        ranges.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
+    }
+
+    /// Why no point of the study slides steadily; `None` if one does.
+    #[must_use]
+    pub fn why_impossible(&self) -> Option<NoSliding> {
+        let mut reasons = self.points.iter().map(|point| point.slide.err());
+        let first = reasons.next()?;
+        if reasons.all(|reason| reason.is_some()) { first } else { None }
+    }
+}

@@ -1,0 +1,74 @@
+//! `wiperlab stability` as a user runs it.
+
+use crate::small_fit::Project;
+use serde_json::Value;
+use std::fs;
+
+const SCENE: &str = "data/scenes/actual-blade.toml";
+
+fn summary(project: &Project, folder: &str) -> Value {
+    serde_json::from_slice(&fs::read(project.path(folder).join("stability.json")).unwrap()).unwrap()
+}
+
+#[test]
+fn a_map_has_a_row_for_each_mode_and_says_where_sliding_is_unstable() {
+    let project = Project::of("twin");
+    let arguments = ["stability", SCENE, "--out", "map", "--speed-m-per-s", "0..0.5"];
+    let (code, out, err) =
+        project.run(&[&arguments[..], &["--preload-n", "0.05..0.25", "--points", "12"]].concat());
+    assert_eq!((code, err.as_str()), (0, ""), "{out}");
+    assert!(out.contains("unstable: flutter at 912.2 Hz (squeal)"), "{out}");
+    let table = fs::read_to_string(project.path("map/stability.csv")).unwrap();
+    let mut rows = table.lines();
+    assert_eq!(rows.next(), Some("speed_m_per_s,preload_n,shoulder,mode,growth_per_s,frequency_hz"));
+    assert!(rows.count() >= 12 * 12 * 2);
+    let found = summary(&project, "map");
+    assert_eq!(found["onset_m_per_s"], 0.0);
+    assert!((found["end_m_per_s"].as_f64().unwrap() - 0.253_709).abs() < 1e-6, "{found}");
+    assert!(found["cycle_fold_m_per_s"].is_null());
+    assert!(found["cycle_fold_note"].as_str().unwrap().starts_with("not computed"));
+    assert_eq!(found["by_preload"].as_array().unwrap().len(), 12);
+    assert!(found["changes"].as_array().unwrap().len() > 10);
+    // the same run writes the same bits over its own files
+    let again = project.run(&[&arguments[..], &["--preload-n", "0.05..0.25", "--points", "12"]].concat());
+    assert_eq!(again.0, 0);
+    assert_eq!(fs::read_to_string(project.path("map/stability.csv")).unwrap(), table);
+}
+
+#[test]
+fn a_blade_without_an_instability_says_so() {
+    let project = Project::of("twin");
+    let scene = fs::read_to_string(project.path(SCENE)).unwrap();
+    fs::write(project.path("calm.toml"), scene.replace("a = 0.108", "a = 0.0")).unwrap();
+    let (code, out, err) = project.run(&["stability", "calm.toml", "--out", "calm"]);
+    assert_eq!((code, err.as_str()), (0, ""), "{out}");
+    assert!(out.contains("no instability of steady sliding at these speeds"), "{out}");
+    let found = summary(&project, "calm");
+    assert!(found["onset_m_per_s"].is_null() && found["end_m_per_s"].is_null(), "{found}");
+    assert_eq!(found["changes"].as_array().unwrap().len(), 0);
+}
+
+#[test]
+fn bad_ranges_and_a_blade_that_cannot_slide_are_refused_and_nothing_is_written() {
+    let project = Project::of("twin");
+    for (option, value) in [
+        ("--speed-m-per-s", "0.5..0.1"),
+        ("--speed-m-per-s", "nan..1"),
+        ("--speed-m-per-s", "0..inf"),
+        ("--speed-m-per-s", "-1..1"),
+        ("--speed-m-per-s", "0.3"),
+        ("--preload-n", "0.2..0.2"),
+        ("--points", "1"),
+    ] {
+        let (code, _, err) = project.run(&["stability", SCENE, "--out", "none", option, value]);
+        assert_eq!(code, 2, "{option} {value}");
+        assert!(err.contains(option) && err.contains(value), "{err}");
+    }
+    let scene = fs::read_to_string(project.path(SCENE)).unwrap();
+    fs::write(project.path("lifted.toml"), scene.replace("preload_force_n = 0.126", "preload_force_n = 0.0"))
+        .unwrap();
+    let (code, _, err) = project.run(&["stability", "lifted.toml", "--out", "none"]);
+    assert_eq!(code, 2);
+    assert!(err.contains("lifted.toml") && err.contains("contact is lost"), "{err}");
+    assert!(!project.path("none").exists());
+}
