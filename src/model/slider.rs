@@ -63,7 +63,7 @@ impl Linkage {
     pub(crate) fn slider(&self) -> Option<Slider> {
         let Spring { stiffness, damping } = self.lip;
         let per_square = 1.0 / (ARM_M * ARM_M);
-        self.is_slider().then(|| Slider {
+        self.is_slider().then_some(Slider {
             mass_kg: self.mass_kg,
             spring: Spring { stiffness: stiffness * per_square, damping: damping * per_square },
             normal_force_n: self.preload_displacement_m * self.head.stiffness,
