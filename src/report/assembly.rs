@@ -170,10 +170,12 @@ fn join_conditions(
     drawn.into_iter().flatten().reduce(|whole, next| whole.with_panels(next, panels))
 }
 
-/// Figures of the poses of the blade, of its links over frames of a video, and an animation.
+/// Figures of the poses of the blade, of its links over frames of a video, and an animation; none of a
+/// slider, which has no links.
 fn blade_figures(shown: &[&ConditionComparison]) -> Vec<FigureBlock> {
-    let first =
-        |draw: fn(&ConditionComparison) -> Option<FigureBlock>| shown.iter().find_map(|case| draw(case));
+    let first = |draw: fn(&ConditionComparison) -> Option<FigureBlock>| {
+        shown.iter().filter(|case| !case.model.motion.linkage.is_slider()).find_map(|case| draw(case))
+    };
     [first(poses::figure_block), first(video_frames::block), first(animation::figure_block)]
         .into_iter()
         .flatten()

@@ -54,6 +54,9 @@ fn a_first_fit_of_a_slider_finds_its_friction() {
         let (low, high) = (found("lower_95"), found("upper_95"));
         assert!(low < truth && truth < high && high - low < width * truth, "{name}: {low} to {high}");
     }
+    run(&project, &["report", "fit", "--out", "page"]);
+    assert!(project.path("page/evidence.svg").exists());
+    assert!(!project.path("page/poses.svg").exists(), "a slider has no links to draw");
 }
 
 #[test]
