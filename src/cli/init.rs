@@ -27,7 +27,7 @@ pub(crate) struct InitArgs {
     /// Write a scene for a blade whose neck has no shoulder to lean on
     #[arg(long)]
     pub no_shoulder: bool,
-    /// Write files for a slider, a mass on a spring that rubs on a surface, in place of a blade
+    /// Write files for a slider in place of a blade: a mass on a spring, which rubs on a surface
     #[arg(
         long,
         requires_all = ["recording", "mass_kg", "normal_force_n"],
@@ -35,7 +35,7 @@ pub(crate) struct InitArgs {
     )]
     pub slider: bool,
     /// Mass of the slider, kg
-    #[arg(long, value_name = "N", requires = "slider", allow_negative_numbers = true)]
+    #[arg(long, value_name = "KG", requires = "slider", allow_negative_numbers = true)]
     pub mass_kg: Option<f64>,
     /// Force that presses the slider onto the surface, N
     #[arg(long, value_name = "N", requires = "slider", allow_negative_numbers = true)]
@@ -104,7 +104,7 @@ impl InitArgs {
         Ok((vec![(SCENE, scene), (JOB, job)], said()))
     }
 
-    /// Mass and load of a slider; `None` for a blade.
+    /// Mass and normal force of a slider; `None` for a blade.
     fn known_slider(&self) -> Outcome<Option<KnownSlider>> {
         check_positive([("--mass-kg", self.mass_kg), ("--normal-force-n", self.normal_force_n)])?;
         let numbers = self.mass_kg.zip(self.normal_force_n).filter(|_| self.slider);

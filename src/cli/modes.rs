@@ -20,7 +20,7 @@ impl ModesArgs {
         let scene = read_scene(&self.scene)?;
         let blade = &scene.linkage;
         if blade.is_slider() && self.figures.folder.is_some() {
-            let problem = "found it with a slider, whose one mode has no shape to draw; leave it out";
+            let problem = "found a slider, expected a blade: the mode of a slider has no shape to draw; leave the option out";
             return Err(Failure::at("--figures", problem));
         }
         self.figures.check_folder(&FIGURES, self.overwrite)?;
@@ -28,7 +28,7 @@ impl ModesArgs {
         print_line!("{}", scene.title());
         print_line!("");
         if blade.is_slider() {
-            print_line!("mode of the slider on its spring, no friction; while it sticks it has none");
+            print_line!("mode of the slider on its spring, without friction; a stuck slider has no mode");
             print_line!("  undamped Hz    damped Hz     ratio");
             for mode in natural_modes(blade, TipConstraint::Free, false) {
                 let [undamped, damped, ratio] = mode_numbers(&mode);

@@ -8,14 +8,14 @@ use crate::model::parameters::{damping_from_ratio, find_parameter};
 use crate::recording::Recording;
 use crate::text::{format_percent, round_to_digits};
 
-/// What the user knows of a slider.
+/// Numbers of a slider that the user gives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct KnownSlider {
     pub mass_kg: f64,
     pub normal_force_n: f64,
 }
 
-/// Friction coefficient at which a search starts, and the bounds between which it looks: dry solids have 0.1
+/// Friction coefficient of the first scene, and the bounds of the search. Coefficients of dry solids are 0.1
 /// to 1.
 const FRICTION: f64 = 0.3;
 const FRICTION_BOUNDS: [f64; 2] = [0.03, 1.5];
@@ -27,8 +27,8 @@ const MAX_DAMPING_RATIO: f64 = 0.2;
 const OFFSET_SD_M: f64 = 0.002;
 
 impl KnownSlider {
-    /// First guess of the stiffness, N/m: friction holds the slider at the deflection that a tenth of the
-    /// frames exceeds.
+    /// First guess of the stiffness, N/m. At the deflection that a tenth of the frames exceed, the force of
+    /// the spring is equal to friction.
     fn guess_stiffness(self, recording: &Recording) -> Option<f64> {
         let traces = recording.traces();
         let points = traces.tip_x_m.iter().zip(&traces.head_x_m);
@@ -53,7 +53,7 @@ impl KnownSlider {
     ) -> Result<[String; 2], DraftError> {
         let stiffness = self.guess_stiffness(recording).filter(|_| found.head == DraftHead::Recorded);
         let stiffness = stiffness.ok_or_else(|| {
-            let why = "found no head that moves relative to the slider, expected both points; track the other end of the spring as the head";
+            let why = "found no head that moves relative to the slider, expected the positions of slider and head; track the other end of the spring as the head";
             DraftError::new(why)
         })?;
         let damping = damping_from_ratio(MAX_DAMPING_RATIO, stiffness, self.mass_kg);
@@ -82,15 +82,15 @@ impl KnownSlider {
             .add_number("normal_force_n", self.normal_force_n)
             .add_comments(how("stiffness_n_per_m"))
             .add_comment(
-                "A first guess from the deflections in the recording. The fit finds it between wide bounds.",
+                "A first guess from the deflections in the recording. The fit searches between wide bounds.",
             )
             .add_number("stiffness_n_per_m", stiffness)
             .add_comments(how("damping_n_s_per_m"))
-            .add_comment("The fit finds it between zero and a damping ratio of a fifth.")
+            .add_comment("The fit searches between zero and a damping ratio of about a fifth.")
             .add_number("damping_n_s_per_m", 0.0)
             .add_empty_line()
             .add_comment(
-                "Between slider and surface: mu = a exp(-b |speed|) + c. Here it is the same at all speeds.",
+                "Between slider and surface: mu = a exp(-b |speed|) + c. Here mu is the same at all speeds.",
             )
             .add_line("[friction]")
             .add_numbers(&[("a", 0.0), ("b_s_per_m", 0.0), ("c", FRICTION)])
@@ -122,9 +122,7 @@ fn write_job(
         .add_comment("A whole number; the same one gives the same result.")
         .add_line("seed = 1")
         .add_empty_line()
-        .add_comment(
-            "How well the weighed numbers are known (standard deviations); the fit moves them within it.",
-        )
+        .add_comment("Standard deviations of the mass and the normal force, which the fit moves within them.")
         .add_line("nuisance = [");
     let text = ["slider.mass_kg", "slider.normal_force_n"].into_iter().fold(text, |text, name| {
         let sd = find_parameter(name).and_then(default_prior_sd).map(format_percent).unwrap_or_default();
@@ -145,11 +143,11 @@ fn write_job(
             .add_text("scale", scale)
     });
     text.add_empty_line()
-        .add_comment("Every frame of the slider's position is compared, in segments; the recorded head drives the model.")
+        .add_comment("Every frame of tip x is compared, in short segments; the head of the recording drives the model.")
         .add_line("[[trace]]")
         .add_line("channels = [\"tip-x\"]")
         .add_empty_line()
-        .add_comment("How far the zeros of the sensors of slider and head are apart.")
+        .add_comment("Standard deviation of the difference between the zeros of the sensors of slider and head.")
         .add_line("[trace.camera]")
         .add_number("offset_sd_m", OFFSET_SD_M)
         .into_text()

@@ -106,7 +106,7 @@ fn free_all_constants(
 
 /// Default standard deviation of the prior of the natural logarithm of a constant. It states how well the
 /// constant of a real blade is known from a balance, a picture of the section, or a similar blade. `None` for
-/// a quantity that is not a constant of the blade.
+/// a quantity that is not a constant of a blade or slider.
 ///
 /// The default priors apply to a job with traces and without `nuisance`.
 pub(crate) fn default_prior_sd(parameter: &ModelParameter) -> Option<f64> {
@@ -123,10 +123,12 @@ pub(crate) fn default_prior_sd(parameter: &ModelParameter) -> Option<f64> {
     /// Natural frequencies and the angle of the shoulder are known from a blade of the same kind.
     const SIMILAR: f64 = 0.1;
     /// The damping of rubber varies with its age and temperature, by a factor of 1.5; the value is ln 1.5.
+    /// The damping of a slider has the same prior.
     const DAMPING: f64 = 0.405;
-    /// Mass and load of a slider are weighed, and are those of the model.
+    /// Mass and normal force of a slider are weighed. Nothing is cut, so only the error of the balance
+    /// counts.
     const WEIGHED_WHOLE: f64 = 0.01;
-    /// The stiffness of the spring of a slider is read off its force over its way.
+    /// The stiffness of a slider's spring is measured as force divided by displacement.
     const PULLED: f64 = 0.05;
     let frequency_sd = match parameter.quantity {
         Q::SliderMass | Q::NormalForce => return Some(WEIGHED_WHOLE),

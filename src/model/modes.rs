@@ -57,8 +57,8 @@ pub(crate) fn body_frequencies(blade: &Linkage) -> BodyFrequencies {
 }
 
 /// Modes about the upright position, in order of rising frequency. With `on_shoulder`, stiffness and damping
-/// of the shoulder are added to those of the neck. A slider has one mode while it slides and none while it is
-/// held.
+/// of the shoulder are added to those of the neck. A slider has one mode if its tip is free and none
+/// if it is held.
 #[must_use]
 pub fn natural_modes(blade: &Linkage, tip: TipConstraint, on_shoulder: bool) -> Vec<NaturalMode> {
     if let Some(slider) = blade.slider() {

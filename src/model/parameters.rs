@@ -338,9 +338,13 @@ impl ParameterQuantity {
             Self::DriveFrequency => "one over the time of a stroke there and back",
             Self::Restitution => "0 for a lip that does not bounce",
             Self::SliderMass => "weigh everything that moves with the slider",
-            Self::SliderStiffness => "pull the slider off the surface and read force over way",
-            Self::SliderDamping => "from a ring-down off the surface: twice the mass times the rate of decay",
-            Self::NormalForce => "weight and load of the slider, or the reading of a force sensor below it",
+            Self::SliderStiffness => {
+                "lift the slider off the surface, pull it, and divide the force by the displacement"
+            }
+            Self::SliderDamping => {
+                "let it ring off the surface: twice the mass times the rate of decay of the amplitude"
+            }
+            Self::NormalForce => "add the load to the weight of the slider, or read a force sensor below it",
         }
     }
 }

@@ -25,7 +25,7 @@ pub enum Drive {
         #[serde(skip_serializing_if = "is_zero")]
         delay_s: f64,
     },
-    /// Uniform motion `v = speed * t`, for tests with exact solutions; a scene file cannot select it.
+    /// Uniform motion `v = speed * t`.
     Uniform {
         /// Speed of the head, m/s.
         speed_m_per_s: f64,

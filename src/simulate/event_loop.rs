@@ -233,8 +233,9 @@ impl<'a> EventLoop<'a> {
         self.decide_after_stick(end.cause, pose)
     }
 
-    /// Longest step of stick, s. While a slider sticks, no state changes. So error control does not limit the
-    /// steps of a method without series, which would check the guards too rarely.
+    /// Longest step of stick, s. While a slider sticks, the integrated states stay zero, so error control
+    /// does not limit the step. Without this limit, a method without series would check the guards too
+    /// rarely.
     fn longest_stick_step_s(&self) -> f64 {
         /// Fraction of the shorter of the periods of slider and drive.
         const SHARE: f64 = 0.02;

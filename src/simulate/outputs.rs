@@ -304,7 +304,7 @@ pub fn sample_times(scene: &Scene) -> impl Iterator<Item = f64> + use<> {
 
 /// Coordinates of a sample as in a recording, m: tip x, tip y, head x, head y.
 ///
-/// The origin is the position of the head of the upright blade; the glass is at `y = -(l1 + l2)`. The heights
+/// The origin is the position of the head of the upright blade; the glass is at `y = -(l1 + l2)`. Both `y`
 /// of a slider are zero.
 #[must_use]
 pub fn recorded_points_m(linkage: &Linkage, sample: &ModelSample) -> [f64; 4] {

@@ -259,7 +259,7 @@ impl Scene {
                 ("no [shoulder]", "a scene with a shoulder", "add a [shoulder] table to the scene")
             }
             ("drive", Drive::Recorded(_)) => {
-                ("a recorded drive", "a scene whose head moves as a cosine", "leave the parameter out")
+                ("a recorded drive", "a scene whose `[drive]` has this key", "leave the parameter out")
             }
             ("drive", Drive::Cosine { .. }) if is_speed => (
                 "a head that moves as a cosine",
@@ -276,14 +276,14 @@ impl Scene {
         Err(key_error(&self.file, name, found, expected, advice))
     }
 
-    /// Position of a slider less that of its head, m, and its velocity, m/s, at the start.
+    /// At the start, the position of a slider minus that of its head, m, and its velocity, m/s.
     pub(crate) fn slider_state(&self) -> Option<[f64; 2]> {
         let (pose, head) = (super::initial_pose(self)?, self.drive.motion_at(self.start_s));
         let arm_m = self.linkage.l2_m;
         Some([arm_m * pose.phi, arm_m * pose.phi_rate + head.velocity_m_per_s])
     }
 
-    /// Error of a key that belongs to the other mechanism, blade or slider.
+    /// Error of a key that belongs to a blade in the scene of a slider, or the reverse.
     pub(super) fn foreign_key(&self, key: &str) -> SceneError {
         foreign_key(&self.file, key, self.linkage.is_slider())
     }

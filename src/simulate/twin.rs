@@ -58,7 +58,8 @@ pub enum TwinViewError {
 /// Runs a scene and records it without noise from `start_s` to `stop_s`, in the scene's time.
 ///
 /// The origin is the position of the head of the upright blade; the glass is at `y = -(l1 + l2)`. A frame
-/// averages over the part of its exposure between `start_s` and `stop_s`. A slider has no heights.
+/// averages over the part of its exposure between `start_s` and `stop_s`. The recording of a
+/// slider has no heights.
 ///
 /// # Errors
 /// [`TwinViewError`]. A run that stops early but after at least two frames produces a shorter recording.

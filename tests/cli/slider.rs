@@ -1,4 +1,4 @@
-//! A slider from its synthetic recording to the fit of its friction, and a study of a slider.
+//! Commands with a slider: a synthetic recording and the fit to it, a study, and the mode.
 
 use crate::small_fit::Project;
 use serde_json::Value;
@@ -23,7 +23,7 @@ fn a_first_fit_of_a_slider_finds_its_friction() {
     let trace = project.read("rec/trace.csv");
     let heights = trace.lines().skip(1).all(|row| row.split(',').nth(2) == Some("") && row.ends_with(','));
     assert!(heights && trace.lines().count() == 2502);
-    // the same without the columns of heights
+    // the same recording in a table without the columns of heights
     let along: String = trace
         .lines()
         .map(|row| row.split(',').collect::<Vec<_>>())

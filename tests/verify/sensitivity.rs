@@ -136,7 +136,7 @@ fn scale(scene: &Scene, direction: &TangentDirection) -> f64 {
         TangentDirection::NeckAngle | TangentDirection::LipAngle => 0.1,
         TangentDirection::NeckRate | TangentDirection::LipRate => 100.0,
         TangentDirection::DriveScale => 1.0,
-        // (a slider is slower than a blade)
+        // (a slider has longer periods than a blade)
         TangentDirection::DriveDelay if scene.linkage.is_slider() => 0.1,
         TangentDirection::DriveDelay | TangentDirection::Deflection => 1e-3,
         TangentDirection::TipVelocity => 1e-2,

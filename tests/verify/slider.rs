@@ -1,6 +1,7 @@
-//! Sliders against motions that are known in closed form: the free decay of a Coulomb oscillator, Den
-//! Hartog's forced oscillator without and with stops, a block on a shaken table, stick-slip at constant pull, and the
-//! onset of stick-slip under friction that falls with speed.
+//! Compares runs of sliders with motions that are known in closed form: the free decay of a Coulomb
+//! oscillator, Den Hartog's forced oscillator without and with stops, a block that only a damper connects to
+//! a moving head, stick-slip at constant pull, and the onset of stick-slip under friction that falls with
+//! speed.
 
 use crate::scenes::{Seen, committed, seen};
 use crate::sensitivity::worst;
@@ -15,11 +16,11 @@ use wiperlab::simulate::{IntegrationMethod, RunStatus, SolverOptions, Transition
 const INSTANT_S: f64 = 1e-11;
 /// Tolerance at which instants are compared.
 const TIGHT: f64 = 1e-13;
-/// Error of an instant, s, in units of the tolerance: a phase takes a few steps, and each may err by the
-/// tolerance.
+/// Error, s, allowed in an instant, divided by the tolerance: a phase takes a few steps, each with an error
+/// of about the tolerance.
 const ERRORS: f64 = 20.0;
 
-/// A slider with Coulomb friction `c` times the normal force.
+/// A slider with Coulomb friction: `c` times the normal force.
 #[derive(Debug, Clone, Copy)]
 struct Rig {
     m: f64,
@@ -29,7 +30,7 @@ struct Rig {
     c: f64,
 }
 
-/// The values of a frame on which friction was measured (Marino and Cicirello, arXiv 2303.03858).
+/// A measured frame (Marino and Cicirello, arXiv 2303.03858), here without its damper.
 const FRAME: Rig = Rig { m: 3.0799, k: 1191.0, d: 0.0, normal: 2.4525, c: 0.28 };
 
 impl Rig {
@@ -65,21 +66,21 @@ fn cosine(amplitude_m: f64, omega: f64, delay_s: f64) -> String {
     format!("amplitude_m = {amplitude_m:e}\nfrequency_hz = {:e}\ndelay_s = {delay_s:e}", omega / TAU)
 }
 
-/// Instants and modes after them in a run that ends as planned.
+/// Instants of the transitions and the modes after them. Fails if the run stops early.
 fn events(found: &Seen) -> Vec<(f64, TipMode)> {
     assert_eq!(found.run.status, RunStatus::Completed);
     found.transitions.iter().map(|t| (t.time_s, t.to)).collect()
 }
 
-/// Largest error of the instants, s; the modes are those expected.
+/// Largest error of the instants, s. Fails if the modes are not those expected.
 fn compare(found: &[(f64, TipMode)], expected: &[(f64, TipMode)]) -> f64 {
     let modes = |events: &[(f64, TipMode)]| events.iter().map(|e| e.1).collect::<Vec<_>>();
     assert_eq!(modes(found), modes(expected), "{found:?} {expected:?}");
     found.iter().zip(expected).map(|(a, b)| (a.0 - b.0).abs()).fold(0.0, f64::max)
 }
 
-/// Closed forms of position and velocity of a mass that slides in one direction under Coulomb friction, with
-/// a head that moves as a cosine. Either without damper, or without spring.
+/// A slider under Coulomb friction whose head moves as a cosine, with closed forms of its motion. It has a
+/// spring or a damper, not both.
 #[derive(Debug, Clone, Copy)]
 struct Forced {
     rig: Rig,
@@ -156,7 +157,7 @@ impl Forced {
     }
 }
 
-/// First zero of a function that is positive after `from`.
+/// First zero, before `stop`, of a function that is positive right after `from`.
 fn first_zero(from: f64, stop: f64, step: f64, f: impl Fn(f64) -> f64) -> Option<f64> {
     let mut low = from;
     while low < stop {
@@ -173,8 +174,8 @@ fn first_zero(from: f64, stop: f64, step: f64, f: impl Fn(f64) -> f64) -> Option
     None
 }
 
-/// Every half cycle shrinks the deflection by `2F/k`, and with a damper by its decay too; the mass sticks
-/// where the spring no longer overcomes friction.
+/// In every half cycle friction lowers the amplitude by `2F/k`, and a damper lowers it further. The mass
+/// sticks at the reversal where the force of the spring no longer exceeds friction.
 #[test]
 fn a_free_slider_loses_twice_the_friction_over_the_stiffness_each_half_cycle() {
     for (d, deflection) in [(0.0, 7.3), (0.0, -12.6), (0.669, 9.2)] {
@@ -244,8 +245,8 @@ fn den_hartogs_oscillator_without_stops_reverses_twice_a_cycle() {
     }
 }
 
-/// Den Hartog's oscillator with one, two and more stops per half cycle, and a block on a shaken table, which
-/// only a damper drives: it stays, sticks at each turn, or passes through its reversals.
+/// Den Hartog's oscillator with one stop, three stops and no stop per half cycle, and a block that only a
+/// damper connects to the head: it never slips, stops in every half cycle, or reverses without a stop.
 fn forced_cases() -> Vec<(Forced, [usize; 2])> {
     let sprung = |ratio: f64, share: f64| {
         let (drive, amplitude) = (ratio * FRAME.omega(), 2e-3);
@@ -261,7 +262,7 @@ fn forced_cases() -> Vec<(Forced, [usize; 2])> {
         let c = share * d * amplitude * drive / FRAME.normal;
         Forced { rig: Rig { k: 0.0, d, c, ..FRAME }, amplitude, drive, delay: 0.0 }
     };
-    // with the least numbers of sticks and of direct reversals in 30 turns of the head
+    // each with the least numbers of stops and of direct reversals in 30 half cycles of the head
     vec![
         (sprung(0.32, 0.28), [20, 0]),
         (sprung(0.5, 0.6), [20, 0]),
@@ -294,7 +295,7 @@ fn forced_sliders_stop_and_turn_at_the_instants_of_the_closed_form() {
 }
 
 #[test]
-fn errors_of_instants_follow_the_tolerance_with_either_integrator() {
+fn errors_of_instants_stay_below_twenty_tolerances_with_both_methods() {
     for (forced, _) in forced_cases() {
         let Forced { rig, amplitude, drive, .. } = forced;
         let stop = 30.3 * PI / drive;
@@ -313,9 +314,9 @@ fn errors_of_instants_follow_the_tolerance_with_either_integrator() {
     }
 }
 
-/// Pulled at constant speed, with a static limit above that of slip: the mass slips for
-/// `2 (pi - atan(B w / V)) / w` and sticks for `2 B / V`, with `B` the jump of friction
-/// over the stiffness.
+/// The head moves at the speed `V`, and the static limit is above the friction of slip. The mass slips for
+/// `2 (pi - atan(B w / V)) / w` and sticks for `2 B / V`, where `w` is the natural angular frequency and `B`
+/// the jump of friction divided by the stiffness.
 #[test]
 fn a_slider_pulled_at_constant_speed_sticks_and_slips_with_the_known_period() {
     const CYCLES: usize = 50;
@@ -338,8 +339,9 @@ fn a_slider_pulled_at_constant_speed_sticks_and_slips_with_the_known_period() {
     assert!(error < INSTANT_S, "{error:e} s");
 }
 
-/// Friction that falls with speed takes `N a b exp(-b V)` off the damping. So steady sliding is stable above
-/// a speed, and below it a small disturbance grows at half that rate over the mass, up to stick-slip.
+/// Friction that falls with speed reduces the damping `d` by `N a b exp(-b V)`. Below the speed `V` at which
+/// the two are equal, a small disturbance grows at the rate `(N a b exp(-b V) - d) / (2 m)`, up to
+/// stick-slip. Above it, steady sliding is stable.
 #[test]
 fn stick_slip_sets_in_where_falling_friction_outweighs_the_damper() {
     let rig = Rig { d: 0.669, ..FRAME };
@@ -353,7 +355,7 @@ fn stick_slip_sets_in_where_falling_friction_outweighs_the_damper() {
         let period = TAU / (rig.omega().powi(2) - growth * growth).sqrt();
         let rest = -rig.normal * (fall + rig.c) / rig.k;
         let drive = format!("speed_m_per_s = {speed:e}");
-        // the swing after whole periods of a small disturbance, from its start at the same phase
+        // after whole periods the disturbance has the phase of its start, so their ratio gives the growth
         let (small, periods) = (1e-8, 20.0);
         let scene = rig.scene(&friction, &drive, &state(rest + small, speed), periods * period);
         let found = seen(&scene, TIGHT);
@@ -384,7 +386,8 @@ fn a_slider_starts_in_steady_slip_and_has_one_mode() {
     assert!(natural_modes(&scene.linkage, TipConstraint::Held, false).is_empty());
 }
 
-/// Derivatives by every parameter, the start and the drive, through sticks, releases and reversals.
+/// Derivatives by every parameter, the start and the drive, in runs with stops, releases and direct
+/// reversals.
 #[test]
 fn derivatives_of_a_slider_are_those_of_differences() {
     const LAW: &str = "law = \"stribeck\"\nlimit_at_zero = 0.34\ncoulomb_level = 0.25\nstribeck_speed_m_per_s = 0.01\n\
@@ -417,9 +420,9 @@ fn derivatives_of_a_slider_are_those_of_differences() {
     }
 }
 
-/// A key of a blade in a scene of a slider, and the reverse, is refused by name.
+/// A scene of a slider refuses a key of a blade and names it, and the reverse.
 #[test]
-fn keys_of_the_other_mechanism_are_refused_by_name() {
+fn keys_of_a_blade_in_the_scene_of_a_slider_are_refused_and_the_reverse() {
     let slider = FRAME.scene("", "speed_m_per_s = 0.01", "kind = \"relaxed\"", 1.0);
     let names =
         ["blade.lip_mass_kg", "shoulder.stiffness_ratio", "contact.restitution", "start.lip_angle_rad"];
@@ -480,7 +483,7 @@ fn keys_of_the_other_mechanism_are_refused_by_name() {
     }
 }
 
-/// The message about a changed scene of a slider.
+/// The error message of a scene of a slider in which `to` replaces `from`.
 fn parse_with(from: &str, to: &str) -> String {
     let text = FRAME.text("", "speed_m_per_s = 0.01", "kind = \"relaxed\"", 1.0);
     assert!(text.contains(from), "{text}");

@@ -344,7 +344,7 @@ impl<'a> RecordingModel<'a> {
         let rows = residuals.len();
         let mut by_state = DMatrix::zeros(rows, STATES);
         for (i, column) in by_state.as_mut_slice().chunks_mut(rows.max(1)).enumerate() {
-            // (the state of the neck of a slider stays zero)
+            // (the neck of a slider does not turn, so derivatives by its state are zero)
             if self.scene.linkage.angle_units()[i % 2] > 0.0 {
                 self.add_run_derivative(&shot, i, 1.0, column);
             }

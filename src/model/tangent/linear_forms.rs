@@ -146,8 +146,8 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         form
     }
 
-    /// Linear form of friction in stick, from the equation of the neck; that of a slider is from the equation
-    /// of the lip.
+    /// Linear form of friction in stick, from the equation of the neck; for a slider, from the equation of
+    /// the lip.
     fn stick_friction_form(&self, matrices: &TangentMatrices) -> LinearForm {
         let (mut form, link) = (LinearForm::default(), usize::from(self.linkage.is_slider()));
         let share = 1.0 / self.lengths()[link];

@@ -11,7 +11,7 @@ const NO_ROWS: &str = ": found no rows of numbers, expected the header \
 
 /// First columns in the header of every `trace.csv`; the confidences may follow.
 pub const HEADER: &str = "time_s,tip_x_m,tip_y_m,head_x_m,head_y_m";
-/// Header of a recording without heights; its missing columns are empty.
+/// Header of a recording without heights; every height is then absent, as in an empty cell.
 const HEADER_ALONG: &str = "time_s,tip_x_m,head_x_m";
 const CONFIDENCES: [&str; 2] = ["tip_confidence", "head_confidence"];
 const POSITIONS: usize = 4;

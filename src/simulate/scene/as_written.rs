@@ -23,11 +23,11 @@ pub(crate) struct SceneFile {
     pub(super) format: u32,
     /// Title for pages and figures.
     pub(super) title: String,
-    /// Masses, lengths, stiffnesses and dampings, all for one length of blade.
+    /// Masses, lengths, stiffnesses and dampings, all for one length of blade; needed without `[slider]`.
     #[schemars(schema_with = "blade")]
     #[serde(default)]
     pub(super) blade: Option<SceneNumbers>,
-    /// A mass on a spring that rubs on a surface, in place of a blade.
+    /// A slider in place of a blade: a mass on a spring, which rubs on a surface.
     #[schemars(schema_with = "slider")]
     #[serde(default)]
     pub(super) slider: Option<SceneNumbers>,
@@ -35,22 +35,22 @@ pub(crate) struct SceneFile {
     #[schemars(schema_with = "shoulder")]
     #[serde(default)]
     pub(super) shoulder: Option<SceneNumbers>,
-    /// Coefficient of friction between lip and glass: `A exp(-B |v|) + C`, or another law.
+    /// Coefficient of friction of the lip or slider: `A exp(-B |v|) + C`, or another law.
     #[schemars(schema_with = "friction")]
     pub(super) friction: FrictionValues,
-    /// Motion of the head: a cosine, a constant speed, or that of the head in a recording.
+    /// Motion of the head: a cosine, a constant speed, or the motion in a recording.
     pub(super) drive: DriveFile,
     /// What happens when contact is lost or the tip jams.
     #[serde(default)]
     pub(super) contact: Option<ContactFile>,
-    /// Start of the run: its time and the state of the blade.
+    /// Start of the run: its time and the state of the blade or slider.
     #[serde(default)]
     pub(super) start: StartFile,
     /// How long the simulation runs, and which tables it writes.
     pub(super) run: RunFile,
 }
 
-/// Motion of the head: `amplitude_m` and `frequency_hz`, `speed_m_per_s`, or `recording`.
+/// Motion of the head: `recording`, `speed_m_per_s`, or both `amplitude_m` and `frequency_hz`.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct DriveFile {
@@ -64,7 +64,7 @@ pub(crate) struct DriveFile {
     /// Time at which the head starts from one end of its stroke, s; 0 if left out.
     #[schemars(with = "Option<f64>")]
     pub(super) delay_s: Option<Spanned<f64>>,
-    /// Constant speed of the head, m/s; the head is at `speed_m_per_s t`.
+    /// Constant speed of the head, m/s; its position at time `t` is `speed_m_per_s t`.
     #[schemars(with = "Option<f64>")]
     pub(super) speed_m_per_s: Option<Spanned<f64>>,
     /// Folder of a recording whose head drives the scene, or its trace.csv; relative to this file.
@@ -91,13 +91,13 @@ pub(crate) struct ContactFile {
 #[derive(Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum StartWord {
-    /// A blade, upright and at rest.
+    /// A blade, upright and at rest relative to its head.
     Upright,
-    /// A slider at rest with its spring relaxed.
+    /// A slider at rest on its surface, with the spring relaxed.
     Relaxed,
     /// In the equilibrium of steady slip at the head's speed.
     SteadySlide,
-    /// In a given state: four angles and rates of a blade, or deflection and velocity of a slider.
+    /// In a given state: two angles and two rates of a blade, or deflection and velocity of a slider.
     State,
 }
 
@@ -119,7 +119,7 @@ pub(crate) struct StartFile {
     pub(super) neck_rate_rad_per_s: Option<f64>,
     /// Rate of the lip's angle, rad/s; only with kind = "state".
     pub(super) lip_rate_rad_per_s: Option<f64>,
-    /// Position of a slider less that of its head, m; only with kind = "state".
+    /// Position of a slider minus that of its head, m; only with kind = "state".
     pub(super) deflection_m: Option<f64>,
     /// Velocity of a slider, m/s; only with kind = "state".
     pub(super) tip_velocity_m_per_s: Option<f64>,

@@ -93,7 +93,7 @@ impl SceneReader<'_> {
     }
 
     /// Reads the motion of the head. For a recorded head, returns the place of the key in the file and the
-    /// path of the recording. For another motion, reads its numbers and returns `None`.
+    /// path of the recording. For a cosine or a constant speed, reads the numbers and returns `None`.
     pub(crate) fn read_drive(&mut self, written: &DriveFile) -> Result<Option<(String, String)>, SceneError> {
         let numbers = [
             ("amplitude_m", &written.amplitude_m),
@@ -180,7 +180,7 @@ pub(super) fn check_law_key(place: &str, name: &str, law: &FrictionShape) -> Res
     Err(key_error(place, name, format!("the law \"{law}\""), &expected, &advice))
 }
 
-/// Whether a table belongs to a blade in a scene of a slider, or to a slider in a scene of a blade.
+/// Whether a table belongs to a blade while the scene has a slider, or the reverse.
 pub(super) fn of_other_mechanism(table: &str, is_slider: bool) -> bool {
     match table {
         "slider" => !is_slider,
@@ -189,8 +189,8 @@ pub(super) fn of_other_mechanism(table: &str, is_slider: bool) -> bool {
     }
 }
 
-/// Refuses a scene that lacks a quantity without a default. The quantities of an absent part or of another
-/// motion of the head are not required.
+/// Refuses a scene that lacks a quantity without a default. Quantities of a shoulder, mechanism or motion of
+/// the head that the scene does not have are not required.
 pub(super) fn check_complete(
     file: &str,
     values: &BTreeMap<&'static str, f64>,

@@ -109,11 +109,11 @@ pub enum StartKind {
     SteadySlide,
     /// In a given state.
     State(Pose),
-    /// A slider in a given state; the kind "relaxed" is that with zeros.
+    /// A slider in a given state; both numbers are 0 for the kind "relaxed".
     Slider {
-        /// Position of the tip less that of the head, m.
+        /// Position of the slider minus that of the head, m.
         deflection_m: f64,
-        /// Velocity of the tip, m/s.
+        /// Velocity of the slider, m/s.
         tip_velocity_m_per_s: f64,
     },
     /// In a given state off the glass, for tests with exact solutions; a scene file cannot select it.
@@ -181,7 +181,7 @@ pub(super) fn check_start(
     Ok((written.time_s, kind))
 }
 
-/// Error of a key of a blade in a scene of a slider, or of a key of a slider in a scene of a blade.
+/// Error of a key that belongs to a blade in the scene of a slider, or the reverse.
 pub(super) fn foreign_key(file: &str, key: &str, is_slider: bool) -> SceneError {
     let (found, expected) = if is_slider {
         ("a key of a blade", "the keys of a slider, because the scene has [slider]")

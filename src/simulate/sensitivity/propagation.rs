@@ -105,7 +105,7 @@ impl<'a, O> TangentPropagator<'a, O> {
             *block = TangentBlock { state: seed.start, ..TangentBlock::default() };
             let d_speed = seed.head_velocity(system, scene.start_s);
             if let StartKind::Slider { .. } = scene.start {
-                // the velocity of the tip does not change with that of the head
+                // the start gives the velocity of the tip: the deflection's rate falls by the head's change
                 block.state.rate[1] += (-1.0 / scene.linkage.l2_m) * d_speed;
             }
             let Some(pose) = pose else { continue };

@@ -206,7 +206,7 @@ pub enum TangentDirection {
     NeckRate,
     /// Angular rate of the lip at the start, rad/s.
     LipRate,
-    /// Position of a slider less that of its head at the start, m.
+    /// Position of a slider minus that of its head at the start, m.
     Deflection,
     /// Velocity of a slider at the start, m/s.
     TipVelocity,
@@ -273,7 +273,7 @@ pub(super) fn steady_slip_tangent(
         };
         central_difference(DIFFERENCE_STEP, at).map(|column: [f64; 2]| Vector2::from(column))
     };
-    // (the angles of a slider are an explicit function of the parameters)
+    // (the equilibrium of a slider is an explicit function of the parameters)
     let jacobian = if linkage.is_slider() {
         -Matrix2::identity()
     } else {
