@@ -1,8 +1,8 @@
 //! Stability of sliding: the speeds at which a blade vibrates by itself, and what changes them.
 //!
-//! Two speeds must not be confused. Steady sliding is unstable where a mode of small vibrations grows
-//! ([`steady_sliding`]). A stick-slip cycle, once it exists, may go on at speeds at which steady sliding is
-//! stable again, so chatter ends later than the instability.
+//! Steady sliding is unstable at the speeds at which a mode of small vibrations grows ([`steady_sliding`]).
+//! A stick-slip cycle, once it exists, can go on at higher speeds, at which steady sliding is stable. So
+//! chatter can end at a higher speed than the instability. The speed at which the cycle ends is not computed.
 
 pub mod changes;
 pub mod outputs;

@@ -7,11 +7,11 @@ use wiperlab::simulate::scene::{Scene, StartKind};
 use wiperlab::simulate::{Observer, RunStatus, SolutionSegment, SolverOptions, run_scene_with};
 use wiperlab::stability::steady_sliding::SlideFinder;
 
-/// Size of the perturbations: angles in rad, rates relative to the fastest natural frequency.
+/// Size of the perturbations: rad for angles, a fraction of the fastest natural angular frequency for rates.
 const PERTURBATION: f64 = 1e-6;
-/// Length of the runs in radians of the fastest natural frequency of the links.
+/// Length of the runs, s, times the fastest natural angular frequency of the links.
 const RADIANS: f64 = 20.0;
-/// Tolerance of the runs.
+/// Relative tolerance of the runs.
 const TOLERANCE: f64 = 1e-13;
 
 #[derive(Default)]
@@ -24,7 +24,8 @@ impl Observer for LastPose {
 }
 
 /// Growth, 1/s, of the perturbation of steady sliding that grows fastest, from eight runs that start next to
-/// steady sliding. `None` if the blade cannot slide steadily at the speed, m/s, or a run leaves slip.
+/// steady sliding. `None` if the blade cannot slide steadily at the speed, m/s, or if a run does not complete
+/// or has a transition.
 pub fn simulated_growth(scene: &Scene, speed: f64) -> Option<f64> {
     let slide = SlideFinder::new(&scene.linkage, 1.0).find_slide(speed).ok()?;
     let (_, fastest) = wiperlab::model::modes::time_scales_rad_per_s(&scene.linkage);
@@ -55,8 +56,8 @@ pub fn simulated_growth(scene: &Scene, speed: f64) -> Option<f64> {
     Some(sizes.max().ln() / length_s)
 }
 
-/// The speed, m/s, at which simulated perturbations stop to grow, by bisection between a speed at which they
-/// grow and one at which they decay.
+/// The speed, m/s, at which simulated perturbations stop growing, by bisection between a speed at which they
+/// grow and one at which they decay. `None` if the growth is missing at a speed on the way.
 pub fn simulated_end(scene: &Scene, [mut unstable, mut stable]: [f64; 2]) -> Option<f64> {
     while stable - unstable > 1e-5 * stable {
         let middle = 0.5 * (unstable + stable);

@@ -1,4 +1,5 @@
-//! Where steady sliding of random blades becomes stable: eigenvalues against simulated perturbations.
+//! Compares the speed at which steady sliding of random blades becomes stable, from eigenvalues, with the
+//! speed at which perturbations of simulated runs stop growing.
 //!
 //! `cargo run --release --example sliding -- [BLADES]`
 
@@ -28,7 +29,6 @@ fn main() {
             stable += 1;
             continue;
         };
-        // (an interval that ends where the pose jumps has no growth that passes zero)
         if end >= TOP {
             at_top += 1;
             continue;
@@ -38,11 +38,12 @@ fn main() {
                 compared += 1;
                 worst = worst.max((found / end - 1.0).abs());
             }
+            // a run has a transition, or the blade cannot slide steadily near the end
             None => not_smooth += 1,
         }
     }
     println!("blades {count}: never unstable {stable}, unstable up to {TOP} m/s {at_top}");
     println!(
-        "compared {compared}: largest relative difference of the end {worst:.1e}; runs left slip {not_smooth}"
+        "compared {compared}: largest relative difference of the end {worst:.1e}; not comparable {not_smooth}"
     );
 }

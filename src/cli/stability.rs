@@ -23,7 +23,7 @@ pub(crate) struct StabilityArgs {
     /// Preloads, N (default: the preload of the scene alone)
     #[arg(long, value_name = "FROM..TO", value_parser = parse_range, allow_hyphen_values = true)]
     pub preload_n: Option<NumberRange>,
-    /// Number of speeds, and of preloads
+    /// Number of speeds, and number of preloads of a range
     #[arg(long, value_name = "N", default_value_t = 100,
           value_parser = clap::value_parser!(u16).range(2..=1000))]
     pub points: u16,
@@ -48,7 +48,7 @@ const SUMMARY: &str = "stability.json";
 /// File names of the outputs.
 const OUTPUTS: [&str; 5] =
     [TABLE, SUMMARY, "stability.svg", "paper/stability-85mm.svg", "paper/stability-170mm.svg"];
-/// Number of changes that are printed.
+/// Largest number of changes that are printed.
 const PRINTED_CHANGES: usize = 5;
 
 impl StabilityArgs {
@@ -118,12 +118,12 @@ fn print_study(title: &str, study: &StabilityStudy) {
             if end == study.range.speeds_m_per_s[1] {
                 print_line!("the range ends there; name higher speeds with --speed-m-per-s");
             }
-            print_line!("not computed: the speed up to which a stick-slip cycle goes on; it can be higher");
+            print_line!("not computed: the speed at which a stick-slip cycle ends; it can be higher");
         }
     }
     if !study.changes.is_empty() {
         print_line!("");
-        print_line!("what moves the end of the instability most; a damping of 0 changes to a ratio of 0.001");
+        print_line!("largest effects on onset or end; a damping of 0 changes to a ratio of 0.001");
     }
     for change in study.changes.iter().take(PRINTED_CHANGES) {
         let shown = |moved: Option<f64>| moved.map_or_else(|| "-".to_owned(), |v| format!("{v:+.2e} m/s"));
@@ -141,7 +141,7 @@ fn print_interval(interval: &SpeedInterval) {
     let [from, to] = interval.speeds_m_per_s.map(|speed| format_digits(speed, 4));
     let words = match (interval.state, interval.modes.zip(interval.instabilities())) {
         (SlidingState::Unstable, Some((modes, kinds))) => {
-            // the growth vanishes at the upper end, so the lower end says more
+            // the growth is usually zero at the upper end, so the mode at the lower end is printed
             let (growth, (kind, band)) = (format_digits(modes[0].growth_per_s, 3), kinds[0]);
             let hz = format_digits(modes[0].frequency_hz, 4);
             match kind {

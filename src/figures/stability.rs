@@ -1,4 +1,4 @@
-//! Growth of the small vibrations of steady sliding: against speed, or over speed and preload.
+//! Growth of small vibrations about steady sliding: against speed, or over speed and preload.
 
 use super::sweep_map::colour_limits;
 use crate::stability::speed_intervals::unstable_range;
@@ -13,17 +13,18 @@ use plain_charts::{
 /// Height of the panel, mm.
 const PANEL_MM: f64 = 56.0;
 
-/// The map of the growth over speed and preload, or its curves against speed for the scene's preload alone.
+/// The map of the growth over speed and preload, or its curves against speed if the study has only the
+/// preload of the scene. The title gives the unstable speeds at the preload of the scene in both cases.
 #[must_use]
 pub fn draw_figure(title: &str, study: &StabilityStudy) -> Figure {
     let panel = if study.by_preload.is_empty() { draw_curves(study) } else { draw_map(study) };
     Figure {
         title: claim_sentence(study),
-        subtitle: format!("{title}; small vibrations of steady sliding, without stick-slip"),
+        subtitle: format!("{title}; small vibrations about steady sliding, without stick-slip"),
         watermarked: false,
         description: format!(
-            "Growth of the vibrations of steady sliding from {} to {} m/s; hatched where the blade cannot slide \
-             steadily.",
+            "Growth of small vibrations about steady sliding from {} to {} m/s; curves have gaps and maps are \
+             hatched where the blade cannot slide steadily.",
             study.range.speeds_m_per_s[0], study.range.speeds_m_per_s[1]
         ),
         width_mm: COLUMN_WIDTH_MM,
@@ -84,14 +85,15 @@ fn draw_curves(study: &StabilityStudy) -> Panel {
     Panel::new(speed_axis(study), ChartAxis::linear("growth, 1/s"), PANEL_MM, series)
 }
 
-/// Growth of the leading mode as colours, with the ends of the unstable range as a line.
+/// Growth of the mode that grows fastest as colours, with the highest unstable speed of each preload as a
+/// line.
 fn draw_map(study: &StabilityStudy) -> Panel {
     let (points, rows) = (forward_points(study), study.range.points);
     let growth = |point: &StudyPoint| point.slide.ok().map(|slide| slide.leading_mode().growth_per_s);
     let at = |speed: usize, preload: usize| points[preload * rows + speed];
     let all: Vec<Option<f64>> = points.iter().map(|point| growth(point)).collect();
     let largest = all.iter().flatten().fold(0.0, |largest: f64, value| largest.max(value.abs()));
-    // colours are symmetric about zero growth, so that their change of hue is the boundary
+    // the colour range is symmetric about zero, so the hue changes where the growth changes sign
     let limit = colour_limits(&all).map_or(largest, |(low, high)| low.abs().max(high.abs()));
     let preloads: Vec<f64> = (0..rows).map(|row| at(0, row).preload_n).collect();
     let speeds: Vec<f64> = (0..rows).map(|column| at(column, 0).speed_m_per_s).collect();

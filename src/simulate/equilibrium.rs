@@ -38,7 +38,7 @@ pub(crate) fn is_upright(pose: &Pose) -> bool {
     [pose.theta, pose.phi].iter().all(|angle| angle.abs() < std::f64::consts::FRAC_PI_2)
 }
 
-/// A static equilibrium with its coefficient of friction, from which others are reached in small steps.
+/// A static equilibrium and its coefficient of friction. Small steps of friction lead from it to others.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StaticPose {
     /// Coefficient of friction, with the sign of the tip's velocity.
@@ -61,10 +61,11 @@ impl StaticPose {
         Some(Self { mu, angles })
     }
 
-    /// An equilibrium that Newton's iteration finds from a grid of angles, the least inclined first. A blade
-    /// that snaps over while friction grows has such an equilibrium beyond the snap.
+    /// The first equilibrium with both links above level that Newton's iteration finds from a grid of start
+    /// angles, the smallest first. A blade that snaps over while friction grows can have such an equilibrium
+    /// beyond the snap.
     pub(crate) fn search_grid(linkage: &Linkage, mu: f64) -> Option<Self> {
-        /// Angles of both links, rad, against the direction of slip.
+        /// Start angles of each link, rad, against the direction of slip.
         const GRID: [f64; 6] = [0.0, 0.15, 0.3, 0.5, 0.8, 1.2];
         let starts = GRID.into_iter().flat_map(|lip| GRID.map(|neck| Vector2::new(neck, lip)));
         let mut found = starts.filter_map(|start| solve_for_load(linkage, mu, -mu.signum() * start));

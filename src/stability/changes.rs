@@ -8,8 +8,8 @@ use crate::model::parameters::{ModelParameter, PARAMETERS, find_parameter};
 use crate::simulate::scene::Scene;
 use crate::simulate::scene::error::SceneError;
 
-/// Masses, stiffnesses, dampings and the preload: what is changed one at a time, all else staying as it is.
-/// The numbers of the friction law follow.
+/// Masses, stiffnesses, dampings, the preload and the angle of the shoulder. Each changes alone, while all
+/// other parameters keep their values. The numbers of the friction law are added to these.
 const PARTS: [&str; 13] = [
     "blade.head_mass_kg",
     "blade.neck_mass_kg",
@@ -38,14 +38,14 @@ pub struct ParameterChange {
     pub parameter: &'static ModelParameter,
     /// Its value, in its SI unit.
     pub value: f64,
-    /// The change, in the same unit: 1 % of the value, or a damping ratio of 0.001 for a part without
-    /// damping.
+    /// The change, in the same unit: 1 % of the value. For a damping of zero it is the damping that gives a
+    /// damping ratio of 0.001.
     pub step: f64,
-    /// Change of the lowest speed at which steady sliding is unstable, m/s per step; `None` if this speed is
-    /// an end of the range.
+    /// Change of the lowest speed at which steady sliding is unstable, m/s per step. `None` if this speed is
+    /// the lowest of the range, or if it is not found for the changed blade.
     pub onset_m_per_s: Option<f64>,
-    /// Change of the highest speed at which steady sliding is unstable, m/s per step; `None` if this speed
-    /// is an end of the range.
+    /// Change of the highest speed at which steady sliding is unstable, m/s per step. `None` if this speed is
+    /// the highest of the range, or if it is not found for the changed blade.
     pub end_m_per_s: Option<f64>,
 }
 
@@ -55,8 +55,8 @@ impl ParameterChange {
     }
 }
 
-/// The scene with masses, stiffnesses, dampings and preload in physical units, so that each can change
-/// without the others.
+/// The scene with masses, stiffnesses, dampings, preload and shoulder angle in SI units. A stiffness that is
+/// given as a natural frequency, for example, would change with a mass.
 ///
 /// # Errors
 /// As [`Scene::with_parameter`].
@@ -68,8 +68,8 @@ pub fn write_in_physical_units(scene: &Scene) -> Result<Scene, SceneError> {
     PARTS.iter().try_fold(scene.clone(), convert)
 }
 
-/// Effects of all parameters on the unstable range, the most effective first. Effects on the direction with
-/// the higher end are taken.
+/// Effects of all parameters on the unstable range, the largest first; parameters without effect are left
+/// out. If friction differs between the directions, the range is that of the direction with the higher end.
 pub(super) fn rank_changes(
     scene: &Scene,
     own: &[SlidingSurvey],
@@ -98,7 +98,7 @@ pub(super) fn rank_changes(
     Ok(changes)
 }
 
-/// The change of a parameter whose effect is computed; `None` for a number that is zero and no damping.
+/// The step of a parameter; `None` if its value is zero and it is not a damping.
 fn change_step(scene: &Scene, name: &str, value: f64) -> Option<f64> {
     if value != 0.0 {
         return Some(SHARE * value);
@@ -108,9 +108,9 @@ fn change_step(scene: &Scene, name: &str, value: f64) -> Option<f64> {
     scene.with_parameter(ratio, DAMPING_STEP).ok()?.value(name)
 }
 
-/// Change of a boundary of the unstable range, m/s per step of a parameter, from the boundaries of two blades
-/// that differ by a fraction of the step. `inwards` is +1 if the speeds above the boundary are unstable, and
-/// -1 if those below are.
+/// Change of a boundary of the unstable range, m/s per step of a parameter: a central difference over a
+/// fraction of the step. `inwards` is +1 if the speeds above the boundary are unstable, and -1 if those below
+/// are. `None` if the boundary is not found for the changed blade.
 fn speed_change(
     scene: &Scene,
     name: &str,
@@ -118,19 +118,21 @@ fn speed_change(
     direction: f64,
     [speed, inwards]: [f64; 2],
 ) -> Option<f64> {
-    /// Fraction of the step: the error of the difference is about the square of 1e-3.
+    /// Fraction of the step. With steps of 1 % the parameter changes by 1e-3 of its value, and the relative
+    /// error of a central difference is about the square of that.
     const FRACTION: f64 = 0.1;
     let find = |factor: f64| {
         let changed = scene.with_parameter(name, value + factor * step).ok()?;
         find_boundary(&changed.linkage, direction, speed, inwards)
     };
-    // a value of zero or at the end of its range cannot fall
+    // a parameter at the lower limit of its range cannot fall; the difference is then one-sided
     let (ahead, behind) = (find(FRACTION)?, find(-FRACTION));
     let (before, width) = behind.map_or((speed, FRACTION), |behind| (behind, 2.0 * FRACTION));
     Some((ahead - before) / width)
 }
 
-/// The boundary of instability next to a speed, m/s.
+/// The boundary of the unstable range near a speed, m/s; `None` if there is none within a third of this
+/// speed.
 fn find_boundary(linkage: &Linkage, direction: f64, speed: f64, inwards: f64) -> Option<f64> {
     let mut finder = SlideFinder::new(linkage, direction);
     let mut width = 0.01;
@@ -155,10 +157,10 @@ mod tests {
         StabilityStudy::from_scene(scene, range).unwrap()
     }
 
-    /// A small part of each change, made in the scene, moves the end as stated. The part is smaller than the
-    /// differences that the changes come from, so that those are checked too.
+    /// Each parameter of the scene changes by 0.02 of its step, and the end of the instability moves as
+    /// computed. The differences use 0.1 of a step, so the smaller change here also checks their error.
     #[test]
-    fn a_changed_blade_has_the_end_that_was_stated() {
+    fn the_end_of_a_changed_blade_moves_as_computed() {
         const PART: f64 = 0.02;
         for text in [
             include_str!("../../data/scenes/actual-blade.toml"),
@@ -180,9 +182,9 @@ mod tests {
         }
     }
 
-    /// A blade without damping is told what damping does: the step is a damping ratio of 0.001.
+    /// The step of a damping of zero is a damping ratio of 0.001, and it lowers the end of the instability.
     #[test]
-    fn a_blade_without_damping_learns_what_damping_does() {
+    fn the_effect_of_a_damping_of_zero_is_computed() {
         let text = include_str!("../../data/scenes/light-blade.toml");
         let scene = Scene::parse("s", text).unwrap().with_parameter("blade.neck_damping_ratio", 0.0).unwrap();
         let changes = study(&scene).changes;

@@ -7,11 +7,12 @@ use crate::model::shoulder::ShoulderContact;
 use serde_json::{Value, json};
 use std::fmt::Write;
 
-/// What the files say about the speed at which stick-slip ends.
+/// Note in `stability.json` on the speed at which a stick-slip cycle ends.
 pub const CYCLE_NOTE: &str = "not computed: a stick-slip cycle can go on above end_m_per_s, where steady \
-     sliding is stable; `wiperlab simulate` shows it";
+     sliding is stable; `wiperlab simulate` shows whether it does";
 
-/// The table of all modes: a row for each mode of each equilibrium.
+/// The table of all modes: a row for each mode of each equilibrium, also of those on other sides of the
+/// shoulder.
 #[must_use]
 pub fn write_stability_csv(study: &StabilityStudy) -> String {
     let mut text = "speed_m_per_s,preload_n,shoulder,mode,growth_per_s,frequency_hz\n".to_owned();

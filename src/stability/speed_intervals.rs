@@ -36,12 +36,12 @@ impl SpeedInterval {
     }
 }
 
-/// A mode counts as growing if its rate, relative to the highest natural frequency of the links, is above
-/// this value. It is far above the rounding errors of an undamped mode.
+/// A mode counts as growing if its growth, divided by the highest natural angular frequency of the links, is
+/// above this value. The value is far above the rounding errors of an undamped mode.
 const NEUTRAL: f64 = 1e-9;
 
 impl SlideFinder {
-    /// Growth of the leading mode at a speed, m/s, less that of a neutral mode, 1/s.
+    /// Growth of the leading mode at a speed, m/s, minus the least growth that counts as growing, 1/s.
     fn excess_per_s(&mut self, speed_m_per_s: f64) -> Result<f64, NoSliding> {
         let mode = self.find_slide(speed_m_per_s)?.leading_mode();
         Ok(mode.growth_per_s - NEUTRAL * self.fastest_rad_per_s)
@@ -52,9 +52,8 @@ impl SlideFinder {
         state_from_excess(self.excess_per_s(speed_m_per_s))
     }
 
-    /// Finds where a state ends between two speeds, m/s, of which the first has this state and the second
-    /// another. Returns a speed at which it still holds, one next to it at which it has ended, and the state
-    /// there.
+    /// Finds where a state ends between two speeds, m/s: `inside` has this state and `outside` has another.
+    /// Returns a speed next to the boundary that has the state, one that has another, and this other state.
     pub(super) fn bisect_state(
         &mut self,
         state: SlidingState,
@@ -75,8 +74,9 @@ impl SlideFinder {
         ([inside, outside], after)
     }
 
-    /// Divides a range of speed, m/s, into intervals of one state. States are compared at `points` equally
-    /// spaced speeds, and where the growth has an extremum between them.
+    /// Divides a range of speed, m/s, into intervals of one state. The state is computed at `points` equally
+    /// spaced speeds and at extrema of the growth between them; a boundary between two of these speeds is
+    /// found by bisection. An interval narrower than the spacing can be missed.
     #[must_use]
     pub fn find_intervals(&mut self, [from, to]: [f64; 2], points: usize) -> Vec<SpeedInterval> {
         let last = points.max(2) - 1;
@@ -92,7 +92,7 @@ impl SlideFinder {
             let [(a, before), (b, after)] = [pair[0], pair[1]];
             let (mut state, mut at) = (state_from_excess(before), a);
             let last = state_from_excess(after);
-            // more than one state may end between two neighbours
+            // several states can end between two neighbouring speeds
             while state != last && at < b {
                 let ([end, next], beyond) = self.bisect_state(state, [at, b]);
                 found.push(self.describe_interval([start, end], state));
@@ -114,8 +114,8 @@ impl SlideFinder {
         SpeedInterval { speeds_m_per_s, state, modes: modes.map(|(low, high)| [low, high]) }
     }
 
-    /// Where the growth has an extremum between three equally spaced speeds of one state: a speed of another
-    /// state, if there is one.
+    /// A speed of another state, with its excess, near an extremum of the growth between three equally spaced
+    /// speeds of one state; `None` if the growth has no extremum there or does not change sign.
     fn find_hidden_state(
         &mut self,
         three: &[(f64, Result<f64, NoSliding>)],

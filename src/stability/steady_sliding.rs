@@ -23,7 +23,7 @@ pub enum NoSliding {
     NoEquilibrium,
     /// The glass would have to pull the tip.
     ContactLost,
-    /// The Painlevé condition fails: the tip jams.
+    /// The Painlevé condition fails, so the tip jams, or the eigenvalues are not finite.
     Jammed,
 }
 
@@ -49,7 +49,7 @@ pub struct SlidingMode {
 }
 
 impl SlidingMode {
-    /// The instability of a growing mode.
+    /// Kind of the instability if the mode grows.
     #[must_use]
     pub fn instability(&self) -> Instability {
         if self.frequency_hz > 0.0 { Instability::Flutter } else { Instability::Divergence }
@@ -66,13 +66,13 @@ pub enum Instability {
     Divergence,
 }
 
-/// Band of the noise of wipers (Goto, Takahashi and Oya 2001, Analysis of Wiper Vibration).
+/// Frequency band of wiper noise (Goto, Takahashi and Oya 2001, Analysis of Wiper Vibration).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NoiseBand {
-    /// Vibration below 100 Hz.
+    /// Chatter, below 100 Hz.
     Chatter,
-    /// Noise at the reversal, near 500 Hz.
+    /// Reversal noise, near 500 Hz.
     ReversalNoise,
     /// Squeal, near 1 kHz.
     Squeal,
@@ -84,7 +84,7 @@ impl NoiseBand {
     pub fn from_frequency(frequency_hz: f64) -> Self {
         /// Upper limit of chatter, Hz.
         const CHATTER_HZ: f64 = 100.0;
-        /// Geometric mean of 500 Hz and 1 kHz, the middles of the other two bands.
+        /// Limit between reversal noise and squeal: the geometric mean of 500 Hz and 1 kHz.
         const SQUEAL_HZ: f64 = 707.0;
         match frequency_hz {
             f if f < CHATTER_HZ => Self::Chatter,
@@ -132,14 +132,14 @@ impl SteadySlide {
     }
 }
 
-/// Finds the equilibria of steady sliding of a blade in one direction. The search starts from the equilibrium
-/// that it found last.
+/// Finds the equilibria of steady sliding of a blade in one direction. A search starts from the equilibrium
+/// of the previous one.
 #[derive(Debug, Clone)]
 pub struct SlideFinder {
     linkage: Linkage,
     direction: f64,
     last: StaticPose,
-    /// Least coefficient of friction at which the equilibrium that starts upright is known to be lost.
+    /// Least magnitude of the friction coefficient at which the search from the upright blade has failed.
     lost_from: f64,
     /// Highest natural angular frequency of the links, rad/s.
     pub(super) fastest_rad_per_s: f64,
@@ -159,8 +159,9 @@ impl SlideFinder {
         }
     }
 
-    /// The equilibrium at a speed, m/s, that the blade reaches when friction grows slowly from zero. The
-    /// speed has no sign; 0 stands for the limit of slow sliding.
+    /// The equilibrium at a speed, m/s, that the blade reaches when friction grows slowly. If the blade snaps
+    /// over while friction grows, it is an equilibrium beyond the snap. The speed has no sign; 0 stands for
+    /// the limit of slow sliding.
     ///
     /// # Errors
     /// [`NoSliding`] if the blade cannot slide steadily at this speed.
@@ -170,7 +171,8 @@ impl SlideFinder {
         self.linearise(&found, speed_m_per_s)
     }
 
-    /// The equilibria at a speed, m/s, with the neck on the other sides of the shoulder.
+    /// The equilibria at a speed, m/s, at which the neck is on another side of the shoulder than in
+    /// [`Self::find_slide`].
     #[must_use]
     pub fn find_other_slides(&mut self, speed_m_per_s: f64) -> Vec<SteadySlide> {
         if self.linkage.shoulder.is_none() {
@@ -234,14 +236,15 @@ impl SlideFinder {
 }
 
 /// Eigenvalues of `M y'' + D y' + K y = 0`, 1/s, in rising order of frequency; `None` if they are not finite.
-/// `scale` is an angular frequency, 1/s, in whose unit the entries of the matrices are of one size.
+/// `scale` is an angular frequency of the blade, 1/s. Time in units of `1 / scale` makes the entries of the
+/// state matrix similar in size.
 fn solve_eigenvalues(
     mass: &Matrix2<f64>,
     damping: &Matrix2<f64>,
     stiffness: &Matrix2<f64>,
     scale: f64,
 ) -> Option<[Complex<f64>; 4]> {
-    /// Steps of the QR iteration; four eigenvalues take about ten.
+    /// Largest number of steps of the QR iteration; four eigenvalues take about ten.
     const MOST_STEPS: usize = 400;
     let inverse = mass.try_inverse()?;
     let mut state = Matrix4::zeros();
@@ -267,8 +270,8 @@ mod tests {
         Scene::parse("s", include_str!("../../data/scenes/light-blade.toml")).unwrap().linkage
     }
 
-    /// With friction that tends to zero but keeps its slope, the blade stays upright and its matrices are
-    /// those of a mass on a belt: a heavy neck on a stiff spring stays still, so the lip alone vibrates with
+    /// The friction coefficient is almost zero but its slope is not, so the blade stays upright. A heavy neck
+    /// on a stiff spring stays at rest, so the lip alone vibrates, as a mass on a belt:
     /// `m_phi phi'' + (c2 + mu' N l2^2) phi' + (k2 - N l2) phi = 0`.
     #[test]
     fn the_lip_alone_grows_as_a_mass_on_a_belt() {
@@ -292,9 +295,10 @@ mod tests {
         }
     }
 
-    /// The same equilibrium and eigenvalues follow from any earlier search, and from the mirrored blade.
+    /// The growth and frequency at a speed are the same after other searches as in a new search, and the same
+    /// in both directions.
     #[test]
-    fn a_search_does_not_depend_on_the_earlier_one_and_both_directions_mirror() {
+    fn a_search_does_not_depend_on_earlier_ones_or_on_the_direction() {
         let text = include_str!("../../data/scenes/actual-blade.toml");
         let blade = Scene::parse("s", text).unwrap().linkage;
         let mut moved = SlideFinder::new(&blade, 1.0);

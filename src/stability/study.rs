@@ -9,7 +9,7 @@ use crate::simulate::scene::Scene;
 use crate::simulate::scene::error::SceneError;
 use std::f64::consts::TAU;
 
-/// Name of the parameter that a preload sets.
+/// Name of the parameter that holds the preload.
 pub(super) const PRELOAD: &str = "blade.preload_force_n";
 
 /// Speeds and preloads of a study.
@@ -19,7 +19,7 @@ pub struct StudyRange {
     pub speeds_m_per_s: [f64; 2],
     /// Lowest and highest preload, N; `None` for the preload of the scene alone.
     pub preloads_n: Option<[f64; 2]>,
-    /// Number of speeds, and of preloads.
+    /// Number of speeds, and number of preloads of a range.
     pub points: usize,
 }
 
@@ -30,7 +30,7 @@ pub struct StudyPoint {
     pub speed_m_per_s: f64,
     /// Preload, N.
     pub preload_n: f64,
-    /// The equilibrium that a blade reaches, or why it reaches none.
+    /// The equilibrium that the blade reaches, or why it reaches none.
     pub slide: Result<SteadySlide, NoSliding>,
     /// Equilibria with the neck on other sides of the shoulder.
     pub others: Vec<SteadySlide>,
@@ -58,18 +58,19 @@ pub struct StabilityStudy {
     pub has_shoulder: bool,
     /// The blade with the scene's preload: towards +v, then towards -v if friction differs there.
     pub own: Vec<SlidingSurvey>,
-    /// The blade with every preload of the range, in both directions as far as they differ.
+    /// The blade with each preload of the range, in the directions of `own`; empty without a range of
+    /// preloads.
     pub by_preload: Vec<SlidingSurvey>,
     /// All points, by direction, preload and speed.
     pub points: Vec<StudyPoint>,
-    /// What changes of the blade do to the instability, the most effective first.
+    /// Effects of changes of the parameters on the instability at the scene's preload, the largest first.
     pub changes: Vec<ParameterChange>,
 }
 
-/// Twice the highest speed of the head in a scene's run, m/s: the range of a study that names none.
+/// Twice the highest speed of the scene's drive, m/s: the top of the default range of speeds.
 #[must_use]
 pub fn default_top_speed(scene: &Scene) -> f64 {
-    /// Instants at which the speed of a recorded head is compared.
+    /// Number of intervals between the instants at which the speed of any drive but a cosine is read.
     const INSTANTS: u32 = 2000;
     let length_s = scene.run.stop_s - scene.start_s;
     let instants = (0..=INSTANTS).map(|i| scene.start_s + length_s * f64::from(i) / f64::from(INSTANTS));
@@ -83,7 +84,7 @@ impl StabilityStudy {
     /// Studies the blade of a scene.
     ///
     /// # Errors
-    /// [`SceneError`] if the scene cannot have a preload of the range.
+    /// [`SceneError`] if the scene does not admit a preload of the range, or a parameter in its SI unit.
     pub fn from_scene(scene: &Scene, range: StudyRange) -> Result<Self, SceneError> {
         let own_n = scene.value(PRELOAD).unwrap_or(0.0);
         let directions: &[f64] =
@@ -138,7 +139,7 @@ impl StabilityStudy {
         ranges.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
     }
 
-    /// Why no point of the study slides steadily; `None` if one does.
+    /// Why the blade cannot slide steadily at the first point; `None` if it can at any point of the study.
     #[must_use]
     pub fn why_impossible(&self) -> Option<NoSliding> {
         let mut reasons = self.points.iter().map(|point| point.slide.err());

@@ -29,7 +29,7 @@ fn a_map_has_a_row_for_each_mode_and_says_where_sliding_is_unstable() {
     assert!(found["cycle_fold_note"].as_str().unwrap().starts_with("not computed"));
     assert_eq!(found["by_preload"].as_array().unwrap().len(), 12);
     assert!(found["changes"].as_array().unwrap().len() > 10);
-    // the same run writes the same bits over its own files
+    // a second run overwrites the files of the first with the same bytes
     let again = project.run(&[&arguments[..], &["--preload-n", "0.05..0.25", "--points", "12"]].concat());
     assert_eq!(again.0, 0);
     assert_eq!(fs::read_to_string(project.path("map/stability.csv")).unwrap(), table);

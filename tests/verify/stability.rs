@@ -1,4 +1,4 @@
-//! Stability of steady sliding and of stick-slip cycles against simulated runs and closed forms.
+//! Stability of steady sliding: eigenvalues against simulated runs.
 
 use crate::blade::{Parts, STROKE};
 use crate::scenes::committed;
@@ -8,9 +8,9 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use wiperlab::stability::speed_intervals::{SlidingState, unstable_range};
 use wiperlab::stability::steady_sliding::SlideFinder;
 
-/// Perturbations of 1e-6 grow in a run as the leading eigenvalue says, on the shoulder and off it.
+/// Perturbations of 1e-6 grow in simulated runs at the rate of the leading eigenvalue.
 #[test]
-fn perturbations_of_steady_sliding_grow_as_the_eigenvalue_says() {
+fn perturbations_of_steady_sliding_grow_at_the_rate_of_the_leading_eigenvalue() {
     let mut compared = 0;
     for name in ["actual-blade", "light-blade", "published-simulation"] {
         let scene = committed(name);
@@ -26,7 +26,7 @@ fn perturbations_of_steady_sliding_grow_as_the_eigenvalue_says() {
     assert_eq!(compared, 9);
 }
 
-/// The end of the instability is found where simulated perturbations stop growing, for random blades.
+/// For random blades, simulated perturbations stop growing at the computed end of the instability.
 #[test]
 fn steady_sliding_becomes_stable_where_simulated_perturbations_decay() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
@@ -43,7 +43,7 @@ fn steady_sliding_becomes_stable_where_simulated_perturbations_decay() {
     assert!(compared >= 8, "{compared}");
 }
 
-/// Friction that does not fall with speed, on a damped blade: nothing is unstable.
+/// Steady sliding of the damped light blade is stable at all speeds if friction does not fall with speed.
 #[test]
 fn a_damped_blade_with_constant_friction_is_stable_at_all_speeds() {
     let scene = committed("light-blade").with_parameter("friction.a", 0.0).unwrap();
