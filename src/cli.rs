@@ -95,7 +95,7 @@ pub(crate) enum Command {
     Blade(blade::BladeArgs),
     /// Natural frequencies and modes of a scene's blade
     Modes(modes::ModesArgs),
-    /// Speeds at which steady sliding of a scene's blade is unstable, and what changes them
+    /// Speeds at which steady sliding is unstable, and what changes them
     Stability(stability::StabilityArgs),
     /// Compare speed and error of every integration method on a scene
     Accuracy(accuracy::AccuracyArgs),

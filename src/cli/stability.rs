@@ -11,7 +11,7 @@ use crate::text::format_digits;
 
 #[derive(Debug, Args)]
 pub(crate) struct StabilityArgs {
-    /// Scene of the blade (scene.toml)
+    /// Scene of the blade or slider (scene.toml)
     pub scene: PathBuf,
     /// Folder for stability.csv, stability.json and stability.svg
     #[arg(long, value_name = "DIR")]
@@ -20,7 +20,7 @@ pub(crate) struct StabilityArgs {
     /// speed of the scene's drive)
     #[arg(long, value_name = "FROM..TO", value_parser = parse_range, allow_hyphen_values = true)]
     pub speed_m_per_s: Option<NumberRange>,
-    /// Preloads, N (default: the preload of the scene alone)
+    /// Preloads of the blade, or normal forces of the slider, N (default: that of the scene alone)
     #[arg(long, value_name = "FROM..TO", value_parser = parse_range, allow_hyphen_values = true)]
     pub preload_n: Option<NumberRange>,
     /// Number of speeds, and number of preloads of a range
@@ -54,11 +54,6 @@ const PRINTED_CHANGES: usize = 5;
 impl StabilityArgs {
     pub(crate) fn run(&self, global: &GlobalArgs) -> Outcome {
         let scene = read_scene(&self.scene)?;
-        if scene.linkage.is_slider() {
-            let problem =
-                "found a slider, expected a blade; `wiperlab simulate` shows whether a slider sticks";
-            return Err(Failure::at(self.scene.display(), problem));
-        }
         let writer = global.write_policy(OutputCommand::Stability, self.overwrite);
         OutputFolder::check(&self.out, &writer, &OUTPUTS)?;
         print_warnings(&self.scene, &scene.find_implausible(), global);
@@ -76,14 +71,15 @@ impl StabilityArgs {
         let study = StabilityStudy::from_scene(&scene, range).map_err(Failure::input)?;
         if let Some(reason) = study.why_impossible() {
             let [from, to] = speeds_m_per_s;
-            let advice = "expected a blade that slides steadily; change preload, friction or speeds";
-            return Err(Failure::at(
-                self.scene.display(),
-                format!(
-                    "at no speed from {from} to {to} m/s can the blade slide steadily: {}; {advice}",
-                    reason.meaning()
-                ),
-            ));
+            let preloads = preloads_n
+                .map_or(String::new(), |[from, to]| format!(" and no preload from {from} to {to} N"));
+            let body = if scene.linkage.is_slider() { "slider" } else { "blade" };
+            let problem = format!(
+                "at no speed from {from} to {to} m/s{preloads} can the {body} slide steadily: {}; expected a {body} that \
+                 slides steadily; change preload, friction or speeds",
+                reason.meaning()
+            );
+            return Err(Failure::at(self.scene.display(), problem));
         }
         let json = serde_json::to_vec_pretty(&write_stability_json(&study)).map_err(Failure::internal)?;
         let mut outputs =

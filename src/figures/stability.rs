@@ -2,7 +2,7 @@
 
 use super::sweep_map::colour_limits;
 use crate::stability::speed_intervals::unstable_range;
-use crate::stability::steady_sliding::{NoSliding, NoiseBand, SlidingMode};
+use crate::stability::steady_sliding::{NoSliding, NoiseBand, SlidingMode, SteadySlide};
 use crate::stability::study::{StabilityStudy, StudyPoint};
 use crate::text::format_digits;
 use plain_charts::{
@@ -67,9 +67,8 @@ fn draw_curves(study: &StabilityStudy) -> Panel {
         (Colour::Orange, Mark::Dotted),
     ];
     let points = forward_points(study);
-    let modes = |point: &StudyPoint| {
-        point.slide.map_or_else(|_| Vec::new(), |slide| slide.modes().collect::<Vec<SlidingMode>>())
-    };
+    let modes =
+        |point: &StudyPoint| point.slide.iter().flat_map(SteadySlide::modes).collect::<Vec<SlidingMode>>();
     let count = points.iter().map(|point| modes(point).len()).max().unwrap_or(0);
     let curves = STYLES.iter().enumerate().take(count).map(|(i, (colour, mark))| {
         let found: Vec<_> =
@@ -89,7 +88,7 @@ fn draw_curves(study: &StabilityStudy) -> Panel {
 /// line.
 fn draw_map(study: &StabilityStudy) -> Panel {
     let (points, rows) = (forward_points(study), study.range.points);
-    let growth = |point: &StudyPoint| point.slide.ok().map(|slide| slide.leading_mode().growth_per_s);
+    let growth = |point: &StudyPoint| Some(point.slide.as_ref().ok()?.leading_mode().growth_per_s);
     let at = |speed: usize, preload: usize| points[preload * rows + speed];
     let all: Vec<Option<f64>> = points.iter().map(|point| growth(point)).collect();
     let largest = all.iter().flatten().fold(0.0, |largest: f64, value| largest.max(value.abs()));
@@ -110,7 +109,7 @@ fn draw_map(study: &StabilityStudy) -> Panel {
     let [x, y] = [&speeds, &preloads].map(|middles| cell_edges(middles, AxisScale::Linear));
     let cells = |reason: NoSliding| -> Vec<[f64; 4]> {
         let all = (0..rows).flat_map(|column| (0..rows).map(move |row| (column, row)));
-        let missing = all.filter(|(column, row)| at(*column, *row).slide.err() == Some(reason));
+        let missing = all.filter(|(column, row)| at(*column, *row).slide.as_ref().err() == Some(&reason));
         missing.map(|(column, row)| [x[column], x[column + 1], y[row], y[row + 1]]).collect()
     };
     let reasons = [

@@ -1,16 +1,16 @@
-//! What a change of the blade does to the speeds at which steady sliding is unstable.
+//! What a change of the blade or slider does to the speeds at which steady sliding is unstable.
 
 use super::speed_intervals::{SlidingState, unstable_range};
 use super::steady_sliding::SlideFinder;
-use super::study::{PRELOAD, SlidingSurvey};
+use super::study::SlidingSurvey;
 use crate::model::Linkage;
-use crate::model::parameters::{ModelParameter, PARAMETERS, find_parameter};
+use crate::model::parameters::{ModelParameter, PARAMETERS, damping_from_ratio, find_parameter};
 use crate::simulate::scene::Scene;
 use crate::simulate::scene::error::SceneError;
 
 /// Masses, stiffnesses, dampings, the preload and the angle of the shoulder. Each changes alone, while all
 /// other parameters keep their values. The numbers of the friction law are added to these.
-const PARTS: [&str; 13] = [
+const PARTS: [&str; 17] = [
     "blade.head_mass_kg",
     "blade.neck_mass_kg",
     "blade.lip_mass_kg",
@@ -22,8 +22,12 @@ const PARTS: [&str; 13] = [
     "blade.neck_damping_n_m_s_per_rad",
     "blade.lip_damping_n_m_s_per_rad",
     "shoulder.damping_n_m_s_per_rad",
-    PRELOAD,
+    "blade.preload_force_n",
     "shoulder.contact_angle_rad",
+    "slider.mass_kg",
+    "slider.stiffness_n_per_m",
+    "slider.damping_n_s_per_m",
+    "slider.normal_force_n",
 ];
 
 /// Step of a change, as a fraction of the value.
@@ -102,6 +106,10 @@ pub(super) fn rank_changes(
 fn change_step(scene: &Scene, name: &str, value: f64) -> Option<f64> {
     if value != 0.0 {
         return Some(SHARE * value);
+    }
+    if let Some(slider) = scene.linkage.slider().filter(|_| name == "slider.damping_n_s_per_m") {
+        let stiffness = slider.spring.stiffness;
+        return Some(damping_from_ratio(DAMPING_STEP, stiffness, slider.mass_kg)).filter(|step| *step > 0.0);
     }
     let part = name.split_once("_damping_").or_else(|| name.split_once(".damping_"))?.0;
     let ratio = if part == "shoulder" { "shoulder.damping_ratio" } else { &format!("{part}_damping_ratio") };

@@ -1,4 +1,4 @@
-//! Steady sliding of a blade and the eigenvalues of its small vibrations.
+//! Steady sliding of a blade or slider and the eigenvalues of its small vibrations.
 //!
 //! At a constant speed of the head the blade can slide in an equilibrium. The first variation of the motion
 //! about it ([`crate::model::tangent`]) has constant coefficients, `M y'' + D y' + K y = 0`. Its eigenvalues
@@ -11,15 +11,15 @@ use crate::model::shoulder::ShoulderContact;
 use crate::model::tangent::{LaneVector, ReferenceMotion};
 use crate::model::{HeadMotion, LinkDirections, Linkage, Pose};
 use crate::simulate::equilibrium::{StaticPose, is_upright, shoulder_contact};
-use nalgebra::{Complex, Matrix2, Matrix4, Schur};
+use nalgebra::{Complex, DMatrix, Schur};
 use serde::Serialize;
 use std::f64::consts::TAU;
 
-/// Why a blade cannot slide steadily.
+/// Why a blade or slider cannot slide steadily.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NoSliding {
-    /// No equilibrium with both links above level exists.
+    /// There is no equilibrium, for a blade none with both links above level.
     NoEquilibrium,
     /// The glass would have to pull the tip.
     ContactLost,
@@ -32,7 +32,7 @@ impl NoSliding {
     #[must_use]
     pub fn meaning(self) -> &'static str {
         match self {
-            Self::NoEquilibrium => "no equilibrium has both links above level",
+            Self::NoEquilibrium => "there is no equilibrium, or none with both links above level",
             Self::ContactLost => "contact is lost: the glass would have to pull the tip",
             Self::Jammed => "the Painlevé condition fails: no normal force is admissible and the tip jams",
         }
@@ -105,7 +105,7 @@ impl NoiseBand {
 }
 
 /// An equilibrium of steady sliding.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct SteadySlide {
     /// The pose, at rest relative to the head.
     pub pose: Pose,
@@ -114,13 +114,13 @@ pub struct SteadySlide {
     /// Normal force on the tip, N.
     pub normal_n: f64,
     /// Eigenvalues in rising order of frequency, 1/s.
-    eigenvalues: [Complex<f64>; 4],
+    eigenvalues: Vec<Complex<f64>>,
 }
 
 impl SteadySlide {
     /// The modes in rising order of frequency; a pair of conjugate eigenvalues is one mode.
     pub fn modes(&self) -> impl Iterator<Item = SlidingMode> {
-        let upper = self.eigenvalues.into_iter().filter(|e| e.im >= 0.0);
+        let upper = self.eigenvalues.iter().filter(|e| e.im >= 0.0);
         upper.map(|e| SlidingMode { growth_per_s: e.re, frequency_hz: e.im / TAU })
     }
 
@@ -132,8 +132,8 @@ impl SteadySlide {
     }
 }
 
-/// Finds the equilibria of steady sliding of a blade in one direction. A search starts from the equilibrium
-/// of the previous one.
+/// Finds the equilibria of steady sliding of a blade or slider in one direction. A search starts from the
+/// equilibrium of the previous one.
 #[derive(Debug, Clone)]
 pub struct SlideFinder {
     linkage: Linkage,
@@ -227,9 +227,13 @@ impl SlideFinder {
         motion.expand(linkage, touch, shoulder, &pose, 1);
         let reference = ReferenceMotion { linkage, touch, lean: shoulder, motion: &motion };
         let matrices = reference.tangent_matrices(&reference.sample_motion(LaneVector::ZERO));
-        let square = |rows: &[[LaneVector; 3]; 3]| Matrix2::from_fn(|i, j| rows[i][j][0]);
+        // the neck of a slider does not turn
+        let first = usize::from(linkage.is_slider());
+        let square = |rows: &[[LaneVector; 3]; 3]| {
+            DMatrix::from_fn(2 - first, 2 - first, |i, j| rows[first + i][first + j][0])
+        };
         let [mass, damping, stiffness] = [&matrices.mass, &matrices.damping, &matrices.stiffness].map(square);
-        let eigenvalues = solve_eigenvalues(&mass, &damping, &stiffness, self.fastest_rad_per_s);
+        let eigenvalues = solve_eigenvalues(mass, &damping, &stiffness, self.fastest_rad_per_s);
         let eigenvalues = eigenvalues.ok_or(NoSliding::Jammed)?;
         Ok(SteadySlide { pose, shoulder, normal_n, eigenvalues })
     }
@@ -239,23 +243,24 @@ impl SlideFinder {
 /// `scale` is an angular frequency of the blade, 1/s. Time in units of `1 / scale` makes the entries of the
 /// state matrix similar in size.
 fn solve_eigenvalues(
-    mass: &Matrix2<f64>,
-    damping: &Matrix2<f64>,
-    stiffness: &Matrix2<f64>,
+    mass: DMatrix<f64>,
+    damping: &DMatrix<f64>,
+    stiffness: &DMatrix<f64>,
     scale: f64,
-) -> Option<[Complex<f64>; 4]> {
+) -> Option<Vec<Complex<f64>>> {
     /// Largest number of steps of the QR iteration; four eigenvalues take about ten.
     const MOST_STEPS: usize = 400;
+    let size = mass.nrows();
     let inverse = mass.try_inverse()?;
-    let mut state = Matrix4::zeros();
-    state.fixed_view_mut::<2, 2>(0, 2).copy_from(&Matrix2::identity());
-    state.fixed_view_mut::<2, 2>(2, 0).copy_from(&(-inverse * stiffness / (scale * scale)));
-    state.fixed_view_mut::<2, 2>(2, 2).copy_from(&(-inverse * damping / scale));
+    let mut state = DMatrix::zeros(2 * size, 2 * size);
+    state.view_mut((0, size), (size, size)).fill_with_identity();
+    state.view_mut((size, 0), (size, size)).copy_from(&(-&inverse * stiffness / (scale * scale)));
+    state.view_mut((size, size), (size, size)).copy_from(&(-&inverse * damping / scale));
     if !state.iter().all(|entry| entry.is_finite()) {
         return None;
     }
-    let found = Schur::try_new(state, f64::EPSILON, MOST_STEPS)?.complex_eigenvalues() * Complex::from(scale);
-    let mut found = [found[0], found[1], found[2], found[3]];
+    let found = Schur::try_new(state, f64::EPSILON, MOST_STEPS)?.complex_eigenvalues();
+    let mut found: Vec<Complex<f64>> = found.iter().map(|value| value * scale).collect();
     found.sort_by(|a, b| a.im.abs().total_cmp(&b.im.abs()).then(a.re.total_cmp(&b.re)));
     Some(found)
 }

@@ -1,4 +1,4 @@
-//! The stability of a scene's blade over speed and preload.
+//! The stability of a scene's blade or slider over speed and preload.
 
 use super::changes::{ParameterChange, rank_changes};
 use super::speed_intervals::{SpeedInterval, unstable_range};
@@ -9,15 +9,17 @@ use crate::simulate::scene::Scene;
 use crate::simulate::scene::error::SceneError;
 use std::f64::consts::TAU;
 
-/// Name of the parameter that holds the preload.
-pub(super) const PRELOAD: &str = "blade.preload_force_n";
+/// Name of the parameter that holds the preload of a scene's blade, or the normal force of its slider.
+pub(super) fn preload_name(scene: &Scene) -> &'static str {
+    if scene.linkage.is_slider() { "slider.normal_force_n" } else { "blade.preload_force_n" }
+}
 
 /// Speeds and preloads of a study.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StudyRange {
     /// Lowest and highest speed of the head, m/s; 0 stands for the limit of slow sliding.
     pub speeds_m_per_s: [f64; 2],
-    /// Lowest and highest preload, N; `None` for the preload of the scene alone.
+    /// Lowest and highest preload, for a slider normal force, N; `None` for that of the scene alone.
     pub preloads_n: Option<[f64; 2]>,
     /// Number of speeds, and number of preloads of a range.
     pub points: usize,
@@ -47,12 +49,12 @@ pub struct SlidingSurvey {
     pub intervals: Vec<SpeedInterval>,
 }
 
-/// The stability of a blade.
+/// The stability of a blade or slider.
 #[derive(Debug, Clone)]
 pub struct StabilityStudy {
     /// Speeds and preloads.
     pub range: StudyRange,
-    /// Preload of the scene, N.
+    /// Preload of the scene, for a slider its normal force, N.
     pub preload_n: f64,
     /// Whether the blade has a shoulder.
     pub has_shoulder: bool,
@@ -86,7 +88,8 @@ impl StabilityStudy {
     /// # Errors
     /// [`SceneError`] if the scene does not admit a preload of the range, or a parameter in its SI unit.
     pub fn from_scene(scene: &Scene, range: StudyRange) -> Result<Self, SceneError> {
-        let own_n = scene.value(PRELOAD).unwrap_or(0.0);
+        let preload = preload_name(scene);
+        let own_n = scene.value(preload).unwrap_or(0.0);
         let directions: &[f64] =
             if scene.linkage.friction.backward_ratio == 1.0 { &[1.0] } else { &[1.0, -1.0] };
         let last = range.points.max(2) - 1;
@@ -98,7 +101,7 @@ impl StabilityStudy {
             Some(ends) => (0..=last)
                 .map(|i| {
                     let preload_n = spread(ends, i);
-                    Ok((preload_n, scene.with_parameter(PRELOAD, preload_n)?.linkage))
+                    Ok((preload_n, scene.with_parameter(preload, preload_n)?.linkage))
                 })
                 .collect::<Result<_, SceneError>>()?,
         };
@@ -142,7 +145,7 @@ impl StabilityStudy {
     /// Why the blade cannot slide steadily at the first point; `None` if it can at any point of the study.
     #[must_use]
     pub fn why_impossible(&self) -> Option<NoSliding> {
-        let mut reasons = self.points.iter().map(|point| point.slide.err());
+        let mut reasons = self.points.iter().map(|point| point.slide.as_ref().err().copied());
         let first = reasons.next()?;
         if reasons.all(|reason| reason.is_some()) { first } else { None }
     }

@@ -80,10 +80,20 @@ fn the_mode_of_a_slider_is_that_of_the_mass_on_its_spring() {
 }
 
 #[test]
-fn the_stability_of_a_slider_is_refused_and_nothing_is_written() {
+fn the_stability_of_a_slider_has_one_mode_and_names_its_own_numbers() {
     let project = project();
-    let (code, out, err) = project.run(&["stability", "data/scenes/slider-frame.toml", "--out", "none"]);
-    assert_eq!((code, out.as_str()), (2, ""), "{err}");
-    assert!(err.contains("slider-frame.toml") && err.contains("found a slider, expected a blade"), "{err}");
+    let scene = project.read("data/scenes/slider-frame.toml").replace("a = 0.0", "a = 0.2");
+    project.write("falling.toml", &scene.replace("b_s_per_m = 0.0", "b_s_per_m = 10.0"));
+    let said = run(&project, &["stability", "falling.toml", "--out", "st", "--speed-m-per-s", "0..1"]);
+    // ln(2.4525 * 0.2 * 10 / 0.669) / 10
+    assert!(said.contains("unstable between 0.000 and 0.1992 m/s"), "{said}");
+    assert!(said.contains("damping between head and slider"), "{said}");
+    let table = project.read("st/stability.csv");
+    assert!(table.lines().skip(1).all(|row| row.contains(",2.4525,none,1,")), "{table}");
+    // without a spring nothing holds the slider
+    project.write("loose.toml", &scene.replace("stiffness_n_per_m = 1191.0", "stiffness_n_per_m = 0.0"));
+    let (code, _, err) = project.run(&["stability", "loose.toml", "--out", "none"]);
+    assert_eq!(code, 2, "{err}");
+    assert!(err.contains("loose.toml") && err.contains("there is no equilibrium"), "{err}");
     assert!(!project.path("none").exists());
 }

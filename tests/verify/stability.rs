@@ -5,8 +5,11 @@ use crate::scenes::committed;
 use crate::sliding_growth::{simulated_end, simulated_growth};
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
+use std::f64::consts::TAU;
+use wiperlab::simulate::scene::Scene;
 use wiperlab::stability::speed_intervals::{SlidingState, unstable_range};
 use wiperlab::stability::steady_sliding::SlideFinder;
+use wiperlab::stability::study::{StabilityStudy, StudyRange};
 
 /// Perturbations of 1e-6 grow in simulated runs at the rate of the leading eigenvalue.
 #[test]
@@ -51,4 +54,45 @@ fn a_damped_blade_with_constant_friction_is_stable_at_all_speeds() {
     assert_eq!(intervals.len(), 1);
     assert_eq!((intervals[0].state, intervals[0].speeds_m_per_s), (SlidingState::Stable, [0.0, 2.0]));
     assert_eq!(unstable_range(&intervals), None);
+}
+
+/// A mass on a belt: small vibrations grow at `(N a b exp(-b V) - d) / (2 m)`. They end at the speed
+/// `V = ln(N a b / d) / b`, and stiffness does not move this end.
+#[test]
+fn a_slider_grows_and_ends_as_a_mass_on_a_belt() {
+    const TEXT: &str = "format = 1\ntitle = \"belt\"\n[slider]\nmass_kg = 3.0799\nstiffness_n_per_m = 1191.0\n\
+                        damping_n_s_per_m = 0.669\nnormal_force_n = 2.4525\n[friction]\na = 0.2\nb_s_per_m = 10.0\n\
+                        c = 0.15\n[drive]\nspeed_m_per_s = 0.1\n[run]\nstop_s = 1.0\nsample_rate_hz = 100.0\n";
+    let (m, k, d, normal, a, b) = (3.0799, 1191.0, 0.669, 2.4525, 0.2, 10.0);
+    let scene = Scene::parse("belt.toml", TEXT).unwrap();
+    for speed in [0.0_f64, 0.05, 0.19, 0.3, 1.0] {
+        let slide = SlideFinder::new(&scene.linkage, 1.0).find_slide(speed).unwrap();
+        let modes: Vec<_> = slide.modes().collect();
+        let growth = (normal * a * b * (-b * speed).exp() - d) / (2.0 * m);
+        let omega = (k / m - growth * growth).sqrt();
+        assert_eq!(modes.len(), 1, "{modes:?}");
+        assert!((modes[0].growth_per_s - growth).abs() < 1e-12 * omega, "{modes:?}, {growth} 1/s");
+        assert!((modes[0].frequency_hz * TAU - omega).abs() < 1e-12 * omega, "{modes:?}, {omega} rad/s");
+        assert_eq!(slide.normal_n, normal);
+    }
+    let range = StudyRange { speeds_m_per_s: [0.0, 1.0], preloads_n: None, points: 50 };
+    let study = StabilityStudy::from_scene(&scene, range).unwrap();
+    let [onset, end] = study.unstable_range().unwrap();
+    let expected = (normal * a * b / d).ln() / b;
+    assert_eq!(onset, 0.0);
+    assert!((end / expected - 1.0).abs() < 1e-7, "{end} m/s, expected {expected} m/s");
+    // the derivatives by the logarithms of the parameters, per step of 1 %
+    for (name, derivative) in [
+        ("slider.damping_n_s_per_m", -1.0 / b),
+        ("slider.normal_force_n", 1.0 / b),
+        ("friction.a", 1.0 / b),
+        ("friction.b_s_per_m", 1.0 / b - expected),
+    ] {
+        let change = study.changes.iter().find(|change| change.parameter.name == name).unwrap();
+        let moved = change.end_m_per_s.unwrap();
+        assert!((moved - 0.01 * derivative).abs() < 1e-4 * 0.01 * derivative.abs(), "{name}: {moved} m/s");
+        assert_eq!(change.onset_m_per_s, None);
+    }
+    let largest = |name| study.changes.iter().find(|c| c.parameter.name == name).and_then(|c| c.end_m_per_s);
+    assert!(largest("slider.stiffness_n_per_m").is_none_or(|moved| moved.abs() < 1e-7));
 }
