@@ -489,3 +489,35 @@ fn parse_with(from: &str, to: &str) -> String {
     assert!(text.contains(from), "{text}");
     Scene::parse("s", &text.replace(from, to)).unwrap_err().to_string()
 }
+
+/// A block slides to rest through the whole Stribeck curve: the time is the integral of `m dv / (N mu(v))`.
+/// At first the exponent of the law is so large that its exponential is zero.
+#[test]
+fn a_block_slides_to_rest_along_a_stribeck_curve_in_a_few_steps() {
+    let rig = Rig { k: 0.0, ..FRAME };
+    let (speed, level, limit) = (1e-3, 0.05, 0.4);
+    for exponent in [0.5, 1.5, 3.2, 4.0] {
+        let law = format!(
+            "law = \"stribeck\"\nlimit_at_zero = {limit}\ncoulomb_level = {level}\n\
+             stribeck_speed_m_per_s = {speed}\nstribeck_exponent = {exponent}"
+        );
+        let first = 500.0 * speed;
+        let scene = rig.scene(&law, "speed_m_per_s = 0", &state(0.0, first), 20.0);
+        let mut list = Transitions::default();
+        let run = run_scene_with(&scene, SolverOptions::new(1e-10), &mut list);
+        assert!(run.status == RunStatus::Completed && run.work.steps < 400, "{exponent}: {run:?}");
+        // Simpson's rule for the speed as the eighth power of `s`, which smooths the law at rest
+        let slowness = |s: f64| {
+            let v = first * s.powi(8);
+            let mu = level + (limit - level) * (-(v / speed).powf(exponent)).exp();
+            8.0 * first * s.powi(7) * rig.m / (rig.normal * mu)
+        };
+        const HALVES: u32 = 20_000;
+        let at = |i: u32| slowness(f64::from(i) / f64::from(2 * HALVES));
+        let pairs = (0..HALVES).map(|i| at(2 * i) + 4.0 * at(2 * i + 1) + at(2 * i + 2));
+        let expected = pairs.sum::<f64>() / f64::from(6 * HALVES);
+        assert_eq!(list.0.len(), 1, "{:?}", list.0);
+        let stop = list.0[0].time_s;
+        assert!((stop / expected - 1.0).abs() < 1e-8, "{exponent}: {stop} s, expected {expected} s");
+    }
+}

@@ -86,11 +86,36 @@ impl<const N: usize, const G: usize> TaylorExpansion<N, G> {
         const SHARE: f64 = 0.25;
         /// Value of `x` above which `exp(-x)` is below rounding errors.
         const NEGLIGIBLE: f64 = 40.0;
+        /// Largest number of Newton steps; from any step length about ten are enough.
+        const MOST_STEPS: usize = 40;
         let Some(exponent) = &self.exponent else { return h };
-        let varies = h * exponent[1..=self.order].iter().rev().fold(0.0, |sum, c| sum * h + c.abs());
         let most = (SHARE * self.order as f64).max(exponent[0] - NEGLIGIBLE);
-        // (the change grows at least in proportion to the step length)
-        if varies > most { h * most / varies } else { h }
+        let varies = |h: f64| h * exponent[1..=self.order].iter().rev().fold(0.0, |sum, c| sum * h + c.abs());
+        let (mut h, mut change) = (h, varies(h));
+        if change <= most {
+            return h;
+        }
+        // the change grows at least in proportion to the step length, so this step is short enough
+        let proportional = |h: f64, change: f64| h * most / change;
+        if varies(proportional(h, change)) >= 0.5 * most {
+            return proportional(h, change);
+        }
+        // the logarithm of the change is convex in that of the step length, so Newton's iteration does not
+        // pass the solution
+        for _ in 0..MOST_STEPS {
+            if change <= 2.0 * most {
+                break;
+            }
+            if change.is_finite() {
+                let terms = exponent[1..=self.order].iter().enumerate().rev();
+                let slope = h * terms.fold(0.0, |sum, (k, c)| sum * h + (k + 1) as f64 * c.abs()) / change;
+                h *= math::powf(most / change, 1.0 / slope);
+            } else {
+                h *= 1e-3;
+            }
+            change = varies(h);
+        }
+        if change > most { proportional(h, change) } else { h }
     }
 
     /// Index of the guard that falls first within `h`, and the time from the start of the step to its zero;
