@@ -37,9 +37,12 @@ const MIN_SPEED_SD: f64 = 5.0;
 /// Maximum number of measured points.
 const MAX_POINTS: usize = 60;
 
-/// Coefficients of friction during steady sliding of the recorded tip; none if tip or head was not tracked.
+/// Coefficients of friction during steady sliding of the recorded tip; none if tip or head was not tracked,
+/// and none of a slider, whose inertia is not small beside friction.
 pub(crate) fn measure_steady_friction(case: &ConditionComparison) -> Vec<FrictionPoint> {
-    let Some(side) = case.measured_side() else { return Vec::new() };
+    let Some(side) = case.measured_side().filter(|_| !case.model.scene.linkage.is_slider()) else {
+        return Vec::new();
+    };
     let mut deflections = static_deflections(&case.model.scene.linkage);
     deflections.iter_mut().for_each(|(_, deflection_m)| *deflection_m += case.alignment.tip_m);
     let blocks = steady_blocks(&side, case.noise_m(Channel::TipX).unwrap_or(0.0));

@@ -149,6 +149,9 @@ fn track_ridge(
     for point in ridge.points.iter_mut().chain(courses.iter_mut().flatten()) {
         point.frequency_sd_hz = side.recording.add_clock_sd(point.frequency_hz, point.frequency_sd_hz);
     }
+    if is_measured && !is_listed(&analysis, &courses, ridge.segment_s) {
+        courses.clear();
+    }
     let start_s = side.recording.grid().time_s(frames.start);
     let shift_s = if is_measured { case.alignment.shift_s } else { 0.0 };
     // a measured component needs no stick of the model, which may slide where the recorded tip sticks
@@ -166,6 +169,16 @@ fn track_ridge(
     let cycle: Vec<RidgePoint> = courses.iter().flatten().filter(is_cycle).copied().collect();
     let over_speed = ridge_over_speed(side, frames.start, &cycle, ridge.segment_s);
     Some(TrackedRidge { start_s, spectrogram, ridge, courses, band_hz, over_speed })
+}
+
+/// Whether the analysis of the whole record lists a component within the frequencies of a ridge, with a
+/// margin of a resolution of its segments. The strongest peaks of noise can follow each other like a ridge,
+/// too, but noise has no component.
+fn is_listed(analysis: &SpectralAnalysis, courses: &[Vec<RidgePoint>], segment_s: f64) -> bool {
+    let all = || courses.iter().flatten().map(|point| point.frequency_hz);
+    let [low, high] = [all().fold(f64::INFINITY, f64::min), all().fold(0.0, f64::max)];
+    let within = (low - segment_s.recip())..(high + segment_s.recip());
+    analysis.spectrum.components.iter().any(|component| within.contains(&component.frequency_hz))
 }
 
 /// The ridge in segments of the given length. Without a given length, chooses the shortest segments in which

@@ -5,7 +5,7 @@ use super::spectrogram::speed_series;
 use super::{Drawing, FigureBlock, about};
 use crate::compare::{ConditionComparison, TrackedRidge};
 use crate::figures::full_figure;
-use crate::model::modes::body_frequencies;
+use crate::model::modes::named_frequencies;
 use crate::text::{format_digits, format_speed, truncate_text};
 use plain_charts::{ChartAxis, Colour, Figure, Mark, MarkerShape, Panel, Ribbon, Series, TextAnnotation};
 pub use short_spectra::Target;
@@ -166,13 +166,11 @@ pub(crate) fn figure_block(cases: &[&ConditionComparison]) -> Option<FigureBlock
         model: over_speed(&case.ridges.model),
     };
     let case = cases.first()?;
-    let blade = body_frequencies(&case.model.scene.linkage);
-    let natural_hz = [("head", blade.head_hz), ("neck", blade.neck_hz), ("lip", blade.lip_hz)];
     let shown = CycleOverSpeed {
         title: String::new(),
         note: about(&case.figure_title(), &case.heading_note("")),
         synthetic: cases.iter().any(|case| case.is_synthetic()),
-        natural_hz: natural_hz.map(|(name, hz)| (name.to_owned(), hz)).to_vec(),
+        natural_hz: named_frequencies(&case.model.scene.linkage),
         targets: case.frequency_comparisons().map(|sought| sought.target).collect::<Vec<Target>>(),
         recordings: cases.iter().map(cycle).filter(|cycle| !cycle.points().is_empty()).collect(),
     };

@@ -56,6 +56,18 @@ pub(crate) fn body_frequencies(blade: &Linkage) -> BodyFrequencies {
     }
 }
 
+/// Natural frequencies that figures show, Hz, each with its name: those of head, neck and lip as single
+/// bodies, or that of a slider on its spring.
+pub(crate) fn named_frequencies(linkage: &Linkage) -> Vec<(String, f64)> {
+    let BodyFrequencies { head_hz, neck_hz, lip_hz } = body_frequencies(linkage);
+    let named: &[(&str, f64)] = if linkage.is_slider() {
+        &[("slider", lip_hz)]
+    } else {
+        &[("head", head_hz), ("neck", neck_hz), ("lip", lip_hz)]
+    };
+    named.iter().map(|(name, hz)| ((*name).to_owned(), *hz)).collect()
+}
+
 /// Modes about the upright position, in order of rising frequency. With `on_shoulder`, stiffness and damping
 /// of the shoulder are added to those of the neck. A slider has one mode if its tip is free and none
 /// if it is held.

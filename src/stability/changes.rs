@@ -35,6 +35,9 @@ const SHARE: f64 = 0.01;
 /// Step of a damping that is zero, as a damping ratio.
 const DAMPING_STEP: f64 = 1e-3;
 
+/// An effect below this fraction of the highest speed of the range is an error of the bisection.
+const LEAST_EFFECT: f64 = 1e-8;
+
 /// Effect of a change of one parameter.
 #[derive(Debug, Clone, Copy)]
 pub struct ParameterChange {
@@ -97,7 +100,7 @@ pub(super) fn rank_changes(
         let [onset_m_per_s, end_m_per_s] = boundaries.map(change);
         changes.push(ParameterChange { parameter, value, step, onset_m_per_s, end_m_per_s });
     }
-    changes.retain(|change| change.size() > 0.0);
+    changes.retain(|change| change.size() > LEAST_EFFECT * highest);
     changes.sort_by(|a, b| b.size().total_cmp(&a.size()));
     Ok(changes)
 }

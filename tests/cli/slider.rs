@@ -57,6 +57,7 @@ fn a_first_fit_of_a_slider_finds_its_friction() {
     run(&project, &["report", "fit", "--out", "page"]);
     assert!(project.path("page/evidence.svg").exists());
     assert!(!project.path("page/poses.svg").exists(), "a slider has no links to draw");
+    assert!(!project.path("page/cycle.svg").exists(), "the spectrum between two reversals is noise");
 }
 
 #[test]

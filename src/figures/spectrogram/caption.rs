@@ -5,7 +5,7 @@ use crate::compare::{ConditionComparison, TrackedRidge};
 use crate::figures::spectrogram::comparison::{SpectrogramComparison, SpectrogramSide, draw_comparison};
 use crate::figures::spectrogram::{SpectrogramPlot, SpectrogramRidgePoint, TargetFrequency, fill_map};
 use crate::figures::{FigureBlock, FigureText};
-use crate::model::modes::body_frequencies;
+use crate::model::modes::named_frequencies;
 use crate::text::{format_digits, format_milliseconds};
 use std::ops::Range;
 
@@ -35,9 +35,7 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     let channel = case.cycle_channel();
     let note = format!("spectrogram of the {} in segments of {segment}", channel.label());
     let title = figure_title(&sides);
-    let blade = body_frequencies(&case.model.scene.linkage);
-    let natural_hz = [("head", blade.head_hz), ("neck", blade.neck_hz), ("lip", blade.lip_hz)]
-        .map(|(name, hz)| (name.to_owned(), hz));
+    let natural_hz = named_frequencies(&case.model.scene.linkage);
     let figure = draw_comparison(&SpectrogramComparison {
         title: title.clone(),
         note: case.heading_note(&note),
@@ -50,7 +48,7 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
                     quantity: channel.to_string(),
                     shown_hz: Some(shown_hz),
                     targets: target_frequencies(case, side),
-                    natural_hz: natural_hz.to_vec(),
+                    natural_hz: natural_hz.clone(),
                     ..SpectrogramPlot::default()
                 };
                 // with a fast camera, most frequency bins lie above the shown frequencies
