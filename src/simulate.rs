@@ -241,9 +241,8 @@ pub fn build_system(scene: &Scene) -> DrivenBlade {
     /// The angles of a wiper blade in use are 0.1 to 1 rad.
     const ANGLE_SCALE: f64 = 0.1;
     let (linkage, (slowest, _)) = (scene.linkage, time_scales_rad_per_s(&scene.linkage));
-    let angle_scale = linkage
-        .slider()
-        .map_or(ANGLE_SCALE, |slider| linkage.slider_pose(slider.deflection_scale_m(), 0.0).phi);
+    let angle_scale =
+        linkage.slider().map_or(ANGLE_SCALE, |slider| Pose::of_slider(slider.deflection_scale_m(), 0.0).phi);
     DrivenBlade { linkage, drive: scene.drive.clone(), angle_scale, rate_scale: angle_scale * slowest }
 }
 
@@ -254,7 +253,7 @@ pub(crate) fn initial_pose(scene: &Scene) -> Option<Pose> {
         StartKind::Upright => Some(Pose { theta: 0.0, phi: 0.0, theta_rate: 0.0, phi_rate: 0.0 }),
         StartKind::State(pose) | StartKind::Airborne(FlightState { pose, .. }) => Some(pose),
         StartKind::Slider { deflection_m, tip_velocity_m_per_s } => {
-            Some(scene.linkage.slider_pose(deflection_m, tip_velocity_m_per_s - head_speed()))
+            Some(Pose::of_slider(deflection_m, tip_velocity_m_per_s - head_speed()))
         }
         StartKind::SteadySlide => equilibrium::steady_slip_pose(&scene.linkage, head_speed()),
     }

@@ -1,7 +1,7 @@
 //! Descents from the true values, and the Cramér-Rao standard deviations at their ends, from finite
 //! differences.
 
-use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
+use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 use wiperlab::fit::Problem;
 use wiperlab::fit::trace::{
@@ -41,7 +41,7 @@ pub fn descend_from(problem: &Problem, truth: &Scene) -> Option<(TraceModel, Ite
         at = next;
     }
     // otherwise the cost is not chi2, or the model cannot run through a segment
-    (at.plain && chi2_per_dof(&at).0.is_finite()).then_some((model, at))
+    (at.plain && chi2_per_dof(&model, &at).0.is_finite()).then_some((model, at))
 }
 
 /// Whitened residuals by segment and by channel, which is `true` for the drop.
@@ -65,16 +65,15 @@ fn slopes(above: &Residuals, below: &Residuals, step: f64) -> Residuals {
 }
 
 /// Cramér-Rao standard deviations of the logarithms of the parameters, by name: from the inverse of the
-/// information of residuals and priors, with unknown starting states of the segments. `lip_rad_per_s` sets
-/// the steps of the starting rates.
+/// information of residuals and priors, with unknown starting states of the segments. `state_steps` are the
+/// steps of the four numbers of a starting state; a number whose step is zero does not vary.
 pub fn find_deviations(
     model: &TraceModel,
     at: &Iterate,
-    lip_rad_per_s: f64,
+    state_steps: [f64; 4],
 ) -> Option<BTreeMap<String, f64>> {
     const STEP_SD: f64 = 0.02;
     const STEP: f64 = 1e-3;
-    const STATE_RAD: f64 = 1e-4;
     let difference = |moved: &dyn Fn(&mut Iterate, f64), step: f64| {
         let [above, below] = [step, -step].map(|by| {
             let mut iterate = at.clone();
@@ -91,8 +90,9 @@ pub fn find_deviations(
         })
         .collect();
     let by_state: Vec<Residuals> = (0..4)
+        .filter(|i| state_steps[*i] > 0.0)
         .map(|i| {
-            let step = if i < 2 { STATE_RAD } else { STATE_RAD * lip_rad_per_s };
+            let step = state_steps[i];
             let move_all = |iterate: &mut Iterate, by: f64| {
                 iterate.segments.iter_mut().for_each(|segment| segment.start[i] += by);
             };
@@ -113,14 +113,15 @@ pub fn find_deviations(
         if own.iter().chain(&states).any(|one| one.len() != own[0].len()) {
             continue;
         }
-        let mut of_states = Matrix4::from_fn(|i, j| states[i].dot(&states[j]));
-        of_states += Matrix4::identity() * (1e-10 * of_states.trace());
+        let count = states.len();
+        let mut of_states = DMatrix::from_fn(count, count, |i, j| states[i].dot(&states[j]));
+        of_states += DMatrix::identity(count, count) * (1e-10 * of_states.trace());
         let Some(inverse) = of_states.try_inverse() else { continue };
-        let crossed: Vec<Vector4<f64>> =
-            own.iter().map(|one| Vector4::from_fn(|i, _| states[i].dot(one))).collect();
+        let crossed: Vec<DVector<f64>> =
+            own.iter().map(|one| DVector::from_fn(count, |i, _| states[i].dot(one))).collect();
         for i in 0..n {
             for j in 0..n {
-                information[(i, j)] += own[i].dot(&own[j]) - crossed[i].dot(&(inverse * crossed[j]));
+                information[(i, j)] += own[i].dot(&own[j]) - crossed[i].dot(&(&inverse * &crossed[j]));
             }
         }
     }

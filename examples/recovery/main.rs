@@ -27,7 +27,7 @@ use table::{Line, write_table};
 use truth::{Blade, Fault, SOUGHT, draw_blade, write_job};
 use wiperlab::fit::job::Job;
 use wiperlab::fit::result::FitResult;
-use wiperlab::fit::trace::{Iterate, chi2_per_dof};
+use wiperlab::fit::trace::{Iterate, TraceModel, chi2_per_dof};
 use wiperlab::fit::{MeasuredRecording, Problem};
 use wiperlab::simulate::scene::Scene;
 
@@ -112,19 +112,22 @@ fn fit_blade(blade: &Blade, number: u64, fault: Option<Fault>) -> Vec<Line> {
     let seconds = begun.elapsed().as_secs_f64();
     // a descent from the true values gives a cost to compare with, and the Cramér-Rao standard deviations
     let truth = descend_from(&problem, &blade.filmed);
+    const STATE_RAD: f64 = 1e-4;
     let lip_rad_per_s = TAU * blade.believed.value("blade.lip_natural_frequency_hz").unwrap_or(f64::NAN);
-    let deviations = truth.as_ref().and_then(|(model, at)| find_deviations(model, at, lip_rad_per_s));
-    let excess = |at: &Iterate| at.cost - chi2_per_dof(at).1 as f64;
+    let rate = STATE_RAD * lip_rad_per_s;
+    let state_steps = [STATE_RAD, STATE_RAD, rate, rate];
+    let deviations = truth.as_ref().and_then(|(model, at)| find_deviations(model, at, state_steps));
+    let excess = |(model, at): &(TraceModel, Iterate)| at.cost - chi2_per_dof(model, at).1 as f64;
     let above_truth = |result: &FitResult| {
         let dof = result.misfit.as_ref()?.stages.last()?.dof as f64;
-        Some(result.cost - dof - excess(&truth.as_ref()?.1))
+        Some(result.cost - dof - excess(truth.as_ref()?))
     };
     let visible = fault.and_then(|fault| match fault {
         Fault::Constant(name) => {
             // how much lower the cost is with the true value of this constant as the mean of its prior
             let right = blade.believed.with_parameter(name, blade.filmed.value(name)?).ok()?;
-            let (_, at) = descend_from(&make_problem(blade, &right, number), &blade.filmed)?;
-            Some(excess(&truth.as_ref()?.1) - excess(&at))
+            let right = descend_from(&make_problem(blade, &right, number), &blade.filmed)?;
+            Some(excess(truth.as_ref()?) - excess(&right))
         }
         Fault::Marker | Fault::Contact => None,
     });

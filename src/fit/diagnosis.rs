@@ -220,7 +220,7 @@ impl TriedHypothesis {
 
     fn cost_per_dof(&self) -> f64 {
         self.robust_cost()
-            / self.parts.iter().map(|part| chi2_per_dof(&part.at).1).sum::<usize>().max(1) as f64
+            / self.parts.iter().map(|part| chi2_per_dof(&part.model, &part.at).1).sum::<usize>().max(1) as f64
     }
 
     /// Fraction of the frames that the segments of the trial contain.
@@ -337,7 +337,8 @@ impl FittedHypothesis {
 
     /// Chi2 per degree of freedom of all parts together, and number of degrees of freedom.
     fn chi2_per_dof(&self) -> (f64, usize) {
-        let each = || self.ends.iter().map(chi2_per_dof);
+        let parts = || self.trial.parts.iter().zip(&self.ends);
+        let each = || parts().map(|(part, end)| chi2_per_dof(&part.model, end));
         let dof = each().map(|(_, dof)| dof).sum::<usize>().max(1);
         (each().map(|(chi2, dof)| chi2 * dof as f64).sum::<f64>() / dof as f64, dof)
     }
@@ -366,7 +367,7 @@ impl FittedHypothesis {
             |unknown| matches!(&unknown.kind, UnknownKind::Parameter { name: own, .. } if own == name),
         )?;
         let factor = unknowns[at].value(end.point[at]) / scene_value(failed.problem, name);
-        let widening = chi2_per_dof(end).0.max(1.0);
+        let widening = chi2_per_dof(&part.model, end).0.max(1.0);
         let covariance = trace_covariance(&part.model, end)?;
         Some([factor, factor * (widening * covariance.curvature[(at, at)]).sqrt()])
     }

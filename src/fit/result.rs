@@ -10,8 +10,8 @@ use super::job::{FreeParameter, Job};
 use super::linear_model::ParameterCombination;
 use super::misfit::{TraceMisfit, far_from_priors, unexplained_headline};
 use super::uncertainty::ParameterVerdict;
-use crate::model::Pose;
 use crate::model::parameters::describe_parameters;
+use crate::model::{Linkage, Pose};
 use crate::text::{pluralise, text_sha256};
 pub(super) use assembly::{FitFindings, ModelledTargets, camera_nuisance_results, predicted_feature_result};
 use serde::{Deserialize, Serialize};
@@ -127,24 +127,65 @@ pub struct FittedSegment {
     pub fits: bool,
     /// Time of the start on the clock of the drive, s.
     pub time_s: f64,
-    /// Angle of the neck, rad.
-    pub neck_angle_rad: f64,
-    /// Angle of the lip, rad.
-    pub lip_angle_rad: f64,
-    /// Angular velocity of the neck, rad/s.
-    pub neck_rate_rad_per_s: f64,
-    /// Angular velocity of the lip, rad/s.
-    pub lip_rate_rad_per_s: f64,
+    /// State at the start.
+    #[serde(flatten)]
+    pub start: SegmentStart,
+}
+
+/// State of the model at the start of a segment.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum SegmentStart {
+    /// State of a blade.
+    Blade {
+        /// Angle of the neck, rad.
+        neck_angle_rad: f64,
+        /// Angle of the lip, rad.
+        lip_angle_rad: f64,
+        /// Angular velocity of the neck, rad/s.
+        neck_rate_rad_per_s: f64,
+        /// Angular velocity of the lip, rad/s.
+        lip_rate_rad_per_s: f64,
+    },
+    /// State of a slider.
+    Slider {
+        /// Position of the slider minus that of its head, m.
+        deflection_m: f64,
+        /// Rate of change of the deflection, m/s.
+        deflection_rate_m_per_s: f64,
+    },
+}
+
+impl SegmentStart {
+    /// The pose as the state of a blade or slider.
+    pub(crate) fn new(pose: &Pose, linkage: &Linkage) -> Self {
+        let Pose { theta, phi, theta_rate, phi_rate } = *pose;
+        if linkage.is_slider() {
+            let [deflection_m, deflection_rate_m_per_s] = pose.slider_deflection();
+            return Self::Slider { deflection_m, deflection_rate_m_per_s };
+        }
+        Self::Blade {
+            neck_angle_rad: theta,
+            lip_angle_rad: phi,
+            neck_rate_rad_per_s: theta_rate,
+            lip_rate_rad_per_s: phi_rate,
+        }
+    }
 }
 
 impl FittedSegment {
     /// Angles and rates of the links at the start.
     pub(crate) fn pose(&self) -> Pose {
-        Pose {
-            theta: self.neck_angle_rad,
-            phi: self.lip_angle_rad,
-            theta_rate: self.neck_rate_rad_per_s,
-            phi_rate: self.lip_rate_rad_per_s,
+        match self.start {
+            SegmentStart::Blade {
+                neck_angle_rad: theta,
+                lip_angle_rad: phi,
+                neck_rate_rad_per_s: theta_rate,
+                lip_rate_rad_per_s: phi_rate,
+            } => Pose { theta, phi, theta_rate, phi_rate },
+            SegmentStart::Slider { deflection_m, deflection_rate_m_per_s } => {
+                Pose::of_slider(deflection_m, deflection_rate_m_per_s)
+            }
         }
     }
 }

@@ -12,16 +12,19 @@ use super::misfit::{ChannelMisfit, StageMisfit, TraceMisfit, WorstSegment};
 use super::problem::Problem;
 use super::result::{
     EvaluationCounts, FitResult, FitStatus, FittedSegment, LocalOptimum, NuisanceResult, ParameterResult,
+    SegmentStart,
 };
 use super::targets::measure_targets;
 use super::trace::{
-    Iterate, SegmentResiduals, SegmentState, TraceAssessment, TraceDescent, TraceModel, TraceSearchOutcome,
-    TraceSearchSettings, TraceUnknown, UnknownKind, chi2_per_dof, describe_start_limits, search_trace,
-    segment_residuals, undersampled_mode,
+    CameraUnknown, Iterate, SegmentResiduals, SegmentState, TraceAssessment, TraceDescent, TraceModel,
+    TraceRecording, TraceSearchOutcome, TraceSearchSettings, TraceUnknown, UnknownKind, chi2_per_dof,
+    describe_start_limits, search_trace, segment_residuals, undersampled_mode,
 };
 use super::uncertainty::ParameterVerdict;
 use crate::checkpoint::CheckpointSink;
+use crate::model::Pose;
 use crate::recording::Recording;
+use crate::text::format_trimmed;
 use std::collections::{BTreeMap, BTreeSet};
 
 impl Problem {
@@ -269,17 +272,15 @@ impl TraceFindings<'_> {
             let film = segment.recording;
             let seen = &self.model.recordings[film].observation;
             let clock_s = self.model.unknowns.camera_at(film, &end.point).clock_s;
-            let [neck_angle_rad, lip_angle_rad, neck_rate_rad_per_s, lip_rate_rad_per_s] = segment.start;
+            let [theta, phi, theta_rate, phi_rate] = segment.start;
+            let pose = Pose { theta, phi, theta_rate, phi_rate };
             FittedSegment {
                 recording: self.recording_name(film),
                 first_frame: segment.first,
                 end_frame: segment.last,
                 fits: segment.chi2.is_finite() && !segment.is_bad(),
                 time_s: seen.times_s[segment.first] - seen.lead_s() - clock_s,
-                neck_angle_rad,
-                lip_angle_rad,
-                neck_rate_rad_per_s,
-                lip_rate_rad_per_s,
+                start: SegmentStart::new(&pose, &self.model.recordings[film].scene.linkage),
             }
         };
         end.segments.iter().map(fitted).collect()
@@ -295,7 +296,7 @@ impl TraceFindings<'_> {
             }
         }
         found.iter().for_each(|r| channels.entry((r.recording, r.is_drop)).or_default().push(r));
-        let ((chi2, dof), data) = (chi2_per_dof(end), end.count_data());
+        let ((chi2, dof), data) = (chi2_per_dof(self.model, end), end.count_data());
         // degrees of freedom per measured value, assumed to be equal for all channels; chi2 is NaN if a run
         // fails
         let share = if chi2.is_nan() || data == 0 { 1.0 } else { dof as f64 / data as f64 };
@@ -353,7 +354,7 @@ impl TraceFindings<'_> {
     }
 
     fn stage_misfit(&self, iterate: &Iterate) -> StageMisfit {
-        let (chi2_per_dof, dof) = chi2_per_dof(iterate);
+        let (chi2_per_dof, dof) = chi2_per_dof(self.model, iterate);
         StageMisfit {
             segment_s: self.problem.segment_s().get(iterate.stage).copied().unwrap_or_default(),
             segments: iterate.segments.len(),
@@ -384,6 +385,28 @@ impl TraceFindings<'_> {
         found
     }
 
+    /// Sentence on the constant part of the deflection of a slider, which is an offset of a sensor as well as
+    /// a constant force; `None` for a blade, and if it may be zero.
+    fn describe_constant_force(&self, film: usize, end: &Iterate) -> Option<String> {
+        let TraceRecording { scene, observation } = &self.model.recordings[film];
+        let unknowns = &self.model.unknowns;
+        let stiffness = unknowns.scene_at(scene, observation.own_head, film, &end.point)?.linkage.slider()?;
+        let stiffness = stiffness.spring.stiffness;
+        let is_offset = |unknown: &TraceUnknown| matches!(unknown.kind, UnknownKind::Camera { film: own, what: CameraUnknown::OffsetX } if own == film);
+        let at = unknowns.0.iter().position(is_offset)?;
+        let offset_m = unknowns.0[at].value(end.point[at]);
+        let [low_m, high_m] = self.searched.assessment.as_ref()?.estimates[at].widest_95();
+        (low_m > 0.0 || high_m < 0.0).then(|| {
+            format!(
+                "{}: the zeros of the sensors of slider and head differ by {} mm, or a constant force of {} N acts on \
+                 the slider; the recording alone cannot say which",
+                self.recording_name(film),
+                format_trimmed(1e3 * offset_m, 3),
+                format_trimmed(stiffness * offset_m, 3),
+            )
+        })
+    }
+
     fn collect_notes(&self, end: &Iterate) -> Vec<String> {
         let mut notes = Vec::new();
         if let Some([rate_hz, fastest_hz]) = undersampled_mode(self.model, end) {
@@ -393,6 +416,7 @@ impl TraceFindings<'_> {
             ));
         }
         for (film, shoot) in self.model.recordings.iter().enumerate() {
+            notes.extend(self.describe_constant_force(film, end));
             if !end.segments.iter().any(|segment| segment.recording == film) {
                 notes.push(format!(
                     "{}: {}",

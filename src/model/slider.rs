@@ -77,21 +77,11 @@ impl Linkage {
         self.l1_m == 0.0
     }
 
-    /// Pose of a slider with this deflection, m, and this rate of the deflection, m/s.
-    pub(crate) fn slider_pose(&self, deflection_m: f64, rate_m_per_s: f64) -> Pose {
-        Pose {
-            theta: 0.0,
-            phi: deflection_m / self.l2_m,
-            theta_rate: 0.0,
-            phi_rate: rate_m_per_s / self.l2_m,
-        }
-    }
-
     /// Factors that convert usual angles of neck and lip of a blade to those of this linkage. They are 1 for
     /// a blade. For a slider they are 0 for the neck, which does not turn, and the angle of
     /// [`Slider::deflection_scale_m`] for the lip.
     pub(crate) fn angle_units(&self) -> [f64; 2] {
-        let lip = |slider: Slider| self.slider_pose(slider.deflection_scale_m(), 0.0).phi;
+        let lip = |slider: Slider| Pose::of_slider(slider.deflection_scale_m(), 0.0).phi;
         self.slider().map_or([1.0; 2], |slider| [0.0, lip(slider)])
     }
 
@@ -99,6 +89,19 @@ impl Linkage {
     #[must_use]
     pub fn upright_height_m(&self) -> f64 {
         if self.is_slider() { 0.0 } else { self.l1_m + self.l2_m }
+    }
+}
+
+impl Pose {
+    /// Pose of a slider with this deflection, m, and this rate of the deflection, m/s.
+    pub(crate) fn of_slider(deflection_m: f64, rate_m_per_s: f64) -> Self {
+        let (phi, phi_rate) = (deflection_m / ARM_M, rate_m_per_s / ARM_M);
+        Self { theta: 0.0, phi, theta_rate: 0.0, phi_rate }
+    }
+
+    /// Deflection, m, of a slider with this pose, and its rate, m/s.
+    pub(crate) fn slider_deflection(&self) -> [f64; 2] {
+        [self.phi * ARM_M, self.phi_rate * ARM_M]
     }
 }
 

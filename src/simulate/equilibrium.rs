@@ -133,7 +133,7 @@ pub(super) fn solve_for_load(linkage: &Linkage, mu: f64, angles: Pair) -> Option
     if let Some(slider) = linkage.slider() {
         let deflection_m = -mu * slider.normal_force_n / slider.spring.stiffness;
         return deflection_m.is_finite().then(|| {
-            let pose = linkage.slider_pose(deflection_m, 0.0);
+            let pose = Pose::of_slider(deflection_m, 0.0);
             Vector2::new(pose.theta, pose.phi)
         });
     }
@@ -201,7 +201,7 @@ fn moment_jacobian(linkage: &Linkage, mu: f64, angles: &Pair, side: ShoulderCont
 /// the tip is at the distance `lean` from the head along the sweep. They are used if the drop is not tracked.
 pub(crate) fn equilibrium_angles(linkage: &Linkage, lean: f64) -> Option<[f64; 2]> {
     if linkage.is_slider() {
-        let Pose { theta, phi, .. } = linkage.slider_pose(lean, 0.0);
+        let Pose { theta, phi, .. } = Pose::of_slider(lean, 0.0);
         return Some([theta, phi]);
     }
     /// Largest neck angle, rad, that is tried.

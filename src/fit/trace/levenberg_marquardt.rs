@@ -3,7 +3,7 @@
 
 use super::camera_observation::CameraObservation;
 use super::initial_states::{RescuePolicy, fit_states, join_states, rescue_states, update_states};
-use super::iterate::{Iterate, SegmentState, TraceSearchSettings};
+use super::iterate::{Iterate, SegmentState, TraceSearchSettings, is_slider};
 use super::model::TraceModel;
 use super::normal_equations::{NormalEquations, carry_states, damped_step, normal_equations};
 use super::normal_equations::{recording_models, segments_cost};
@@ -68,7 +68,8 @@ pub fn next_iterate(model: &TraceModel, settings: &TraceSearchSettings, before: 
         return Some(Iterate { repeats: 1, ..next });
     }
     if before.is_junk() {
-        return None; // neither other starting states nor longer segments help
+        // neither other starting states nor longer segments help
+        return is_slider(model).then(|| continue_plain(model, settings, before))?;
     }
     let bad = before.count_bad_segments();
     let stage = before.stage + 1;
@@ -87,6 +88,23 @@ pub fn next_iterate(model: &TraceModel, settings: &TraceSearchSettings, before: 
         return start_stage(model, settings, (stage, before.whole), &before.point, &before.segments);
     }
     resegment(model, settings, before)
+}
+
+/// The iterate that follows the end of a stage of a slider that explains nothing: the same stage, and then the
+/// next one, with plain chi2 as cost; `None` at the end of the search. A law of friction hardly ever explains
+/// sensors that resolve a thousandth of the motion. The least-squares fit still gives the friction that is
+/// nearest, with intervals from the scatter of the segments.
+fn continue_plain(model: &TraceModel, settings: &TraceSearchSettings, before: &Iterate) -> Option<Iterate> {
+    let stage = before.stage + 1;
+    if !before.plain {
+        return refit_plain(model, Iterate { settled: false, number: 0, ..before.clone() });
+    }
+    if stage == settings.segment_s.len() {
+        return None;
+    }
+    let next = start_stage(model, settings, (stage, before.whole), &before.point, &before.segments)?;
+    let cost = total_cost(model, &next.point, &next.segments, true);
+    Some(Iterate { plain: true, cost, ..next })
 }
 
 /// The iterate after bad segments were restarted from other starting states; `None` if this lowers the cost

@@ -32,13 +32,19 @@ const USUAL_SEGMENT_S: f64 = 0.004;
 /// Natural frequency, Hz, of the lip alone of a blade of the usual size.
 const USUAL_LIP_HZ: f64 = 608.0;
 
-/// Length of the shortest segments of a blade, s: [`USUAL_SEGMENT_S`] times a power of 2 that follows from
-/// the natural frequency of the lip alone. A power of 2, so that a small error of this frequency hardly ever
-/// changes the length.
+/// Number of times by which the segments of a slider are halved again. A slider has no motion that is faster
+/// than its cycle. Shorter segments depend less on what the model lacks, and there are more of them, so that
+/// their scatter is better known.
+const SLIDER_HALVINGS: f64 = 3.0;
+
+/// Length of the shortest segments of a blade or slider, s: [`USUAL_SEGMENT_S`] times a power of 2 that
+/// follows from the natural frequency of the lip alone, or of the slider. A power of 2, so that a small error
+/// of this frequency hardly ever changes the length.
 pub(crate) fn first_segment_s(linkage: &Linkage) -> f64 {
     let lip_hz = body_frequencies(linkage).lip_hz;
     let halves = math::ln(USUAL_LIP_HZ / lip_hz) / math::ln(2.0);
     let steps = if halves.is_finite() { halves.round().clamp(-12.0, 12.0) } else { 0.0 };
+    let steps = if linkage.is_slider() { steps - SLIDER_HALVINGS } else { steps };
     USUAL_SEGMENT_S * math::powi(2.0, steps as i32)
 }
 

@@ -108,7 +108,7 @@ impl<'a> SearchEnd<'a> {
         at: &'a Iterate,
     ) -> Option<Self> {
         let covariance = trace_covariance(model, at)?;
-        let widening = chi2_per_dof(at).0.max(covariance.gradient_scatter).max(1.0);
+        let widening = chi2_per_dof(model, at).0.max(covariance.gradient_scatter).max(1.0);
         let sd = (0..at.point.len()).map(|i| covariance.variance(i, widening).sqrt()).collect();
         Some(Self { model, settings, seed, at, covariance, widening, sd })
     }
@@ -255,17 +255,21 @@ const MAX_STRETCH: f64 = 3.0;
 
 /// Distances below and above each estimate, in the coordinate of the unknown, at which the cost reaches the
 /// 95 % threshold. Each distance is at least 1.96 standard deviations; it is exactly 1.96 standard deviations
-/// if no run holds the unknown on that side. `sides` returns the last iterate of a run.
+/// if no run holds the unknown on that side. The threshold is the cost of the linear model at this distance,
+/// so only a deviation from the linear model widens the interval. `sides` returns the last iterate of a run.
 pub(super) fn profile_distances<'s>(
     end: &SearchEnd<'_>,
     sides: impl Fn(UncertaintyRun) -> Option<&'s Iterate>,
 ) -> Vec<[f64; 2]> {
-    let rise = Z_95 * Z_95 * end.widening;
+    let TraceCovariance { curvature, heads, .. } = &end.covariance;
     let one = |unknown: usize| {
+        // the errors of the recorded head are part of the distance and do not change the cost
+        let by_cost = curvature[(unknown, unknown)] - heads[(unknown, unknown)];
         [false, true].map(|above| {
             let moved = end.profile_offset(unknown, above);
             let found = sides(UncertaintyRun::Side { unknown, above });
             let risen = found.map(|at| cost_rise(end, unknown, moved, at)).filter(|risen| risen.is_finite());
+            let rise = moved * moved / by_cost;
             let stretch = risen.map_or(1.0, |risen| (rise / risen.max(1e-9)).sqrt());
             moved.abs() * stretch.clamp(1.0, MAX_STRETCH)
         })

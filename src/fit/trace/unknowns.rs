@@ -218,7 +218,7 @@ impl TraceUnknowns {
     }
 
     /// The scene of a recording at a point; `None` if the scene refuses a value.
-    pub(super) fn scene_at(&self, base: &Scene, own_head: bool, film: usize, point: &[f64]) -> Option<Scene> {
+    pub(crate) fn scene_at(&self, base: &Scene, own_head: bool, film: usize, point: &[f64]) -> Option<Scene> {
         let mut scene = base.clone();
         for (unknown, z) in self.0.iter().zip(point) {
             if let UnknownKind::Parameter { name, .. } = &unknown.kind {
