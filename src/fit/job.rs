@@ -167,10 +167,10 @@ impl Job {
         settings::check_counts(written)?;
         let conditions = conditions::check_conditions(written, known)?;
         let camera = settings::check_camera_table(written)?;
-        let parameters = parameters::check_parameters(&written.parameter, known)?;
+        let traces = traces::check_traces(&written.trace, &conditions)?;
+        let parameters = parameters::check_parameters(&written.parameter, known, &traces)?;
         parameters.iter().try_for_each(|p| conditions::check_not_set(&conditions, &p.name))?;
         conditions::check_no_camera_with_traces(written)?;
-        let traces = traces::check_traces(&written.trace, &conditions)?;
         let constants = parameters::check_constants(written, &parameters, known)?;
         constants.listed_names().try_for_each(|name| conditions::check_not_set(&conditions, name))?;
         let nyquist_hz = camera.map(|c| c.frame_rate_hz / 2.0);

@@ -11,6 +11,7 @@ use super::trace::{TraceModel, TraceSource};
 use super::trace_data::{TraceData, TraceError, prepare_traces};
 use super::{FitError, job};
 use crate::checkpoint::{CheckpointSink, NullSink, fingerprint};
+use crate::model::parameters::name_in_scene;
 use crate::recording::quality::measure_quality;
 use crate::recording::{FrameGrid, Recording, Traces};
 use crate::simulate::drive::HeadMotionError;
@@ -270,7 +271,7 @@ fn check_scene(
     }
     for FreeParameter { name, bounds, .. } in &job.parameters {
         for end in [bounds.lower(), bounds.upper()] {
-            scene.with_parameter(name, end).map_err(refused(format!("bounds of `{name}`")))?;
+            scene.with_parameter(name_in_scene(name), end).map_err(refused(format!("bounds of `{name}`")))?;
         }
     }
     Ok(scene)

@@ -5,6 +5,7 @@ use super::model::{Draw, Model, Restart};
 use super::trace::FittedTraces;
 use crate::model::Pose;
 use crate::model::modes::{TipConstraint, natural_modes, time_scales_rad_per_s};
+use crate::model::parameters::name_if_in_recording;
 use crate::recording::Recording;
 use crate::simulate::drive::Drive;
 use crate::simulate::outputs::LargestTilt;
@@ -108,7 +109,10 @@ impl SceneModel {
     /// [`RunFailure`] if the scene refuses a value.
     pub(crate) fn scene_at(&self, values: &[f64], condition: usize) -> Result<Scene, RunFailure> {
         let scene = self.condition(condition)?.scene.clone();
-        let set = |scene: Scene, (name, value): (&String, &f64)| scene.with_parameter(name, *value);
+        let set = |scene: Scene, (name, value): (&String, &f64)| match name_if_in_recording(name, condition) {
+            Some(name) => scene.with_parameter(name, *value),
+            None => Ok(scene),
+        };
         let scene = self.names.iter().zip(values).try_fold(scene, set);
         scene.map_err(|error| RunFailure::new(FailureReason::Refused, error.to_string(), 0.0))
     }

@@ -34,7 +34,6 @@ pub use iterate::{Iterate, SegmentState, TraceSearchSettings, chi2_per_dof};
 pub use levenberg_marquardt::{first_iterate, next_iterate};
 pub(crate) use levenberg_marquardt::{outer_step, start_stage};
 pub use model::TraceModel;
-pub(crate) use model::TraceRecording;
 pub(crate) use normal_equations::trace_covariance;
 pub use search::{TraceSearchOutcome, search_trace, start_point, undersampled_mode};
 pub use segment_simulation::{SegmentResiduals, segment_residuals};

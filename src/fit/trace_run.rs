@@ -17,8 +17,8 @@ use super::result::{
 use super::targets::measure_targets;
 use super::trace::{
     CameraUnknown, Iterate, SegmentResiduals, SegmentState, TraceAssessment, TraceDescent, TraceModel,
-    TraceRecording, TraceSearchOutcome, TraceSearchSettings, TraceUnknown, UnknownKind, chi2_per_dof,
-    describe_start_limits, search_trace, segment_residuals, undersampled_mode,
+    TraceSearchOutcome, TraceSearchSettings, TraceUnknown, UnknownKind, chi2_per_dof, describe_start_limits,
+    search_trace, segment_residuals, undersampled_mode,
 };
 use super::uncertainty::ParameterVerdict;
 use crate::checkpoint::CheckpointSink;
@@ -388,9 +388,9 @@ impl TraceFindings<'_> {
     /// Sentence on the constant part of the deflection of a slider, which is an offset of a sensor as well as
     /// a constant force; `None` for a blade, and if it may be zero.
     fn describe_constant_force(&self, film: usize, end: &Iterate) -> Option<String> {
-        let TraceRecording { scene, observation } = &self.model.recordings[film];
         let unknowns = &self.model.unknowns;
-        let stiffness = unknowns.scene_at(scene, observation.own_head, film, &end.point)?.linkage.slider()?;
+        let stiffness =
+            unknowns.scene_at(&self.model.recordings[film], film, &end.point)?.linkage.slider()?;
         let stiffness = stiffness.spring.stiffness;
         let is_offset = |unknown: &TraceUnknown| matches!(unknown.kind, UnknownKind::Camera { film: own, what: CameraUnknown::OffsetX } if own == film);
         let at = unknowns.0.iter().position(is_offset)?;

@@ -184,10 +184,31 @@ table! {
     "slider.normal_force_n" "N" "N" NormalForce None, Positive, Log, "constant force of the slider on the surface";
 }
 
-/// Finds the row of the parameter with this name.
+/// Finds the row of the parameter with this name; a number of a recording in the name has no effect.
 #[must_use]
 pub fn find_parameter(name: &str) -> Option<&'static ModelParameter> {
+    let name = name_in_scene(name);
     PARAMETERS.iter().find(|p| p.name == name)
+}
+
+/// Sign between the name of a parameter and the number of the recording in which it has its own value, as in
+/// `friction.c@2`.
+const OF_RECORDING: char = '@';
+
+/// Name of the parameter that has its own value in the recording with this index.
+pub(crate) fn name_in_recording(name: &str, recording: usize) -> String {
+    format!("{name}{OF_RECORDING}{}", recording + 1)
+}
+
+/// Key in the scene file of a parameter, without the number of a recording.
+pub(crate) fn name_in_scene(name: &str) -> &str {
+    name.split(OF_RECORDING).next().unwrap_or(name)
+}
+
+/// Key in the scene file of a parameter, if it has a value in the recording with this index.
+pub(crate) fn name_if_in_recording(name: &str, recording: usize) -> Option<&str> {
+    let (key, number) = name.split_once(OF_RECORDING).unwrap_or((name, ""));
+    (number.is_empty() || number.parse() == Ok(recording + 1)).then_some(key)
 }
 
 /// Names of all parameters, in the order of the table.

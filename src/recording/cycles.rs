@@ -107,7 +107,7 @@ const CHANGING: f64 = 1.2;
 const ROUNDING_M: f64 = 1e-9;
 /// Largest ratio of the noise of the tip to that of the head: a larger difference between neighbouring frames
 /// of the tip is a fast cycle, not noise.
-const MOST_UNLIKE: f64 = 2.0;
+pub(crate) const MOST_UNLIKE: f64 = 2.0;
 
 /// One slip of the tip.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

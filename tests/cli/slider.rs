@@ -105,3 +105,69 @@ fn the_stability_of_a_slider_has_one_mode_and_names_its_own_numbers() {
     assert!(err.contains("loose.toml") && err.contains("there is no equilibrium"), "{err}");
     assert!(!project.path("none").exists());
 }
+
+#[test]
+fn two_loads_share_the_stiffness_and_each_has_its_own_friction() {
+    let project = project();
+    let scene = project.read("data/scenes/slider-frame.toml");
+    let twin = project.read("data/twins/slider-frame.toml");
+    let loads = [("2.4525", "0.28"), ("5.3955", "0.30")];
+    let mut recordings = String::new();
+    for (at, (load, friction)) in loads.into_iter().enumerate() {
+        let scene = scene.replace("2.4525", load).replace("c = 0.28", &format!("c = {friction}"));
+        project.write(&format!("data/scenes/load-{at}.toml"), &scene);
+        project.write(
+            &format!("data/twins/load-{at}.toml"),
+            &twin.replace("slider-frame", &format!("load-{at}")),
+        );
+        run(&project, &["twin", &format!("data/twins/load-{at}.toml"), "--out", &format!("rec-{at}")]);
+        recordings += &format!(
+            "[[recording]]\npath = \"../rec-{at}\"\nset = {{ \"slider.normal_force_n\" = {load} }}\n\
+             [[trace]]\nrecording = {}\nchannels = [\"tip-x\"]\n[trace.camera]\nscale_sd = 0.0\n",
+            at + 1
+        );
+    }
+    let job = format!(
+        "format = 1\ntitle = \"Two loads\"\nscene = \"../data/scenes/slider-frame.toml\"\nseed = 1\n\
+         nuisance = [{{ name = \"slider.mass_kg\", sd = \"1 %\" }}]\n{recordings}\
+         [[parameter]]\nname = \"friction.c\"\nlower = 0.03\nupper = 1.5\nscale = \"log\"\nscope = \"recording\"\n\
+         [[parameter]]\nname = \"slider.stiffness_n_per_m\"\nlower = 100\nupper = 6000\nscale = \"log\"\n\
+         [[parameter]]\nname = \"slider.damping_n_s_per_m\"\nlower = 0.0\nupper = 20.0\nscale = \"linear\"\n"
+    );
+    project.write("fit/job.toml", &job);
+    let said = run(&project, &["fit", "fit"]);
+    let result: Value = serde_json::from_str(&project.read("fit/result.json")).unwrap();
+    assert_eq!(result["misfit"]["explained"], true, "{said}");
+    let found = |name: &str| {
+        let one = &result["parameters"][name];
+        assert_eq!(one["verdict"], "identified", "{name}: {one}");
+        ["lower_95", "estimate", "upper_95"].map(|key| one[key].as_f64().unwrap())
+    };
+    let expected = [
+        ("friction.c@1", 0.28),
+        ("friction.c@2", 0.30),
+        ("slider.stiffness_n_per_m", 1191.0),
+        ("slider.damping_n_s_per_m", 0.669),
+    ];
+    for (name, truth) in expected {
+        let [low, estimate, high] = found(name);
+        assert!(
+            low < truth && truth < high && (estimate / truth - 1.0).abs() < 0.05,
+            "{name}: {low} to {high}"
+        );
+    }
+    assert_eq!(result["parameters"].as_object().unwrap().len(), 4);
+    // what the fit leaves describes each load
+    for (at, (load, _)) in loads.into_iter().enumerate() {
+        let scene: toml::Table = project.read(&format!("fit/fitted-scene-{}.toml", at + 1)).parse().unwrap();
+        let number = |table: &str, key: &str| scene[table][key].as_float().unwrap();
+        assert_eq!(number("slider", "normal_force_n"), load.parse::<f64>().unwrap());
+        assert_eq!(number("friction", "c"), found(&format!("friction.c@{}", at + 1))[1]);
+    }
+    run(&project, &["report", "fit", "--out", "page"]);
+    let features =
+        job.split("[[trace]]").next().unwrap().to_owned() + job.split("scale_sd = 0.0\n").last().unwrap();
+    project.write("fit/features.toml", &features);
+    let (code, _, err) = project.run(&["fit", "fit/features.toml"]);
+    assert!(code == 2 && err.contains("`friction.c`, `scope`"), "{err}");
+}

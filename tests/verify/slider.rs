@@ -245,8 +245,8 @@ fn den_hartogs_oscillator_without_stops_reverses_twice_a_cycle() {
     }
 }
 
-/// Den Hartog's oscillator with one stop, three stops and no stop per half cycle, and a block that only a
-/// damper connects to the head: it never slips, stops in every half cycle, or reverses without a stop.
+/// Den Hartog's oscillator with one stop, two stops, three stops and no stop per half cycle, and a block that
+/// only a damper connects to the head: it never slips, stops in every half cycle, or reverses without a stop.
 fn forced_cases() -> Vec<(Forced, [usize; 2])> {
     let sprung = |ratio: f64, share: f64| {
         let (drive, amplitude) = (ratio * FRAME.omega(), 2e-3);
@@ -266,6 +266,7 @@ fn forced_cases() -> Vec<(Forced, [usize; 2])> {
     vec![
         (sprung(0.32, 0.28), [20, 0]),
         (sprung(0.5, 0.6), [20, 0]),
+        (sprung(0.2, 0.4), [58, 0]),
         (sprung(0.1, 0.5), [85, 0]),
         (sprung(0.8, 0.3), [0, 20]),
         (shaken(1.01), [0, 0]),

@@ -122,6 +122,20 @@ pub(crate) struct JobParameterTable {
     pub scale: BoundsSpacing,
     /// Prior knowledge of the parameter; none if left out.
     pub prior: Option<JobPriorTable>,
+    /// "job" for one value in all recordings, or "recording" for one in each; "job" if left out.
+    #[serde(default)]
+    pub scope: ParameterScope,
+}
+
+/// The recordings that share the value of a parameter.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum ParameterScope {
+    /// All recordings share one value.
+    #[default]
+    Job,
+    /// Each recording has its own value.
+    Recording,
 }
 
 /// Prior knowledge of a parameter: a normal distribution.

@@ -1,9 +1,10 @@
 //! Free parameters and freed constants of a job: bounds and priors.
 
-use super::as_written::{self, JobNuisanceEntry, ListedNuisance};
+use super::as_written::{self, JobNuisanceEntry, ListedNuisance, ParameterScope};
 use super::checks::find_repeated;
-use super::{KeyRefusal, check_above_zero, is_same_quantity};
+use super::{KeyRefusal, TraceTarget, check_above_zero, is_same_quantity};
 use crate::fit::bounds::{Bounds, BoundsSpacing, Prior};
+use crate::model::parameters::name_in_recording;
 use crate::toml_file::suggest_key;
 use portable_math as math;
 use serde::Serialize;
@@ -11,7 +12,8 @@ use serde::Serialize;
 /// A parameter that the search may change.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FreeParameter {
-    /// Key in the scene file, preceded by its table, such as `friction.a`.
+    /// Key in the scene file, preceded by its table, such as `friction.a`. If the parameter has its own value
+    /// in each recording, the number of the recording follows, as in `friction.a@2`.
     pub name: String,
     /// Bounds of the parameter, in its SI unit.
     pub bounds: Bounds,
@@ -29,6 +31,7 @@ impl From<Bounds> for FreeParameter {
 pub(super) fn check_parameters(
     written: &[as_written::JobParameterTable],
     known: &[&str],
+    traces: &[TraceTarget],
 ) -> Result<Vec<FreeParameter>, KeyRefusal> {
     if written.is_empty() {
         refuse!("parameter", "found none, expected at least one [[parameter]] to fit");
@@ -42,9 +45,23 @@ pub(super) fn check_parameters(
         }
         let bounds = Bounds::new(p.lower, p.upper, p.scale).or_else(|problem| refuse!(key, "{problem}"))?;
         let prior = p.prior.as_ref().map(|prior| check_prior(&p.name, prior, &bounds)).transpose()?;
-        Ok(FreeParameter { name: p.name.clone(), bounds, prior })
+        if p.scope == ParameterScope::Job {
+            return Ok(vec![FreeParameter { name: p.name.clone(), bounds, prior }]);
+        }
+        if traces.is_empty() {
+            refuse!(
+                format!("parameter `{}`, `scope`", p.name),
+                "found \"recording\" in a job without a [[trace]], whose recordings share all parameters; remove it"
+            );
+        }
+        let own = |trace: &TraceTarget| {
+            let name = name_in_recording(&p.name, trace.condition);
+            FreeParameter { name, bounds, prior }
+        };
+        Ok(traces.iter().map(own).collect())
     };
-    written.iter().map(check).collect()
+    let found: Vec<Vec<FreeParameter>> = written.iter().map(check).collect::<Result<_, _>>()?;
+    Ok(found.concat())
 }
 
 /// Refuses two entries that set the same quantity, such as a stiffness and its natural frequency, because the

@@ -14,6 +14,7 @@ use crate::fit::trace::unknowns::{CameraUnknown, TraceUnknown, TraceUnknowns, Un
 use crate::fit::trace_data::TraceData;
 use crate::recording::Recording;
 use crate::recording::channel::ReversalInstants;
+use crate::recording::cycles::MOST_UNLIKE;
 use crate::recording::noise::{AutoregressiveNoise, measure_noise};
 use crate::recording::quality::{CameraTilt, measure_quality, measure_tilt};
 use crate::simulate::drive::{Drive, HeadMotionError, smooth_head_motion};
@@ -95,7 +96,8 @@ fn build_recording(source: &TraceSource<'_>) -> Result<TraceRecording, HeadMotio
         scene.drive = Drive::Recorded(Arc::new(smooth_head_motion(recording)?));
     }
     let found = measure_noise(recording);
-    let noise = [found.own_tip_x(), found.own_head_y()].map(|own| channel_noise(traced, recording, own));
+    let noise = [found.own_tip_x(), found.own_head_y()]
+        .map(|own| channel_noise(scene.linkage.is_slider(), traced, recording, own));
     let has = |channel| traced.channels.contains(&channel);
     let settings = ObservationSettings {
         tip_x: has(TraceChannel::TipX) || has(TraceChannel::Deflection),
@@ -115,13 +117,14 @@ fn build_recording(source: &TraceSource<'_>) -> Result<TraceRecording, HeadMotio
         glass.as_ref(),
         first_segment_s,
     );
-    Ok(TraceRecording { scene, observation: film })
+    Ok(TraceRecording { condition: traced.condition, scene, observation: film })
 }
 
 /// Noise of a channel: the value in the job, if it gives one. Otherwise it is the measured noise without the
-/// part that tip and head have in common. If the measurement fails, it is white noise with the scatter from
+/// part that tip and head have in common; of a slider, only if the head has about the same noise. If the measurement fails, it is white noise with the scatter from
 /// frame to frame.
 fn channel_noise(
+    is_slider: bool,
     traced: &TraceData,
     recording: &Recording,
     own: Option<AutoregressiveNoise>,
@@ -133,8 +136,12 @@ fn channel_noise(
     if let Some(noise_m) = traced.noise_m {
         return white(noise_m);
     }
-    let Some(noise) = own else {
-        let measured = measure_quality(recording, None);
+    let measured = measure_quality(recording, None);
+    // the sensors of slider and head are alike, and a stick-slip cycle of few frames may pass for noise
+    let is_motion = |noise: &AutoregressiveNoise| {
+        is_slider && measured.head_x.noise_m.is_some_and(|head_m| noise.sd() > MOST_UNLIKE * head_m)
+    };
+    let Some(noise) = own.filter(|noise| !is_motion(noise)) else {
         return white(measured.head_x.noise_m.or(measured.tip_x.noise_m).unwrap_or(MIN_NOISE_M));
     };
     let sd_m = noise.sd().max(MIN_NOISE_M);

@@ -7,6 +7,8 @@ use crate::simulate::scene::Scene;
 /// A recording and the scene that is fitted to it.
 #[derive(Clone)]
 pub struct TraceRecording {
+    /// Index of the condition of the job to which the recording belongs.
+    pub condition: usize,
     /// The scene, whose drive moves the head of the model.
     pub scene: Scene,
     pub observation: CameraObservation,

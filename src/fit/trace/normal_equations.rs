@@ -122,7 +122,7 @@ pub(super) fn carry_states(
         let Some(part) = part else { continue };
         let follow = &part.move_by_unknown * moved;
         let step = -LinkState::from_fn(|i, _| part.move_held[i] + follow[i]);
-        let TraceRecording { scene, observation } = &model.recordings[segment.recording];
+        let TraceRecording { scene, observation, .. } = &model.recordings[segment.recording];
         let [neck, lip] = scene.linkage.angle_units();
         let size = |i: usize| {
             let of_neck = if neck > 0.0 { step[i].abs() } else { 0.0 };

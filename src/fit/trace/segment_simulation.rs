@@ -6,6 +6,7 @@ use super::model::{TraceModel, TraceRecording};
 use super::normal_equations::recording_models;
 use super::unknowns::{CameraParameters, CameraUnknown, TraceUnknowns, UnknownKind};
 use crate::model::Pose;
+use crate::model::parameters::name_if_in_recording;
 use crate::model::shoulder::Shoulder;
 use crate::simulate::mode::TipMode;
 use crate::simulate::scene::{Scene, StartKind};
@@ -169,7 +170,7 @@ impl<'a> RecordingModel<'a> {
         z: &[f64],
     ) -> Option<Self> {
         let film = &shoot.observation;
-        let scene = unknowns.scene_at(&shoot.scene, film.own_head, number, z)?;
+        let scene = unknowns.scene_at(shoot, number, z)?;
         let view = unknowns.camera_at(number, z);
         let mut directions = vec![
             TangentDirection::NeckAngle,
@@ -186,9 +187,12 @@ impl<'a> RecordingModel<'a> {
             };
             let slope = unknown.slope(*z);
             effects.push(match &unknown.kind {
-                UnknownKind::Parameter { name, .. } => {
-                    UnknownEffect::Run(direction(TangentDirection::Parameter(name.clone())), slope)
-                }
+                UnknownKind::Parameter { name, .. } => match name_if_in_recording(name, shoot.condition) {
+                    Some(name) => {
+                        UnknownEffect::Run(direction(TangentDirection::Parameter(name.to_owned())), slope)
+                    }
+                    None => UnknownEffect::Nowhere,
+                },
                 UnknownKind::Camera { film, .. } if *film != number => UnknownEffect::Nowhere,
                 UnknownKind::Camera { what: CameraUnknown::Clock, .. } => {
                     UnknownEffect::Run(direction(TangentDirection::DriveDelay), slope)

@@ -1,6 +1,8 @@
 //! Unknowns of a trace fit, without the starting states: parameters of the scene and errors of the cameras.
 //! Each has a dimensionless coordinate whose size is of the order of 1.
 
+use super::model::TraceRecording;
+use crate::model::parameters::name_if_in_recording;
 use crate::simulate::scene::Scene;
 use portable_math as math;
 
@@ -218,14 +220,16 @@ impl TraceUnknowns {
     }
 
     /// The scene of a recording at a point; `None` if the scene refuses a value.
-    pub(crate) fn scene_at(&self, base: &Scene, own_head: bool, film: usize, point: &[f64]) -> Option<Scene> {
-        let mut scene = base.clone();
+    pub(crate) fn scene_at(&self, shoot: &TraceRecording, film: usize, point: &[f64]) -> Option<Scene> {
+        let mut scene = shoot.scene.clone();
         for (unknown, z) in self.0.iter().zip(point) {
-            if let UnknownKind::Parameter { name, .. } = &unknown.kind {
+            if let UnknownKind::Parameter { name, .. } = &unknown.kind
+                && let Some(name) = name_if_in_recording(name, shoot.condition)
+            {
                 scene = scene.with_parameter(name, unknown.value(*z)).ok()?;
             }
         }
-        if own_head {
+        if shoot.observation.own_head {
             scene.drive = scene.drive.scale_lengths(1.0 / (1.0 + self.camera_at(film, point).scale));
         }
         Some(scene)
