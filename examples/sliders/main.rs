@@ -43,7 +43,7 @@ struct Slider {
 }
 
 impl Slider {
-    fn draw(random: &mut Xoshiro256PlusPlus) -> Self {
+    fn draw_slider(random: &mut Xoshiro256PlusPlus) -> Self {
         let mut within = |low: f64, high: f64| low * (high / low).powf(random.random());
         let (mass, stiffness, normal) = (within(1.0, 5.0), within(500.0, 3000.0), within(2.0, 20.0));
         let friction = within(0.15, 0.6);
@@ -60,24 +60,25 @@ impl Slider {
         }
     }
 
-    fn head(&self, t: f64) -> [f64; 2] {
+    fn head_motion(&self, t: f64) -> [f64; 2] {
         let (sin, cos) = (self.omega * t + self.phase).sin_cos();
         [self.amplitude * cos, -self.amplitude * self.omega * sin]
     }
 
     /// Force of spring and damper on the slider.
-    fn pull(&self, t: f64, [x, v]: [f64; 2]) -> f64 {
-        let [head, speed] = self.head(t);
+    fn pull_force(&self, t: f64, [x, v]: [f64; 2]) -> f64 {
+        let [head, speed] = self.head_motion(t);
         self.stiffness * (head - x) + self.damping * (speed - v)
     }
 
-    fn limit(&self) -> f64 {
+    fn friction_limit(&self) -> f64 {
         self.friction * self.normal
     }
 
     /// The state after a step of slip in the direction `sign`.
-    fn slip(&self, t: f64, state: [f64; 2], sign: f64, h: f64) -> [f64; 2] {
-        let rate = |t: f64, s: [f64; 2]| [s[1], (self.pull(t, s) - sign * self.limit()) / self.mass];
+    fn slip_step(&self, t: f64, state: [f64; 2], sign: f64, h: f64) -> [f64; 2] {
+        let rate =
+            |t: f64, s: [f64; 2]| [s[1], (self.pull_force(t, s) - sign * self.friction_limit()) / self.mass];
         let after = |k: [f64; 2], h: f64| [state[0] + h * k[0], state[1] + h * k[1]];
         let a = rate(t, state);
         let b = rate(t + 0.5 * h, after(a, 0.5 * h));
@@ -87,8 +88,8 @@ impl Slider {
     }
 
     /// Positions at the frames, from rest with a relaxed spring.
-    fn positions(&self) -> Vec<f64> {
-        let (mut state, mut sign) = ([self.head(0.0)[0], 0.0], 0.0);
+    fn frame_positions(&self) -> Vec<f64> {
+        let (mut state, mut sign) = ([self.head_motion(0.0)[0], 0.0], 0.0);
         let mut found = vec![state[0]];
         for step in 0..STEPS * (FRAMES - 1) {
             let (mut t, end) = (step as f64 * STEP_S, (step + 1) as f64 * STEP_S);
@@ -96,23 +97,24 @@ impl Slider {
                 let from = t;
                 if sign == 0.0 {
                     // the share of the step until friction reaches its limit
-                    let excess =
-                        |share: f64| self.pull(from + share * (end - from), state).abs() - self.limit();
-                    let share = bisect(|share| excess(share) > 0.0);
+                    let excess = |share: f64| {
+                        self.pull_force(from + share * (end - from), state).abs() - self.friction_limit()
+                    };
+                    let share = find_onset(|share| excess(share) > 0.0);
                     t = from + share * (end - from);
                     if excess(share) > 0.0 {
-                        sign = self.pull(t, state).signum();
+                        sign = self.pull_force(t, state).signum();
                     }
                 } else {
-                    let after = |share: f64| self.slip(from, state, sign, share * (end - from));
+                    let after = |share: f64| self.slip_step(from, state, sign, share * (end - from));
                     // a slip begins at rest, so only a motion against its direction ends it
-                    let share = bisect(|share| after(share)[1] * sign < 0.0);
+                    let share = find_onset(|share| after(share)[1] * sign < 0.0);
                     state = after(share);
                     t = from + share * (end - from);
                     if state[1] * sign <= 0.0 {
                         state[1] = 0.0;
-                        let pull = self.pull(t, state);
-                        sign = if pull.abs() > self.limit() { pull.signum() } else { 0.0 };
+                        let pull = self.pull_force(t, state);
+                        sign = if pull.abs() > self.friction_limit() { pull.signum() } else { 0.0 };
                     }
                 }
                 if end - t < 1e-12 {
@@ -127,7 +129,7 @@ impl Slider {
     }
 
     /// The scene with these values, in which mass and normal force have the given relative errors.
-    fn scene(&self, errors: [f64; 2]) -> Scene {
+    fn write_scene(&self, errors: [f64; 2]) -> Scene {
         let Self { mass, stiffness, damping, normal, friction, .. } = self;
         let (mass, normal) = (mass * (1.0 + errors[0]), normal * (1.0 + errors[1]));
         let text = format!(
@@ -139,13 +141,13 @@ impl Slider {
         Scene::parse("scene.toml", &text).expect("a scene")
     }
 
-    fn truth(&self) -> [f64; 3] {
+    fn true_values(&self) -> [f64; 3] {
         [self.friction, self.stiffness, self.damping]
     }
 }
 
 /// The least share of a step at which `happens` is true, to the last bit but a few; 1 if it is not true at 1.
-fn bisect(happens: impl Fn(f64) -> bool) -> f64 {
+fn find_onset(happens: impl Fn(f64) -> bool) -> f64 {
     let [mut low, mut high] = [0.0, 1.0];
     if happens(high) {
         for _ in 0..48 {
@@ -161,7 +163,7 @@ fn normal_number(random: &mut Xoshiro256PlusPlus) -> f64 {
     (-2.0 * (1.0 - a).ln()).sqrt() * (TAU * b).cos()
 }
 
-fn record(slider: &Slider, random: &mut Xoshiro256PlusPlus) -> Recording {
+fn record_slider(slider: &Slider, random: &mut Xoshiro256PlusPlus) -> Recording {
     let noise_m = 0.5e-6 * 10f64.powf(random.random());
     let zeros: [f64; 2] = std::array::from_fn(|_| 1e-4 * normal_number(random));
     let mut read = |true_m: f64, zero_m: f64| {
@@ -170,8 +172,8 @@ fn record(slider: &Slider, random: &mut Xoshiro256PlusPlus) -> Recording {
     };
     let grid = FrameGrid { start_s: 0.0, frame_rate_hz: 1.0 / (STEPS as f64 * STEP_S), frames: FRAMES };
     let traces = Traces {
-        tip_x_m: slider.positions().into_iter().map(|x| read(x, zeros[0])).collect(),
-        head_x_m: (0..FRAMES).map(|i| read(slider.head(grid.time_s(i))[0], zeros[1])).collect(),
+        tip_x_m: slider.frame_positions().into_iter().map(|x| read(x, zeros[0])).collect(),
+        head_x_m: (0..FRAMES).map(|i| read(slider.head_motion(grid.time_s(i))[0], zeros[1])).collect(),
         tip_y_m: vec![None; FRAMES],
         head_y_m: vec![None; FRAMES],
         ..Traces::default()
@@ -179,11 +181,11 @@ fn record(slider: &Slider, random: &mut Xoshiro256PlusPlus) -> Recording {
     Recording::new("slider", grid, traces, true).expect("a recording")
 }
 
-fn job(slider: &Slider, number: u64) -> Job {
+fn write_job(slider: &Slider, number: u64) -> Job {
     let bounds = |name: &str, low: f64, high: f64, scale: &str| {
         format!("[[parameter]]\nname = \"{name}\"\nlower = {low}\nupper = {high}\nscale = \"{scale}\"\n")
     };
-    let [_, stiffness, _] = slider.truth();
+    let [_, stiffness, _] = slider.true_values();
     let most = 0.4 * (stiffness * slider.mass).sqrt();
     let text = format!(
         "format = 1\ntitle = \"slider\"\nscene = \"scene.toml\"\nseed = {number}\n\
@@ -206,14 +208,14 @@ fn main() {
     );
     for number in from..to {
         let mut random = Xoshiro256PlusPlus::seed_from_u64(number);
-        let slider = Slider::draw(&mut random);
-        let recording = record(&slider, &mut random);
+        let slider = Slider::draw_slider(&mut random);
+        let recording = record_slider(&slider, &mut random);
         let errors = std::array::from_fn(|_| 0.01 * normal_number(&mut random));
         let measured = vec![MeasuredRecording { recording, exposure_s: Some(0.0) }];
-        let problem =
-            Problem::new(job(&slider, number), vec![slider.scene(errors)], measured).expect("a problem");
+        let problem = Problem::new(write_job(&slider, number), vec![slider.write_scene(errors)], measured)
+            .expect("a problem");
         let result = problem.fit().expect("a fit");
-        let truth = descend_from(&problem, &slider.scene([0.0; 2]));
+        let truth = descend_from(&problem, &slider.write_scene([0.0; 2]));
         let bounds = truth.as_ref().and_then(|(model, at)| {
             let lip = 1e-6 / ARM_M;
             find_deviations(model, at, [0.0, lip, 0.0, lip * (slider.stiffness / slider.mass).sqrt()])
@@ -224,7 +226,7 @@ fn main() {
             println!("{number:6}  cost {:.1}, from the true values {from_truth:.1}", result.cost);
         }
         let mut hits = Vec::new();
-        for (name, truth) in NAMES.into_iter().zip(slider.truth()) {
+        for (name, truth) in NAMES.into_iter().zip(slider.true_values()) {
             let found = &result.parameters[name];
             let known = found.verdict.name() == "identified";
             answered.push(f64::from(known));
@@ -237,18 +239,22 @@ fn main() {
             println!("{number:6}  {explained:9}  {name:25} {truth:10.4}  {:10.4}  {ratio}", found.estimate);
         }
         if !hits.is_empty() {
-            contained.push(mean(&hits));
+            contained.push(mean_value(&hits));
         }
     }
-    let (coverage, count) = (mean(&contained), contained.len() as f64);
-    let scatter = mean(&contained.iter().map(|c| (c - coverage).powi(2)).collect::<Vec<_>>()) / (count - 1.0);
+    let (coverage, count) = (mean_value(&contained), contained.len() as f64);
+    let scatter =
+        mean_value(&contained.iter().map(|c| (c - coverage).powi(2)).collect::<Vec<_>>()) / (count - 1.0);
     ratios.sort_by(f64::total_cmp);
-    println!("\nanswered: {:.3} of {} parameters", mean(&answered), answered.len());
+    if ratios.is_empty() {
+        return;
+    }
+    println!("\nanswered: {:.3} of {} parameters", mean_value(&answered), answered.len());
     println!("coverage of 95 % intervals: {coverage:.3} +- {:.3} (sliders as units)", 1.96 * scatter.sqrt());
     println!("half width over 1.96 Cramér-Rao deviations: median {:.2}", ratios[ratios.len() / 2]);
     println!("  90 % of them below {:.2}", ratios[9 * ratios.len() / 10]);
 }
 
-fn mean(values: &[f64]) -> f64 {
+fn mean_value(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
