@@ -139,7 +139,8 @@ fn channel_noise(
     let measured = measure_quality(recording, None);
     // the sensors of slider and head are alike, and a stick-slip cycle of few frames may pass for noise
     let is_motion = |noise: &AutoregressiveNoise| {
-        is_slider && measured.head_x.noise_m.is_some_and(|head_m| noise.sd() > MOST_UNLIKE * head_m)
+        let head_m = measured.head_x.noise_m.filter(|head_m| *head_m > MIN_NOISE_M);
+        is_slider && head_m.is_some_and(|head_m| noise.sd() > MOST_UNLIKE * head_m)
     };
     let Some(noise) = own.filter(|noise| !is_motion(noise)) else {
         return white(measured.head_x.noise_m.or(measured.tip_x.noise_m).unwrap_or(MIN_NOISE_M));

@@ -144,6 +144,9 @@ fn has_enough_starts(
 ) -> bool {
     let best = best_descent(descents);
     let Some(end) = descents[best].last_iterate() else { return false };
+    if end.plain && end.is_junk() {
+        return false; // a least-squares fit: another start may still explain the recording
+    }
     // if short segments fit and longer ones do not, the model is wrong, not the start
     let grows = |descent: &&TraceDescent| {
         descent.stages.len() > 1 && descent.last_iterate().is_some_and(Iterate::is_junk)
