@@ -3,7 +3,9 @@
 use super::load::{print_warnings, read_scene};
 use super::prelude::*;
 use crate::figures::stability::draw_figure;
-use crate::stability::outputs::{write_stability_csv, write_stability_json};
+use crate::stability::outputs::{
+    describe_cycle_end, write_cycles_csv, write_stability_csv, write_stability_json,
+};
 use crate::stability::speed_intervals::{SlidingState, SpeedInterval};
 use crate::stability::steady_sliding::Instability;
 use crate::stability::study::{StabilityStudy, StudyRange, default_top_speed};
@@ -13,7 +15,7 @@ use crate::text::format_digits;
 pub(crate) struct StabilityArgs {
     /// Scene of the blade or slider (scene.toml)
     pub scene: PathBuf,
-    /// Folder for stability.csv, stability.json and stability.svg
+    /// Folder for stability.csv, cycles.csv, stability.json and stability.svg
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     /// Speeds of the head, m/s; 0 stands for the limit of slow sliding (default: from 0 to twice the top
@@ -44,10 +46,11 @@ fn parse_range(text: &str) -> Result<NumberRange, String> {
 }
 
 const TABLE: &str = "stability.csv";
+const CYCLES: &str = "cycles.csv";
 const SUMMARY: &str = "stability.json";
 /// File names of the outputs.
-const OUTPUTS: [&str; 5] =
-    [TABLE, SUMMARY, "stability.svg", "paper/stability-85mm.svg", "paper/stability-170mm.svg"];
+const OUTPUTS: [&str; 6] =
+    [TABLE, CYCLES, SUMMARY, "stability.svg", "paper/stability-85mm.svg", "paper/stability-170mm.svg"];
 /// Largest number of changes that are printed.
 const PRINTED_CHANGES: usize = 5;
 
@@ -84,6 +87,7 @@ impl StabilityArgs {
         let json = serde_json::to_vec_pretty(&write_stability_json(&study)).map_err(Failure::internal)?;
         let mut outputs =
             vec![(TABLE.to_owned(), write_stability_csv(&study).into_bytes()), (SUMMARY.to_owned(), json)];
+        outputs.push((CYCLES.to_owned(), write_cycles_csv(&study).into_bytes()));
         outputs.extend(files::figure_files("stability", &draw_figure(scene.title(), &study)));
         files::write_outputs(&self.out, &writer, &outputs)?;
         if !global.quiet {
@@ -114,22 +118,61 @@ fn print_study(title: &str, study: &StabilityStudy) {
             if end == study.range.speeds_m_per_s[1] {
                 print_line!("the range ends there; name higher speeds with --speed-m-per-s");
             }
-            print_line!("not computed: the speed at which a stick-slip cycle ends; it can be higher");
         }
     }
+    print_chatter(study);
     if !study.changes.is_empty() {
         print_line!("");
-        print_line!("largest effects on onset or end; a damping of 0 changes to a ratio of 0.001");
+        print_line!("largest effects on onset, end or cycle; a damping of 0 changes to a ratio of 0.001");
     }
     for change in study.changes.iter().take(PRINTED_CHANGES) {
         let shown = |moved: Option<f64>| moved.map_or_else(|| "-".to_owned(), |v| format!("{v:+.2e} m/s"));
         let meaning = change.parameter.meaning.split(',').next().unwrap_or_default();
         let size = if change.value == 0.0 { "ratio 0.001" } else { "+1 %" };
         print_line!(
-            "  {meaning:52} {size:>11}: onset {:>14}, end {:>14}",
+            "  {meaning:52} {size:>11}: onset {:>14}, end {:>14}, cycle {:>14}",
             shown(change.onset_m_per_s),
-            shown(change.end_m_per_s)
+            shown(change.end_m_per_s),
+            shown(change.fold_m_per_s)
         );
+    }
+}
+
+/// Prints where the cycle ends, why there is one, and what ends it sooner.
+fn print_chatter(study: &StabilityStudy) {
+    let note = describe_cycle_end(study);
+    let Some(branch) = study.leading_branch() else {
+        print_line!("{note}");
+        return;
+    };
+    match branch.fold_m_per_s() {
+        Some(speed) => {
+            print_line!("the stick-slip cycle goes on up to {} m/s ({note})", format_digits(speed, 4))
+        }
+        None => print_line!("the stick-slip cycle: {note}"),
+    }
+    if let Some(cause) = &study.cause {
+        print_line!("");
+        print_line!("at {} m/s", format_digits(cause.speed_m_per_s, 3));
+        let [cycle, natural] = [cause.cycle_hz, cause.natural_hz].map(|hz| format_digits(hz, 3));
+        let part = &cause.part;
+        print_line!(
+            "  the cycle has {cycle} Hz; nearest is the natural frequency of the {part}, {natural} Hz"
+        );
+        let slope = format_digits(cause.friction_slope_s_per_m.abs(), 3);
+        let word = if cause.friction_slope_s_per_m < 0.0 { "falls" } else { "rises" };
+        print_line!("  the friction coefficient {word} by {slope} per m/s");
+        if let Some(ratio) = cause.growth.and_then(|growth| growth.feeding_over_damping()) {
+            let ratio = format_digits(ratio, 3);
+            print_line!("  the growth this gives to small vibrations is {ratio} times the decay by damping");
+        }
+    }
+    if let (Some(remedy), Some(speed)) = (&study.remedy, branch.fold_m_per_s()) {
+        let (speed, factor) = (format_digits(speed, 3), format_digits(remedy.factor, 3));
+        let meaning = remedy.parameter.meaning.split(',').next().unwrap_or_default();
+        let new = remedy.fold_m_per_s.map(|speed| format!("ends at {} m/s", format_digits(speed, 3)));
+        let new = new.unwrap_or_else(|| "does not occur".to_owned());
+        print_line!("chatter {new} instead of {speed} m/s with {factor} times the {meaning}");
     }
 }
 

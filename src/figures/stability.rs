@@ -1,7 +1,10 @@
-//! Growth of small vibrations about steady sliding: against speed, or over speed and preload.
+//! Growth of small vibrations about steady sliding, against speed or over speed and preload, and the
+//! stick-slip cycle against speed.
 
 use super::sweep_map::colour_limits;
-use crate::stability::speed_intervals::unstable_range;
+use crate::stability::cycle_branch::CycleBranch;
+use crate::stability::shooting::PeriodicMotion;
+use crate::stability::speed_intervals::{SlidingState, unstable_range};
 use crate::stability::steady_sliding::{NoSliding, NoiseBand, SlidingMode, SteadySlide};
 use crate::stability::study::{StabilityStudy, StudyPoint};
 use crate::text::format_digits;
@@ -17,18 +20,25 @@ const PANEL_MM: f64 = 56.0;
 /// preload of the scene. The title gives the unstable speeds at the preload of the scene in both cases.
 #[must_use]
 pub fn draw_figure(title: &str, study: &StabilityStudy) -> Figure {
-    let panel = if study.by_preload.is_empty() { draw_curves(study) } else { draw_map(study) };
+    let panels = match &study.by_preload[..] {
+        [] => std::iter::once(draw_curves(study)).chain(draw_cycle(study)).collect(),
+        _ => vec![draw_map(study)],
+    };
     Figure {
         title: claim_sentence(study),
-        subtitle: format!("{title}; small vibrations about steady sliding, without stick-slip"),
+        subtitle: match panels.len() {
+            1 => format!("{title}; small vibrations about steady sliding, without stick-slip"),
+            _ => format!("{title}; small vibrations about steady sliding (top) and the stick-slip cycle"),
+        },
         watermarked: false,
         description: format!(
             "Growth of small vibrations about steady sliding from {} to {} m/s; curves have gaps and maps are \
-             hatched where the blade cannot slide steadily.",
+             hatched where the blade cannot slide steadily. Amplitude and frequency of the stick-slip cycle, where \
+             one is found.",
             study.range.speeds_m_per_s[0], study.range.speeds_m_per_s[1]
         ),
         width_mm: COLUMN_WIDTH_MM,
-        panels: vec![panel],
+        panels,
         ..Figure::default()
     }
 }
@@ -44,7 +54,14 @@ fn claim_sentence(study: &StabilityStudy) -> String {
         .filter(|mode| mode.frequency_hz > 0.0)
         .map(|mode| format!(" ({})", NoiseBand::from_frequency(mode.frequency_hz).name()));
     let [onset, end] = [onset, end].map(|speed| format_digits(speed, 3));
-    format!("Steady sliding is unstable between {onset} and {end} m/s{}", band.unwrap_or_default())
+    let sentence =
+        format!("Steady sliding is unstable between {onset} and {end} m/s{}", band.unwrap_or_default());
+    match study.leading_branch().and_then(CycleBranch::fold_m_per_s) {
+        Some(fold) if study.by_preload.is_empty() => {
+            format!("{sentence}; a stick-slip cycle goes on up to {} m/s", format_digits(fold, 3))
+        }
+        _ => sentence,
+    }
 }
 
 fn speed_axis(study: &StabilityStudy) -> ChartAxis {
@@ -82,6 +99,54 @@ fn draw_curves(study: &StabilityStudy) -> Panel {
     let zero = Series::new("", Colour::Grey, Mark::Line, [(from, 0.0), (to, 0.0)]);
     let series: Vec<Series> = std::iter::once(zero).chain(curves).collect();
     Panel::new(speed_axis(study), ChartAxis::linear("growth, 1/s"), PANEL_MM, series)
+}
+
+/// Amplitude and frequency of the cycle along its branch: stable and unstable cycles, and vibrations without
+/// stick; with steady sliding at amplitude zero. Empty without a cycle.
+fn draw_cycle(study: &StabilityStudy) -> Vec<Panel> {
+    /// Height of each panel, mm.
+    const HEIGHT_MM: f64 = 38.0;
+    const MICROMETRES: f64 = 1e6;
+    let Some(branch) = study.leading_branch() else { return Vec::new() };
+    let kinds: [(&str, Colour, Mark, fn(&PeriodicMotion) -> bool); 4] = [
+        ("stable cycle", Colour::Vermilion, Mark::Line, |m| m.is_stable() && !m.sticks_s.is_empty()),
+        ("unstable cycle", Colour::Vermilion, Mark::Dashed, |m| !m.is_stable() && !m.sticks_s.is_empty()),
+        ("stable vibration without stick", Colour::Blue, Mark::Line, |m| {
+            m.is_stable() && m.sticks_s.is_empty()
+        }),
+        ("unstable vibration without stick", Colour::Blue, Mark::Dashed, |m| {
+            !m.is_stable() && m.sticks_s.is_empty()
+        }),
+    ];
+    let curves = |value: fn(&PeriodicMotion) -> f64| -> Vec<Series> {
+        let all = kinds.into_iter().filter(|(.., is_kind)| branch.motions.iter().any(is_kind));
+        all.map(|(label, colour, mark, is_kind)| {
+            let motions = branch.motions.iter().enumerate();
+            let points = motions.map(|(i, motion)| {
+                // a curve goes on to the first motion of the next kind, so that the branch has no gap
+                let joins = i > 0 && is_kind(&branch.motions[i - 1]);
+                (is_kind(motion) || joins).then_some((motion.speed_m_per_s, value(motion)))
+            });
+            Series::new(label, colour, mark, points)
+        })
+        .collect()
+    };
+    let survey = study.own.iter().find(|survey| survey.direction == branch.direction);
+    let rest = survey.into_iter().flat_map(|survey| &survey.intervals).filter_map(|interval| {
+        let [from, to] = interval.speeds_m_per_s;
+        let (label, mark) = match interval.state {
+            SlidingState::Stable => ("stable steady sliding", Mark::Line),
+            SlidingState::Unstable => ("unstable steady sliding", Mark::Dashed),
+            SlidingState::Impossible(_) => return None,
+        };
+        Some(Series::new(label, Colour::Grey, mark, [(from, 0.0), (to, 0.0)]))
+    });
+    let amplitude: Vec<Series> = rest.chain(curves(|motion| MICROMETRES * motion.amplitude_m)).collect();
+    let frequency = curves(PeriodicMotion::frequency_hz);
+    let axes = [("amplitude of the tip, µm", amplitude), ("frequency, Hz", frequency)];
+    axes.into_iter()
+        .map(|(label, series)| Panel::new(speed_axis(study), ChartAxis::linear(label), HEIGHT_MM, series))
+        .collect()
 }
 
 /// Growth of the mode that grows fastest as colours, with the highest unstable speed of each preload as a

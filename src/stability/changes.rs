@@ -1,5 +1,6 @@
 //! What a change of the blade or slider does to the speeds at which steady sliding is unstable.
 
+use super::cycle_branch::CycleBranch;
 use super::speed_intervals::{SlidingState, unstable_range};
 use super::steady_sliding::SlideFinder;
 use super::study::SlidingSurvey;
@@ -37,6 +38,8 @@ const DAMPING_STEP: f64 = 1e-3;
 
 /// An effect below this fraction of the highest speed of the range is an error of the bisection.
 const LEAST_EFFECT: f64 = 1e-8;
+/// An effect on the end of the cycle below this fraction of the highest speed is an error of the branch.
+const LEAST_FOLD: f64 = 1e-5;
 
 /// Effect of a change of one parameter.
 #[derive(Debug, Clone, Copy)]
@@ -54,11 +57,18 @@ pub struct ParameterChange {
     /// Change of the highest speed at which steady sliding is unstable, m/s per step. `None` if this speed is
     /// the highest of the range, or if it is not found for the changed blade.
     pub end_m_per_s: Option<f64>,
+    /// Change of the speed at which the stick-slip cycle ends, m/s per step. `None` if this speed is not
+    /// found, for the scene or for the changed one.
+    pub fold_m_per_s: Option<f64>,
 }
 
 impl ParameterChange {
     fn size(&self) -> f64 {
-        [self.onset_m_per_s, self.end_m_per_s].into_iter().flatten().map(f64::abs).fold(0.0, f64::max)
+        [self.onset_m_per_s, self.end_m_per_s, self.fold_m_per_s]
+            .into_iter()
+            .flatten()
+            .map(f64::abs)
+            .fold(0.0, f64::max)
     }
 }
 
@@ -75,34 +85,100 @@ pub fn write_in_physical_units(scene: &Scene) -> Result<Scene, SceneError> {
     PARTS.iter().try_fold(scene.clone(), convert)
 }
 
-/// Effects of all parameters on the unstable range, the largest first; parameters without effect are left
-/// out. If friction differs between the directions, the range is that of the direction with the higher end.
+/// Effects of all parameters on the unstable range and on the end of the cycle, the largest first; parameters
+/// without effect are left out. If friction differs between the directions, the range is that of the direction
+/// with the higher end. `cycle` is a branch whose end is found.
 pub(super) fn rank_changes(
     scene: &Scene,
     own: &[SlidingSurvey],
+    cycle: Option<&CycleBranch>,
     speeds_m_per_s: [f64; 2],
 ) -> Result<Vec<ParameterChange>, SceneError> {
     let ranges = own.iter().filter_map(|survey| Some((survey.direction, unstable_range(&survey.intervals)?)));
-    let Some((direction, [onset, end])) = ranges.max_by(|a, b| a.1[1].total_cmp(&b.1[1])) else {
-        return Ok(Vec::new());
-    };
+    let range = ranges.max_by(|a, b| a.1[1].total_cmp(&b.1[1]));
     let [lowest, highest] = speeds_m_per_s;
-    let boundaries = [(onset, 1.0, onset > lowest), (end, -1.0, end < highest)];
+    let boundaries = range.map(|(direction, [onset, end])| {
+        [(onset, 1.0, onset > lowest), (end, -1.0, end < highest)].map(|boundary| (direction, boundary))
+    });
     let physical = write_in_physical_units(scene)?;
     let laws = PARAMETERS.iter().map(|row| row.name).filter(|name| name.starts_with("friction."));
     let mut changes = Vec::new();
     for name in PARTS.into_iter().chain(laws) {
         let (Some(parameter), Some(value)) = (find_parameter(name), physical.value(name)) else { continue };
         let Some(step) = change_step(&physical, name, value) else { continue };
-        let change = |(speed, inwards, is_found): (f64, f64, bool)| {
-            is_found.then(|| speed_change(&physical, name, [value, step], direction, [speed, inwards]))?
+        let change = |(direction, (speed, inwards, is_found)): (f64, (f64, f64, bool))| {
+            let find = |linkage: &Linkage| find_boundary(linkage, direction, speed, inwards);
+            is_found
+                .then(|| speed_change(&physical, name, [value, step], speed, |scene| find(&scene.linkage)))?
         };
-        let [onset_m_per_s, end_m_per_s] = boundaries.map(change);
-        changes.push(ParameterChange { parameter, value, step, onset_m_per_s, end_m_per_s });
+        let [onset_m_per_s, end_m_per_s] = boundaries.map_or([None; 2], |both| both.map(change));
+        let fold = cycle.and_then(|cycle| {
+            let find = |scene: &Scene| cycle.find_changed_end(scene);
+            speed_change(&physical, name, [value, step], cycle.end_m_per_s, find)
+        });
+        let fold_m_per_s = fold.map(|moved| if moved.abs() > LEAST_FOLD * highest { moved } else { 0.0 });
+        changes.push(ParameterChange { parameter, value, step, onset_m_per_s, end_m_per_s, fold_m_per_s });
     }
     changes.retain(|change| change.size() > LEAST_EFFECT * highest);
     changes.sort_by(|a, b| b.size().total_cmp(&a.size()));
     Ok(changes)
+}
+
+/// A change of one parameter that lowers the speed at which the stick-slip cycle ends.
+#[derive(Debug, Clone, Copy)]
+pub struct CycleRemedy {
+    /// The parameter, one of blade, shoulder or slider.
+    pub parameter: &'static ModelParameter,
+    /// Factor on its value.
+    pub factor: f64,
+    /// The speed at which the cycle of the changed blade or slider ends, m/s, computed for the changed value;
+    /// `None` if no cycle is found and steady sliding is stable.
+    pub fold_m_per_s: Option<f64>,
+}
+
+/// The change of one parameter after which the cycle ends at the lowest speed: a damping is doubled, any other
+/// parameter changes by a fifth. The derivatives choose three changes, which are then computed. `None` if none
+/// of them lowers the speed.
+pub(super) fn find_remedy(
+    scene: &Scene,
+    changes: &[ParameterChange],
+    cycle: &CycleBranch,
+    speeds_m_per_s: [f64; 2],
+) -> Option<CycleRemedy> {
+    const CANDIDATES: usize = 3;
+    const FIFTH: f64 = 1.2;
+    let physical = write_in_physical_units(scene).ok()?;
+    let own = changes.iter().filter(|change| !change.parameter.name.starts_with("friction."));
+    let mut guesses: Vec<(f64, &ParameterChange, f64)> = own
+        .filter_map(|change| {
+            let slope = change.fold_m_per_s?;
+            let is_damping = change.parameter.name.contains("damping");
+            let factor = match (is_damping, slope > 0.0) {
+                (true, true) => 0.5,
+                (true, false) => 2.0,
+                (false, true) => 1.0 / FIFTH,
+                (false, false) => FIFTH,
+            };
+            Some((slope * change.value * (factor - 1.0) / change.step, change, factor))
+        })
+        .filter(|(moved, ..)| *moved < 0.0)
+        .collect();
+    guesses.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let computed = guesses.into_iter().take(CANDIDATES).filter_map(|(_, change, factor)| {
+        let changed = physical.with_parameter(change.parameter.name, factor * change.value).ok()?;
+        let intervals =
+            SlideFinder::new(&changed.linkage, cycle.direction).find_intervals(speeds_m_per_s, 100);
+        let unstable = unstable_range(&intervals);
+        let branch = CycleBranch::from_scene(&changed, cycle.direction, speeds_m_per_s, unstable);
+        let fold_m_per_s = match (branch, unstable) {
+            (Some(branch), _) => Some(branch.fold_m_per_s()?),
+            (None, None) => None,
+            (None, Some(_)) => return None,
+        };
+        Some(CycleRemedy { parameter: change.parameter, factor, fold_m_per_s })
+    });
+    let speed = |remedy: &CycleRemedy| remedy.fold_m_per_s.unwrap_or(0.0);
+    computed.min_by(|a, b| speed(a).total_cmp(&speed(b))).filter(|best| speed(best) < cycle.end_m_per_s)
 }
 
 /// The step of a parameter; `None` if its value is zero and it is not a damping.
@@ -119,23 +195,19 @@ fn change_step(scene: &Scene, name: &str, value: f64) -> Option<f64> {
     scene.with_parameter(ratio, DAMPING_STEP).ok()?.value(name)
 }
 
-/// Change of a boundary of the unstable range, m/s per step of a parameter: a central difference over a
-/// fraction of the step. `inwards` is +1 if the speeds above the boundary are unstable, and -1 if those below
-/// are. `None` if the boundary is not found for the changed blade.
+/// Change of a speed that `find` computes, m/s per step of a parameter: a central difference over a fraction of
+/// the step. `None` if the speed is not found for the changed blade.
 fn speed_change(
     scene: &Scene,
     name: &str,
     [value, step]: [f64; 2],
-    direction: f64,
-    [speed, inwards]: [f64; 2],
+    speed: f64,
+    find: impl Fn(&Scene) -> Option<f64>,
 ) -> Option<f64> {
     /// Fraction of the step. With steps of 1 % the parameter changes by 1e-3 of its value, and the relative
     /// error of a central difference is about the square of that.
     const FRACTION: f64 = 0.1;
-    let find = |factor: f64| {
-        let changed = scene.with_parameter(name, value + factor * step).ok()?;
-        find_boundary(&changed.linkage, direction, speed, inwards)
-    };
+    let find = |factor: f64| find(&scene.with_parameter(name, value + factor * step).ok()?);
     // a parameter at the lower limit of its range cannot fall; the difference is then one-sided
     let (ahead, behind) = (find(FRACTION)?, find(-FRACTION));
     let (before, width) = behind.map_or((speed, FRACTION), |behind| (behind, 2.0 * FRACTION));

@@ -1,5 +1,7 @@
 //! `stability.csv` and `stability.json`.
 
+use super::chatter::ChatterCause;
+use super::cycle_branch::CycleEnd;
 use super::speed_intervals::{SlidingState, SpeedInterval, unstable_range};
 use super::steady_sliding::SteadySlide;
 use super::study::{SlidingSurvey, StabilityStudy};
@@ -7,9 +9,53 @@ use crate::model::shoulder::ShoulderContact;
 use serde_json::{Value, json};
 use std::fmt::Write;
 
-/// Note in `stability.json` on the speed at which a stick-slip cycle ends.
-pub const CYCLE_NOTE: &str = "not computed: a stick-slip cycle can go on above end_m_per_s, where steady \
-     sliding is stable; `wiperlab simulate` shows whether it does";
+/// What is known of the speed at which the stick-slip cycle ends, as a sentence.
+#[must_use]
+pub fn describe_cycle_end(study: &StabilityStudy) -> String {
+    let Some(branch) = study.leading_branch() else {
+        return "no stick-slip cycle was found at these speeds".to_owned();
+    };
+    let end = match branch.end {
+        CycleEnd::Fold => "a fold: a stable and an unstable cycle meet".to_owned(),
+        CycleEnd::StickLost => "a corner: the stick of the cycle shrinks to an instant".to_owned(),
+        CycleEnd::Grazing => "above it the tip slows down but does not stop".to_owned(),
+        CycleEnd::EndOfRange => "the cycle goes on at the highest speed of the range".to_owned(),
+        CycleEnd::Undecided => {
+            let speed = branch.end_m_per_s;
+            format!("undecided: the cycle was followed up to {speed} m/s only; {}", branch.problem)
+        }
+    };
+    match branch.cycles().last() {
+        Some(last) if !last.multipliers.is_empty() && !branch.is_stable_below_end() => {
+            format!("{end}; this cycle of equal periods is unstable, so that the vibration is less regular")
+        }
+        _ => end,
+    }
+}
+
+/// The table of the stick-slip cycle along its branch; empty without a cycle.
+#[must_use]
+pub fn write_cycles_csv(study: &StabilityStudy) -> String {
+    let mut text =
+        "speed_m_per_s,period_s,frequency_hz,amplitude_m,sticks,stick_s,largest_multiplier\n".to_owned();
+    for branch in &study.branches {
+        for motion in &branch.motions {
+            let largest = motion.multipliers.iter().map(|factor| factor.norm()).fold(0.0, f64::max);
+            let _ = writeln!(
+                text,
+                "{},{:e},{},{:e},{},{:e},{}",
+                branch.direction * motion.speed_m_per_s,
+                motion.period_s,
+                motion.frequency_hz(),
+                motion.amplitude_m,
+                motion.sticks_s.len(),
+                motion.stick_s(),
+                largest
+            );
+        }
+    }
+    text
+}
 
 /// The table of all modes: a row for each mode of each equilibrium, also of those on other sides of the
 /// shoulder.
@@ -60,7 +106,7 @@ pub fn write_stability_json(study: &StabilityStudy) -> Value {
                 "step": change.step,
                 "onset_change_m_per_s": change.onset_m_per_s,
                 "end_change_m_per_s": change.end_m_per_s,
-                "cycle_fold_change_m_per_s": null,
+                "cycle_fold_change_m_per_s": change.fold_m_per_s,
             })
         })
         .collect();
@@ -72,11 +118,31 @@ pub fn write_stability_json(study: &StabilityStudy) -> Value {
         "onset_m_per_s": range.map(|range| range[0]),
         "end_m_per_s": range.map(|range| range[1]),
         "end_is_end_of_range": range.map(|range| range[1] == study.range.speeds_m_per_s[1]),
-        "cycle_fold_m_per_s": null,
-        "cycle_fold_note": CYCLE_NOTE,
+        "cycle_fold_m_per_s": study.leading_branch().and_then(|branch| branch.fold_m_per_s()),
+        "cycle_fold_kind": study.leading_branch().map(|branch| branch.end),
+        "cycle_fold_note": describe_cycle_end(study),
+        "cause": study.cause.as_ref().map_or_else(|| json!("undecided"), describe_cause),
+        "remedy": study.remedy.map(|remedy| json!({
+            "parameter": remedy.parameter.name,
+            "factor": remedy.factor,
+            "cycle_fold_m_per_s": remedy.fold_m_per_s,
+        })),
         "directions": study.own.iter().map(describe_survey).collect::<Vec<_>>(),
         "by_preload": study.by_preload.iter().map(describe_survey).collect::<Vec<_>>(),
         "changes": changes,
+    })
+}
+
+fn describe_cause(cause: &ChatterCause) -> Value {
+    json!({
+        "speed_m_per_s": cause.speed_m_per_s,
+        "cycle_hz": cause.cycle_hz,
+        "part": cause.part,
+        "natural_hz": cause.natural_hz,
+        "friction_slope_s_per_m": cause.friction_slope_s_per_m,
+        "growth_per_s": cause.growth.map(|growth| growth.total_per_s),
+        "growth_with_constant_friction_per_s": cause.growth.map(|growth| growth.constant_friction_per_s),
+        "feeding_over_damping": cause.growth.and_then(|growth| growth.feeding_over_damping()),
     })
 }
 

@@ -1,6 +1,8 @@
 //! The stability of a scene's blade or slider over speed and preload.
 
-use super::changes::{ParameterChange, rank_changes};
+use super::changes::{CycleRemedy, ParameterChange, find_remedy, rank_changes};
+use super::chatter::ChatterCause;
+use super::cycle_branch::CycleBranch;
 use super::speed_intervals::{SpeedInterval, unstable_range};
 use super::steady_sliding::{NoSliding, SlideFinder, SteadySlide};
 use crate::model::Linkage;
@@ -67,6 +69,12 @@ pub struct StabilityStudy {
     pub points: Vec<StudyPoint>,
     /// Effects of changes of the parameters on the instability at the scene's preload, the largest first.
     pub changes: Vec<ParameterChange>,
+    /// The stick-slip cycle at the scene's preload, in the directions of `own` in which one is found.
+    pub branches: Vec<CycleBranch>,
+    /// The change after which the cycle ends at the lowest speed.
+    pub remedy: Option<CycleRemedy>,
+    /// Why the blade chatters; `None` if no cycle is found.
+    pub cause: Option<ChatterCause>,
 }
 
 /// Twice the highest speed of the scene's drive, m/s: the top of the default range of speeds.
@@ -129,9 +137,31 @@ impl StabilityStudy {
                 }));
             }
         }
-        let changes = rank_changes(scene, &own, range.speeds_m_per_s)?;
+        let speeds = range.speeds_m_per_s;
+        let branches: Vec<CycleBranch> = own
+            .iter()
+            .filter_map(|survey| {
+                let unstable = unstable_range(&survey.intervals);
+                CycleBranch::from_scene(scene, survey.direction, speeds, unstable)
+            })
+            .collect();
+        let leading = leading_branch(&branches);
+        let cycle = leading.filter(|branch| branch.fold_m_per_s().is_some());
+        let changes = rank_changes(scene, &own, cycle, speeds)?;
+        let remedy = cycle.and_then(|cycle| find_remedy(scene, &changes, cycle, speeds));
+        let cause = leading.and_then(|branch| {
+            let survey = own.iter().find(|survey| survey.direction == branch.direction)?;
+            ChatterCause::from_branch(scene, branch, unstable_range(&survey.intervals))
+        });
         let has_shoulder = scene.linkage.shoulder.is_some();
-        Ok(Self { range, preload_n: own_n, has_shoulder, own, by_preload, points, changes })
+        let preload_n = own_n;
+        Ok(Self { range, preload_n, has_shoulder, own, by_preload, points, changes, branches, remedy, cause })
+    }
+
+    /// The cycle that goes on to the highest speed, of those in both directions.
+    #[must_use]
+    pub fn leading_branch(&self) -> Option<&CycleBranch> {
+        leading_branch(&self.branches)
     }
 
     /// The lowest and the highest speed, m/s, at which steady sliding of the scene's blade is unstable in
@@ -149,4 +179,8 @@ impl StabilityStudy {
         let first = reasons.next()?;
         if reasons.all(|reason| reason.is_some()) { first } else { None }
     }
+}
+
+fn leading_branch(branches: &[CycleBranch]) -> Option<&CycleBranch> {
+    branches.iter().max_by(|a, b| a.end_m_per_s.total_cmp(&b.end_m_per_s))
 }

@@ -1,0 +1,431 @@
+//! The stick-slip cycle of a blade or slider over the speed of its head, and the speed at which it ends.
+//!
+//! A cycle is followed along its branch, in steps of arc length, through folds. The branch turns back to lower
+//! speeds at a fold, where a multiplier is 1, or at a corner, where the cycle loses its stick: there it meets a
+//! motion without stick. Above this speed chatter does not go on.
+
+use super::shooting::{CycleShooter, PeriodicMotion, Solution, Unknowns};
+use super::steady_sliding::{SlideFinder, SteadySlide};
+use crate::model::{LinkDirections, Linkage, Pose};
+use crate::simulate::scene::Scene;
+use serde::Serialize;
+
+/// How a stick-slip cycle ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum CycleEnd {
+    /// A fold: a stable and an unstable cycle meet, and a multiplier is 1.
+    Fold,
+    /// A corner of the branch: the stick of the cycle shrinks to an instant.
+    StickLost,
+    /// Above the last cycle the tip slows down but does not stop, so a stick that is not short is missed.
+    Grazing,
+    /// The cycle goes on at the highest speed of the range.
+    EndOfRange,
+    /// The branch could not be followed further.
+    Undecided,
+}
+
+/// The cycle over speed, in one direction.
+#[derive(Debug, Clone)]
+pub struct CycleBranch {
+    /// Direction of sliding, +1 or -1.
+    pub direction: f64,
+    /// The motions along the branch: from low speeds to the end of the cycle, then the motions beyond it.
+    pub motions: Vec<PeriodicMotion>,
+    /// Number of the motions up to the end of the cycle.
+    pub before_end: usize,
+    /// How the cycle ends.
+    pub end: CycleEnd,
+    /// The speed at which the cycle ends, m/s, or the highest speed at which it was found.
+    pub end_m_per_s: f64,
+    /// Why the branch could not be followed; empty for other ends.
+    pub problem: &'static str,
+}
+
+impl CycleBranch {
+    /// The speed at which the cycle ends, m/s; `None` if no end was found.
+    #[must_use]
+    pub fn fold_m_per_s(&self) -> Option<f64> {
+        (!matches!(self.end, CycleEnd::EndOfRange | CycleEnd::Undecided)).then_some(self.end_m_per_s)
+    }
+
+    /// Whether the cycle just below its end is stable. The last motions are so close to the end that their
+    /// multipliers may belong to the other side of it.
+    #[must_use]
+    pub fn is_stable_below_end(&self) -> bool {
+        let below = |cycle: &&PeriodicMotion| cycle.speed_m_per_s < 0.999 * self.end_m_per_s;
+        self.cycles().iter().rev().find(below).is_some_and(PeriodicMotion::is_stable)
+    }
+
+    /// The cycles up to the end.
+    #[must_use]
+    pub fn cycles(&self) -> &[PeriodicMotion] {
+        &self.motions[..self.before_end]
+    }
+
+    /// Finds the cycle of a scene and follows it over a range of speed, m/s. `unstable` are the lowest and the
+    /// highest speed at which steady sliding is unstable. `None` if no cycle is found.
+    #[must_use]
+    pub fn from_scene(
+        scene: &Scene,
+        direction: f64,
+        range: [f64; 2],
+        unstable: Option<[f64; 2]>,
+    ) -> Option<Self> {
+        /// Fractions of the speed below which a cycle is searched.
+        const SHARES: [f64; 7] = [0.9, 0.6, 0.3, 0.1, 0.03, 0.01, 0.003];
+        let top = unstable.map_or(range[1], |[_, end]| end);
+        let mut speeds = SHARES.iter().map(|share| share * top).filter(|speed| *speed > range[0]);
+        let settled = speeds.find_map(|speed| {
+            let mut walker = BranchWalker::new(scene, direction, range, speed)?;
+            let slide = walker.finder.find_slide(speed).ok()?;
+            let start = walker.shooter.settle(stop_tip(&scene.linkage, &slide, direction * speed), speed)?;
+            Some(walker.follow_cycle(start, direction))
+        });
+        // a run does not settle if a slower vibration makes its cycles unequal
+        settled.or_else(|| {
+            let end = unstable.map(|[_, end]| end).filter(|end| *end < range[1])?;
+            BranchWalker::new(scene, direction, range, end)?.follow_small_vibration(end, direction)
+        })
+    }
+
+    /// The speed at which the cycle of a changed scene ends, m/s. The search starts from a cycle of the scene
+    /// itself. `None` if there is no such cycle, or if its branch could not be followed.
+    pub(super) fn find_changed_end(&self, scene: &Scene) -> Option<f64> {
+        /// Fraction of the speed at which the cycle ends, at which the search starts.
+        const SHARE: f64 = 0.97;
+        let mut cycles = self.cycles().iter().rev();
+        let near = |cycle: &&PeriodicMotion| {
+            cycle.speed_m_per_s < SHARE * self.end_m_per_s && !cycle.sticks_s.is_empty()
+        };
+        let PeriodicMotion { speed_m_per_s, period_s, pose, .. } = cycles.find(near)?;
+        let range = [0.0, 2.0 * self.end_m_per_s];
+        let mut walker = BranchWalker::new(scene, self.direction, range, *speed_m_per_s)?;
+        let guess = walker.shooter.unknowns_from(pose, *period_s, *speed_m_per_s);
+        let by_speed = by_speed(guess.len());
+        let start = walker.shooter.solve(&guess, &by_speed)?;
+        let (found, end) = walker.walk(start, &by_speed);
+        matches!(end, WalkEnd::Turn(..)).then(|| walker.shooter.speed_of(&found[found.len() - 1].unknowns))
+    }
+}
+
+/// The direction in which the speed alone rises.
+fn by_speed(unknowns: usize) -> Unknowns {
+    let mut direction = Unknowns::zeros(unknowns);
+    direction[unknowns - 1] = 1.0;
+    direction
+}
+
+/// The pose of steady sliding with the tip at rest on the glass.
+fn stop_tip(linkage: &Linkage, slide: &SteadySlide, velocity_m_per_s: f64) -> Pose {
+    let d = LinkDirections::from_pose(&slide.pose);
+    let lip = linkage.l2_m * d.cos_phi;
+    if linkage.is_slider() {
+        return Pose { phi_rate: -velocity_m_per_s / lip, ..slide.pose };
+    }
+    let rate = -velocity_m_per_s / (linkage.l1_m * d.cos_theta + lip);
+    Pose { theta_rate: rate, phi_rate: rate, ..slide.pose }
+}
+
+/// How a walk along a branch ends.
+enum WalkEnd {
+    /// The branch turns back to speeds that it has passed; with the first solution beyond the turn and the
+    /// direction of the branch there, if it is found.
+    Turn(CycleEnd, Option<(Solution, Unknowns)>),
+    EndOfRange,
+    /// The motion has become steady sliding.
+    Vanishes,
+    Undecided,
+}
+
+struct BranchWalker {
+    shooter: CycleShooter,
+    finder: SlideFinder,
+    range: [f64; 2],
+}
+
+/// A point of a walk: a solution and the direction of the branch there.
+type BranchPoint = (Solution, Unknowns);
+
+/// Longest step along a branch, in scales.
+const LONGEST: f64 = 0.15;
+/// Largest number of runs over a period for one branch.
+const MOST_RUNS: usize = 12_000;
+
+impl BranchWalker {
+    fn new(scene: &Scene, direction: f64, range: [f64; 2], speed: f64) -> Option<Self> {
+        let mut finder = SlideFinder::new(&scene.linkage, direction);
+        let mode = finder.find_slide(speed).ok()?.leading_mode();
+        let frequency_hz = if mode.frequency_hz > 0.0 {
+            mode.frequency_hz
+        } else {
+            finder.fastest_rad_per_s / std::f64::consts::TAU
+        };
+        let shooter = CycleShooter::new(scene, direction, speed, 1.0 / frequency_hz);
+        Some(Self { shooter, finder, range })
+    }
+
+    /// Follows a cycle down and up, and the motions beyond its end.
+    fn follow_cycle(&mut self, start: Solution, direction: f64) -> CycleBranch {
+        /// Largest number of times that a walk starts again from a simulated run.
+        const RESTARTS: usize = 8;
+        let by_speed = by_speed(start.unknowns.len());
+        let (mut found, _) = self.walk(start.clone(), &-&by_speed);
+        found.reverse();
+        found.pop();
+        let (mut next, mut restarts) = (start, 0);
+        let end = loop {
+            let (up, end) = self.walk(next.clone(), &by_speed);
+            found.extend(up);
+            if matches!(end, WalkEnd::EndOfRange) || restarts == RESTARTS {
+                break end;
+            }
+            // a run above the last cycle shows whether the blade still chatters, in another cycle
+            let Some(last) = found.last() else { break end };
+            let problem = self.shooter.problem;
+            let Some(above) = self.settle_above(&last.unknowns) else {
+                self.shooter.problem = problem;
+                break end;
+            };
+            (next, restarts) = (above, restarts + 1);
+        };
+        let before_end = found.len();
+        let last = found.last().map(|last| last.unknowns.clone());
+        let end_m_per_s = last.map_or(0.0, |last| self.shooter.speed_of(&last));
+        let problem = self.shooter.problem;
+        let end = match end {
+            WalkEnd::Turn(kind, next) => {
+                let next = next.or_else(|| self.leave_corner(found.last()?));
+                if let Some((first, along)) = next {
+                    found.extend(self.walk(first, &along).0);
+                }
+                kind
+            }
+            WalkEnd::EndOfRange => CycleEnd::EndOfRange,
+            WalkEnd::Vanishes | WalkEnd::Undecided => CycleEnd::Undecided,
+        };
+        let problem = if end == CycleEnd::Undecided { problem } else { "" };
+        self.describe_branch(&found, before_end, direction, (end, end_m_per_s, problem))
+    }
+
+    fn describe_branch(
+        &mut self,
+        found: &[Solution],
+        before_end: usize,
+        direction: f64,
+        (end, end_m_per_s, problem): (CycleEnd, f64, &'static str),
+    ) -> CycleBranch {
+        let motions = found.iter().map(|solution| self.shooter.describe(solution)).collect();
+        CycleBranch { direction, motions, before_end, end, end_m_per_s, problem }
+    }
+
+    /// Follows the branch of vibrations without stick that begins where steady sliding becomes stable, up to
+    /// the stick-slip cycle and down. `None` if it does not lead to a cycle with stick.
+    fn follow_small_vibration(&mut self, end: f64, direction: f64) -> Option<CycleBranch> {
+        /// Size of the first vibration, in scales.
+        const SIZE: f64 = 0.1;
+        /// Largest number of turns.
+        const TURNS: usize = 6;
+        let slide = self.finder.find_slide(end).ok()?;
+        let period_s = 1.0 / slide.leading_mode().frequency_hz;
+        let rest = self.shooter.unknowns_from(&slide.pose, period_s, end);
+        let along = self.shooter.small_vibration_at(&rest)?;
+        let first = self.shooter.solve(&(&rest + SIZE * &along), &along)?;
+        let (mut next, mut found) = ((first, along), Vec::new());
+        let mut turn: Option<(f64, CycleEnd, usize)> = None;
+        for _ in 0..TURNS {
+            let (part, end) = self.walk(next.0, &next.1);
+            found.extend(part);
+            let WalkEnd::Turn(kind, beyond) = end else { break };
+            let speed = self.shooter.speed_of(&found.last()?.unknowns);
+            if turn.is_none_or(|(highest, ..)| speed > highest) {
+                turn = Some((speed, kind, found.len()));
+            }
+            let Some(beyond) = beyond else { break };
+            next = beyond;
+        }
+        let (speed, kind, count) = turn?;
+        found.last().filter(|last| !last.sticks_s.is_empty())?;
+        let before_end = found.len() - count;
+        found.reverse();
+        Some(self.describe_branch(&found, before_end, direction, (kind, speed, "")))
+    }
+
+    /// A cycle with stick at a slightly higher speed, which a run reaches from the state of another.
+    fn settle_above(&mut self, unknowns: &Unknowns) -> Option<Solution> {
+        /// Factors by which the speed rises.
+        const RISES: [f64; 2] = [1.003, 1.02];
+        let (pose, speed) = (self.shooter.pose_of(unknowns), self.shooter.speed_of(unknowns));
+        RISES.iter().find_map(|rise| self.shooter.settle(pose, rise * speed))
+    }
+
+    /// The first motion without stick beyond a corner, with the direction of the branch there. The branch is
+    /// sought on the side of smaller motions.
+    fn leave_corner(&mut self, corner: &Solution) -> Option<BranchPoint> {
+        /// Part by which the motion shrinks, so that its tip does not stop.
+        const SHRINK: f64 = 1e-3;
+        const STEPS: [f64; 4] = [3e-3, 1e-2, 3e-2, 1e-3];
+        let slide = self.slide_unknowns(corner)?;
+        let mut inwards = &slide - &corner.unknowns;
+        let n = self.shooter.state_count();
+        inwards.rows_range_mut(n..).fill(0.0);
+        let near = self.shooter.linearise(&(&corner.unknowns + SHRINK * &inwards))?;
+        let along = self.shooter.tangent_of(&near, &inwards)?;
+        STEPS.iter().find_map(|step| {
+            let guess = &corner.unknowns + *step * &along;
+            let first = self.shooter.solve(&guess, &along)?;
+            let along = self.shooter.tangent_of(&first, &along)?;
+            (first.sticks_s.len() < corner.sticks_s.len()).then_some((first, along))
+        })
+    }
+
+    /// Steady sliding at the speed of a solution, with the period of the solution.
+    fn slide_unknowns(&mut self, solution: &Solution) -> Option<Unknowns> {
+        let speed = self.shooter.speed_of(&solution.unknowns);
+        let slide = self.finder.find_slide(speed).ok()?;
+        Some(self.shooter.unknowns_from(&slide.pose, self.shooter.period_of(&solution.unknowns), speed))
+    }
+
+    /// Follows a branch until it turns back, ends or leaves the range of speed.
+    fn walk(&mut self, start: Solution, along: &Unknowns) -> (Vec<Solution>, WalkEnd) {
+        /// Largest number of points of a walk.
+        const POINTS: usize = 150;
+        /// First step, step below which the branch counts as interrupted, and factor of growth of a step.
+        const FIRST: f64 = 0.03;
+        const SHORTEST: f64 = 1e-3;
+        const GROWTH: f64 = 1.4;
+        /// Fraction of the highest speed below which a branch is not followed.
+        const SLOW: f64 = 0.02;
+        /// A motion closer than this, in scales, to steady sliding has become steady sliding.
+        const NEAR: f64 = 0.02;
+        let mut found = vec![start.clone()];
+        let Some(tangent) = self.shooter.tangent_of(&start, along) else {
+            return (found, WalkEnd::Undecided);
+        };
+        let (mut at, mut step): (BranchPoint, f64) = ((start, tangent), FIRST);
+        while found.len() < POINTS && self.shooter.runs < MOST_RUNS {
+            let speed = self.shooter.speed_of(&at.0.unknowns);
+            let [lowest, highest] = self.range;
+            if speed > highest || speed < lowest.max(SLOW * highest) {
+                found.truncate((found.len() - 1).max(1));
+                return (found, WalkEnd::EndOfRange);
+            }
+            let slide = self.slide_unknowns(&at.0);
+            if slide.is_none_or(|slide| (slide - &at.0.unknowns).norm() < NEAR) {
+                return (found, WalkEnd::Vanishes);
+            }
+            let next = self.advance(&at, step);
+            let is_same = next.as_ref().is_some_and(|next| has_gone_on(&at, next));
+            let is_smooth = next.as_ref().is_some_and(|next| next.1.dot(&at.1) > 0.9);
+            if let Some(next) = next.clone().filter(|_| is_same && is_smooth) {
+                found.push(next.0.clone());
+                (at, step) = (next, (GROWTH * step).min(LONGEST));
+                continue;
+            }
+            if (next.is_none() || is_same) && step > SHORTEST {
+                step *= 0.5;
+                continue;
+            }
+            let (before, beyond) = self.approach_change(&at, step, next);
+            let beyond = beyond.and_then(|beyond| self.turn_away(&before, beyond));
+            found.push(before.0.clone());
+            match beyond {
+                Some(beyond) if turns_back(&before, &beyond) => {
+                    let is_fold = beyond.0.sticks_s.len() == before.0.sticks_s.len();
+                    let kind = if is_fold { CycleEnd::Fold } else { CycleEnd::StickLost };
+                    return (found, WalkEnd::Turn(kind, Some(beyond)));
+                }
+                Some(beyond) => {
+                    found.push(beyond.0.clone());
+                    (at, step) = (beyond, FIRST.min(step));
+                }
+                None if self.has_short_stick(&before.0) => {
+                    return (found, WalkEnd::Turn(CycleEnd::StickLost, None));
+                }
+                None if self.misses_stick(&before.0) => {
+                    return (found, WalkEnd::Turn(CycleEnd::Grazing, None));
+                }
+                None => return (found, WalkEnd::Undecided),
+            }
+        }
+        (found, WalkEnd::Undecided)
+    }
+
+    /// The direction of the branch beyond a change of the number of sticks: that in which this number stays.
+    /// `None` if the number stays in neither direction.
+    fn turn_away(&mut self, before: &BranchPoint, beyond: BranchPoint) -> Option<BranchPoint> {
+        /// Length of the step that tries a direction, in scales.
+        const PROBE: f64 = 1e-5;
+        let sticks = beyond.0.sticks_s.len();
+        if sticks == before.0.sticks_s.len() {
+            return Some(beyond);
+        }
+        let (solution, along) = beyond;
+        [1.0, -1.0].into_iter().find_map(|sign| {
+            let along = sign * &along;
+            let next = self.advance(&(solution.clone(), along.clone()), PROBE)?;
+            (next.0.sticks_s.len() == sticks).then(|| (solution.clone(), along))
+        })
+    }
+
+    /// Whether the tip stops less often in a period if the head is slightly faster than in a cycle.
+    fn misses_stick(&mut self, solution: &Solution) -> bool {
+        /// Factor on the speed.
+        const FASTER: f64 = 1.0 + 1e-4;
+        let Self { shooter, .. } = self;
+        let (pose, period_s) = (shooter.pose_of(&solution.unknowns), shooter.period_of(&solution.unknowns));
+        let speed = FASTER * shooter.speed_of(&solution.unknowns);
+        shooter.count_sticks(pose, speed, period_s).is_some_and(|sticks| sticks < solution.sticks_s.len())
+    }
+
+    fn has_short_stick(&self, solution: &Solution) -> bool {
+        /// Part of a period below which a stick is an instant.
+        const SHORT: f64 = 1e-2;
+        let period_s = self.shooter.period_of(&solution.unknowns);
+        solution.sticks_s.iter().any(|stick_s| *stick_s < SHORT * period_s)
+    }
+
+    fn advance(&mut self, (from, along): &BranchPoint, step: f64) -> Option<BranchPoint> {
+        let solution = self.shooter.solve(&(&from.unknowns + step * along), along)?;
+        let tangent = self.shooter.tangent_of(&solution, along)?;
+        Some((solution, tangent))
+    }
+
+    /// Approaches a turn, a change of the number of sticks or a gap of the branch by bisection. Returns the
+    /// last point before it and the first one beyond it.
+    fn approach_change(
+        &mut self,
+        at: &BranchPoint,
+        mut ahead: f64,
+        mut beyond: Option<BranchPoint>,
+    ) -> (BranchPoint, Option<BranchPoint>) {
+        /// Distance at which the bisection ends, in scales.
+        const CLOSE: f64 = 1e-10;
+        let mut before = at.clone();
+        while ahead > CLOSE && self.shooter.runs < MOST_RUNS {
+            ahead *= 0.5;
+            let middle = self.advance(&before, ahead);
+            match middle {
+                Some(middle) if has_gone_on(at, &middle) => before = middle,
+                other => beyond = other,
+            }
+        }
+        (before, beyond)
+    }
+}
+
+/// Change of the speed per step, in scales.
+fn speed_rate((_, along): &BranchPoint) -> f64 {
+    along[along.len() - 1]
+}
+
+/// Whether the branch turns back to speeds that it has passed.
+fn turns_back(before: &BranchPoint, beyond: &BranchPoint) -> bool {
+    speed_rate(before) * speed_rate(beyond) < 0.0
+}
+
+/// Whether two points belong to one piece of a branch, without a turn and with the same number of sticks.
+fn has_gone_on(before: &BranchPoint, beyond: &BranchPoint) -> bool {
+    !turns_back(before, beyond) && before.0.sticks_s.len() == beyond.0.sticks_s.len()
+}
