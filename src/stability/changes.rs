@@ -86,8 +86,8 @@ pub fn write_in_physical_units(scene: &Scene) -> Result<Scene, SceneError> {
 }
 
 /// Effects of all parameters on the unstable range and on the end of the cycle, the largest first; parameters
-/// without effect are left out. If friction differs between the directions, the range is that of the direction
-/// with the higher end. `cycle` is a branch whose end is found.
+/// without effect are left out. If friction differs between the directions, the range is that of the
+/// direction with the higher end. `cycle` is a branch whose end is found.
 pub(super) fn rank_changes(
     scene: &Scene,
     own: &[SlidingSurvey],
@@ -136,9 +136,9 @@ pub struct CycleRemedy {
     pub fold_m_per_s: Option<f64>,
 }
 
-/// The change of one parameter after which the cycle ends at the lowest speed: a damping is doubled, any other
-/// parameter changes by a fifth. The derivatives choose three changes, which are then computed. `None` if none
-/// of them lowers the speed.
+/// The change of one parameter after which the cycle ends at the lowest speed: a damping is doubled, any
+/// other parameter changes by a fifth. The derivatives choose three changes, which are then computed. `None`
+/// if none of them lowers the speed.
 pub(super) fn find_remedy(
     scene: &Scene,
     changes: &[ParameterChange],
@@ -195,8 +195,8 @@ fn change_step(scene: &Scene, name: &str, value: f64) -> Option<f64> {
     scene.with_parameter(ratio, DAMPING_STEP).ok()?.value(name)
 }
 
-/// Change of a speed that `find` computes, m/s per step of a parameter: a central difference over a fraction of
-/// the step. `None` if the speed is not found for the changed blade.
+/// Change of a speed that `find` computes, m/s per step of a parameter: a central difference over a fraction
+/// of the step. `None` if the speed is not found for the changed blade.
 fn speed_change(
     scene: &Scene,
     name: &str,
@@ -241,10 +241,13 @@ mod tests {
     }
 
     /// Each parameter of the scene changes by 0.02 of its step, and the end of the instability moves as
-    /// computed. The differences use 0.1 of a step, so the smaller change here also checks their error.
+    /// computed; a few of them change by 0.5 of their step, and the end of the cycle does. The differences
+    /// use 0.1 of a step, so these changes also check their error.
     #[test]
-    fn the_end_of_a_changed_blade_moves_as_computed() {
+    fn the_ends_of_a_changed_blade_move_as_computed() {
         const PART: f64 = 0.02;
+        const PART_OF_CYCLE: f64 = 0.5;
+        let mut cycles = 0;
         for text in [
             include_str!("../../data/scenes/actual-blade.toml"),
             include_str!("../../data/scenes/light-blade.toml"),
@@ -252,17 +255,33 @@ mod tests {
             let scene = Scene::parse("s", text).unwrap();
             let own = study(&scene);
             let [_, end] = own.unstable_range().unwrap();
+            let fold = own.leading_branch().unwrap().fold_m_per_s().unwrap();
             assert!(own.changes.len() >= 12, "{}", own.changes.len());
             let physical = write_in_physical_units(&scene).unwrap();
+            let unstable = |scene: &Scene| {
+                unstable_range(&SlideFinder::new(&scene.linkage, 1.0).find_intervals([0.0, 1.0], 40))
+            };
             for change in &own.changes {
                 let name = change.parameter.name;
                 let changed = physical.with_parameter(name, change.value + PART * change.step).unwrap();
-                let moved = (study(&changed).unstable_range().unwrap()[1] - end) / PART;
+                let moved = (unstable(&changed).unwrap()[1] - end) / PART;
                 let stated = change.end_m_per_s.unwrap();
                 let allowed = 0.01 * stated.abs() + 1e-8;
                 assert!((moved - stated).abs() < allowed, "{name}: {moved:e} m/s, stated {stated:e} m/s");
             }
+            for change in own.changes.iter().filter(|change| change.value != 0.0).take(4) {
+                let name = change.parameter.name;
+                let value = change.value + PART_OF_CYCLE * change.step;
+                let changed = physical.with_parameter(name, value).unwrap();
+                let branch = CycleBranch::from_scene(&changed, 1.0, [0.0, 1.0], unstable(&changed)).unwrap();
+                let moved = (branch.fold_m_per_s().unwrap() - fold) / PART_OF_CYCLE;
+                let stated = change.fold_m_per_s.unwrap();
+                let allowed = 0.02 * stated.abs();
+                assert!((moved - stated).abs() < allowed, "{name}: {moved:e} m/s, stated {stated:e} m/s");
+                cycles += 1;
+            }
         }
+        assert_eq!(cycles, 8);
     }
 
     /// The step of a damping of zero is a damping ratio of 0.001, and it lowers the end of the instability.

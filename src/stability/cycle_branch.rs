@@ -1,8 +1,8 @@
 //! The stick-slip cycle of a blade or slider over the speed of its head, and the speed at which it ends.
 //!
-//! A cycle is followed along its branch, in steps of arc length, through folds. The branch turns back to lower
-//! speeds at a fold, where a multiplier is 1, or at a corner, where the cycle loses its stick: there it meets a
-//! motion without stick. Above this speed chatter does not go on.
+//! A cycle is followed along its branch, in steps of arc length, through folds. The branch turns back to
+//! lower speeds at a fold, where a multiplier is 1, or at a corner, where the cycle loses its stick: there it
+//! meets a motion without stick. Above this speed chatter does not go on.
 
 use super::shooting::{CycleShooter, PeriodicMotion, Solution, Unknowns};
 use super::steady_sliding::{SlideFinder, SteadySlide};
@@ -50,12 +50,24 @@ impl CycleBranch {
         (!matches!(self.end, CycleEnd::EndOfRange | CycleEnd::Undecided)).then_some(self.end_m_per_s)
     }
 
-    /// Whether the cycle just below its end is stable. The last motions are so close to the end that their
-    /// multipliers may belong to the other side of it.
+    /// The cycle just below its end. The last motions are so close to the end that their multipliers and sticks
+    /// may belong to the other side of it.
+    fn cycle_below_end(&self) -> Option<&PeriodicMotion> {
+        let below = |cycle: &&PeriodicMotion| cycle.speed_m_per_s < 0.999 * self.end_m_per_s;
+        self.cycles().iter().rev().find(below)
+    }
+
+    /// Whether the cycle just below its end is stable.
     #[must_use]
     pub fn is_stable_below_end(&self) -> bool {
-        let below = |cycle: &&PeriodicMotion| cycle.speed_m_per_s < 0.999 * self.end_m_per_s;
-        self.cycles().iter().rev().find(below).is_some_and(PeriodicMotion::is_stable)
+        self.cycle_below_end().is_some_and(PeriodicMotion::is_stable)
+    }
+
+    /// Whether the cycle just below its end sticks. If it does not, it has lost its stick at a lower speed and
+    /// goes on as a vibration without stick.
+    #[must_use]
+    pub fn sticks_below_end(&self) -> bool {
+        self.cycle_below_end().is_some_and(|cycle| !cycle.sticks_s.is_empty())
     }
 
     /// The cycles up to the end.
@@ -64,8 +76,8 @@ impl CycleBranch {
         &self.motions[..self.before_end]
     }
 
-    /// Finds the cycle of a scene and follows it over a range of speed, m/s. `unstable` are the lowest and the
-    /// highest speed at which steady sliding is unstable. `None` if no cycle is found.
+    /// Finds the cycle of a scene and follows it over a range of speed, m/s. `unstable` are the lowest and
+    /// the highest speed at which steady sliding is unstable. `None` if no cycle is found.
     #[must_use]
     pub fn from_scene(
         scene: &Scene,
@@ -88,6 +100,17 @@ impl CycleBranch {
             let end = unstable.map(|[_, end]| end).filter(|end| *end < range[1])?;
             BranchWalker::new(scene, direction, range, end)?.follow_small_vibration(end, direction)
         })
+    }
+
+    /// The cycle of the scene of this branch at a speed, m/s. `None` if none is found next to the branch.
+    #[must_use]
+    pub fn find_cycle(&self, scene: &Scene, speed_m_per_s: f64) -> Option<PeriodicMotion> {
+        let away = |motion: &&PeriodicMotion| (motion.speed_m_per_s - speed_m_per_s).abs();
+        let near = self.cycles().iter().min_by(|a, b| away(a).total_cmp(&away(b)))?;
+        let mut walker = BranchWalker::new(scene, self.direction, [0.0, speed_m_per_s], speed_m_per_s)?;
+        let guess = walker.shooter.unknowns_from(&near.pose, near.period_s, speed_m_per_s);
+        let found = walker.shooter.solve(&guess, &by_speed(guess.len()))?;
+        Some(walker.shooter.describe(&found))
     }
 
     /// The speed at which the cycle of a changed scene ends, m/s. The search starts from a cycle of the scene
@@ -169,7 +192,7 @@ impl BranchWalker {
     /// Follows a cycle down and up, and the motions beyond its end.
     fn follow_cycle(&mut self, start: Solution, direction: f64) -> CycleBranch {
         /// Largest number of times that a walk starts again from a simulated run.
-        const RESTARTS: usize = 8;
+        const RESTARTS: usize = 4;
         let by_speed = by_speed(start.unknowns.len());
         let (mut found, _) = self.walk(start.clone(), &-&by_speed);
         found.reverse();
@@ -206,50 +229,31 @@ impl BranchWalker {
             WalkEnd::Vanishes | WalkEnd::Undecided => CycleEnd::Undecided,
         };
         let problem = if end == CycleEnd::Undecided { problem } else { "" };
-        self.describe_branch(&found, before_end, direction, (end, end_m_per_s, problem))
-    }
-
-    fn describe_branch(
-        &mut self,
-        found: &[Solution],
-        before_end: usize,
-        direction: f64,
-        (end, end_m_per_s, problem): (CycleEnd, f64, &'static str),
-    ) -> CycleBranch {
         let motions = found.iter().map(|solution| self.shooter.describe(solution)).collect();
         CycleBranch { direction, motions, before_end, end, end_m_per_s, problem }
     }
 
-    /// Follows the branch of vibrations without stick that begins where steady sliding becomes stable, up to
-    /// the stick-slip cycle and down. `None` if it does not lead to a cycle with stick.
+    /// Follows the vibrations without stick that begin where steady sliding becomes stable, up to the first
+    /// stick, and then the stick-slip cycle. `None` if no cycle is found there.
     fn follow_small_vibration(&mut self, end: f64, direction: f64) -> Option<CycleBranch> {
         /// Size of the first vibration, in scales.
         const SIZE: f64 = 0.1;
-        /// Largest number of turns.
-        const TURNS: usize = 6;
+        /// Factors on the speed of the vibration with the first stick.
+        const SLOWER: [f64; 5] = [0.9999, 0.999, 0.99, 0.97, 0.9];
         let slide = self.finder.find_slide(end).ok()?;
         let period_s = 1.0 / slide.leading_mode().frequency_hz;
         let rest = self.shooter.unknowns_from(&slide.pose, period_s, end);
         let along = self.shooter.small_vibration_at(&rest)?;
         let first = self.shooter.solve(&(&rest + SIZE * &along), &along)?;
-        let (mut next, mut found) = ((first, along), Vec::new());
-        let mut turn: Option<(f64, CycleEnd, usize)> = None;
-        for _ in 0..TURNS {
-            let (part, end) = self.walk(next.0, &next.1);
-            found.extend(part);
-            let WalkEnd::Turn(kind, beyond) = end else { break };
-            let speed = self.shooter.speed_of(&found.last()?.unknowns);
-            if turn.is_none_or(|(highest, ..)| speed > highest) {
-                turn = Some((speed, kind, found.len()));
-            }
-            let Some(beyond) = beyond else { break };
-            next = beyond;
-        }
-        let (speed, kind, count) = turn?;
-        found.last().filter(|last| !last.sticks_s.is_empty())?;
-        let before_end = found.len() - count;
-        found.reverse();
-        Some(self.describe_branch(&found, before_end, direction, (kind, speed, "")))
+        let (found, _) = self.walk(first, &along);
+        let last = found.last()?.unknowns.clone();
+        let by_speed = by_speed(last.len());
+        let start = SLOWER.iter().find_map(|factor| {
+            let mut guess = last.clone();
+            guess[last.len() - 1] *= *factor;
+            self.shooter.solve(&guess, &by_speed).filter(|solution| !solution.sticks_s.is_empty())
+        })?;
+        Some(self.follow_cycle(start, direction))
     }
 
     /// A cycle with stick at a slightly higher speed, which a run reaches from the state of another.

@@ -16,6 +16,9 @@ pub fn describe_cycle_end(study: &StabilityStudy) -> String {
         return "no stick-slip cycle was found at these speeds".to_owned();
     };
     let end = match branch.end {
+        CycleEnd::Fold if !branch.sticks_below_end() => {
+            "a fold of the vibration as which the cycle goes on after it has lost its stick".to_owned()
+        }
         CycleEnd::Fold => "a fold: a stable and an unstable cycle meet".to_owned(),
         CycleEnd::StickLost => "a corner: the stick of the cycle shrinks to an instant".to_owned(),
         CycleEnd::Grazing => "above it the tip slows down but does not stop".to_owned(),

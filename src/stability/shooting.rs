@@ -1,9 +1,10 @@
 //! Periodic motions of a blade or slider whose head moves at constant speed.
 //!
 //! The unknowns are the state at an instant at which the tip is as fast as the head, the period and the speed
-//! of the head. The state after a period must be the same state. Its derivatives by the state and by the speed
-//! are exact, through all transitions ([`crate::simulate::sensitivity`]), so Newton's iteration converges
-//! quadratically. The conditions hold for cycles with any number of sticks, and for cycles without any.
+//! of the head. The state after a period must be the same state. Its derivatives by the state and by the
+//! speed are exact, through all transitions ([`crate::simulate::sensitivity`]), so Newton's iteration
+//! converges quadratically. The conditions hold for cycles with any number of sticks, and for cycles without
+//! any.
 
 use crate::model::{HeadMotion, LinkDirections, Linkage, Pose};
 use crate::simulate::drive::Drive;
@@ -39,8 +40,8 @@ pub struct PeriodicMotion {
     pub sticks_s: Vec<f64>,
     /// Half the range of the distance between tip and head, m.
     pub amplitude_m: f64,
-    /// Multipliers of the return map on the instants at which the tip is as fast as the head: factors by which
-    /// a small deviation changes in a period. Their number is one less than that of the states.
+    /// Multipliers of the return map on the instants at which the tip is as fast as the head: factors by
+    /// which a small deviation changes in a period. Their number is one less than that of the states.
     pub multipliers: Vec<Complex<f64>>,
 }
 
@@ -245,8 +246,8 @@ impl CycleShooter {
         Some(self.shoot(unknowns)?.1)
     }
 
-    /// Direction of the vibrations without stick that begin at steady sliding, if a mode of the period of these
-    /// unknowns neither grows nor decays there. Its length is 1.
+    /// Direction of the vibrations without stick that begin at steady sliding, if a mode of the period of
+    /// these unknowns neither grows nor decays there. Its length is 1.
     pub(super) fn small_vibration_at(&mut self, rest: &Unknowns) -> Option<Unknowns> {
         let n = self.state_count();
         let conditions = self.linearise(rest)?.jacobian.columns(0, n).into_owned();

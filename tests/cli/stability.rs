@@ -25,8 +25,17 @@ fn a_map_has_a_row_for_each_mode_and_says_where_sliding_is_unstable() {
     let found = summary(&project, "map");
     assert_eq!(found["onset_m_per_s"], 0.0);
     assert!((found["end_m_per_s"].as_f64().unwrap() - 0.253_709).abs() < 1e-6, "{found}");
-    assert!(found["cycle_fold_m_per_s"].is_null());
-    assert!(found["cycle_fold_note"].as_str().unwrap().starts_with("not computed"));
+    assert!((found["cycle_fold_m_per_s"].as_f64().unwrap() - 0.277_534).abs() < 1e-6, "{found}");
+    assert_eq!(found["cycle_fold_kind"], "stick-lost");
+    assert_eq!(found["cause"]["part"], "neck on the shoulder");
+    assert!(found["remedy"]["cycle_fold_m_per_s"].as_f64().unwrap() < 0.277);
+    assert!(out.contains("chatter ends at") && out.contains("instead of 0.278 m/s"), "{out}");
+    let cycles = fs::read_to_string(project.path("map/cycles.csv")).unwrap();
+    assert!(
+        cycles.starts_with("speed_m_per_s,period_s,frequency_hz,amplitude_m,sticks,stick_s,"),
+        "{cycles}"
+    );
+    assert!(cycles.lines().count() > 50);
     assert_eq!(found["by_preload"].as_array().unwrap().len(), 12);
     assert!(found["changes"].as_array().unwrap().len() > 10);
     // a second run overwrites the files of the first with the same bytes
@@ -46,6 +55,8 @@ fn a_blade_without_an_instability_says_so() {
     let found = summary(&project, "calm");
     assert!(found["onset_m_per_s"].is_null() && found["end_m_per_s"].is_null(), "{found}");
     assert_eq!(found["changes"].as_array().unwrap().len(), 0);
+    assert!(found["cycle_fold_m_per_s"].is_null() && found["cause"] == "undecided", "{found}");
+    assert!(found["cycle_fold_note"].as_str().unwrap().starts_with("no stick-slip cycle"), "{found}");
 }
 
 #[test]

@@ -5,6 +5,8 @@
 mod belt;
 #[path = "../common/blade.rs"]
 mod blade;
+#[path = "../../examples/sliding/chatter.rs"]
+mod chatter_sweep;
 #[path = "../../crates/short-spectra/examples/spectra/counts.rs"]
 mod counts;
 #[path = "../../examples/cycles/count.rs"]
@@ -30,6 +32,7 @@ mod allocations;
 mod analysis;
 mod belts;
 mod bits;
+mod chatter;
 mod clock;
 mod compliance;
 mod conditioning;
