@@ -101,6 +101,9 @@ fn draw_curves(study: &StabilityStudy) -> Panel {
     Panel::new(speed_axis(study), ChartAxis::linear("growth, 1/s"), PANEL_MM, series)
 }
 
+/// Whether a motion belongs to a curve.
+type IsKind = fn(&PeriodicMotion) -> bool;
+
 /// Amplitude and frequency of the cycle along its branch: stable and unstable cycles, and vibrations without
 /// stick; with steady sliding at amplitude zero. Empty without a cycle.
 fn draw_cycle(study: &StabilityStudy) -> Vec<Panel> {
@@ -108,7 +111,7 @@ fn draw_cycle(study: &StabilityStudy) -> Vec<Panel> {
     const HEIGHT_MM: f64 = 38.0;
     const MICROMETRES: f64 = 1e6;
     let Some(branch) = study.leading_branch() else { return Vec::new() };
-    let kinds: [(&str, Colour, Mark, fn(&PeriodicMotion) -> bool); 4] = [
+    let kinds: [(&str, Colour, Mark, IsKind); 4] = [
         ("stable cycle", Colour::Vermilion, Mark::Line, |m| m.is_stable() && !m.sticks_s.is_empty()),
         ("unstable cycle", Colour::Vermilion, Mark::Dashed, |m| !m.is_stable() && !m.sticks_s.is_empty()),
         ("stable vibration without stick", Colour::Blue, Mark::Line, |m| {

@@ -392,7 +392,8 @@ impl TraceFindings<'_> {
         let stiffness =
             unknowns.scene_at(&self.model.recordings[film], film, &end.point)?.linkage.slider()?;
         let stiffness = stiffness.spring.stiffness;
-        let is_offset = |unknown: &TraceUnknown| matches!(unknown.kind, UnknownKind::Camera { film: own, what: CameraUnknown::OffsetX } if own == film);
+        let offset = UnknownKind::Camera { film, what: CameraUnknown::OffsetX };
+        let is_offset = |unknown: &TraceUnknown| unknown.kind == offset;
         let at = unknowns.0.iter().position(is_offset)?;
         let offset_m = unknowns.0[at].value(end.point[at]);
         let [low_m, high_m] = self.searched.assessment.as_ref()?.estimates[at].widest_95();

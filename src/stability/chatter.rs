@@ -6,6 +6,7 @@ use super::steady_sliding::SlideFinder;
 use crate::model::friction::FrictionLaw;
 use crate::model::modes::named_frequencies;
 use crate::simulate::scene::Scene;
+use portable_math as math;
 
 /// Cause of the chatter at a speed.
 #[derive(Debug, Clone)]
@@ -67,7 +68,7 @@ impl ChatterCause {
             let leaning = ("neck on the shoulder".to_owned(), free_hz * stiffer.sqrt());
             parts.push(leaning);
         }
-        let distance = |hz: f64| (hz / cycle_hz).ln().abs();
+        let distance = |hz: f64| math::ln(hz / cycle_hz).abs();
         let (part, natural_hz) = parts.into_iter().min_by(|a, b| distance(a.1).total_cmp(&distance(b.1)))?;
         let mu = |speed: f64| linkage.friction.dynamic_coefficient(speed, direction);
         let step = 1e-4 * speed;

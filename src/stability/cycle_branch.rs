@@ -50,8 +50,8 @@ impl CycleBranch {
         (!matches!(self.end, CycleEnd::EndOfRange | CycleEnd::Undecided)).then_some(self.end_m_per_s)
     }
 
-    /// The cycle just below its end. The last motions are so close to the end that their multipliers and sticks
-    /// may belong to the other side of it.
+    /// The cycle just below its end. The last motions are so close to the end that their multipliers and
+    /// sticks may belong to the other side of it.
     fn cycle_below_end(&self) -> Option<&PeriodicMotion> {
         let below = |cycle: &&PeriodicMotion| cycle.speed_m_per_s < 0.999 * self.end_m_per_s;
         self.cycles().iter().rev().find(below)
@@ -63,8 +63,8 @@ impl CycleBranch {
         self.cycle_below_end().is_some_and(PeriodicMotion::is_stable)
     }
 
-    /// Whether the cycle just below its end sticks. If it does not, it has lost its stick at a lower speed and
-    /// goes on as a vibration without stick.
+    /// Whether the cycle just below its end sticks. If it does not, it has lost its stick at a lower speed
+    /// and goes on as a vibration without stick.
     #[must_use]
     pub fn sticks_below_end(&self) -> bool {
         self.cycle_below_end().is_some_and(|cycle| !cycle.sticks_s.is_empty())

@@ -43,7 +43,7 @@ pub fn write_cycles_csv(study: &StabilityStudy) -> String {
         "speed_m_per_s,period_s,frequency_hz,amplitude_m,sticks,stick_s,largest_multiplier\n".to_owned();
     for branch in &study.branches {
         for motion in &branch.motions {
-            let largest = motion.multipliers.iter().map(|factor| factor.norm()).fold(0.0, f64::max);
+            let largest = motion.largest_multiplier();
             let _ = writeln!(
                 text,
                 "{},{:e},{},{:e},{},{:e},{}",

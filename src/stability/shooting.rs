@@ -19,6 +19,7 @@ use crate::simulate::{
     Observer, RunResult, RunStatus, SolutionSegment, SolverOptions, Transition, run_scene_with,
 };
 use nalgebra::{Complex, DMatrix, DVector, Schur};
+use portable_math as math;
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
@@ -58,11 +59,21 @@ impl PeriodicMotion {
         self.sticks_s.iter().sum()
     }
 
+    /// Size of the largest multiplier.
+    #[must_use]
+    pub fn largest_multiplier(&self) -> f64 {
+        self.multipliers.iter().map(complex_size).fold(0.0, f64::max)
+    }
+
     /// Whether small deviations die out.
     #[must_use]
     pub fn is_stable(&self) -> bool {
-        self.multipliers.iter().all(|factor| factor.norm() < 1.0)
+        self.largest_multiplier() < 1.0
     }
+}
+
+fn complex_size(value: &Complex<f64>) -> f64 {
+    math::hypot(value.re, value.im)
 }
 
 /// The unknowns of a periodic motion, divided by their scales: the states, the period, the speed.
@@ -329,7 +340,7 @@ impl CycleShooter {
         let map = onto * &solution.monodromy;
         let found = Schur::try_new(map, f64::EPSILON, 400).map(|schur| schur.complex_eigenvalues());
         let mut found: Vec<_> = found.iter().flat_map(|all| all.iter().copied()).collect();
-        found.sort_by(|a, b| b.norm().total_cmp(&a.norm()));
+        found.sort_by(|a, b| complex_size(b).total_cmp(&complex_size(a)));
         found.truncate(n - 1); // the projection makes the last one zero
         found
     }

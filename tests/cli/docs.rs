@@ -105,6 +105,11 @@ const OTHERWISE: &[(&str, &str, How, &str)] = &[
         "a build of minutes; .ci/python installs the same",
     ),
     ("docs/install.md", "cargo install --path . --locked", Elsewhere, "a build of minutes"),
+    ("docs/measured.md", "cargo run --release --example measured -- FOLDER", Elsewhere, MEASURED),
+    ("docs/measured.md", IMPORT_MEASURED, Elsewhere, MEASURED),
+    ("docs/measured.md", INIT_MEASURED, Elsewhere, MEASURED),
+    ("docs/measured.md", "wiperlab fit fit", Elsewhere, MEASURED),
+    ("docs/measured.md", "wiperlab report fit", Elsewhere, MEASURED),
     (
         "docs/reports.md",
         "wiperlab report fits/A fits/B [fits/C ...]",
@@ -115,6 +120,10 @@ const OTHERWISE: &[(&str, &str, How, &str)] = &[
     ("fuzz/README.md", "fuzz/run 60", Elsewhere, "needs a nightly toolchain"),
     ("fuzz/README.md", "fuzz/run 600 tracker scene", Elsewhere, "needs a nightly toolchain"),
 ];
+const MEASURED: &str = "the records of others are not in this repository";
+const IMPORT_MEASURED: &str = "wiperlab import load-250g.csv --out rec --frame-rate-hz 250 --scale m --y-axis up --time \
+                               real --columns time=time_s,tip-x=mass_x_m,head-x=base_x_m";
+const INIT_MEASURED: &str = "wiperlab init rec --slider --mass-kg 3.0799 --normal-force-n 2.4525 --out fit";
 const CLONE: &str = "git clone --depth 1 https://github.com/rustsec/advisory-db target/advisory-db";
 const SUBMIT_STUDY: &str =
     "wiperlab submit STUDY --out DIR --scheduler slurm --shards 64 --threads 4 --time 1h30min";
@@ -227,6 +236,7 @@ pages! {
     gallery: "docs/gallery.md",
     hard_cases: "docs/hard-cases.md",
     install: "docs/install.md",
+    measured: "docs/measured.md",
     reports: "docs/reports.md",
     stability: "docs/stability.md",
     sweeps: "docs/sweeps.md",

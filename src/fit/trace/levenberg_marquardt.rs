@@ -90,10 +90,10 @@ pub fn next_iterate(model: &TraceModel, settings: &TraceSearchSettings, before: 
     resegment(model, settings, before)
 }
 
-/// The iterate that follows the end of a stage of a slider that explains nothing: the same stage, and then the
-/// next one, with plain chi2 as cost; `None` at the end of the search. A law of friction hardly ever explains
-/// sensors that resolve a thousandth of the motion. The least-squares fit still gives the friction that is
-/// nearest, with intervals from the scatter of the segments.
+/// The iterate that follows the end of a stage of a slider that explains nothing: the same stage, and then
+/// the next one, with plain chi2 as cost; `None` at the end of the search. A law of friction hardly ever
+/// explains sensors that resolve a thousandth of the motion. The least-squares fit still gives the friction
+/// that is nearest, with intervals from the scatter of the segments.
 fn continue_plain(model: &TraceModel, settings: &TraceSearchSettings, before: &Iterate) -> Option<Iterate> {
     let stage = before.stage + 1;
     if !before.plain {
