@@ -13,7 +13,7 @@ use std::fmt::Write;
 #[must_use]
 pub fn describe_cycle_end(study: &StabilityStudy) -> String {
     let Some(branch) = study.leading_branch() else {
-        return "no stick-slip cycle was found at these speeds".to_owned();
+        return "no stick-slip cycle was found at these speeds: no run settled into equal cycles".to_owned();
     };
     let end = match branch.end {
         CycleEnd::Fold if !branch.sticks_below_end() => {
