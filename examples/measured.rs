@@ -143,7 +143,7 @@ fn measure_frame(folder: &Path) {
     println!("\nThe intervals of the friction coefficient at the least and the largest load {words}.");
     let known = together.parameters.values().filter(|found| found.verdict.name() == "identified").count();
     println!("Parameters that are identified in the fit of all loads: {known}.");
-    // the middle load from the others: friction in proportion between them, the rest as found there
+    // the middle load is predicted: friction is interpolated, stiffness and damping are those of the others
     let others = fit_records(&[all[0], all[2]], &frame, "", &free("scope = \"recording\""));
     let value = |name: &str| others.parameters[name].estimate;
     let [low, high] = [value("friction.c@1") * force(0), value("friction.c@2") * force(2)];

@@ -146,7 +146,7 @@ impl Slider {
     }
 }
 
-/// The least share of a step at which `happens` is true, to the last bit but a few; 1 if it is not true at 1.
+/// The smallest fraction of a step at which `happens` is true, up to rounding; 1 if it is not true at 1.
 fn find_onset(happens: impl Fn(f64) -> bool) -> f64 {
     let [mut low, mut high] = [0.0, 1.0];
     if happens(high) {

@@ -123,7 +123,7 @@ fn print_study(title: &str, study: &StabilityStudy) {
     print_chatter(study);
     if !study.changes.is_empty() {
         print_line!("");
-        print_line!("largest effects on onset, end or cycle; a damping of 0 changes to a ratio of 0.001");
+        print_line!("largest effects on onset, end, end of cycle; a damping of 0 becomes a ratio of 0.001");
     }
     for change in study.changes.iter().take(PRINTED_CHANGES) {
         let shown = |moved: Option<f64>| moved.map_or_else(|| "-".to_owned(), |v| format!("{v:+.2e} m/s"));
@@ -164,7 +164,7 @@ fn print_chatter(study: &StabilityStudy) {
         print_line!("  the friction coefficient {word} by {slope} per m/s");
         if let Some(ratio) = cause.growth.and_then(|growth| growth.feeding_over_damping()) {
             let ratio = format_digits(ratio, 3);
-            print_line!("  the growth this gives to small vibrations is {ratio} times the decay by damping");
+            print_line!("  growth by this slope is {ratio} times the decay at constant friction");
         }
     }
     if let (Some(remedy), Some(speed)) = (&study.remedy, branch.fold_m_per_s()) {

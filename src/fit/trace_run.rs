@@ -385,8 +385,8 @@ impl TraceFindings<'_> {
         found
     }
 
-    /// Sentence on the constant part of the deflection of a slider, which is an offset of a sensor as well as
-    /// a constant force; `None` for a blade, and if it may be zero.
+    /// Sentence on the constant part of the deflection of a slider, which can come from an offset of a sensor
+    /// or from a constant force. `None` for a blade, and if the 95 % interval contains zero.
     fn describe_constant_force(&self, film: usize, end: &Iterate) -> Option<String> {
         let unknowns = &self.model.unknowns;
         let stiffness =

@@ -136,9 +136,9 @@ pub struct CycleRemedy {
     pub fold_m_per_s: Option<f64>,
 }
 
-/// The change of one parameter after which the cycle ends at the lowest speed: a damping is doubled, any
-/// other parameter changes by a fifth. The derivatives choose three changes, which are then computed. `None`
-/// if none of them lowers the speed.
+/// The change of one parameter after which the cycle ends at the lowest speed. A damping is doubled or
+/// halved; any other parameter is multiplied or divided by 1.2. The derivatives select three changes, and the
+/// cycle is computed for each of them. `None` if none of them lowers the speed.
 pub(super) fn find_remedy(
     scene: &Scene,
     changes: &[ParameterChange],
@@ -240,9 +240,9 @@ mod tests {
         StabilityStudy::from_scene(scene, range).unwrap()
     }
 
-    /// Each parameter of the scene changes by 0.02 of its step, and the end of the instability moves as
-    /// computed; a few of them change by 0.5 of their step, and the end of the cycle does. The differences
-    /// use 0.1 of a step, so these changes also check their error.
+    /// If a parameter of the scene changes by 0.02 of its step, the end of the instability moves as computed.
+    /// If it changes by 0.5 of its step, so does the end of the cycle; only a few parameters are tried. The
+    /// differences use 0.1 of a step, so these changes also check their error.
     #[test]
     fn the_ends_of_a_changed_blade_move_as_computed() {
         const PART: f64 = 0.02;

@@ -1,5 +1,5 @@
-//! Why a blade or slider chatters: the part whose vibration the cycle feeds on, and how much falling friction
-//! outweighs damping.
+//! Why a blade or slider chatters: the part whose natural frequency is nearest to that of the cycle, and how
+//! much the growth by falling friction exceeds the decay by damping.
 
 use super::cycle_branch::CycleBranch;
 use super::steady_sliding::SlideFinder;
@@ -11,7 +11,8 @@ use portable_math as math;
 /// Cause of the chatter at a speed.
 #[derive(Debug, Clone)]
 pub struct ChatterCause {
-    /// Speed of the head, m/s: about half of that at which the cycle ends.
+    /// Speed of the head, m/s: about half of that at which the instability ends or, without an
+    /// instability, of that at which the cycle ends.
     pub speed_m_per_s: f64,
     /// Frequency of the cycle at this speed, Hz.
     pub cycle_hz: f64,

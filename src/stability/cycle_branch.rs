@@ -18,7 +18,8 @@ pub enum CycleEnd {
     Fold,
     /// A corner of the branch: the stick of the cycle shrinks to an instant.
     StickLost,
-    /// Above the last cycle the tip slows down but does not stop, so a stick that is not short is missed.
+    /// Above the last cycle the tip slows down but does not stop: a stick of finite length is
+    /// lost at once.
     Grazing,
     /// The cycle goes on at the highest speed of the range.
     EndOfRange,
@@ -85,7 +86,8 @@ impl CycleBranch {
         range: [f64; 2],
         unstable: Option<[f64; 2]>,
     ) -> Option<Self> {
-        /// Fractions of the speed below which a cycle is searched.
+        /// Fractions of the speed at which the instability ends, or of the highest speed: the
+        /// speeds of the runs.
         const SHARES: [f64; 7] = [0.9, 0.6, 0.3, 0.1, 0.03, 0.01, 0.003];
         let top = unstable.map_or(range[1], |[_, end]| end);
         let mut speeds = SHARES.iter().map(|share| share * top).filter(|speed| *speed > range[0]);
@@ -267,7 +269,7 @@ impl BranchWalker {
     /// The first motion without stick beyond a corner, with the direction of the branch there. The branch is
     /// sought on the side of smaller motions.
     fn leave_corner(&mut self, corner: &Solution) -> Option<BranchPoint> {
-        /// Part by which the motion shrinks, so that its tip does not stop.
+        /// Fraction by which the motion becomes smaller, so that its tip does not stop.
         const SHRINK: f64 = 1e-3;
         const STEPS: [f64; 4] = [3e-3, 1e-2, 3e-2, 1e-3];
         let slide = self.slide_unknowns(corner)?;

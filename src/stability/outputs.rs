@@ -17,7 +17,7 @@ pub fn describe_cycle_end(study: &StabilityStudy) -> String {
     };
     let end = match branch.end {
         CycleEnd::Fold if !branch.sticks_below_end() => {
-            "a fold of the vibration as which the cycle goes on after it has lost its stick".to_owned()
+            "a fold; below it the cycle loses its stick and goes on as a vibration without stick".to_owned()
         }
         CycleEnd::Fold => "a fold: a stable and an unstable cycle meet".to_owned(),
         CycleEnd::StickLost => "a corner: the stick of the cycle shrinks to an instant".to_owned(),
@@ -30,7 +30,7 @@ pub fn describe_cycle_end(study: &StabilityStudy) -> String {
     };
     match branch.cycles().last() {
         Some(last) if !last.multipliers.is_empty() && !branch.is_stable_below_end() => {
-            format!("{end}; this cycle of equal periods is unstable, so that the vibration is less regular")
+            format!("{end}; this cycle is unstable, so the periods of the real vibration are not equal")
         }
         _ => end,
     }

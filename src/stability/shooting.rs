@@ -227,7 +227,7 @@ impl CycleShooter {
             return None;
         }
         if !last.is_known {
-            self.problem = "a guard grazes zero";
+            self.problem = "a transition has no derivative there (grazing)";
             return None;
         }
         let rates = self.slip_rates(&last.pose);
@@ -391,8 +391,8 @@ impl CycleShooter {
 
     /// A cycle with stick that the blade reaches at a speed, m/s, from a state.
     pub(super) fn settle(&mut self, start: Pose, speed: f64) -> Option<Solution> {
-        /// Instants at which the tip is as fast as the head in each run. After few of them, a cycle that does
-        /// not last, because a slower vibration grows, can still be near.
+        /// Instants at which the tip is as fast as the head in each run. After only a few of them, a slower
+        /// vibration has not yet grown, and the run can still be near an unstable cycle.
         const INSTANTS: [usize; 5] = [8, 30, 300, 300, 300];
         /// Largest number of these instants in a cycle.
         const LONGEST: usize = 6;

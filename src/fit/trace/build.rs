@@ -121,8 +121,8 @@ fn build_recording(source: &TraceSource<'_>) -> Result<TraceRecording, HeadMotio
 }
 
 /// Noise of a channel: the value in the job, if it gives one. Otherwise it is the measured noise without the
-/// part that tip and head have in common; of a slider, only if the head has about the same noise. If the
-/// measurement fails, it is white noise with the scatter from frame to frame.
+/// part that tip and head have in common. For a slider, this noise must be at most twice that of the head. If
+/// it is not, or if the measurement fails, the noise is white, with the scatter from frame to frame.
 fn channel_noise(
     is_slider: bool,
     traced: &TraceData,

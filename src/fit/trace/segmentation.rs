@@ -32,8 +32,8 @@ const USUAL_SEGMENT_S: f64 = 0.004;
 /// Natural frequency, Hz, of the lip alone of a blade of the usual size.
 const USUAL_LIP_HZ: f64 = 608.0;
 
-/// Number of times by which the segments of a slider are halved again. A slider has no motion that is faster
-/// than its cycle. Shorter segments depend less on what the model lacks, and there are more of them, so that
+/// Number of further halvings of the segments of a slider. A slider has no motion that is faster than its
+/// cycle. Shorter segments depend less on what the model lacks, and there are more of them, so that
 /// their scatter is better known.
 const SLIDER_HALVINGS: f64 = 3.0;
 
