@@ -5,6 +5,7 @@
 //! meets a motion without stick. Above this speed chatter does not go on.
 
 use super::shooting::{CycleShooter, PeriodicMotion, Solution, Unknowns};
+use super::speed_intervals::unstable_range;
 use super::steady_sliding::{SlideFinder, SteadySlide};
 use crate::model::{LinkDirections, Linkage, Pose};
 use crate::simulate::scene::Scene;
@@ -98,20 +99,50 @@ impl CycleBranch {
             Some(walker.follow_cycle(start, direction))
         });
         // a run does not settle if a slower vibration makes its cycles unequal
-        settled.or_else(|| {
-            let end = unstable.map(|[_, end]| end).filter(|end| *end < range[1])?;
-            BranchWalker::new(scene, direction, range, end)?.follow_small_vibration(end, direction)
-        })
+        settled.or_else(|| unstable.and_then(|_| Self::from_small_vibration(scene, direction, range)))
     }
 
-    /// The cycle of the scene of this branch at a speed, m/s. `None` if none is found next to the branch.
+    /// Finds the cycle from the small vibrations at the end of the instability. If they are above the range,
+    /// or leave it before they stick, the cycle is followed back into the range.
+    fn from_small_vibration(scene: &Scene, direction: f64, range: [f64; 2]) -> Option<Self> {
+        /// Factors on the highest speed.
+        const WIDER: [f64; 6] = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
+        /// Number of speeds at which the growth is computed.
+        const POINTS: usize = 100;
+        let wide = WIDER.iter().find_map(|factor| {
+            let wide = [range[0], factor * range[1]];
+            let intervals = SlideFinder::new(&scene.linkage, direction).find_intervals(wide, POINTS);
+            let end = unstable_range(&intervals).map(|[_, end]| end).filter(|end| *end < wide[1])?;
+            BranchWalker::new(scene, direction, wide, end)?.follow_small_vibration(end, direction)
+        })?;
+        let within = |cycle: &&PeriodicMotion| cycle.speed_m_per_s < range[1] && !cycle.sticks_s.is_empty();
+        let near = wide.cycles().iter().rev().find(within)?;
+        let (mut walker, start) = wide.solve_near(scene, near, near.speed_m_per_s, range)?;
+        Some(walker.follow_cycle(start, direction))
+    }
+
+    /// The cycle of a scene next to a motion of this branch, at a speed, m/s; with a walker over a range of
+    /// speed.
+    fn solve_near(
+        &self,
+        scene: &Scene,
+        near: &PeriodicMotion,
+        speed_m_per_s: f64,
+        range: [f64; 2],
+    ) -> Option<(BranchWalker, Solution)> {
+        let mut walker = BranchWalker::new(scene, self.direction, range, speed_m_per_s)?;
+        let guess = walker.shooter.unknowns_from(&near.pose, near.period_s, speed_m_per_s);
+        let found = walker.shooter.solve(&guess, &by_speed(guess.len()))?;
+        Some((walker, found))
+    }
+
+    /// The cycle of the scene of this branch, or of a scene that differs little from it, at a speed, m/s.
+    /// `None` if none is found next to the branch.
     #[must_use]
     pub fn find_cycle(&self, scene: &Scene, speed_m_per_s: f64) -> Option<PeriodicMotion> {
         let away = |motion: &&PeriodicMotion| (motion.speed_m_per_s - speed_m_per_s).abs();
         let near = self.cycles().iter().min_by(|a, b| away(a).total_cmp(&away(b)))?;
-        let mut walker = BranchWalker::new(scene, self.direction, [0.0, speed_m_per_s], speed_m_per_s)?;
-        let guess = walker.shooter.unknowns_from(&near.pose, near.period_s, speed_m_per_s);
-        let found = walker.shooter.solve(&guess, &by_speed(guess.len()))?;
+        let (mut walker, found) = self.solve_near(scene, near, speed_m_per_s, [0.0, speed_m_per_s])?;
         Some(walker.shooter.describe(&found))
     }
 
@@ -121,15 +152,13 @@ impl CycleBranch {
         /// Fraction of the speed at which the cycle ends, at which the search starts.
         const SHARE: f64 = 0.97;
         let mut cycles = self.cycles().iter().rev();
-        let near = |cycle: &&PeriodicMotion| {
+        let is_below = |cycle: &&PeriodicMotion| {
             cycle.speed_m_per_s < SHARE * self.end_m_per_s && !cycle.sticks_s.is_empty()
         };
-        let PeriodicMotion { speed_m_per_s, period_s, pose, .. } = cycles.find(near)?;
+        let near = cycles.find(is_below)?;
         let range = [0.0, 2.0 * self.end_m_per_s];
-        let mut walker = BranchWalker::new(scene, self.direction, range, *speed_m_per_s)?;
-        let guess = walker.shooter.unknowns_from(pose, *period_s, *speed_m_per_s);
-        let by_speed = by_speed(guess.len());
-        let start = walker.shooter.solve(&guess, &by_speed)?;
+        let (mut walker, start) = self.solve_near(scene, near, near.speed_m_per_s, range)?;
+        let by_speed = by_speed(start.unknowns.len());
         let (found, end) = walker.walk(start, &by_speed);
         matches!(end, WalkEnd::Turn(..)).then(|| walker.shooter.speed_of(&found[found.len() - 1].unknowns))
     }

@@ -59,6 +59,23 @@ fn the_cycles_of_belts_have_their_exact_periods_and_never_end_without_a_damper()
     assert!((amplitude - 0.538_516_480_713_45).abs() < 1e-3, "{amplitude} m");
 }
 
+/// No run of the published simulation settles into equal cycles. Its cycle is found from vibrations above the
+/// range, and is the same as in a range that contains them.
+#[test]
+fn a_cycle_is_followed_back_from_vibrations_above_the_range() {
+    let scene = committed("published-simulation");
+    let whole = branch_of(&scene, 1.5);
+    assert_eq!(whole.end, CycleEnd::StickLost);
+    for top in [0.18, 0.7] {
+        let part = branch_of(&scene, top);
+        assert_eq!((part.end, part.fold_m_per_s()), (CycleEnd::EndOfRange, None));
+        assert!(part.motions.iter().all(|motion| motion.speed_m_per_s <= top));
+        let [found, expected] =
+            [&part, &whole].map(|branch| branch.find_cycle(&scene, 0.9 * top).unwrap().period_s);
+        assert!((found / expected - 1.0).abs() < 1e-8, "{top} m/s: {found} s, {expected} s");
+    }
+}
+
 /// Whether a tip sticks, and for how long after its release it does not.
 #[derive(Default)]
 struct SecondStick {
@@ -103,6 +120,33 @@ fn the_cycle_of_a_damped_belt_ends_where_a_released_mass_does_not_stick_again() 
         let end = branch.fold_m_per_s().unwrap();
         assert!((end - below).abs() < 1e-6, "{kind:?}: {end} m/s, in runs {below} m/s");
     }
+}
+
+/// Sliding friction of a belt of Coulomb's is constant, so the velocity of the released mass is a damped wave,
+/// known in closed form. The cycle ends by grazing at the speed of the belt that is the wave's next crest.
+#[test]
+fn the_cycle_of_a_damped_coulomb_belt_ends_where_the_crest_of_its_slip_grazes_the_belt() {
+    let (damping, drop) = (0.1_f64, 0.5_f64);
+    let half = 0.5 * damping;
+    let omega = (1.0 - half * half).sqrt();
+    // velocity minus that of the belt at the crest of the wave that starts at the belt's speed with the
+    // acceleration `-drop`
+    let excess = |speed: f64| {
+        let trough = (drop * omega).atan2(half * drop - speed).rem_euclid(std::f64::consts::PI);
+        let t = (trough + std::f64::consts::PI) / omega;
+        let wave = speed * (omega * t).cos() + (half * speed - drop) / omega * (omega * t).sin();
+        (-half * t).exp() * wave - speed
+    };
+    let [mut sticks, mut passes] = [0.05, 5.0];
+    assert!(excess(sticks) > 0.0 && excess(passes) < 0.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (sticks + passes);
+        if excess(middle) > 0.0 { sticks = middle } else { passes = middle }
+    }
+    let branch = branch_of(&belt(COULOMB, damping), 2.0);
+    let end = branch.fold_m_per_s().unwrap();
+    assert_eq!(branch.end, CycleEnd::Grazing);
+    assert!((end / sticks - 1.0).abs() < 1e-7, "{end} m/s, exact {sticks} m/s");
 }
 
 /// Integral over a run of the rate at which the motion of the belt contracts areas.
