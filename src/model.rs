@@ -19,6 +19,7 @@
 pub mod flight;
 pub mod friction;
 pub mod modes;
+pub mod parameter_spread;
 pub mod parameters;
 pub mod plausibility;
 pub mod section;

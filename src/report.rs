@@ -15,6 +15,7 @@ use crate::figures::friction::FrictionLine;
 use crate::fit::findings::FitFinding;
 use crate::fit::misfit::TraceMisfit;
 use crate::fit::result::NuisanceResult;
+use crate::stability::chatter::ChatterSummary;
 use serde::Serialize;
 pub(crate) use summary::{ReportSummary, SummaryQuantity};
 pub(crate) use view_model::{
@@ -46,6 +47,8 @@ pub struct Report {
     pub parameters: Vec<ParameterLine>,
     /// Friction of the best model at rest and at the largest speed of the tip.
     pub friction: Vec<FrictionLine>,
+    /// Where and why the fitted blade or slider chatters.
+    pub chatter: Option<ChatterSummary>,
     /// Products of powers of the parameters. Each line says whether the features determine the product.
     pub combinations: Vec<CombinationLine>,
     /// Advice on additional measurements, one sentence each.

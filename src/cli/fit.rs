@@ -127,7 +127,7 @@ impl LoadedJob {
         let resume = resumed.as_ref().map(|journal| (name.as_str(), journal));
         let context = FitContext { max_evaluations: most, resume, ..self.problem.new_context() };
         let fitted = self.problem.fit_with(&context, &mut sink, &mut |now: &FitProgress| shown.advance(now));
-        let result = fitted.map_err(|error| match error {
+        let mut result = fitted.map_err(|error| match error {
             FitError::JournalWrite { .. } => Failure::internal(error),
             FitError::Journal(_) | FitError::OtherSeed { .. } => Failure::input(error),
             _ => Failure::at(&self.file, error),
@@ -139,7 +139,7 @@ impl LoadedJob {
             // an earlier result file is kept; a resumed fit continues from the journal
             stops.announce_stop(&kept());
         } else {
-            self.write_outputs(&result, &writer)?;
+            self.write_outputs(&mut result, &writer)?;
         }
         Ok(CompletedFit { result, replayed: shown.replayed, wall })
     }

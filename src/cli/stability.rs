@@ -1,15 +1,22 @@
 //! `wiperlab stability`.
 
+use super::files::RESULT_FILE;
+use super::job::job_path;
 use super::load::{print_warnings, read_scene};
 use super::prelude::*;
 use crate::figures::stability::draw_figure;
+use crate::fit::result::FitResult;
+use crate::model::parameter_spread::ParameterSpread;
+use crate::simulate::scene::Scene;
+use crate::stability::chatter::ChatterSummary;
+use crate::stability::cycle_branch::CycleBranch;
 use crate::stability::outputs::{
     describe_cycle_end, write_cycles_csv, write_stability_csv, write_stability_json,
 };
 use crate::stability::speed_intervals::{SlidingState, SpeedInterval};
 use crate::stability::steady_sliding::Instability;
 use crate::stability::study::{StabilityStudy, StudyRange, default_top_speed};
-use crate::text::format_digits;
+use crate::text::{format_digits, to_ascii};
 
 #[derive(Debug, Args)]
 pub(crate) struct StabilityArgs {
@@ -29,6 +36,9 @@ pub(crate) struct StabilityArgs {
     #[arg(long, value_name = "N", default_value_t = 100,
           value_parser = clap::value_parser!(u16).range(2..=1000))]
     pub points: u16,
+    /// Folder of the fit that wrote the scene (fits/NAME): numbers get their 95 % intervals
+    #[arg(long, value_name = "FIT")]
+    pub fit: Option<PathBuf>,
     #[command(flatten)]
     pub overwrite: Overwrite,
 }
@@ -60,6 +70,8 @@ impl StabilityArgs {
         let writer = global.write_policy(OutputCommand::Stability, self.overwrite);
         OutputFolder::check(&self.out, &writer, &OUTPUTS)?;
         print_warnings(&self.scene, &scene.find_implausible(), global);
+        let spread =
+            self.fit.as_deref().map(|fit| read_spread(fit, &self.scene, &scene)).transpose()?.flatten();
         let top = default_top_speed(&scene);
         let speeds_m_per_s = self.speed_m_per_s.map_or([0.0, top], |range| range.0);
         if speeds_m_per_s[1] <= speeds_m_per_s[0] {
@@ -84,21 +96,23 @@ impl StabilityArgs {
             );
             return Err(Failure::at(self.scene.display(), problem));
         }
-        let json = serde_json::to_vec_pretty(&write_stability_json(&study)).map_err(Failure::internal)?;
+        let chatter = study.summarise_chatter(&scene, spread.as_ref());
+        let json = write_stability_json(&study, &chatter);
+        let json = serde_json::to_vec_pretty(&json).map_err(Failure::internal)?;
         let mut outputs =
             vec![(TABLE.to_owned(), write_stability_csv(&study).into_bytes()), (SUMMARY.to_owned(), json)];
         outputs.push((CYCLES.to_owned(), write_cycles_csv(&study).into_bytes()));
         outputs.extend(files::figure_files("stability", &draw_figure(scene.title(), &study)));
         files::write_outputs(&self.out, &writer, &outputs)?;
         if !global.quiet {
-            print_study(scene.title(), &study);
+            print_study(scene.title(), &study, &chatter);
             print_line!("written to {}", self.out.display());
         }
         Ok(CommandOutcome::Done)
     }
 }
 
-fn print_study(title: &str, study: &StabilityStudy) {
+fn print_study(title: &str, study: &StabilityStudy, chatter: &ChatterSummary) {
     print_line!("{title}");
     for survey in &study.own {
         let direction = match study.own.len() {
@@ -120,7 +134,7 @@ fn print_study(title: &str, study: &StabilityStudy) {
             }
         }
     }
-    print_chatter(study);
+    print_chatter(study, chatter);
     if !study.changes.is_empty() {
         print_line!("");
         print_line!("largest effects on onset, end, end of cycle; a damping of 0 becomes a ratio of 0.001");
@@ -139,41 +153,44 @@ fn print_study(title: &str, study: &StabilityStudy) {
 }
 
 /// Prints where the cycle ends, why there is one, and what ends it sooner.
-fn print_chatter(study: &StabilityStudy) {
-    let note = describe_cycle_end(study);
-    let Some(branch) = study.leading_branch() else {
-        print_line!("{note}");
-        return;
+fn print_chatter(study: &StabilityStudy, chatter: &ChatterSummary) {
+    let end = match study.leading_branch().and_then(CycleBranch::fold_m_per_s) {
+        Some(speed) => format!("the stick-slip cycle goes on up to {} m/s: ", format_digits(speed, 4)),
+        None => String::new(),
     };
-    match branch.fold_m_per_s() {
-        Some(speed) => {
-            print_line!("the stick-slip cycle goes on up to {} m/s ({note})", format_digits(speed, 4))
+    print_line!("{end}{}", describe_cycle_end(study));
+    print_line!("");
+    chatter.sentences.iter().for_each(|sentence| print_line!("{}", to_ascii(sentence)));
+}
+
+/// The uncertainty of a scene that a fit wrote; `None` if the fitted model does not explain the recordings.
+fn read_spread(fit: &Path, path: &Path, scene: &Scene) -> Outcome<Option<ParameterSpread>> {
+    /// Largest relative difference between a value of the scene and the estimate.
+    const SAME: f64 = 1e-9;
+    if !fit.exists() {
+        return Err(Failure::at(
+            fit.display(),
+            "no such fit; expected the folder of a fit, such as fits/NAME",
+        ));
+    }
+    let file = files::containing_folder(&job_path(fit)).join(RESULT_FILE);
+    let name = file.display().to_string();
+    let result = FitResult::parse(&name, &files::read_json(&file)?).map_err(Failure::input)?;
+    let spread = result.parameter_spread();
+    for (key, estimate) in spread.names.iter().zip(&spread.estimates) {
+        let found = scene.value(key).unwrap_or(f64::NAN);
+        if !((found - estimate).abs() <= SAME * estimate.abs()) {
+            let problem = format!(
+                "found {key} = {found}, expected {estimate}, the estimate in {name}; give the scene that this fit wrote"
+            );
+            return Err(Failure::at(path.display(), problem));
         }
-        None => print_line!("the stick-slip cycle: {note}"),
     }
-    if let Some(cause) = &study.cause {
-        print_line!("");
-        print_line!("at {} m/s", format_digits(cause.speed_m_per_s, 3));
-        let [cycle, natural] = [cause.cycle_hz, cause.natural_hz].map(|hz| format_digits(hz, 3));
-        let part = &cause.part;
-        print_line!(
-            "  the cycle has {cycle} Hz; nearest is the natural frequency of the {part}, {natural} Hz"
-        );
-        let slope = format_digits(cause.friction_slope_s_per_m.abs(), 3);
-        let word = if cause.friction_slope_s_per_m < 0.0 { "falls" } else { "rises" };
-        print_line!("  the friction coefficient {word} by {slope} per m/s");
-        if let Some(ratio) = cause.growth.and_then(|growth| growth.feeding_over_damping()) {
-            let ratio = format_digits(ratio, 3);
-            print_line!("  growth by this slope is {ratio} times the decay at constant friction");
-        }
+    if !result.explains_recordings() {
+        warn_line!("warning: {name}: the model does not explain the recordings, so there are no intervals");
+        return Ok(None);
     }
-    if let (Some(remedy), Some(speed)) = (&study.remedy, branch.fold_m_per_s()) {
-        let (speed, factor) = (format_digits(speed, 3), format_digits(remedy.factor, 3));
-        let meaning = remedy.parameter.meaning.split(',').next().unwrap_or_default();
-        let new = remedy.fold_m_per_s.map(|speed| format!("ends at {} m/s", format_digits(speed, 3)));
-        let new = new.unwrap_or_else(|| "does not occur".to_owned());
-        print_line!("chatter {new} instead of {speed} m/s with {factor} times the {meaning}");
-    }
+    Ok(Some(spread))
 }
 
 fn print_interval(interval: &SpeedInterval) {

@@ -10,8 +10,10 @@ use super::job::{FreeParameter, Job};
 use super::linear_model::ParameterCombination;
 use super::misfit::{TraceMisfit, far_from_priors, unexplained_headline};
 use super::uncertainty::ParameterVerdict;
+use crate::model::parameter_spread::ParameterSpread;
 use crate::model::parameters::describe_parameters;
 use crate::model::{Linkage, Pose};
+use crate::stability::chatter::ChatterSummary;
 use crate::text::{pluralise, text_sha256};
 pub(super) use assembly::{FitFindings, ModelledTargets, camera_nuisance_results, predicted_feature_result};
 use serde::{Deserialize, Serialize};
@@ -324,6 +326,10 @@ pub struct FitResult {
     pub findings: Vec<FitFinding>,
     /// Results of the parameters, by key in the scene file preceded by its table.
     pub parameters: BTreeMap<String, ParameterResult>,
+    /// Where and why the fitted blade or slider of the first condition chatters; `None` if the model does not
+    /// explain the recordings.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chatter: Option<ChatterSummary>,
     /// Estimated calibration errors of cameras and freed constants.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub nuisances: Vec<NuisanceResult>,
@@ -424,6 +430,35 @@ impl FitResult {
         job.parameters.iter().map(estimate).collect()
     }
 
+    /// Intervals and correlations of the parameters that are identified, and intervals of the constants of the scene that the fit
+    /// freed. Constants count as uncorrelated with all others.
+    #[must_use]
+    pub fn parameter_spread(&self) -> ParameterSpread {
+        let half = |estimate: f64, lower: Option<f64>, upper: Option<f64>| {
+            Some((estimate - lower?).max(upper? - estimate)).filter(|half| half.is_finite())
+        };
+        let own = self.parameters.iter().map(|(name, found)| {
+            let half_95 = half(found.estimate, found.lower_95, found.upper_95);
+            (name.clone(), found.estimate, half_95.filter(|_| found.verdict == ParameterVerdict::Identified))
+        });
+        let constants = self.nuisances.iter().filter(|nuisance| nuisance.recording.is_none());
+        let constants =
+            constants.map(|n| (n.name.clone(), n.estimate, half(n.estimate, n.lower_95, n.upper_95)));
+        let all: Vec<(String, f64, Option<f64>)> = own.chain(constants).collect();
+        let correlation =
+            |a: &str, b: &str| match self.parameters.contains_key(a) && self.parameters.contains_key(b) {
+                true => self.correlations.get(a)?.get(b).copied(),
+                false => Some(0.0),
+            };
+        let row = |a: &str| all.iter().map(|(b, ..)| correlation(a, b)).collect();
+        ParameterSpread {
+            names: all.iter().map(|(name, ..)| name.clone()).collect(),
+            estimates: all.iter().map(|(_, estimate, _)| *estimate).collect(),
+            halves_95: all.iter().map(|(.., half)| *half).collect(),
+            correlations: all.iter().map(|(name, ..)| row(name)).collect(),
+        }
+    }
+
     /// `"free"` if the fit estimated constants of the scene within priors, `"held"` if it took all as exact.
     pub(crate) fn constants_word(&self) -> &'static str {
         if self.nuisances.iter().any(|nuisance| nuisance.recording.is_none()) { "free" } else { "held" }
@@ -518,6 +553,7 @@ pub(super) fn check_hash(text: &str) -> Result<(), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stability::chatter::{ChatterEstimate, ChatterNumber};
 
     fn sample() -> FitResult {
         let parameter = |estimate, verdict| ParameterResult {
@@ -540,6 +576,13 @@ mod tests {
             status: FitStatus::BudgetExhausted,
             misfit: None,
             findings: vec![],
+            chatter: Some(ChatterSummary {
+                numbers: BTreeMap::from([(
+                    ChatterNumber::End,
+                    ChatterEstimate { value: 0.3, half_95: None },
+                )]),
+                ..ChatterSummary::default()
+            }),
             nuisances: vec![],
             segments: vec![],
             parameters: parameters.into_iter().map(|(name, p)| (name.to_owned(), p)).collect(),

@@ -150,6 +150,7 @@ impl TraceFindings<'_> {
             segments: self.fitted_segments(end),
             misfit: Some(misfit),
             findings: Vec::new(),
+            chatter: None,
             components: Vec::new(),
             features: Vec::new(),
             held_out: Vec::new(),

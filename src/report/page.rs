@@ -100,8 +100,10 @@ fn subject_figures_html(report: &Report, subject: FigureSubject) -> String {
 
 pub(super) fn summary_html(report: &Report) -> String {
     let answer = ReportSummary::from_report(report);
+    let chatter = sentence_html(&answer.chatter);
+    let chatter = if chatter.is_empty() { chatter } else { format!("<p>{chatter}</p>\n") };
     format!(
-        "{}{}<p>{}</p>\n<p><strong>Next:</strong> {}</p>\n",
+        "{}{}<p>{}</p>\n{chatter}<p><strong>Next:</strong> {}</p>\n",
         headline_html(&answer.headline),
         quantities_html(&answer.quantities),
         sentence_html(&answer.certainty),

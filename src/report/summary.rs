@@ -11,7 +11,9 @@ use crate::figures::friction::FrictionLine;
 use crate::fit::misfit::{TraceMisfit, WorstSegment, far_from_priors, unexplained_headline};
 use crate::fit::result::describe_met_targets;
 use crate::model::parameters::{self, describe_parameters};
-use crate::text::{capitalise, format_decimals, format_digits, format_length, format_speed, pluralise};
+use crate::text::{
+    capitalise, format_decimals, format_digits, format_length, format_speed, make_printable, pluralise,
+};
 use serde::Serialize;
 
 /// Ratio of the residual of a run to the noise above which the run deviates visibly from the recording.
@@ -31,6 +33,8 @@ pub(crate) struct ReportSummary {
     pub quantities: Vec<SummaryQuantity>,
     /// Certainty of these numbers.
     pub certainty: Sentence,
+    /// Where and why the blade chatters; empty if it is not known.
+    pub chatter: Sentence,
     /// Recommended next step.
     pub next: Sentence,
 }
@@ -62,6 +66,7 @@ impl ReportSummary {
             headline: report_headline(report),
             quantities: blade_quantities(report),
             certainty: certainty_sentence(report),
+            chatter: chatter_sentences(report),
             next: next_step_sentence(report),
         }
     }
@@ -263,6 +268,13 @@ pub(in crate::report) fn certainty_sentence(report: &Report) -> Sentence {
         " Masses, dampings and every other constant are taken as exact."
     };
     Sentence::new(known_words + constants)
+}
+
+/// Where and why the blade chatters; empty if it is not known.
+pub(in crate::report) fn chatter_sentences(report: &Report) -> Sentence {
+    Sentence::new(
+        report.chatter.as_ref().map_or_else(String::new, |found| make_printable(&found.sentences.join(" "))),
+    )
 }
 
 /// The reason why parameters are not identified, if it is the same for all.

@@ -1,5 +1,6 @@
 //! What a change of the blade or slider does to the speeds at which steady sliding is unstable.
 
+use super::chatter::CycleRemedy;
 use super::cycle_branch::CycleBranch;
 use super::speed_intervals::{SlidingState, unstable_range};
 use super::steady_sliding::SlideFinder;
@@ -109,12 +110,12 @@ pub(super) fn rank_changes(
         let change = |(direction, (speed, inwards, is_found)): (f64, (f64, f64, bool))| {
             let find = |linkage: &Linkage| find_boundary(linkage, direction, speed, inwards);
             is_found
-                .then(|| speed_change(&physical, name, [value, step], speed, |scene| find(&scene.linkage)))?
+                .then(|| number_change(&physical, name, [value, step], speed, |scene| find(&scene.linkage)))?
         };
         let [onset_m_per_s, end_m_per_s] = boundaries.map_or([None; 2], |both| both.map(change));
         let fold = cycle.and_then(|cycle| {
             let find = |scene: &Scene| cycle.find_changed_end(scene);
-            speed_change(&physical, name, [value, step], cycle.end_m_per_s, find)
+            number_change(&physical, name, [value, step], cycle.end_m_per_s, find)
         });
         let fold_m_per_s = fold.map(|moved| if moved.abs() > LEAST_FOLD * highest { moved } else { 0.0 });
         changes.push(ParameterChange { parameter, value, step, onset_m_per_s, end_m_per_s, fold_m_per_s });
@@ -122,18 +123,6 @@ pub(super) fn rank_changes(
     changes.retain(|change| change.size() > LEAST_EFFECT * highest);
     changes.sort_by(|a, b| b.size().total_cmp(&a.size()));
     Ok(changes)
-}
-
-/// A change of one parameter that lowers the speed at which the stick-slip cycle ends.
-#[derive(Debug, Clone, Copy)]
-pub struct CycleRemedy {
-    /// The parameter, one of blade, shoulder or slider.
-    pub parameter: &'static ModelParameter,
-    /// Factor on its value.
-    pub factor: f64,
-    /// The speed at which the cycle of the changed blade or slider ends, m/s, computed for the changed value;
-    /// `None` if no cycle is found and steady sliding is stable.
-    pub fold_m_per_s: Option<f64>,
 }
 
 /// The change of one parameter after which the cycle ends at the lowest speed. A damping is doubled or
@@ -170,14 +159,15 @@ pub(super) fn find_remedy(
             SlideFinder::new(&changed.linkage, cycle.direction).find_intervals(speeds_m_per_s, 100);
         let unstable = unstable_range(&intervals);
         let branch = CycleBranch::from_scene(&changed, cycle.direction, speeds_m_per_s, unstable);
-        let fold_m_per_s = match (branch, unstable) {
+        let cycle_fold_m_per_s = match (branch, unstable) {
             (Some(branch), _) => Some(branch.fold_m_per_s()?),
             (None, None) => None,
             (None, Some(_)) => return None,
         };
-        Some(CycleRemedy { parameter: change.parameter, factor, fold_m_per_s })
+        let parameter = change.parameter.name.to_owned();
+        Some(CycleRemedy { parameter, factor, cycle_fold_m_per_s })
     });
-    let speed = |remedy: &CycleRemedy| remedy.fold_m_per_s.unwrap_or(0.0);
+    let speed = |remedy: &CycleRemedy| remedy.cycle_fold_m_per_s.unwrap_or(0.0);
     computed.min_by(|a, b| speed(a).total_cmp(&speed(b))).filter(|best| speed(best) < cycle.end_m_per_s)
 }
 
@@ -195,13 +185,13 @@ fn change_step(scene: &Scene, name: &str, value: f64) -> Option<f64> {
     scene.with_parameter(ratio, DAMPING_STEP).ok()?.value(name)
 }
 
-/// Change of a speed that `find` computes, m/s per step of a parameter: a central difference over a fraction
-/// of the step. `None` if the speed is not found for the changed blade.
-fn speed_change(
+/// Change of a number, such as a speed, that `find` computes, per step of a parameter: a central difference
+/// over a fraction of the step. `None` if the number is not found for the changed blade.
+pub(super) fn number_change(
     scene: &Scene,
     name: &str,
     [value, step]: [f64; 2],
-    speed: f64,
+    own: f64,
     find: impl Fn(&Scene) -> Option<f64>,
 ) -> Option<f64> {
     /// Fraction of the step. With steps of 1 % the parameter changes by 1e-3 of its value, and the relative
@@ -210,13 +200,13 @@ fn speed_change(
     let find = |factor: f64| find(&scene.with_parameter(name, value + factor * step).ok()?);
     // a parameter at the lower limit of its range cannot fall; the difference is then one-sided
     let (ahead, behind) = (find(FRACTION)?, find(-FRACTION));
-    let (before, width) = behind.map_or((speed, FRACTION), |behind| (behind, 2.0 * FRACTION));
+    let (before, width) = behind.map_or((own, FRACTION), |behind| (behind, 2.0 * FRACTION));
     Some((ahead - before) / width)
 }
 
 /// The boundary of the unstable range near a speed, m/s; `None` if there is none within a third of this
 /// speed.
-fn find_boundary(linkage: &Linkage, direction: f64, speed: f64, inwards: f64) -> Option<f64> {
+pub(super) fn find_boundary(linkage: &Linkage, direction: f64, speed: f64, inwards: f64) -> Option<f64> {
     let mut finder = SlideFinder::new(linkage, direction);
     let mut width = 0.01;
     while width < 0.5 {

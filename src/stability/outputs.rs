@@ -1,6 +1,6 @@
 //! `stability.csv` and `stability.json`.
 
-use super::chatter::ChatterCause;
+use super::chatter::ChatterSummary;
 use super::cycle_branch::CycleEnd;
 use super::speed_intervals::{SlidingState, SpeedInterval, unstable_range};
 use super::steady_sliding::SteadySlide;
@@ -30,7 +30,7 @@ pub fn describe_cycle_end(study: &StabilityStudy) -> String {
     };
     match branch.cycles().last() {
         Some(last) if !last.multipliers.is_empty() && !branch.is_stable_below_end() => {
-            format!("{end}; this cycle is unstable, so the periods of the real vibration are not equal")
+            format!("{end}; this cycle is unstable, so the periods of the real vibration may be unequal")
         }
         _ => end,
     }
@@ -93,9 +93,9 @@ fn shoulder_word(study: &StabilityStudy, slide: &SteadySlide) -> &'static str {
     }
 }
 
-/// The summary: onset and end, intervals of speed, and the ranked changes.
+/// The summary: onset and end, intervals of speed, where and why the blade chatters, and the ranked changes.
 #[must_use]
-pub fn write_stability_json(study: &StabilityStudy) -> Value {
+pub fn write_stability_json(study: &StabilityStudy, chatter: &ChatterSummary) -> Value {
     let range = study.unstable_range();
     let changes: Vec<Value> = study
         .changes
@@ -124,28 +124,10 @@ pub fn write_stability_json(study: &StabilityStudy) -> Value {
         "cycle_fold_m_per_s": study.leading_branch().and_then(|branch| branch.fold_m_per_s()),
         "cycle_fold_kind": study.leading_branch().map(|branch| branch.end),
         "cycle_fold_note": describe_cycle_end(study),
-        "cause": study.cause.as_ref().map_or_else(|| json!("undecided"), describe_cause),
-        "remedy": study.remedy.map(|remedy| json!({
-            "parameter": remedy.parameter.name,
-            "factor": remedy.factor,
-            "cycle_fold_m_per_s": remedy.fold_m_per_s,
-        })),
+        "chatter": chatter,
         "directions": study.own.iter().map(describe_survey).collect::<Vec<_>>(),
         "by_preload": study.by_preload.iter().map(describe_survey).collect::<Vec<_>>(),
         "changes": changes,
-    })
-}
-
-fn describe_cause(cause: &ChatterCause) -> Value {
-    json!({
-        "speed_m_per_s": cause.speed_m_per_s,
-        "cycle_hz": cause.cycle_hz,
-        "part": cause.part,
-        "natural_hz": cause.natural_hz,
-        "friction_slope_s_per_m": cause.friction_slope_s_per_m,
-        "growth_per_s": cause.growth.map(|growth| growth.total_per_s),
-        "growth_with_constant_friction_per_s": cause.growth.map(|growth| growth.constant_friction_per_s),
-        "feeding_over_damping": cause.growth.and_then(|growth| growth.feeding_over_damping()),
     })
 }
 

@@ -1,7 +1,7 @@
 //! The stability of a scene's blade or slider over speed and preload.
 
-use super::changes::{CycleRemedy, ParameterChange, find_remedy, rank_changes};
-use super::chatter::ChatterCause;
+use super::changes::{ParameterChange, find_remedy, rank_changes};
+use super::chatter::{ChatterCause, CycleRemedy};
 use super::cycle_branch::CycleBranch;
 use super::speed_intervals::{SpeedInterval, unstable_range};
 use super::steady_sliding::{NoSliding, SlideFinder, SteadySlide};
@@ -151,7 +151,7 @@ impl StabilityStudy {
         let remedy = cycle.and_then(|cycle| find_remedy(scene, &changes, cycle, speeds));
         let cause = leading.and_then(|branch| {
             let survey = own.iter().find(|survey| survey.direction == branch.direction)?;
-            ChatterCause::from_branch(scene, branch, unstable_range(&survey.intervals))
+            ChatterCause::from_branch(&scene.linkage, branch, unstable_range(&survey.intervals))
         });
         let has_shoulder = scene.linkage.shoulder.is_some();
         let preload_n = own_n;
@@ -162,6 +162,15 @@ impl StabilityStudy {
     #[must_use]
     pub fn leading_branch(&self) -> Option<&CycleBranch> {
         leading_branch(&self.branches)
+    }
+
+    /// The direction of the leading branch or, without a cycle, that in which the instability ends at the
+    /// higher speed.
+    pub(super) fn leading_direction(&self) -> f64 {
+        let end = |survey: &&SlidingSurvey| unstable_range(&survey.intervals).map_or(-1.0, |[_, end]| end);
+        let unstable =
+            || self.own.iter().max_by(|a, b| end(a).total_cmp(&end(b))).map(|survey| survey.direction);
+        self.leading_branch().map(|branch| branch.direction).or_else(unstable).unwrap_or(1.0)
     }
 
     /// The lowest and the highest speed, m/s, at which steady sliding of the scene's blade is unstable in

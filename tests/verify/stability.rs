@@ -6,7 +6,9 @@ use crate::sliding_growth::{simulated_end, simulated_growth};
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
+use wiperlab::model::parameter_spread::ParameterSpread;
 use wiperlab::simulate::scene::Scene;
+use wiperlab::stability::chatter::ChatterNumber;
 use wiperlab::stability::speed_intervals::{SlidingState, unstable_range};
 use wiperlab::stability::steady_sliding::SlideFinder;
 use wiperlab::stability::study::{StabilityStudy, StudyRange};
@@ -54,6 +56,44 @@ fn a_damped_blade_with_constant_friction_is_stable_at_all_speeds() {
     assert_eq!(intervals.len(), 1);
     assert_eq!((intervals[0].state, intervals[0].speeds_m_per_s), (SlidingState::Stable, [0.0, 2.0]));
     assert_eq!(unstable_range(&intervals), None);
+}
+
+/// The intervals of a belt's numbers are those of their closed forms: the end is `ln(N a b / d) / b`, and the
+/// slope of friction is `-a b exp(-b V)`. With correlated parameters the effects partly cancel. If the
+/// intervals are wide enough, the sentences say what is undecided.
+#[test]
+fn intervals_of_a_fit_are_propagated_to_end_and_slope() {
+    let (d, normal, a, b) = (0.669, 2.4525, 0.2, 10.0);
+    let text = format!(
+        "format = 1\ntitle = \"belt\"\n[slider]\nmass_kg = 3.0799\nstiffness_n_per_m = 1191.0\n\
+         damping_n_s_per_m = {d}\nnormal_force_n = {normal}\n[friction]\na = {a}\nb_s_per_m = {b}\nc = 0.15\n\
+         [drive]\nspeed_m_per_s = 0.1\n[run]\nstop_s = 1.0\nsample_rate_hz = 100.0\n"
+    );
+    let scene = Scene::parse("belt.toml", &text).unwrap();
+    let range = StudyRange { speeds_m_per_s: [0.0, 1.0], preloads_n: None, points: 50 };
+    let study = StabilityStudy::from_scene(&scene, range).unwrap();
+    let spread = |share: f64, correlation: Option<f64>| ParameterSpread {
+        names: vec!["friction.a".to_owned(), "slider.damping_n_s_per_m".to_owned()],
+        estimates: vec![a, d],
+        halves_95: vec![Some(share * a), Some(share * d)],
+        correlations: vec![vec![Some(1.0), correlation], vec![correlation, Some(1.0)]],
+    };
+    for correlation in [-0.5_f64, 0.0, 0.9] {
+        let found = study.summarise_chatter(&scene, Some(&spread(0.01, Some(correlation))));
+        let end = found.numbers[&ChatterNumber::End].half_95.unwrap();
+        let expected = 0.01 / b * (2.0 - 2.0 * correlation).sqrt();
+        assert!((end / expected - 1.0).abs() < 1e-4, "{end}, expected {expected}");
+        let slope = found.numbers[&ChatterNumber::FrictionSlope];
+        let expected = -a * b * (-b * found.speed_m_per_s.unwrap()).exp();
+        assert!((slope.value / expected - 1.0).abs() < 1e-6, "{slope:?}, expected {expected}");
+        assert!((slope.half_95.unwrap() / (0.01 * expected.abs()) - 1.0).abs() < 1e-4, "{slope:?}");
+        assert!(found.sentences.iter().all(|sentence| !sentence.contains("undecided")), "{found:?}");
+    }
+    let unknown = study.summarise_chatter(&scene, Some(&spread(0.01, None)));
+    assert_eq!(unknown.numbers[&ChatterNumber::End].half_95, None);
+    assert!(unknown.numbers[&ChatterNumber::FrictionSlope].half_95.is_some());
+    let wide = study.summarise_chatter(&scene, Some(&spread(1.5, Some(0.0))));
+    assert!(wide.sentences[1].contains("whether friction falls with speed there is undecided"), "{wide:?}");
 }
 
 /// A mass on a belt: small vibrations grow at `(N a b exp(-b V) - d) / (2 m)`. They end at the speed

@@ -168,6 +168,15 @@ class FitResult(Mapping[str, Any]):
         return list(self.get("findings", []))
 
     @property
+    def chatter(self) -> dict[str, Any] | None:
+        """Where and why the fitted blade chatters: ``sentences``, and their numbers with intervals.
+
+        None if the model does not explain the recordings.
+        """
+        chatter: dict[str, Any] | None = self.get("chatter")
+        return chatter
+
+    @property
     def verdict(self) -> list[str]:
         """The verdict in the words of the terminal: the first sentence, then the reasons that it leaves out.
 

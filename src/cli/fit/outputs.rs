@@ -7,6 +7,8 @@ use crate::compare::{COMPARISON_FILE, FittedRecording, ModelRun, comparison_tabl
 use crate::draft::{FittedScene, write_fitted_scene};
 use crate::fit::job::HeadSource;
 use crate::fit::result::{FitResult, FitStatus};
+use crate::simulate::scene::Scene;
+use crate::stability::chatter::ChatterSummary;
 
 /// File with the parameters as one row.
 const PARAMETERS_FILE: &str = "parameters.csv";
@@ -22,13 +24,21 @@ impl LoadedJob {
         (0..self.job().conditions.len()).try_for_each(|at| self.driver_path(at).map(|_| ()))
     }
 
-    /// Writes the result and the other files into the folder of the job.
-    pub(crate) fn write_outputs(&self, result: &FitResult, writer: &WritePolicy) -> Outcome<()> {
-        let mut files = vec![(files::RESULT_FILE.to_owned(), result.to_json().into_bytes())];
+    /// Writes the result and the other files into the folder of the job,
+    /// and completes the result with the chatter of the fitted model.
+    pub(crate) fn write_outputs(&self, result: &mut FitResult, writer: &WritePolicy) -> Outcome<()> {
+        let mut files = Vec::new();
         if result.status != FitStatus::Failed {
             files.push((PARAMETERS_FILE.to_owned(), self.parameters_csv(result)?));
-            files.extend(self.comparison_files(result)?);
+            let (compared, first) = self.comparison_files(result)?;
+            files.extend(compared);
+            let explained =
+                result.status.has_ended() && result.has_estimates() && result.explains_recordings();
+            result.chatter = first
+                .filter(|_| explained)
+                .and_then(|scene| ChatterSummary::from_scene(&scene, &result.parameter_spread()));
         }
+        files.insert(0, (files::RESULT_FILE.to_owned(), result.to_json().into_bytes()));
         files::write_outputs(&self.folder, writer, &files)
     }
 
@@ -70,8 +80,9 @@ impl LoadedJob {
         table.into_inner().map_err(Failure::internal)
     }
 
-    /// The files with the recordings compared with the model, and with the scenes at the estimates.
-    fn comparison_files(&self, result: &FitResult) -> Outcome<Vec<(String, Vec<u8>)>> {
+    /// The files with the recordings compared with the model, and with the scenes at the estimates; with the
+    /// scene of the first condition.
+    fn comparison_files(&self, result: &FitResult) -> Outcome<(Vec<(String, Vec<u8>)>, Option<Scene>)> {
         let model = self.problem.fitted_model(result).map_err(Failure::input)?;
         let runs = match run_conditions(self.job(), &model, result) {
             Ok(runs) => runs,
@@ -80,7 +91,7 @@ impl LoadedJob {
                 warn_line!(
                     "warning: {file}: no {COMPARISON_FILE} and no scene: the best model does not run: {why}"
                 );
-                return Ok(Vec::new());
+                return Ok((Vec::new(), None));
             }
         };
         let measured = self.measured.iter().map(|loaded| FittedRecording {
@@ -96,7 +107,7 @@ impl LoadedJob {
             let scene = self.fitted_scene_text(at, run, result)?;
             files.extend(scene.map(|text| (self.scene_file_name(at), text.into_bytes())));
         }
-        Ok(files)
+        Ok((files, runs.into_iter().next().map(|run| run.scene)))
     }
 
     /// Path of the recording that drives the fitted scene of a condition, as written in that scene.

@@ -48,6 +48,7 @@ impl FitFindings<'_> {
             status: self.status,
             misfit: None,
             findings: Vec::new(),
+            chatter: None,
             nuisances: camera_nuisance_results(self.job, &found.cameras),
             segments: Vec::new(),
             parameters: map_names(&names, found.intervals.iter().cloned()),

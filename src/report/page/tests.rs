@@ -9,6 +9,7 @@ use crate::report::{
     CombinationLine, FailureCount, FigureGroup, ProbeLine, Provenance, RecordingLine, RunSummary, SearchLine,
     SourceFile,
 };
+use crate::stability::chatter::ChatterSummary;
 
 pub(in crate::report) fn recording(name: &str, synthetic: bool) -> RecordingLine {
     let still = vec![Some(0.0); 10];
@@ -101,6 +102,7 @@ fn everywhere(t: &str) -> Report {
             upper_95: None,
         }],
         friction: Vec::new(),
+        chatter: Some(ChatterSummary { sentences: vec![own()], ..ChatterSummary::default() }),
         combinations: vec![CombinationLine { words: own(), determined: false, sd_relative: 0.1 }],
         advice: vec![own()],
         comparison: Vec::new(),
@@ -127,6 +129,20 @@ fn everywhere(t: &str) -> Report {
             commands: vec![own()],
         },
     }
+}
+
+/// Where and why the blade chatters is in the answer of the page, and among the lines of the terminal.
+#[test]
+fn the_page_and_the_terminal_say_why_the_blade_chatters() {
+    let sentences = vec!["It chatters.".to_owned(), "At 1 m/s, on the neck.".to_owned()];
+    let report = Report {
+        chatter: Some(ChatterSummary { sentences, ..ChatterSummary::default() }),
+        ..Report::default()
+    };
+    assert!(summary_html(&report).contains("<p>It chatters. At 1 m/s, on the neck.</p>"));
+    let lines = crate::report::verdict::ReportVerdict::from_report(&report).summary();
+    assert!(lines.iter().any(|line| line.starts_with("It chatters. At 1 m/s, on the neck")), "{lines:?}");
+    assert!(!summary_html(&Report::default()).contains("<p></p>"));
 }
 
 #[test]
