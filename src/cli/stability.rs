@@ -179,7 +179,8 @@ fn read_spread(fit: &Path, path: &Path, scene: &Scene) -> Outcome<Option<Paramet
     let spread = result.parameter_spread();
     for (key, estimate) in spread.names.iter().zip(&spread.estimates) {
         let found = scene.value(key).unwrap_or(f64::NAN);
-        if !((found - estimate).abs() <= SAME * estimate.abs()) {
+        let is_same = (found - estimate).abs() <= SAME * estimate.abs();
+        if !is_same {
             let problem = format!(
                 "found {key} = {found}, expected {estimate}, the estimate in {name}; give the scene that this fit wrote"
             );

@@ -107,6 +107,18 @@ pub enum ChatterNumber {
     Feeding,
 }
 
+impl ChatterNumber {
+    const ALL: [Self; 7] = [
+        Self::Onset,
+        Self::End,
+        Self::CycleFold,
+        Self::CycleFrequency,
+        Self::NaturalFrequency,
+        Self::FrictionSlope,
+        Self::Feeding,
+    ];
+}
+
 /// A number with its uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ChatterEstimate {
@@ -184,9 +196,7 @@ impl StabilityStudy {
     /// Summarises a study of a scene. `spread` is the uncertainty of the scene's parameters after a fit.
     #[must_use]
     pub fn summarise_chatter(&self, scene: &Scene, spread: Option<&ParameterSpread>) -> ChatterSummary {
-        use ChatterNumber::*;
-        let all = [Onset, End, CycleFold, CycleFrequency, NaturalFrequency, FrictionSlope, Feeding];
-        let known = all.into_iter().filter_map(|which| {
+        let known = ChatterNumber::ALL.into_iter().filter_map(|which| {
             let value = self.chatter_number(which, scene)?;
             let half_95 = spread.and_then(|spread| self.propagate_number(which, value, scene, spread));
             Some((which, ChatterEstimate { value, half_95 }))
@@ -198,8 +208,15 @@ impl StabilityStudy {
             numbers: known.collect(),
             remedy: self.remedy.clone(),
         };
-        summary.sentences =
-            [Some(self.describe_speeds(&summary)), describe_cause(&summary)].into_iter().flatten().collect();
+        // an end of the range of speeds has no interval even if the fit determines all parameters
+        let is_open = |which| summary.numbers.get(&which).is_some_and(|known| known.half_95.is_none());
+        let open = [ChatterNumber::CycleFrequency, ChatterNumber::FrictionSlope, ChatterNumber::Feeding];
+        let doubt = (spread.is_some() && open.into_iter().any(is_open))
+            .then(|| "Numbers without an interval depend on what the fit does not determine.".to_owned());
+        summary.sentences = [Some(self.describe_speeds(&summary)), describe_cause(&summary), doubt]
+            .into_iter()
+            .flatten()
+            .collect();
         summary
     }
 
