@@ -159,6 +159,8 @@ pub(crate) struct FittedScene<'a> {
     pub scene: &'a Scene,
     /// Name of the operating condition of the scene.
     pub condition: &'a str,
+    /// Index of the condition, and thus of its recording, in the job.
+    pub index: usize,
     /// Whether the recording of the condition is synthetic; `None` if there are only published numbers.
     pub synthetic: Option<bool>,
     /// Path of the recording that drives the scene, relative to the file of the scene; `None` if none drives
@@ -171,7 +173,7 @@ pub(crate) struct FittedScene<'a> {
 /// Writes the scene of a fit at its estimates, with their intervals as comments; `None` if a scene file
 /// cannot express it, for example a start in the air.
 pub(crate) fn write_fitted_scene(fitted: &FittedScene<'_>) -> Option<String> {
-    let FittedScene { scene, condition, synthetic, recording, result } = *fitted;
+    let FittedScene { scene, condition, index, synthetic, recording, result } = *fitted;
     let of = match synthetic {
         Some(true) => "fitted to a synthetic recording, which no camera took",
         Some(false) => "fitted to a recording",
@@ -187,13 +189,14 @@ pub(crate) fn write_fitted_scene(fitted: &FittedScene<'_>) -> Option<String> {
             head.add_comment("The model does not explain the recording: the numbers are those of no blade.");
     }
     let title = format!("{} ({condition})", make_printable(&result.title));
-    write_scene_toml(head, &title, scene, recording, |name| describe_estimate(result, name))
+    write_scene_toml(head, &title, scene, recording, |name| describe_estimate(result, index, name))
 }
 
-/// Describes the estimate of a number with its interval.
-fn describe_estimate(result: &FitResult, name: &str) -> Option<String> {
+/// Describes the estimate of a number in a condition with its interval.
+fn describe_estimate(result: &FitResult, index: usize, name: &str) -> Option<String> {
     let ends = |lower, upper| format_interval(lower, upper, |end| format_digits(end, DIGITS));
-    if let Some(found) = result.parameters.get(name) {
+    let is_own = |free: &str| parameters::name_if_in_recording(free, index) == Some(name);
+    if let Some((_, found)) = result.parameters.iter().find(|(free, _)| is_own(free)) {
         let verdict = found.verdict.name();
         return Some(format!("fitted, {verdict}; 95 %: {}", ends(found.lower_95, found.upper_95)));
     }

@@ -86,7 +86,7 @@ const LETTERS: usize = 10;
 
 /// Symbol of a parameter in the equations, or the first letters of its name if it has no symbol.
 pub(super) fn parameter_symbol(name: &str) -> String {
-    parameters::find_parameter(name).map_or_else(|| truncate_text(name, LETTERS), |row| row.symbol.to_owned())
+    parameters::symbol_with_recording(name).unwrap_or_else(|| truncate_text(name, LETTERS))
 }
 
 #[cfg(test)]
@@ -96,8 +96,8 @@ mod tests {
     #[test]
     fn a_symbol_stands_for_a_known_name_and_a_short_form_for_any_other() {
         assert_eq!(
-            [parameter_symbol("friction.a"), parameter_symbol("something.unheard_of")],
-            ["A".to_owned(), "something\u{2026}".to_owned()]
+            ["friction.a", "friction.a@2", "something.unheard_of"].map(parameter_symbol),
+            ["A", "A@2", "something\u{2026}"]
         );
     }
 }

@@ -211,6 +211,13 @@ pub(crate) fn name_if_in_recording(name: &str, recording: usize) -> Option<&str>
     (number.is_empty() || number.parse() == Ok(recording + 1)).then_some(key)
 }
 
+/// Symbol of a parameter in the equations, with the number of the recording in which it has its own value, as
+/// in `C@2`; `None` if there is no such parameter.
+pub(crate) fn symbol_with_recording(name: &str) -> Option<String> {
+    let number = &name[name_in_scene(name).len()..];
+    find_parameter(name).map(|row| format!("{}{number}", row.symbol))
+}
+
 /// Names of all parameters, in the order of the table.
 #[must_use]
 pub fn parameter_names() -> Vec<&'static str> {
@@ -226,7 +233,7 @@ pub(crate) fn describe_parameters<'a>(names: impl IntoIterator<Item = &'a str>) 
     let camera = |name| CAMERA_ERRORS.iter().find(|(key, _)| *key == name).map(|(_, words)| *words);
     let meaning = |name| find_parameter(name).and_then(|row| row.meaning.split(',').next()).or(camera(name));
     let mut words: Vec<String> = others.iter().map(|name| meaning(name).unwrap_or(name).to_owned()).collect();
-    words.extend(of_law.iter().filter_map(|name| find_parameter(name)).map(|row| row.symbol.to_owned()));
+    words.extend(of_law.iter().filter_map(|name| symbol_with_recording(name)));
     let law = if of_law.is_empty() { "" } else { " of the friction law" };
     join_with_and(&words) + law
 }

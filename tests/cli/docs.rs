@@ -121,8 +121,8 @@ const OTHERWISE: &[(&str, &str, How, &str)] = &[
     ("fuzz/README.md", "fuzz/run 600 tracker scene", Elsewhere, "needs a nightly toolchain"),
 ];
 const MEASURED: &str = "the records of others are not in this repository";
-const IMPORT_MEASURED: &str = "wiperlab import load-250g.csv --out rec --frame-rate-hz 250 --scale m --y-axis up --time \
-                               real --columns time=time_s,tip-x=mass_x_m,head-x=base_x_m";
+const IMPORT_MEASURED: &str = "wiperlab import load-250g.csv --out rec --frame-rate-hz 250 --scale m --time real \
+                               --columns time=time_s,tip-x=mass_x_m,head-x=base_x_m";
 const INIT_MEASURED: &str = "wiperlab init rec --slider --mass-kg 3.0799 --normal-force-n 2.4525 --out fit";
 const CLONE: &str = "git clone --depth 1 https://github.com/rustsec/advisory-db target/advisory-db";
 const SUBMIT_STUDY: &str =

@@ -30,9 +30,12 @@ fn a_first_fit_of_a_slider_finds_its_friction() {
         .map(|cells| format!("{},{},{}\n", cells[0], cells[1], cells[3]))
         .collect();
     project.write("along.csv", &along);
+    let columns = "--columns time=time_s,tip-x=tip_x_m,head-x=head_x_m";
+    let import = format!("import along.csv --out along --frame-rate-hz 250 --scale m --time real {columns}");
+    run(&project, &import.split(' ').collect::<Vec<_>>());
     let init = [
         "init",
-        "along.csv",
+        "along",
         "--slider",
         "--mass-kg",
         "3.0799",
@@ -162,9 +165,16 @@ fn two_loads_share_the_stiffness_and_each_has_its_own_friction() {
         let scene: toml::Table = project.read(&format!("fit/fitted-scene-{}.toml", at + 1)).parse().unwrap();
         let number = |table: &str, key: &str| scene[table][key].as_float().unwrap();
         assert_eq!(number("slider", "normal_force_n"), load.parse::<f64>().unwrap());
-        assert_eq!(number("friction", "c"), found(&format!("friction.c@{}", at + 1))[1]);
+        let name = format!("friction.c@{}", at + 1);
+        assert_eq!(number("friction", "c"), found(&name)[1]);
+        let text = project.read(&format!("fit/fitted-scene-{}.toml", at + 1));
+        let [low, _, high] = found(&name).map(|end| format!("{end:.3}"));
+        let note = text.lines().find(|line| line.starts_with("# fitted")).unwrap();
+        assert!(note.contains(&low) && note.contains(&high), "{note}");
     }
     run(&project, &["report", "fit", "--out", "page"]);
+    let report: Value = serde_json::from_str(&project.read("page/report.json")).unwrap();
+    assert_eq!(report["parameters"][0]["symbol"], "C@1", "{}", report["parameters"]);
     let features =
         job.split("[[trace]]").next().unwrap().to_owned() + job.split("scale_sd = 0.0\n").last().unwrap();
     project.write("fit/features.toml", &features);

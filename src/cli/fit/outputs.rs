@@ -126,6 +126,7 @@ impl LoadedJob {
         Ok(write_fitted_scene(&FittedScene {
             scene: &run.scene,
             condition: &condition.name,
+            index: at,
             synthetic: recording.map(|recording| recording.is_synthetic()),
             recording: driver.as_deref(),
             result,

@@ -312,7 +312,9 @@ fn coordinate_scales(
 
 fn y_direction(exports: &[TrackFile], options: &ImportOptions, report: &mut ImportReport) -> Option<YAxis> {
     let fact = exports.iter().find_map(|export| export.facts.y_axis.as_ref());
-    let Some((stated, why)) = fact else { return options.y_axis };
+    // (tracks without y have no direction to ask for)
+    let has_y = exports.iter().flat_map(|export| &export.tracks).any(|track| track.y.is_some());
+    let Some((stated, why)) = fact else { return options.y_axis.or((!has_y).then_some(YAxis::Up)) };
     let word = |axis: YAxis| if axis == YAxis::Up { "up" } else { "down" };
     match options.y_axis {
         Some(declared) if declared != *stated => {

@@ -121,7 +121,7 @@ fn parameter_line(
     let reasons = (!found.reasons.is_empty()).then(|| found.reasons.join("; "));
     let mut line = ParameterLine {
         name: free.name.clone(),
-        symbol: row.map_or_else(String::new, |p| p.symbol.to_owned()),
+        symbol: parameters::symbol_with_recording(&free.name).unwrap_or_default(),
         unit: row.map(|p| p.unit).filter(|unit| *unit != "1").unwrap_or_default().to_owned(),
         estimate: found.estimate,
         lower_95: found.lower_95,
