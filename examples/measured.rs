@@ -87,11 +87,24 @@ fn format_estimate(found: &ParameterResult, factor: f64, digits: usize) -> Strin
     format!("{:.digits$} ({low} to {high})", factor * found.estimate)
 }
 
+/// The estimate times `factor` at the end of each stage, the shortest segments first.
+fn format_stages(result: &FitResult, key: &str, factor: f64) -> String {
+    let stages = &result.misfit.as_ref().expect("a fit to traces").stages;
+    stages.iter().map(|stage| format!("{:.3}", factor * stage.estimates[key])).collect::<Vec<_>>().join(", ")
+}
+
 /// Root mean square of the residual of a recording and noise of the sensor, um.
 fn format_residual(result: &FitResult, recording: &Recording) -> String {
     let channels = &result.misfit.as_ref().expect("a fit to traces").channels;
     let own = channels.iter().find(|channel| channel.recording == recording.name()).expect("the recording");
     format!("{:.1}, {:.2}", 1e6 * own.residual_rms_m, 1e6 * own.noise_m)
+}
+
+/// A fit and the time that it takes, s.
+fn time_fit(fit: impl Fn() -> FitResult) -> (FitResult, f64) {
+    let begun = std::time::Instant::now();
+    let result = fit();
+    (result, begun.elapsed().as_secs_f64())
 }
 
 fn measure_frame(folder: &Path) {
@@ -107,14 +120,16 @@ fn measure_frame(folder: &Path) {
     };
     let force = |at: usize| GRAVITY * LOADS[at].0;
     println!(
-        "| record | friction, N | expected, N | stiffness, N/m | damping, N s/m | residual, noise, um |"
+        "| record | friction, N | by length of segments | expected, N | stiffness, N/m | damping, N s/m | \
+         residual, noise, um | time, s |"
     );
-    println!("|---|---|---:|---|---|---:|");
-    let line = |name: &str, at: usize, key: &str, result: &FitResult| {
+    println!("|---|---|---|---:|---|---|---:|---:|");
+    let line = |name: &str, at: usize, key: &str, (result, time_s): &(FitResult, f64)| {
         let found = |name: &str| &result.parameters[name];
         println!(
-            "| {name} | {} | {} | {} | {} | {} |",
+            "| {name} | {} | {} | {} | {} | {} | {} | {time_s:.1} |",
             format_estimate(found(key), force(at), 3),
+            format_stages(result, key, force(at)),
             LOADS[at].1,
             format_estimate(found("slider.stiffness_n_per_m"), 1.0, 0),
             format_estimate(found("slider.damping_n_s_per_m"), 1.0, 1),
@@ -122,15 +137,16 @@ fn measure_frame(folder: &Path) {
         );
     };
     for (at, record) in records.iter().enumerate() {
-        let result = fit_records(&[(record, force(at))], &frame, "", &free(""));
+        let result = time_fit(|| fit_records(&[(record, force(at))], &frame, "", &free("")));
         line(&format!("{} alone", record.name()), at, "friction.c", &result);
-        result.notes.iter().filter(|note| note.contains("zeros")).for_each(|note| eprintln!("{note}"));
+        result.0.notes.iter().filter(|note| note.contains("zeros")).for_each(|note| eprintln!("{note}"));
     }
     let all: Vec<_> = records.iter().enumerate().map(|(at, record)| (record, force(at))).collect();
-    let together = fit_records(&all, &frame, "", &free("scope = \"recording\""));
+    let together = time_fit(|| fit_records(&all, &frame, "", &free("scope = \"recording\"")));
     for (at, record) in records.iter().enumerate() {
         line(&format!("{} together", record.name()), at, &format!("friction.c@{}", at + 1), &together);
     }
+    let together = together.0;
     let ends = |at: usize| {
         let found = &together.parameters[&format!("friction.c@{at}")];
         [found.lower_95.unwrap_or(0.0), found.upper_95.unwrap_or(f64::INFINITY)]
@@ -164,9 +180,10 @@ fn measure_frame(folder: &Path) {
 
 fn measure_paper(folder: &Path) {
     println!(
-        "| record | slips a second | scatter of the period | slips, um | scatter | static | kinetic | explained |"
+        "| record | slips a second | scatter of the period | slips, um | scatter | falls | static | kinetic | \
+         explained |"
     );
-    println!("|---|---:|---:|---:|---:|---:|---:|---|");
+    println!("|---|---:|---:|---:|---:|---:|---:|---:|---|");
     for (stiffness, speed) in [(168, 1100), (1002, 1100), (168, 4300), (2254, 1100), (2254, 4300)] {
         let name = format!("k{stiffness}-v{speed}");
         let record = read_recording(&folder.join(format!("paper/{name}.csv")), &name);
@@ -181,44 +198,71 @@ fn measure_paper(folder: &Path) {
         let explained = if misfit.explained { "yes" } else { "no" };
         let identified = result.parameters.values().filter(|p| p.verdict.name() == "identified").count();
         let explained = format!("{explained}; {identified} identified");
-        match record.count_cycles(0..record.grid().frames) {
-            Err(why) => println!("| {name} | {why} | | | | | | {explained} |"),
-            Ok(cycle) => {
-                let times: Vec<f64> = cycle.slips.iter().map(|slip| slip.time_s).collect();
-                let [limit, kinetic] = slip_forces(&record, &times, cycle.period_s, stiffness / weight);
-                println!(
-                    "| {name} | {:.1}({:.1}) | {:.0} % | {:.0} | {:.0} % | {limit} | {kinetic} | {explained} |",
+        let pulls: Vec<f64> =
+            deflections(&record).map(|deflection| -deflection * stiffness / weight).collect();
+        let slips = find_slips(&pulls);
+        let [limit, kinetic] = [|slip: &[f64; 2]| slip[0], |slip: &[f64; 2]| 0.5 * (slip[0] + slip[1])]
+            .map(|force| format_mean(&slips.iter().map(force).collect::<Vec<_>>()));
+        let cycle = record.count_cycles(0..record.grid().frames).map_or_else(
+            |why| format!("{why} | | |"),
+            |cycle| {
+                format!(
+                    "{:.1}({:.1}) | {:.0} % | {:.0} | {:.0} %",
                     cycle.rate_hz,
                     cycle.rate_sd_hz,
                     100.0 * cycle.period_scatter,
                     1e6 * cycle.size_m,
                     100.0 * cycle.size_scatter
-                );
-            }
-        }
+                )
+            },
+        );
+        println!("| {name} | {cycle} | {} | {limit} | {kinetic} | {explained} |", slips.len());
     }
 }
 
-/// Friction coefficients with their 95 % intervals and their scatter from slip to slip. The static one is the
-/// largest pull of the spring within half a period before a slip. If friction is constant during a slip, the
-/// pull falls as far below it as it was above, so the kinetic coefficient is the mean of the largest pull and
-/// the least after the slip.
-fn slip_forces(record: &Recording, times_s: &[f64], period_s: f64, per_m: f64) -> [String; 2] {
-    let (grid, traces) = (record.grid(), record.traces());
-    let pull =
-        |i: usize| per_m * (traces.head_x_m[i].unwrap_or(f64::NAN) - traces.tip_x_m[i].unwrap_or(f64::NAN));
-    let half = (0.5 * period_s * grid.frame_rate_hz) as usize;
-    let pulls = |time_s: f64| {
-        let at = ((time_s - grid.start_s) * grid.frame_rate_hz).round() as usize;
-        let most = (at.saturating_sub(half)..=at).map(pull).fold(f64::MIN, f64::max);
-        let least = (at..(at + half).min(grid.frames)).map(pull).fold(f64::MAX, f64::min);
-        [most, 0.5 * (most + least)]
+/// Position of the slider minus that of its head in every frame, m.
+fn deflections(record: &Recording) -> impl Iterator<Item = f64> {
+    let traces = record.traces();
+    let each = traces.tip_x_m.iter().zip(&traces.head_x_m);
+    each.map(|(tip, head)| tip.unwrap_or(f64::NAN) - head.unwrap_or(f64::NAN))
+}
+
+/// The largest pull before each slip and the smallest after it. A slip is a fall of the pull by more than 0.3
+/// of the range in which nine of ten pulls lie.
+fn find_slips(pulls: &[f64]) -> Vec<[f64; 2]> {
+    let mut sorted = pulls.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let at = |share: f64| sorted[(share * sorted.len() as f64) as usize];
+    let least = 0.3 * (at(0.95) - at(0.05));
+    let (mut slips, mut most, mut extreme): (Vec<[f64; 2]>, Option<f64>, f64) = (Vec::new(), None, pulls[0]);
+    for &pull in pulls {
+        let falls = most.is_some();
+        match most {
+            _ if (pull < extreme) == falls => extreme = pull,
+            None if extreme - pull > least => (most, extreme) = (Some(extreme), pull),
+            Some(before) if pull - extreme > least => {
+                slips.push([before, extreme]);
+                (most, extreme) = (None, pull);
+            }
+            _ => {}
+        }
+    }
+    slips
+}
+
+/// The mean with its 95 % interval and the scatter. Neighbouring slips are alike, so the interval comes from
+/// the means of ten blocks.
+fn format_mean(values: &[f64]) -> String {
+    const BLOCKS: usize = 10;
+    /// 97.5 % quantile of Student's t with nine degrees of freedom.
+    const T: f64 = 2.262;
+    let mean_and_sd = |values: &[f64]| {
+        let count = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / count;
+        (mean, (values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (count - 1.0)).sqrt())
     };
-    let all: Vec<[f64; 2]> = times_s.iter().map(|time_s| pulls(*time_s)).collect();
-    [0, 1].map(|k| {
-        let count = all.len() as f64;
-        let mean = all.iter().map(|one| one[k]).sum::<f64>() / count;
-        let sd = (all.iter().map(|one| (one[k] - mean).powi(2)).sum::<f64>() / (count - 1.0)).sqrt();
-        format!("{mean:.3} +- {:.3} (scatter {sd:.3})", 1.96 * sd / count.sqrt())
-    })
+    let block = |k: usize| &values[k * values.len() / BLOCKS..(k + 1) * values.len() / BLOCKS];
+    let blocks: Vec<f64> = (0..BLOCKS).map(|k| mean_and_sd(block(k)).0).collect();
+    let ((mean, sd), of_blocks) = (mean_and_sd(values), mean_and_sd(&blocks).1);
+    format!("{mean:.3} +- {:.3} (scatter {sd:.3})", T * of_blocks / (BLOCKS as f64).sqrt())
 }

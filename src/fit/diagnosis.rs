@@ -23,6 +23,7 @@ use crate::text::format_trimmed;
 use hypothesis::{Hypothesis, scene_value};
 use portable_math as math;
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Number of segments on which all hypotheses are tried.
 const TRIED_SEGMENTS: usize = 12;
@@ -72,7 +73,11 @@ pub(super) fn diagnose_misfit(
     findings.extend(reasons.map(|reason| FitFinding::new(FindingSource::Misfit, reason)));
     let stage = first_failed_stage(&misfit.stages);
     if let Some(end) = descent.stages.get(stage) {
-        let failed = FailedFit { problem, model, end, stage };
+        let mut problem = problem.clone();
+        for (traced, shoot) in problem.traces.iter_mut().zip(&model.recordings) {
+            traced.noise = Some(Arc::clone(&shoot.noise));
+        }
+        let failed = FailedFit { problem: &problem, model, end, stage };
         findings.extend(failed.try_hypotheses(misfit, journal)?);
     }
     Some(findings)
@@ -152,11 +157,11 @@ impl TriedHypothesis {
             let settings = tried_settings(length_s);
             let middle = start_point(&model, problem.job().search.seed, 0);
             let mut starts: Vec<(Vec<f64>, &[SegmentState])> = Vec::new();
-            if !failed.end.is_junk() {
+            if !failed.end.is_junk(failed.model) {
                 let before = if same_frames && failed.stage > 0 { &failed.end.segments[..] } else { &[] };
                 starts.push((carry_point(&model, &middle, failed.model, &failed.end.point), before));
             }
-            if failed.stage == 0 || failed.end.is_junk() {
+            if failed.stage == 0 || failed.end.is_junk(failed.model) {
                 starts.push((middle, &[]));
             }
             let iterates = starts

@@ -98,8 +98,16 @@ pub struct StageMisfit {
     /// the noise; it is infinite (`null` in a file) if a run of the model fails.
     #[serde(deserialize_with = "or_infinite")]
     pub chi2_per_dof: f64,
+    /// Part of `chi2_per_dof` that the errors of the recorded head of a slider add on average.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub chi2_by_head: f64,
     /// Parameters at the end of the stage, in SI units.
     pub estimates: BTreeMap<String, f64>,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)] // serde passes a reference
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 impl StageMisfit {
@@ -227,7 +235,8 @@ fn bad_segments(stages: &[StageMisfit]) -> Option<String> {
 /// allow.
 fn misfit_above_noise(stages: &[StageMisfit]) -> Option<String> {
     let last = stages.last()?;
-    let most = 1.0 + Z_95 * math::hypot(2.0 * NOISE_SD_RELATIVE, last.chi2_sd());
+    let scatter = 1.0 + Z_95 * math::hypot(2.0 * NOISE_SD_RELATIVE, last.chi2_sd());
+    let most = (1.0 + last.chi2_by_head) * scatter;
     let [found, most_words] = [last.chi2_per_dof, most].map(ratio_text);
     if !last.chi2_per_dof.is_finite() {
         return (last.segments > 0).then(|| "the model cannot run through some segments".to_owned());
@@ -241,7 +250,9 @@ fn misfit_above_noise(stages: &[StageMisfit]) -> Option<String> {
 /// a wrong model accumulates during a run.
 fn misfit_growth(stages: &[StageMisfit]) -> Option<String> {
     let [first, .., last] = stages else { return None };
-    let most = first.chi2_per_dof * (1.0 + MAX_GROWTH + Z_95 * math::hypot(first.chi2_sd(), last.chi2_sd()));
+    let by_head = (last.chi2_by_head - first.chi2_by_head).max(0.0);
+    let scatter = 1.0 + MAX_GROWTH + Z_95 * math::hypot(first.chi2_sd(), last.chi2_sd());
+    let most = (first.chi2_per_dof + by_head) * scatter;
     let grows = last.chi2_per_dof.is_finite() && last.chi2_per_dof > most;
     grows.then(|| {
         format!(

@@ -3,10 +3,12 @@
 use super::job::{CameraPriorSds, HeadSource, Job, TraceChannel, TraceTarget};
 use crate::fit::trace::first_segment_s;
 use crate::recording::Recording;
+use crate::recording::noise::RecordingNoise;
 use crate::recording::channel::{Channel, ReversalInstants, Window};
 use crate::simulate::drive::smooth_head_motion;
 use crate::simulate::scene::Scene;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Default segment lengths of the stages, in units of the first segment length of the blade. The first is
 /// short enough for convergence from the middle of the bounds; the last is the longest for which the motion
@@ -37,6 +39,8 @@ pub(crate) struct TraceData {
     pub head: HeadSource,
     /// Standard deviations of the priors of the camera's errors.
     pub camera: CameraPriorSds,
+    /// Noise of the recording, if it has been measured before.
+    pub noise: Option<Arc<RecordingNoise>>,
 }
 
 /// Reason why a trace cannot be fitted to its recording.
@@ -82,7 +86,7 @@ pub(crate) fn prepare_traces(
         let channels = fitted_channels(aim, recording, &frames).map_err(at)?;
         let head = head_source(aim, recording).map_err(at)?;
         let TraceTarget { condition, noise_m, camera, .. } = *aim;
-        let one = TraceData { condition, channels, head, frames, noise_m, camera };
+        let one = TraceData { condition, channels, head, frames, noise_m, camera, noise: None };
         check_drive(job, one.head).map_err(at)?;
         if let Some(scene) = scenes.get(condition) {
             check_span(scene, &one, recording).map_err(at)?;

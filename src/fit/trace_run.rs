@@ -17,7 +17,7 @@ use super::result::{
 use super::targets::measure_targets;
 use super::trace::{
     CameraUnknown, Iterate, SegmentResiduals, SegmentState, TraceAssessment, TraceDescent, TraceModel,
-    TraceSearchOutcome, TraceSearchSettings, TraceUnknown, UnknownKind, chi2_per_dof, describe_start_limits,
+    TraceSearchOutcome, TraceSearchSettings, TraceUnknown, UnknownKind, chi2_by_head_errors, chi2_per_dof, describe_start_limits,
     search_trace, segment_residuals, undersampled_mode,
 };
 use super::uncertainty::ParameterVerdict;
@@ -175,7 +175,7 @@ impl TraceFindings<'_> {
 
     fn fit_status(&self, best: &TraceDescent) -> FitStatus {
         let is_at_end = best.stages.len() >= self.problem.segment_s().len()
-            || best.last_iterate().is_some_and(Iterate::is_junk);
+            || best.last_iterate().is_some_and(|end| end.is_junk(self.model));
         let is_complete = self.searched.assessment.is_some() && is_at_end;
         match self.stop {
             _ if !self.searched.stopped && is_complete => FitStatus::Converged,
@@ -362,6 +362,7 @@ impl TraceFindings<'_> {
             bad_segments: iterate.count_bad_segments(),
             dof,
             chi2_per_dof,
+            chi2_by_head: chi2_by_head_errors(self.model, iterate, self.problem.job().search.seed),
             estimates: self.parameter_values(iterate),
         }
     }

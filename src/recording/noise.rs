@@ -16,6 +16,7 @@ mod likelihood;
 use super::Recording;
 use blocks::{BlockCut, NoiseBlock, cut_blocks, keep_quiet_blocks};
 use common_noise::{CommonNoise, SharedNoise, measure_common_noise};
+pub(crate) use differences::mean_square_noise;
 pub use differences::{noise_floor, quantisation_step};
 use portable_math as math;
 pub(crate) use short_spectra::noise::{AutoregressiveNoise, Whitener};

@@ -130,6 +130,10 @@ fn is_zero(value: &f64) -> bool {
 /// noise is correlated over a few frames (vibration, sub-pixel bias), and cross-validation would mistake it
 /// for motion. A head moves smoothly within this time.
 const BLOCK_S: f64 = 4e-3;
+/// Time between knots if there are too few frames to average, as a fraction of the length of a piece of the
+/// smooth curve. The error of a cubic between the knots is then about a hundredth of that of the curve, and a
+/// run, whose steps end at knots, takes long steps.
+const KNOT_SHARE: f64 = 0.125;
 /// Minimum number of frames that show the head: cross-validation needs several points per degree of freedom.
 const FEWEST_FRAMES: usize = 10;
 
@@ -173,9 +177,11 @@ pub fn smooth_head_motion(recording: &Recording) -> Result<HeadSpline, HeadMotio
     let block = (BLOCK_S * grid.frame_rate_hz).round() as usize;
     let (first, last) = (points[0].0, points[points.len() - 1].0);
     let block = if block < 3 || (last - first) / block < FEWEST_FRAMES { 1 } else { block };
-    let knots: Vec<usize> =
-        (first..last).step_by(block).filter(|knot| last - knot > block / 2).chain([last]).collect();
-    Ok(HeadSpline::from_points(&grid, &points, block, &knots))
+    let knots = |piece_frames: f64| {
+        let apart = if block > 1 { block } else { ((KNOT_SHARE * piece_frames) as usize).max(1) };
+        (first..last).step_by(apart).filter(|knot| last - knot > apart / 2).chain([last]).collect()
+    };
+    Ok(HeadSpline::from_points(&grid, &points, block, knots))
 }
 
 /// First time at which the head is fast enough for a start in steady slip, s. It is later than the uncertain
@@ -203,7 +209,7 @@ mod tests {
         let wave = |i: usize| 0.01 * (0.4 * i as f64).sin();
         let recorded = {
             let points: Vec<(usize, f64)> = (0..40).map(|i| (i, wave(i))).collect();
-            HeadSpline::from_points(&grid, &points, 1, &(0..40).collect::<Vec<_>>())
+            HeadSpline::from_points(&grid, &points, 1, |_| (0..40).collect())
         };
         let drives = [
             (Drive::Cosine { amplitude_m: 0.0138, frequency_hz: 0.915, delay_s: 0.0 }, 2e-11),

@@ -71,18 +71,32 @@ impl Hypothesis {
         let shortest_s = problem.segment_s().first().copied().unwrap_or_default();
         let scenes =
             || problem.traces.iter().map(|traced| &problem.model.conditions()[traced.condition].scene);
-        let mut all = vec![Self::SwappedPoints, Self::MirroredHeights];
+        let is_slider = scenes().any(|scene| scene.linkage.is_slider());
+        let is_free = |name: &str| problem.job.parameters.iter().any(|free| is_same_quantity(&free.name, name));
+        let mut all = vec![Self::SwappedPoints];
+        if !is_slider {
+            all.push(Self::MirroredHeights);
+        }
         // the model of a blade that is driven by its recorded head is symmetric
         if problem.traces.iter().any(|traced| traced.head == HeadSource::Scene) {
             all.push(Self::MirroredSweep);
         }
-        all.extend(RATE_FACTORS.map(Self::FrameRate));
-        all.extend(SCALE_FACTORS.map(Self::Scale));
+        // another unit of length changes the friction of a slider by the same factor, and another unit of time
+        // changes friction, stiffness and damping: if these are free, the fit has tried all units
+        let has_free_friction = is_slider && is_free("friction.c");
+        let has_free_times =
+            has_free_friction && is_free("slider.stiffness_n_per_m") && is_free("slider.damping_n_s_per_m");
+        if !has_free_times {
+            all.extend(RATE_FACTORS.map(Self::FrameRate));
+        }
+        if !has_free_friction {
+            all.extend(SCALE_FACTORS.map(Self::Scale));
+        }
         all.extend(LATE_SEGMENTS.map(|part| Self::HeadLate(part * shortest_s)));
         all.push(Self::LostFrames);
         let is_held = |name: &&str| {
             scenes().all(|scene| scene.written_values().any(|(own, value)| own == *name && value > 0.0))
-                && !problem.job.parameters.iter().any(|free| is_same_quantity(&free.name, name))
+                && !is_free(name)
         };
         let each = |name| CONSTANT_FACTORS.map(|factor| Self::Constant(name, factor));
         all.extend(CONSTANTS.into_iter().filter(is_held).flat_map(each));
@@ -179,6 +193,15 @@ impl Hypothesis {
             Self::LostFrames => changed.insert_frames(),
             _ => changed.change_recordings(|recording| self.change_recording(recording)),
         };
+        let keeps_noise = match self {
+            Self::Unchanged | Self::Constant(..) | Self::Shoulder(_) => true,
+            // (the positions of a slider do not move)
+            Self::HeadLate(_) => changed.model.conditions().iter().all(|one| one.scene.linkage.is_slider()),
+            _ => false,
+        };
+        if !keeps_noise {
+            changed.traces.iter_mut().for_each(|traced| traced.noise = None);
+        }
         if let Self::FrameRate(_) = self {
             changed.limit_exposures();
         }

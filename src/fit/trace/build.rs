@@ -15,7 +15,7 @@ use crate::fit::trace_data::TraceData;
 use crate::recording::Recording;
 use crate::recording::channel::ReversalInstants;
 use crate::recording::cycles::MOST_UNLIKE;
-use crate::recording::noise::{AutoregressiveNoise, measure_noise};
+use crate::recording::noise::{AutoregressiveNoise, mean_square_noise, measure_noise};
 use crate::recording::quality::{CameraTilt, measure_quality, measure_tilt};
 use crate::simulate::drive::{Drive, HeadMotionError, smooth_head_motion};
 use crate::simulate::scene::{Scene, StartKind};
@@ -95,9 +95,17 @@ fn build_recording(source: &TraceSource<'_>) -> Result<TraceRecording, HeadMotio
     if own_head {
         scene.drive = Drive::Recorded(Arc::new(smooth_head_motion(recording)?));
     }
-    let found = measure_noise(recording);
+    let found = traced.noise.clone().unwrap_or_else(|| Arc::new(measure_noise(recording)));
+    let head_m = match &scene.drive {
+        // (motion makes both estimates too large)
+        Drive::Recorded(curve) if scene.linkage.is_slider() => {
+            let by_frame = mean_square_noise(&recording.traces().head_x_m);
+            curve.noise_m().into_iter().chain(by_frame).reduce(f64::min)
+        }
+        _ => None,
+    };
     let noise = [found.own_tip_x(), found.own_head_y()]
-        .map(|own| channel_noise(scene.linkage.is_slider(), traced, recording, own));
+        .map(|own| channel_noise(traced, recording, own, head_m.filter(|head_m| *head_m > MIN_NOISE_M)));
     let has = |channel| traced.channels.contains(&channel);
     let settings = ObservationSettings {
         tip_x: has(TraceChannel::TipX) || has(TraceChannel::Deflection),
@@ -106,7 +114,8 @@ fn build_recording(source: &TraceSource<'_>) -> Result<TraceRecording, HeadMotio
         noise,
         frames: [traced.frames.start, traced.frames.end],
     };
-    let shared = [found.common.tip_x, found.common.head_y].map(|shared| shared.map(|shared| shared.noise_m));
+    let shared = [&found.common.tip_x, &found.common.head_y]
+        .map(|shared| shared.as_ref().map(|shared| shared.noise_m.clone()));
     let first_segment_s = first_segment_s(&scene.linkage);
     let film = CameraObservation::new(
         recording,
@@ -117,17 +126,18 @@ fn build_recording(source: &TraceSource<'_>) -> Result<TraceRecording, HeadMotio
         glass.as_ref(),
         first_segment_s,
     );
-    Ok(TraceRecording { condition: traced.condition, scene, observation: film })
+    Ok(TraceRecording { condition: traced.condition, scene, observation: film, noise: found })
 }
 
 /// Noise of a channel: the value in the job, if it gives one. Otherwise it is the measured noise without the
-/// part that tip and head have in common. For a slider, this noise must be at most twice that of the head. If
-/// it is not, or if the measurement fails, the noise is white, with the scatter from frame to frame.
+/// part that tip and head have in common. For a slider, this noise must be at most twice `head_m`, the noise of
+/// its recorded head, m. If it is not, or if the measurement fails, the noise is white, with the size `head_m`
+/// or, without it, with the scatter from frame to frame.
 fn channel_noise(
-    is_slider: bool,
     traced: &TraceData,
     recording: &Recording,
     own: Option<AutoregressiveNoise>,
+    head_m: Option<f64>,
 ) -> AutoregressiveNoise {
     let white = |sd_m: f64| {
         let noise = AutoregressiveNoise::white(sd_m.max(MIN_NOISE_M));
@@ -136,14 +146,15 @@ fn channel_noise(
     if let Some(noise_m) = traced.noise_m {
         return white(noise_m);
     }
-    let measured = measure_quality(recording, None);
     // the sensors of slider and head are alike, and a stick-slip cycle of few frames may pass for noise
-    let is_motion = |noise: &AutoregressiveNoise| {
-        let head_m = measured.head_x.noise_m.filter(|head_m| *head_m > MIN_NOISE_M);
-        is_slider && head_m.is_some_and(|head_m| noise.sd() > MOST_UNLIKE * head_m)
-    };
+    let is_motion =
+        |noise: &AutoregressiveNoise| head_m.is_some_and(|head_m| noise.sd() > MOST_UNLIKE * head_m);
     let Some(noise) = own.filter(|noise| !is_motion(noise)) else {
-        return white(measured.head_x.noise_m.or(measured.tip_x.noise_m).unwrap_or(MIN_NOISE_M));
+        let scatter_m = || {
+            let measured = measure_quality(recording, None);
+            measured.head_x.noise_m.or(measured.tip_x.noise_m)
+        };
+        return white(head_m.or_else(scatter_m).unwrap_or(MIN_NOISE_M));
     };
     let sd_m = noise.sd().max(MIN_NOISE_M);
     AutoregressiveNoise::new(sd_m, noise.coefficients().to_vec()).unwrap_or_else(|_| white(sd_m))
@@ -269,6 +280,7 @@ fn camera_unknowns(film: usize, source: &TraceSource<'_>, data: &CameraObservati
 /// Angle and curvature of the glass in the picture, from the path of the tip; `None` if they cannot be
 /// measured.
 fn measure_glass(recording: &Recording) -> Option<CameraTilt> {
+    recording.traces().tip_y_m.iter().flatten().next()?;
     let instants = ReversalInstants::find_instants(recording);
     measure_tilt(recording, &instants, &measure_quality(recording, None)).ok()
 }

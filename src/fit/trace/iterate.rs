@@ -93,19 +93,11 @@ impl Iterate {
 
     /// Whether the iterate explains nothing: most segments are bad, and on average the residuals are far
     /// above the noise. Its parameter values mean nothing.
-    pub(crate) fn is_junk(&self) -> bool {
+    pub(crate) fn is_junk(&self, model: &TraceModel) -> bool {
         /// Chi2 per degree of freedom above which the residuals are far above the noise.
         const JUNK_CHI2: f64 = 10.0;
-        let chi2 = self.chi2_per_dof(BLADE_STATES).0;
+        let chi2 = chi2_per_dof(model, self).0;
         2 * self.count_bad_segments() > self.segments.len() && (chi2 > JUNK_CHI2 || chi2.is_nan())
-    }
-
-    /// Chi2 per degree of freedom, and number of degrees of freedom, with this number of fitted numbers per
-    /// starting state.
-    fn chi2_per_dof(&self, states: usize) -> (f64, usize) {
-        let chi2: f64 = self.segments.iter().map(|segment| segment.chi2).sum();
-        let dof = self.count_data().saturating_sub(states * self.segments.len() + self.point.len()).max(1);
-        (chi2 / dof as f64, dof)
     }
 
     /// Number of segments that fit worse than noise explains.
@@ -122,7 +114,10 @@ const SLIDER_STATES: usize = 2;
 /// Chi2 per degree of freedom, and number of degrees of freedom.
 #[must_use]
 pub fn chi2_per_dof(model: &TraceModel, at: &Iterate) -> (f64, usize) {
-    at.chi2_per_dof(if is_slider(model) { SLIDER_STATES } else { BLADE_STATES })
+    let states = if is_slider(model) { SLIDER_STATES } else { BLADE_STATES };
+    let chi2: f64 = at.segments.iter().map(|segment| segment.chi2).sum();
+    let dof = at.count_data().saturating_sub(states * at.segments.len() + at.point.len()).max(1);
+    (chi2 / dof as f64, dof)
 }
 
 /// Whether the recordings show sliders.
@@ -137,9 +132,9 @@ const SAME_END_SD: f64 = 1.0;
 /// Whether two ends belong to the same stage and differ in every coordinate by at most [`SAME_END_SD`]
 /// standard deviations; `sd` are the standard deviations of the coordinates. Ends that explain nothing are
 /// never the same, unless they are least-squares fits.
-pub(super) fn is_same_end(end: &Iterate, other: &Iterate, sd: &[f64]) -> bool {
+pub(super) fn is_same_end(model: &TraceModel, end: &Iterate, other: &Iterate, sd: &[f64]) -> bool {
     let mut pairs = end.point.iter().zip(&other.point).zip(sd);
-    let is_fit = |at: &Iterate| at.plain || !at.is_junk();
+    let is_fit = |at: &Iterate| at.plain || !at.is_junk(model);
     let comparable = other.stage == end.stage && is_fit(end) && is_fit(other);
     comparable && pairs.all(|((a, b), sd)| (a - b).abs() <= SAME_END_SD * sd)
 }

@@ -67,7 +67,7 @@ pub fn next_iterate(model: &TraceModel, settings: &TraceSearchSettings, before: 
         let next = Iterate { settled: false, number: 0, damping: FIRST_DAMPING, ..before.clone() };
         return Some(Iterate { repeats: 1, ..next });
     }
-    if before.is_junk() {
+    if before.is_junk(model) {
         // neither other starting states nor longer segments help
         return is_slider(model).then(|| continue_plain(model, settings, before))?;
     }
@@ -263,7 +263,7 @@ pub(crate) fn outer_step(model: &TraceModel, before: &Iterate, held: bool) -> It
     const LEAST_STATE_GAIN: f64 = 1e-2;
     const TRIALS: usize = 6;
     let number = before.number + 1;
-    let is_lost = !held && before.stage > 0 && number >= MAX_JUNK_STEPS && before.is_junk();
+    let is_lost = !held && before.stage > 0 && number >= MAX_JUNK_STEPS && before.is_junk(model);
     let used_up = number >= MAX_STEPS || is_lost;
     let stay = || Iterate { number, settled: true, ..before.clone() };
     let Some(at) = normal_equations(model, &before.point, &before.segments, before.plain) else {

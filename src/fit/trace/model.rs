@@ -2,7 +2,9 @@
 
 use super::camera_observation::CameraObservation;
 use super::unknowns::TraceUnknowns;
+use crate::recording::noise::RecordingNoise;
 use crate::simulate::scene::Scene;
+use std::sync::Arc;
 
 /// A recording and the scene that is fitted to it.
 #[derive(Clone)]
@@ -12,6 +14,8 @@ pub struct TraceRecording {
     /// The scene, whose drive moves the head of the model.
     pub scene: Scene,
     pub observation: CameraObservation,
+    /// Noise that was measured on the recording.
+    pub(crate) noise: Arc<RecordingNoise>,
 }
 
 /// Recordings, scenes and unknowns of a trace fit.

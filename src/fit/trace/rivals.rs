@@ -24,7 +24,7 @@ pub(super) fn has_lost(end: &SearchEnd<'_>, other: &Iterate) -> bool {
     let comparable = (other.stage, other.plain, other.whole) == (end.at.stage, end.at.plain, end.at.whole);
     !comparable
         || !other.plain
-        || is_same_end(end.at, other, &end.sd)
+        || is_same_end(end.model, end.at, other, &end.sd)
         || evidence_against(end, other) >= LOST_SD
         || is_same_valley(end, other)
 }
@@ -33,7 +33,7 @@ pub(super) fn has_lost(end: &SearchEnd<'_>, other: &Iterate) -> bool {
 /// lies between them. A search may stop anywhere along a direction that the recordings hardly determine.
 pub(super) fn is_same_minimum(end: &SearchEnd<'_>, other: &Iterate) -> bool {
     other.plain == end.at.plain
-        && (is_same_end(end.at, other, &end.sd) || (other.plain && is_same_valley(end, other)))
+        && (is_same_end(end.model, end.at, other, &end.sd) || (other.plain && is_same_valley(end, other)))
 }
 
 /// Whether the cost at five places on the straight line from one end to another never exceeds that of the

@@ -9,6 +9,7 @@ use super::normal_equations::recording_models;
 use super::prior_conflict::prior_conflicts;
 use super::rivals::{has_lost, is_same_minimum};
 use super::segment_simulation::RecordingModel;
+use super::slider_start::regress_motion;
 use super::uncertainty_run::{MAX_STARTS, SearchEnd, describe_iterate, follow_runs};
 use super::unknowns::{TraceUnknown, UnknownKind};
 use crate::fit::journal::Journal;
@@ -116,7 +117,8 @@ pub fn search_trace(
 
 /// Point at which a start begins, in the coordinates of the unknowns. Start 0 is in the middle of every
 /// range, the others are at random points given by `seed`. Camera errors and unknowns with a prior always
-/// begin at their own `start`.
+/// begin at their own `start`. The first two starts of a slider begin at the values that the equation of
+/// motion gives in the two halves of the recordings.
 #[must_use]
 pub fn start_point(model: &TraceModel, seed: u64, start: usize) -> Vec<f64> {
     /// Fraction of each range, at either end, in which no search starts; one entry per start. Later starts
@@ -130,7 +132,9 @@ pub fn start_point(model: &TraceModel, seed: u64, start: usize) -> Vec<f64> {
         let is_known = unknown.prior.is_some() || matches!(unknown.kind, UnknownKind::Camera { .. });
         if start == 0 || is_known { unknown.start } else { low + share * (high - low) }
     };
-    model.unknowns.0.iter().map(place).collect()
+    let point: Vec<f64> = model.unknowns.0.iter().map(place).collect();
+    let regressed = (start < 2).then(|| regress_motion(model, &point, start)).flatten();
+    regressed.unwrap_or(point)
 }
 
 /// Whether no further start is needed. This is so if the minimum number of starts is reached, another start
@@ -144,23 +148,26 @@ fn has_enough_starts(
 ) -> bool {
     let best = best_descent(descents);
     let Some(end) = descents[best].last_iterate() else { return false };
-    if end.plain && end.is_junk() {
-        return false; // a least-squares fit: another start may still explain the recording
+    let end_search = || SearchEnd::new(model, settings, seed, end);
+    if end.plain && end.is_junk(model) {
+        // a least-squares fit
+        return descents.len() >= MIN_STARTS
+            && end_search().is_some_and(|end| has_company(&end, descents, best));
     }
     // if short segments fit and longer ones do not, the model is wrong, not the start
     let grows = |descent: &&TraceDescent| {
-        descent.stages.len() > 1 && descent.last_iterate().is_some_and(Iterate::is_junk)
+        descent.stages.len() > 1 && descent.last_iterate().is_some_and(|end| end.is_junk(model))
     };
     let has_constants = (0..end.point.len()).any(|i| model.unknowns.is_constant(i));
     let most_junk = if has_constants { MIN_STARTS_SLOW } else { MIN_STARTS };
-    if end.is_junk() && descents.iter().filter(grows).count() >= most_junk {
+    if end.is_junk(model) && descents.iter().filter(grows).count() >= most_junk {
         return true;
     }
     let fewest = if undersampled_mode(model, end).is_some() { MIN_STARTS_SLOW } else { MIN_STARTS };
     // constants that contradict their priors may come from a wrong minimum, even if two starts end there
     let is_plausible =
         |end: SearchEnd<'_>| has_company(&end, descents, best) && prior_conflicts(&end).is_empty();
-    descents.len() >= fewest && SearchEnd::new(model, settings, seed, end).is_some_and(is_plausible)
+    descents.len() >= fewest && end_search().is_some_and(is_plausible)
 }
 
 /// Whether another start ends in the same minimum as the best start.

@@ -172,12 +172,17 @@ impl<'a> RecordingModel<'a> {
         let film = &shoot.observation;
         let scene = unknowns.scene_at(shoot, number, z)?;
         let view = unknowns.camera_at(number, z);
-        let mut directions = vec![
-            TangentDirection::NeckAngle,
-            TangentDirection::LipAngle,
-            TangentDirection::NeckRate,
-            TangentDirection::LipRate,
-        ];
+        let [neck, lip] = scene.linkage.angle_units();
+        // (the neck of a slider does not turn)
+        let mut directions: Vec<TangentDirection> = [
+            (neck, TangentDirection::NeckAngle),
+            (lip, TangentDirection::LipAngle),
+            (neck, TangentDirection::NeckRate),
+            (lip, TangentDirection::LipRate),
+        ]
+        .into_iter()
+        .filter_map(|(unit, direction)| (unit > 0.0).then_some(direction))
+        .collect();
         let states = TangentSeeds::new(&scene, &directions).ok()?;
         let mut effects = Vec::new();
         for (unknown, z) in unknowns.0.iter().zip(z) {
@@ -347,11 +352,11 @@ impl<'a> RecordingModel<'a> {
         let mut residuals = self.model_minus_measured(&shot);
         let rows = residuals.len();
         let mut by_state = DMatrix::zeros(rows, STATES);
-        for (i, column) in by_state.as_mut_slice().chunks_mut(rows.max(1)).enumerate() {
-            // (the neck of a slider does not turn, so derivatives by its state are zero)
-            if self.scene.linkage.angle_units()[i % 2] > 0.0 {
-                self.add_run_derivative(&shot, i, 1.0, column);
-            }
+        // (derivatives by the state of a neck that does not turn are zero)
+        let units = self.scene.linkage.angle_units();
+        let columns = by_state.as_mut_slice().chunks_mut(rows.max(1)).enumerate();
+        for (direction, (_, column)) in columns.filter(|(i, _)| units[i % 2] > 0.0).enumerate() {
+            self.add_run_derivative(&shot, direction, 1.0, column);
         }
         let mut by_unknown = DMatrix::zeros(rows, effects.len());
         for (effect, column) in effects.iter().zip(by_unknown.as_mut_slice().chunks_mut(rows.max(1))) {

@@ -122,7 +122,7 @@ pub(crate) fn describe_start_limits(shoot: &TraceRecording, view: &CameraParamet
 }
 
 /// Smallest speed of the tip over the glass, m/s, that counts as sliding.
-fn least_sliding_speed(film: &CameraObservation) -> f64 {
+pub(super) fn least_sliding_speed(film: &CameraObservation) -> f64 {
     (MIN_SPEED * usual_tip_speed(film)).max(SPEED_DEVIATIONS * speed_sd(film))
 }
 
@@ -208,7 +208,7 @@ fn recorded_motion(
 }
 
 /// Half width, in frames, of the window in which rates are fitted.
-fn half_width_frames(film: &CameraObservation) -> usize {
+pub(super) fn half_width_frames(film: &CameraObservation) -> usize {
     ((HALF_WIDTH * film.first_segment_s * film.rate_hz).round() as usize).max(1)
 }
 

@@ -30,6 +30,15 @@ pub fn noise_floor(samples: &[Option<f64>]) -> Option<f64> {
     noise_of_differences(samples.windows(4).filter_map(third), 3)
 }
 
+/// Standard deviation of white noise from the mean square of the third differences. Steps of a sensor that are
+/// as large as its noise do not change it, as they change [`noise_floor`]; outliers do.
+pub(crate) fn mean_square_noise(samples: &[Option<f64>]) -> Option<f64> {
+    let squares: Vec<f64> =
+        (3..samples.len()).filter_map(|k| difference_at(samples, k, 3)).map(|d| d * d).collect();
+    let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+    (squares.len() >= FEWEST_DIFFERENCES).then(|| (mean / DIFFERENCE_VARIANCES[3]).sqrt())
+}
+
 /// Standard deviation of the white noise whose absolute differences of this order have the same median as
 /// `sizes`.
 pub(crate) fn noise_of_differences(sizes: impl Iterator<Item = f64>, order: usize) -> Option<f64> {
@@ -101,6 +110,20 @@ mod tests {
         let samples: Vec<Option<f64>> = (0..40).map(|i| Some(f64::from(i % 2))).collect();
         let expected = 4.0 / (MAD_OF_NORMAL * 20.0_f64.sqrt());
         assert!((noise_floor(&samples).unwrap() - expected).abs() < 1e-12);
+    }
+
+    /// White noise of variance 1 by the sums of twelve uniform numbers, in steps of 1.5.
+    #[test]
+    fn steps_of_a_sensor_add_a_twelfth_of_their_square() {
+        let mut state = 1u64;
+        let mut uniform = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let mut normal = || (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
+        let samples: Vec<Option<f64>> = (0..4000).map(|_| Some(1.5 * (normal() / 1.5).round())).collect();
+        let expected = (1.0 + 1.5 * 1.5 / 12.0_f64).sqrt();
+        assert!((mean_square_noise(&samples).unwrap() / expected - 1.0).abs() < 0.04);
     }
 
     #[test]

@@ -29,7 +29,8 @@ pub struct HeadSpline {
 }
 
 impl HeadSpline {
-    /// Cubic spline through the values of a smooth curve at the frames `knots`.
+    /// Cubic spline through the values of a smooth curve at the frames `knots`, which may depend on the
+    /// number of frames in a piece of the curve.
     ///
     /// The curve is fitted to `points`: at least three frames of `grid` in rising order, each with a
     /// position, m. For the fit, the positions are averaged in blocks of `block` frames.
@@ -37,10 +38,16 @@ impl HeadSpline {
         grid: &FrameGrid,
         points: &[(usize, f64)],
         block: usize,
-        knots: &[usize],
+        knots: impl Fn(f64) -> Vec<usize>,
     ) -> Self {
         let (frames, positions): (Vec<usize>, Vec<f64>) = points.iter().copied().unzip();
         let curve = fit_smoothing_spline(&frames, &positions, block);
+        let knots = knots(1.0 / curve.pieces_per_frame());
+        Self::follow_curve(grid, curve, &knots)
+    }
+
+    /// Cubic spline through the values of a smooth curve at the frames `knots`.
+    fn follow_curve(grid: &FrameGrid, curve: SmoothingSpline, knots: &[usize]) -> Self {
         let places: Vec<f64> = knots.iter().map(|&frame| curve.position(frame as f64)).collect();
         let ends = [knots[0], knots[knots.len() - 1]].map(|frame| curve.curvature(frame as f64));
         Self { curve: Some(Arc::new(curve)), ..Self::interpolate_positions(grid, knots, &places, ends) }
@@ -89,6 +96,20 @@ impl HeadSpline {
         if let Some(curve) = &self.curve {
             curve.multiply_covariance(row);
         }
+    }
+
+    /// The spline through a smooth curve that differs from the own one by errors as they are expected; `draw`
+    /// returns independent numbers with the standard normal distribution. Without a curve, the same spline.
+    pub(crate) fn draw_like(&self, draw: impl FnMut() -> f64) -> Self {
+        let Some(curve) = &self.curve else { return self.clone() };
+        let frame = |time_s: &f64| ((time_s - self.grid.start_s) * self.grid.frame_rate_hz).round() as usize;
+        let knots: Vec<usize> = self.knots_s.iter().map(frame).collect();
+        Self::follow_curve(&self.grid, curve.draw_like(draw), &knots)
+    }
+
+    /// Standard deviation of the tracked positions about the smooth curve, m, if there is a curve.
+    pub(crate) fn noise_m(&self) -> Option<f64> {
+        self.curve.as_ref().map(|curve| curve.variance_m2.sqrt())
     }
 
     /// Times of the first and the last knot, s.
@@ -180,7 +201,7 @@ mod tests {
 
     fn smoothed(points: &[(usize, f64)]) -> HeadSpline {
         let knots: Vec<usize> = points.iter().map(|point| point.0).collect();
-        HeadSpline::from_points(&GRID, points, 1, &knots)
+        HeadSpline::from_points(&GRID, points, 1, |_| knots.clone())
     }
 
     /// A cubic is reproduced by a spline with any number of pieces, with or without gaps.

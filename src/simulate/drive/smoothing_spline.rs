@@ -41,7 +41,7 @@ pub(super) struct SmoothingSpline {
     /// variance of 1 per frame.
     information: CholeskyFactor,
     /// Noise variance of a single frame, m^2, estimated from the scatter of the blocks.
-    variance_m2: f64,
+    pub(super) variance_m2: f64,
 }
 
 /// First and last frame of the span of a spline.
@@ -132,20 +132,20 @@ impl SmoothingSpline {
             let c = &self.coefficients[piece + k..];
             c[0] - 2.0 * c[1] + c[2]
         });
-        let above = dot(&b_splines::<{ SUPPORT - 2 }>(x), &seconds) * math::powi(self.per_frame(), 2);
+        let above = dot(&b_splines::<{ SUPPORT - 2 }>(x), &seconds) * math::powi(self.pieces_per_frame(), 2);
         let trend: [f64; SUPPORT - 2] =
             std::array::from_fn(|k| ((k + 1) * (k + 2)) as f64 * self.trend[k + 2]);
         let per_frame = 2.0 / (self.span.1 - self.span.0);
         above + evaluate_polynomial(&trend, self.span.to_unit_interval(frame)) * per_frame * per_frame
     }
 
-    fn per_frame(&self) -> f64 {
+    pub(super) fn pieces_per_frame(&self) -> f64 {
         self.pieces as f64 / (self.span.1 - self.span.0)
     }
 
     /// Index of the piece that contains a frame, and position of the frame within this piece, from 0 to 1.
     fn piece_at(&self, frame: f64) -> (usize, f64) {
-        let x = (frame - self.span.0) * self.per_frame();
+        let x = (frame - self.span.0) * self.pieces_per_frame();
         let piece = (x as usize).min(self.pieces - 1);
         (piece, x - piece as f64)
     }
@@ -199,6 +199,16 @@ impl SmoothingSpline {
     pub(crate) fn multiply_covariance(&self, row: &mut [f64]) {
         self.information.solve_in_place(row);
         row.iter_mut().for_each(|x| *x *= self.variance_m2);
+    }
+
+    /// The curve with coefficients that are drawn from their normal distribution around those of this curve;
+    /// `draw` returns independent numbers with the standard normal distribution.
+    pub(super) fn draw_like(&self, mut draw: impl FnMut() -> f64) -> Self {
+        let mut errors: Vec<f64> =
+            self.coefficients.iter().map(|_| self.variance_m2.sqrt() * draw()).collect();
+        self.information.solve_upper_in_place(&mut errors);
+        let coefficients = self.coefficients.iter().zip(errors).map(|(c, error)| c + error).collect();
+        Self { coefficients, information: CholeskyFactor(self.information.0.clone()), ..*self }
     }
 
     /// Means of the B-splines over a block: index of the first nonzero mean, and the values from this index
@@ -279,6 +289,11 @@ impl CholeskyFactor {
             let solved = right[j];
             right[j + 1..].iter_mut().zip(&column[1..]).for_each(|(x, below)| *x -= below * solved);
         }
+        self.solve_upper_in_place(right);
+    }
+
+    /// Replaces the right-hand side of the system of the transposed factor by its solution.
+    fn solve_upper_in_place(&self, right: &mut [f64]) {
         for (j, column) in self.0.iter().enumerate().rev() {
             let below = dot(&column[1..], &right[j + 1..]);
             right[j] = (right[j] - below) / column[0];
