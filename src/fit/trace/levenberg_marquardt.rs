@@ -263,7 +263,9 @@ pub(crate) fn outer_step(model: &TraceModel, before: &Iterate, held: bool) -> It
     const LEAST_STATE_GAIN: f64 = 1e-2;
     const TRIALS: usize = 6;
     let number = before.number + 1;
-    let is_lost = !held && before.stage > 0 && number >= MAX_JUNK_STEPS && before.is_junk(model);
+    let is_late = !held && before.stage > 0 && number >= MAX_JUNK_STEPS;
+    // (a least-squares fit goes on to its minimum)
+    let is_lost = is_late && before.is_junk(model) && !(before.plain && is_slider(model));
     let used_up = number >= MAX_STEPS || is_lost;
     let stay = || Iterate { number, settled: true, ..before.clone() };
     let Some(at) = normal_equations(model, &before.point, &before.segments, before.plain) else {
