@@ -342,7 +342,8 @@ impl BranchWalker {
         while found.len() < POINTS && self.shooter.runs < MOST_RUNS {
             let speed = self.shooter.speed_of(&at.0.unknowns);
             let [lowest, highest] = self.range;
-            if speed > highest || speed < lowest.max(SLOW * highest) {
+            let is_slow = speed < lowest.max(SLOW * highest) && speed_rate(&at) < 0.0;
+            if speed > highest || is_slow {
                 found.truncate((found.len() - 1).max(1));
                 return (found, WalkEnd::EndOfRange);
             }

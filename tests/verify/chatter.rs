@@ -78,6 +78,17 @@ fn a_cycle_is_followed_back_from_vibrations_above_the_range() {
     }
 }
 
+/// If the range is a hundred times as wide as the speeds at which the belt chatters, its cycle still ends where
+/// it does in a narrow range.
+#[test]
+fn a_cycle_at_the_low_end_of_a_wide_range_ends_where_it_does_in_a_narrow_one() {
+    let scene = belt(FALLING, 0.1);
+    let [narrow, wide] = [2.0, 100.0].map(|top| branch_of(&scene, top));
+    assert_eq!((narrow.end, wide.end), (CycleEnd::StickLost, CycleEnd::StickLost));
+    let [found, expected] = [&wide, &narrow].map(|branch| branch.fold_m_per_s().unwrap());
+    assert!((found / expected - 1.0).abs() < 1e-6, "{found} m/s, {expected} m/s");
+}
+
 /// Whether a tip sticks, and for how long after its release it does not.
 #[derive(Default)]
 struct SecondStick {
