@@ -430,8 +430,8 @@ impl FitResult {
         job.parameters.iter().map(estimate).collect()
     }
 
-    /// Intervals and correlations of the parameters that are identified, and intervals of the constants of the
-    /// scene that the fit freed. Constants count as uncorrelated with all others.
+    /// Intervals and correlations of the parameters that are identified, and intervals of the constants of
+    /// the scene that the fit freed. Constants count as uncorrelated with all others.
     #[must_use]
     pub fn parameter_spread(&self) -> ParameterSpread {
         let half = |estimate: f64, lower: Option<f64>, upper: Option<f64>| {

@@ -3,8 +3,8 @@
 use super::job::{CameraPriorSds, HeadSource, Job, TraceChannel, TraceTarget};
 use crate::fit::trace::first_segment_s;
 use crate::recording::Recording;
-use crate::recording::noise::RecordingNoise;
 use crate::recording::channel::{Channel, ReversalInstants, Window};
+use crate::recording::noise::RecordingNoise;
 use crate::simulate::drive::smooth_head_motion;
 use crate::simulate::scene::Scene;
 use std::ops::Range;

@@ -17,8 +17,8 @@ use super::result::{
 use super::targets::measure_targets;
 use super::trace::{
     CameraUnknown, Iterate, SegmentResiduals, SegmentState, TraceAssessment, TraceDescent, TraceModel,
-    TraceSearchOutcome, TraceSearchSettings, TraceUnknown, UnknownKind, chi2_by_head_errors, chi2_per_dof, describe_start_limits,
-    search_trace, segment_residuals, undersampled_mode,
+    TraceSearchOutcome, TraceSearchSettings, TraceUnknown, UnknownKind, chi2_by_head_errors, chi2_per_dof,
+    describe_start_limits, search_trace, segment_residuals, undersampled_mode,
 };
 use super::uncertainty::ParameterVerdict;
 use crate::checkpoint::CheckpointSink;

@@ -166,9 +166,9 @@ pub fn smooth_head_motion(recording: &Recording) -> Result<HeadSpline, HeadMotio
     fit_head_motion(recording, None)
 }
 
-/// Smooth curve like that of [`smooth_head_motion`] for many short runs, which end their steps at knots. Where
-/// there are too few frames to average, its knots are farther apart. The error of the cubics between them is
-/// about a hundredth of that of the curve, but the spectrum of a run without noise shows it.
+/// Smooth curve like that of [`smooth_head_motion`] for many short runs, which end their steps at knots.
+/// Where there are too few frames to average, its knots are farther apart. The error of the cubics between
+/// them is about a hundredth of that of the curve, but the spectrum of a run without noise shows it.
 ///
 /// # Errors
 /// [`HeadMotionError`] if too few frames show the head.

@@ -33,23 +33,14 @@ fn a_first_fit_of_a_slider_finds_its_friction() {
     let columns = "--columns time=time_s,tip-x=tip_x_m,head-x=head_x_m";
     let import = format!("import along.csv --out along --frame-rate-hz 250 --scale m --time real {columns}");
     run(&project, &import.split(' ').collect::<Vec<_>>());
-    let init = [
-        "init",
-        "along",
-        "--slider",
-        "--mass-kg",
-        "3.0799",
-        "--normal-force-n",
-        "2.4525",
-        "--out",
-        "fit",
-    ];
+    let init =
+        ["init", "along", "--slider", "--mass-kg", "3.0799", "--normal-force-n", "2.4525", "--out", "fit"];
     run(&project, &init);
     let said = run(&project, &["fit", "fit/job.toml"]);
     let result: Value = serde_json::from_str(&project.read("fit/result.json")).unwrap();
     assert_eq!(result["misfit"]["explained"], true, "{said}{}", result["misfit"]["reasons"]);
-    // mass and normal force are known to 1 %, the scale of the sensors to 0.5 %: the stiffness is as uncertain
-    // as the mass, friction as stiffness and scale divided by the normal force
+    // mass and normal force are known to 1 %, the scale of the sensors to 0.5 %: the stiffness is as
+    // uncertain as the mass, friction as stiffness and scale divided by the normal force
     let z = 2.0 * 1.96;
     for (name, truth, least, most) in [
         ("friction.c", 0.28, z * 0.015, z * 0.018),

@@ -50,8 +50,8 @@ fn a_map_has_a_row_for_each_mode_and_says_where_sliding_is_unstable() {
     assert_eq!(fs::read_to_string(project.path("map/stability.csv")).unwrap(), table);
 }
 
-/// The scene that the bundled fit wrote gets intervals, and they contain the numbers of the true blade. Another
-/// scene, and a folder without a result, are refused.
+/// The scene that the bundled fit wrote gets intervals, and they contain the numbers of the true blade.
+/// Another scene, and a folder without a result, are refused.
 #[test]
 fn a_fit_gives_intervals_to_the_numbers_of_its_scene() {
     let project = Project::of("twin");

@@ -78,8 +78,8 @@ fn a_cycle_is_followed_back_from_vibrations_above_the_range() {
     }
 }
 
-/// If the range is a hundred times as wide as the speeds at which the belt chatters, its cycle still ends where
-/// it does in a narrow range.
+/// If the range is a hundred times as wide as the speeds at which the belt chatters, its cycle still ends
+/// where it does in a narrow range.
 #[test]
 fn a_cycle_at_the_low_end_of_a_wide_range_ends_where_it_does_in_a_narrow_one() {
     let scene = belt(FALLING, 0.1);
@@ -135,8 +135,9 @@ fn the_cycle_of_a_damped_belt_ends_where_a_released_mass_does_not_stick_again() 
     }
 }
 
-/// Sliding friction of a belt of Coulomb's is constant, so the velocity of the released mass is a damped wave,
-/// known in closed form. The cycle ends by grazing at the speed of the belt that is the wave's next crest.
+/// Sliding friction of a belt of Coulomb's is constant, so the velocity of the released mass is a damped
+/// wave, known in closed form. The cycle ends by grazing at the speed of the belt that is the wave's next
+/// crest.
 #[test]
 fn the_cycle_of_a_damped_coulomb_belt_ends_where_the_crest_of_its_slip_grazes_the_belt() {
     let (damping, drop) = (0.1_f64, 0.5_f64);

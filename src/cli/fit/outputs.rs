@@ -10,6 +10,9 @@ use crate::fit::result::{FitResult, FitStatus};
 use crate::simulate::scene::Scene;
 use crate::stability::chatter::ChatterSummary;
 
+/// Names of files with their contents.
+type FileContents = Vec<(String, Vec<u8>)>;
+
 /// File with the parameters as one row.
 const PARAMETERS_FILE: &str = "parameters.csv";
 
@@ -82,7 +85,7 @@ impl LoadedJob {
 
     /// The files with the recordings compared with the model, and with the scenes at the estimates; with the
     /// scene of the first condition.
-    fn comparison_files(&self, result: &FitResult) -> Outcome<(Vec<(String, Vec<u8>)>, Option<Scene>)> {
+    fn comparison_files(&self, result: &FitResult) -> Outcome<(FileContents, Option<Scene>)> {
         let model = self.problem.fitted_model(result).map_err(Failure::input)?;
         let runs = match run_conditions(self.job(), &model, result) {
             Ok(runs) => runs,

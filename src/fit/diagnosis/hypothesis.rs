@@ -72,7 +72,8 @@ impl Hypothesis {
         let scenes =
             || problem.traces.iter().map(|traced| &problem.model.conditions()[traced.condition].scene);
         let is_slider = scenes().any(|scene| scene.linkage.is_slider());
-        let is_free = |name: &str| problem.job.parameters.iter().any(|free| is_same_quantity(&free.name, name));
+        let is_free =
+            |name: &str| problem.job.parameters.iter().any(|free| is_same_quantity(&free.name, name));
         let mut all = vec![Self::SwappedPoints];
         if !is_slider {
             all.push(Self::MirroredHeights);
@@ -81,8 +82,8 @@ impl Hypothesis {
         if problem.traces.iter().any(|traced| traced.head == HeadSource::Scene) {
             all.push(Self::MirroredSweep);
         }
-        // another unit of length changes the friction of a slider by the same factor, and another unit of time
-        // changes friction, stiffness and damping: if these are free, the fit has tried all units
+        // another unit of length changes the friction of a slider by the same factor, and another unit of
+        // time changes friction, stiffness and damping: if these are free, the fit has tried all units
         let has_free_friction = is_slider && is_free("friction.c");
         let has_free_times =
             has_free_friction && is_free("slider.stiffness_n_per_m") && is_free("slider.damping_n_s_per_m");

@@ -130,9 +130,9 @@ fn build_recording(source: &TraceSource<'_>) -> Result<TraceRecording, HeadMotio
 }
 
 /// Noise of a channel: the value in the job, if it gives one. Otherwise it is the measured noise without the
-/// part that tip and head have in common. For a slider, this noise must be at most twice `head_m`, the noise of
-/// its recorded head, m. If it is not, or if the measurement fails, the noise is white, with the size `head_m`
-/// or, without it, with the scatter from frame to frame.
+/// part that tip and head have in common. For a slider, this noise must be at most twice `head_m`, the noise
+/// of its recorded head, m. If it is not, or if the measurement fails, the noise is white, with the size
+/// `head_m` or, without it, with the scatter from frame to frame.
 fn channel_noise(
     traced: &TraceData,
     recording: &Recording,

@@ -2,8 +2,8 @@
 //!
 //! The spring of a slider passes on the errors of its head. They accumulate during a run, most of all those
 //! near the natural frequency, so chi2 grows with the length of the segments although the model is right.
-//! (The natural frequency of a blade is far above the frequencies at which its head moves. Its tip follows the
-//! errors of the head, and the starting states absorb them.)
+//! (The natural frequency of a blade is far above the frequencies at which its head moves. Its tip follows
+//! the errors of the head, and the starting states absorb them.)
 
 use super::initial_states::RescuePolicy;
 use super::iterate::{Iterate, chi2_per_dof, is_slider};

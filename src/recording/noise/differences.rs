@@ -30,8 +30,8 @@ pub fn noise_floor(samples: &[Option<f64>]) -> Option<f64> {
     noise_of_differences(samples.windows(4).filter_map(third), 3)
 }
 
-/// Standard deviation of white noise from the mean square of the third differences. Steps of a sensor that are
-/// as large as its noise do not change it, as they change [`noise_floor`]; outliers do.
+/// Standard deviation of white noise from the mean square of the third differences. Steps of a sensor that
+/// are as large as its noise do not change it, as they change [`noise_floor`]; outliers do.
 pub(crate) fn mean_square_noise(samples: &[Option<f64>]) -> Option<f64> {
     let squares: Vec<f64> =
         (3..samples.len()).filter_map(|k| difference_at(samples, k, 3)).map(|d| d * d).collect();
