@@ -26,7 +26,7 @@ const SHORTER_SEGMENTS: [f64; 3] = [0.8, 0.65, 0.5];
 const LEAST_GAIN: f64 = 0.1;
 /// Standard deviation, in cycles, of the start of a cycle as measured from the phase of the fundamental. The
 /// shape of a cycle changes with its frequency, so this phase moves relative to the start of the cycle.
-const CYCLE_INSTANT_SD: f64 = 0.05;
+pub(super) const CYCLE_INSTANT_SD: f64 = 0.05;
 /// Distance of two points, in segment lengths, at which their segments share so few frames that the noise of
 /// the points is independent.
 const INDEPENDENT_SEGMENTS: f64 = 0.5;

@@ -161,6 +161,14 @@ impl OscillationAtom {
         self.nepers.filter(over).map_or(1.0, |nepers| (self.onset + OVER_NEPERS / nepers).min(1.0))
     }
 
+    /// Whether it ends within a cycle. It then counts as slow motion, because a step looks the same.
+    pub(crate) fn is_single_swing(&self) -> bool {
+        /// Damping ratio above which an oscillation is over within a cycle: its amplitude falls to a quarter
+        /// in one cycle.
+        const DAMPING: f64 = 0.22;
+        self.nepers.is_some_and(|d| d > DAMPING * math::hypot(d, TAU * self.cycles))
+    }
+
     /// Mean frequency from its onset until it is over, cycles per record.
     pub(crate) fn mean_cycles(&self) -> f64 {
         if self.phase.is_empty() {
@@ -169,14 +177,20 @@ impl OscillationAtom {
         (self.phase_at(self.end_place()) - self.phase_at(self.onset)) / (self.end_place() - self.onset)
     }
 
-    /// Lowest and highest frequency from its onset until it is over, cycles per record.
-    pub fn cycles_range(&self) -> (f64, f64) {
+    /// Positions, from its onset until it is over, at which its frequency is lowest and highest.
+    pub(crate) fn extreme_places(&self) -> (f64, f64) {
         /// Number of positions compared: several between two extremes of a phase of degree nine.
         const POINTS: usize = 33;
-        let at = |k: usize| {
-            self.cycles_at(self.onset + (self.end_place() - self.onset) * k as f64 / (POINTS - 1) as f64)
-        };
-        (0..POINTS).map(at).fold((f64::INFINITY, 0.0), |(low, high), c| (low.min(c), high.max(c)))
+        let lasts = self.end_place() - self.onset;
+        let places = || (0..POINTS).map(|k| self.onset + lasts * k as f64 / (POINTS - 1) as f64);
+        let by_frequency = |a: &f64, b: &f64| self.cycles_at(*a).total_cmp(&self.cycles_at(*b));
+        (places().min_by(by_frequency).unwrap_or(0.0), places().max_by(by_frequency).unwrap_or(0.0))
+    }
+
+    /// Lowest and highest frequency from its onset until it is over, cycles per record.
+    pub fn cycles_range(&self) -> (f64, f64) {
+        let (low, high) = self.extreme_places();
+        (self.cycles_at(low), self.cycles_at(high))
     }
 
     /// Factor of the amplitude by decay since the onset; 0 before it.

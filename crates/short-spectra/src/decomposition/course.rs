@@ -124,6 +124,50 @@ impl CourseAtom {
     }
 }
 
+/// The values of a record minus its trend and minus each part `k` for which `is_subtracted(k)` holds; `None`
+/// for a frame that is not used. `courses` are the values of all parts.
+fn subtract_parts(
+    problem: &NoisyRecord,
+    trend: &[f64],
+    courses: &[Vec<f64>],
+    is_subtracted: impl Fn(usize) -> bool,
+) -> Vec<Option<f64>> {
+    let mut left = vec![None; problem.at.frames];
+    for (i, value) in problem.used.iter().zip(&problem.values) {
+        let others = courses.iter().enumerate().filter(|(k, _)| is_subtracted(*k));
+        left[*i] = Some(value - trend[*i] - others.map(|(_, course)| course[*i]).sum::<f64>());
+    }
+    left
+}
+
+/// The ridge of the strongest oscillation in a band, cycles per record; `None` if it does not drift, or if
+/// the ridge does not follow it through nearly the whole record.
+fn follow_ridge(left: &[Option<f64>], band: (f64, f64)) -> Option<Ridge> {
+    let (share, ridge) = select_best_ridge(left, left.len() as f64, band)?;
+    let is_followed = share >= FULLY_FOLLOWED && median_stray(&ridge) < MOST_STRAY;
+    (is_followed && ridge.is_drifting()).then_some(ridge)
+}
+
+/// The ridge of the oscillation `k` of an explanation. All slower parts are subtracted first. Other
+/// oscillations in its band may be pieces of it, so they stay. `None` unless the ridge extends from the first
+/// frame to the last and has points in nearly all segments.
+pub(super) fn follow_oscillation(problem: &NoisyRecord, found: &Explanation, k: usize) -> Option<Ridge> {
+    let atoms = &found.parts.atoms;
+    let (low, high) = atoms[k].oscillation()?.cycles_range();
+    let most = problem.at.frames as f64 / 2.0;
+    let band = (BAND_MARGIN * low, (high / BAND_MARGIN).min(most));
+    let (trend, courses) = problem.values_everywhere(found);
+    let left = subtract_parts(problem, &trend, &courses, |other| {
+        atoms[other].oscillation().is_none_or(|o| o.mean_cycles() < band.0)
+    });
+    follow_ridge(&left, band).filter(|ridge| ridge.start.is_some() && ridge.end.is_some())
+}
+
+/// The band in which a drifting oscillation is followed begins at this fraction of its lowest frequency and
+/// ends at its highest frequency divided by this fraction. Its harmonics lie outside the band if the highest
+/// frequency is less than 1.4 times the lowest.
+const BAND_MARGIN: f64 = 0.7;
+
 /// The parts of an explanation in which one oscillation along a ridge takes the place of all oscillations in
 /// its range of frequencies, or of the course with the index `replaced`. `None` without a ridge that is
 /// followed through nearly the whole record and whose frequency changes by at least `LEAST_RANGE`.
@@ -148,16 +192,8 @@ pub(super) fn unite_along_ridge(
         Some(o) => o.mean_cycles() < band.0 || old.is_some(),
         None => Some(k) != replaced,
     };
-    let mut left = vec![None; frames];
-    for (i, value) in problem.used.iter().zip(&problem.values) {
-        let others = atoms.iter().enumerate().filter(|part| is_subtracted(*part));
-        left[*i] = Some(value - trend[*i] - others.map(|(k, _)| courses[k][*i]).sum::<f64>());
-    }
-    let (share, ridge) = select_best_ridge(&left, frames as f64, band)?;
-    let is_followed = share >= FULLY_FOLLOWED && median_stray(&ridge) < MOST_STRAY;
-    if !is_followed || !ridge.is_drifting() {
-        return None;
-    }
+    let left = subtract_parts(problem, &trend, &courses, |k| is_subtracted((k, &atoms[k])));
+    let ridge = follow_ridge(&left, band)?;
     let mut course = CourseAtom::from_ridge(ridge, frames)?;
     if course.range.high_hz - course.range.low_hz < LEAST_RANGE {
         return None;

@@ -1,23 +1,24 @@
 //! Components from the parts of a record: each oscillation with standard deviations that include those of the
 //! rivals, and the doubts that follow from the odds.
 
+mod pieces;
+
 use super::atom::{Atom, OscillationAtom};
-use super::course::CourseAtom;
+use super::course::{self, CourseAtom};
 use super::problem::{self, Parts};
 use super::search::Rival;
 use super::{Decomposition, with_noise_of};
-use crate::classification::{
-    Evidence, LEAST_CLEAR_DRIFT, RecordContext, SINGLE_CYCLE_DAMPING, classify_components,
-};
-use crate::component::{Component, Estimator, Harmonic};
+use crate::classification::{Evidence, LEAST_CLEAR_DRIFT, RecordContext, classify_components};
+use crate::component::{Component, DecayingTone, Estimator, Harmonic};
+use crate::frequency_drift::{CYCLE_INSTANT_SD, RidgeMean};
 use crate::periodogram::upper_median;
 use crate::record::SampledRecord;
 use crate::sampling::alias_hz;
 use crate::settings::SpectrumSettings;
-use crate::time_frequency::FrequencyRange;
-use nalgebra::DMatrix;
+use crate::time_frequency::{FrequencyRange, Ridge};
+use nalgebra::{DMatrix, DVector};
 use portable_math as math;
-use std::f64::consts::TAU;
+use std::f64::consts::{SQRT_2, TAU};
 
 /// Rivals whose criterion is higher by more than this, nats, do not count in an average: their odds are below
 /// one in 2,900.
@@ -40,6 +41,9 @@ const CLUSTER_REACH: f64 = 2.5;
 /// An oscillation that drifts across one more than this many times as large may be a piece of it: a model
 /// leaves up to a fifth of an oscillation.
 const MUCH_LARGER: f64 = 5.0;
+/// Standard deviation, resolutions, above which the frequency of several united oscillations is in doubt: up
+/// to this value the frequency lies within the peak of a Hann spectrum.
+const MOST_SPREAD: f64 = 0.5;
 /// Each oscillation of a cluster of at least this many is in doubt.
 const CLUSTER: usize = 3;
 /// An oscillation that begins or is over within the record is in doubt with this number of other such ones:
@@ -52,11 +56,17 @@ const LEAST_DECAY: f64 = 2.0;
 /// amplitude is left at the end.
 const TRANSIENT_NEPERS: f64 = 6.0;
 /// Largest scatter of the frequencies of parts of the record, as chi squared per degree of freedom, of a
-/// single oscillation: chance exceeds it in about one of three hundred.
-const MOST_SCATTER: f64 = 4.5;
+/// single oscillation: chance exceeds it in about one of a thousand.
+const MOST_SCATTER: f64 = 5.5;
+/// Scatter of the frequencies of parts of the record above which the standard deviation of the frequency
+/// includes the scatter: chance exceeds this value in one of twenty.
+const CHANCE_SCATTER: f64 = 2.6;
 /// Number of frames per parameter below which every part is in doubt: the odds hold only for many frames per
 /// parameter.
 const PARAMETERS_WITHIN: usize = 6;
+/// Standard deviation, cycles, of the number of cycles between two instants: if the shape of the cycles
+/// changes, so does the phase of the fundamental at which a cycle begins, at either instant.
+const INSTANTS_SD: f64 = CYCLE_INSTANT_SD * SQRT_2;
 /// Number of columns of a cubic trend.
 const CUBIC_COLUMNS: usize = 4;
 
@@ -72,19 +82,60 @@ struct OscillationReading {
     own_cycles_sd: f64,
     /// The same with the spread of the frequency among the rivals.
     cycles_sd: f64,
+    /// Lowest and highest frequency, if it drifts.
+    range: Option<FrequencyRange>,
+    /// Whether its range comes from its ridge.
+    has_ridge: bool,
     /// Standard deviation of the decay, or of the decay that an oscillation of constant amplitude may have.
     nepers_sd: f64,
     /// Amplitudes of cosine and sine at the onset, for it and each multiple, m.
     amplitudes_m: Vec<[f64; 2]>,
     /// Standard deviation of its amplitude, m.
     amplitude_sd_m: f64,
+    /// Sum of the squares of its whitened values without harmonics, divided by the variance of the whitened
+    /// residual.
+    energy: f64,
+    /// Number of oscillations that are united in it.
+    pieces: usize,
     /// Mean square over the noise within two resolutions, dB.
     snr_db: f64,
+    /// Standard deviation, m, of white noise that disturbs the oscillation as much as the noise of the record
+    /// does.
+    noise_m: f64,
     /// Lead over the best rival that has no oscillation near its frequency, nats; infinite without such a
     /// rival.
     lead: f64,
     /// Chi squared, per degree of freedom, of the frequencies that fit parts of the record best.
     scatter: f64,
+}
+
+/// Lowest and highest frequency of a drifting oscillation, cycles per record, with standard deviations, which
+/// include that of the instants at which cycles begin. `covariance` is that of its shape parameters.
+fn read_range(o: &OscillationAtom, covariance: &DMatrix<f64>) -> FrequencyRange {
+    /// Number of cycles over which the lowest or the highest frequency is measured.
+    const CYCLES: f64 = 4.0;
+    let (low_at, high_at) = o.extreme_places();
+    let shapes = Atom::Oscillation(o.clone()).parameters();
+    let deviation = |s: f64| {
+        // the frequency is linear in the parameters on which it depends
+        let gradient: Vec<f64> = (0..shapes.len())
+            .map(|k| {
+                let mut moved = shapes.clone();
+                moved[k] += 1.0;
+                let moved = Atom::Oscillation(o.clone()).with_parameters(&moved);
+                moved.oscillation().map_or(0.0, |moved| moved.cycles_at(s)) - o.cycles_at(s)
+            })
+            .collect();
+        let gradient = DVector::from_vec(gradient);
+        let variance = (gradient.transpose() * covariance * &gradient)[(0, 0)];
+        math::hypot(variance.max(0.0).sqrt(), INSTANTS_SD / CYCLES * o.cycles_at(s))
+    };
+    FrequencyRange {
+        low_hz: o.cycles_at(low_at),
+        low_sd_hz: deviation(low_at),
+        high_hz: o.cycles_at(high_at),
+        high_sd_hz: deviation(high_at),
+    }
 }
 
 /// Whether an oscillation begins or is over within the record.
@@ -106,6 +157,14 @@ fn amplitude_sd(amplitudes: &[f64], covariance: &DMatrix<f64>) -> f64 {
     (a * a * aa + 2.0 * a * b * ab + b * b * bb).max(0.0).sqrt()
 }
 
+/// Whether two oscillations may be pieces of one: they are closer than `LEAST_APART`, or their peaks overlap
+/// and one of the two begins or ends within the record.
+fn may_be_one(a: &OscillationAtom, b: &OscillationAtom) -> bool {
+    let apart = greatest_distance(a, b);
+    apart < LEAST_APART
+        || (is_transient(a) || is_transient(b)) && apart < lobe_half_width(a).max(lobe_half_width(b))
+}
+
 /// Greatest distance, resolutions, of two frequencies at the start, in the middle and at the end of the
 /// record: cycles that cross are close only where they cross.
 fn greatest_distance(a: &OscillationAtom, b: &OscillationAtom) -> f64 {
@@ -123,6 +182,7 @@ fn to_harmonic(of: &Component, multiple: usize, amplitude_m: f64, frame_rate_hz:
         frequency_sd_hz: times * of.frequency_sd_hz,
         cramer_rao_hz: times * of.cramer_rao_hz,
         amplitude_m,
+        amplitude_sd_m: of.amplitude_sd_m * amplitude_m / of.amplitude_m,
         snr_db: of.snr_db + 20.0 * math::log10(amplitude_m / of.amplitude_m),
         damping_ratio: of.damping_ratio.map(|ratio| ratio / times),
         damping_ratio_sd: of.damping_ratio_sd.map(|sd| sd / times),
@@ -179,9 +239,19 @@ impl Decomposition {
         let frames = record.samples.len();
         let resolution_hz = record.frame_rate_hz / frames as f64;
         let mut read: Vec<(Component, Vec<String>)> = Vec::new();
-        for reading in self.read_oscillations() {
-            let component = self.to_component(&reading, record, resolution_hz);
-            let doubts = self.list_doubts(&reading, resolution_hz);
+        let mut readings = self.read_oscillations();
+        readings.retain(|reading| !reading.atom.is_single_swing());
+        let mut readings = self.unite_pieces(readings);
+        readings.iter_mut().for_each(|reading| self.follow_drift(reading));
+        let with_ridge = readings.iter().filter(|reading| reading.has_ridge);
+        let followed: Vec<FrequencyRange> = with_ridge
+            .filter_map(|reading| reading.range)
+            .chain(self.list_courses().map(|(course, _)| course.range))
+            .collect();
+        for reading in &readings {
+            let component = self.to_component(reading, record, resolution_hz);
+            let mut doubts = self.list_doubts(reading, resolution_hz);
+            doubts.extend(reading.describe_larger(&readings, &followed));
             let multiples = reading.atom.multiples.iter().zip(&reading.amplitudes_m[1..]);
             read.extend(multiples.map(|(multiple, [a, b])| {
                 (to_harmonic(&component, *multiple, math::hypot(*a, *b), record.frame_rate_hz), Vec::new())
@@ -205,6 +275,58 @@ impl Decomposition {
         let evidence: Vec<Evidence> = doubts.into_iter().map(evidence).collect();
         classify_components(&mut components, &evidence, &RecordContext::new(record, resolution_hz, settings));
         components
+    }
+
+    /// Unites oscillations that may be pieces of one: those for which `may_be_one` holds and those of a
+    /// cluster, if they are closer than `CLUSTER_REACH`. If one of such a group has most of the energy, a
+    /// single oscillation takes the place of the group. Its frequency is the mean of theirs, weighted by
+    /// their energies.
+    fn unite_pieces(&self, readings: Vec<OscillationReading>) -> Vec<OscillationReading> {
+        /// A group is united if its strongest oscillation has more than this fraction of its energy.
+        const MOST_ENERGY: f64 = 0.6;
+        let clustered: Vec<bool> = readings.iter().map(|r| self.count_cluster(&r.atom) >= CLUSTER).collect();
+        let mut left: Vec<(OscillationReading, bool)> = readings.into_iter().zip(clustered).collect();
+        left.sort_by(|a, b| b.0.energy.total_cmp(&a.0.energy));
+        let mut united = Vec::new();
+        while !left.is_empty() {
+            let (mut group, mut next) = (vec![left.remove(0)], 0);
+            while next < group.len() {
+                let (from, is_clustered) = group[next].clone();
+                let is_piece = |(other, other_clustered): &(OscillationReading, bool)| {
+                    let together = is_clustered && *other_clustered;
+                    (together || may_be_one(&from.atom, &other.atom))
+                        && median_distance(&from.atom, &other.atom) < CLUSTER_REACH
+                };
+                let (near, rest): (Vec<_>, Vec<_>) = left.into_iter().partition(is_piece);
+                group.extend(near);
+                left = rest;
+                next += 1;
+            }
+            let total: f64 = group.iter().map(|(reading, _)| reading.energy).sum();
+            let mut group: Vec<OscillationReading> = group.into_iter().map(|(reading, _)| reading).collect();
+            if group.len() > 1 && group[0].energy > MOST_ENERGY * total {
+                united.push(OscillationReading::unite(&group));
+            } else {
+                united.append(&mut group);
+            }
+        }
+        united
+    }
+
+    /// Takes the range of a drifting oscillation from its ridge, if the ridge extends from the first frame to
+    /// the last: a polynomial swings at the ends of a record.
+    fn follow_drift(&self, reading: &mut OscillationReading) {
+        if reading.range.is_none() {
+            return;
+        }
+        let atoms = &self.explanation.parts.atoms;
+        let k = atoms.iter().position(|atom| atom.oscillation() == Some(&reading.atom));
+        let ridge = k.and_then(|k| course::follow_oscillation(&self.problem, &self.explanation, k));
+        let same = |ridge: &Ridge| (RidgeMean::from_ridge(ridge).frequency_hz - reading.cycles).abs() < 1.0;
+        if let Some(range) = ridge.filter(same).and_then(|ridge| ridge.range_hz()) {
+            reading.range = Some(range);
+            reading.has_ridge = true;
+        }
     }
 
     /// The oscillations along ridges with the amplitudes of their columns.
@@ -242,28 +364,23 @@ impl Decomposition {
         let frames = record.samples.len();
         let duration_s = frames as f64 / record.frame_rate_hz;
         let ratio = |nepers: f64| nepers / math::hypot(nepers, TAU * o.cycles);
-        let range = (!o.phase.is_empty()).then(|| {
-            let (low, high) = o.cycles_range();
-            let sd_hz = reading.cycles_sd * resolution_hz;
-            FrequencyRange {
-                low_hz: low * resolution_hz,
-                low_sd_hz: 2.0 * sd_hz,
-                high_hz: high * resolution_hz,
-                high_sd_hz: 2.0 * sd_hz,
-            }
-        });
-        let amplitude_m = math::hypot(reading.amplitudes_m[0][0], reading.amplitudes_m[0][1]);
+        let amplitude_m = reading.amplitude_m();
+        let has_decay = o.phase.is_empty() && o.envelope.is_empty();
+        let first = (o.onset * frames as f64).round() as usize;
+        let nepers = o.nepers.unwrap_or(0.0) * (1.0 - o.onset);
+        let alone = DecayingTone { amplitude_m, nepers, noise_m: reading.noise_m };
+        let instants_sd = if reading.range.is_some() { INSTANTS_SD } else { 0.0 };
         Component {
             frequency_hz: reading.cycles * resolution_hz,
-            frequency_sd_hz: reading.cycles_sd * resolution_hz,
-            range_hz: range,
+            frequency_sd_hz: math::hypot(reading.cycles_sd, instants_sd) * resolution_hz,
+            range_hz: reading.range.map(|range| range.times(resolution_hz)),
             begins_s: (o.onset > 0.0).then_some(o.onset * duration_s),
             amplitude_m,
             amplitude_sd_m: reading.amplitude_sd_m,
-            damping_ratio: o.phase.is_empty().then(|| o.nepers.map_or(0.0, ratio)),
-            damping_ratio_sd: o.phase.is_empty().then(|| reading.nepers_sd / (TAU * o.cycles)),
+            damping_ratio: has_decay.then(|| o.nepers.map_or(0.0, ratio)),
+            damping_ratio_sd: has_decay.then(|| reading.nepers_sd / (TAU * o.cycles)),
             snr_db: reading.snr_db,
-            cramer_rao_hz: reading.own_cycles_sd * resolution_hz,
+            cramer_rao_hz: alone.cramer_rao_bound_hz(frames - first, record.frame_rate_hz),
             estimator: Estimator::LeastSquares,
             ..Component::default()
         }
@@ -279,13 +396,13 @@ impl Decomposition {
                 math::exp(reading.lead.max(0.0))
             ));
         }
-        let ratio = o.nepers.map_or(0.0, |d| d / math::hypot(d, TAU * o.cycles));
-        if ratio > SINGLE_CYCLE_DAMPING {
-            doubts
-                .push(format!("it is over within a cycle (damping ratio {ratio:.2}): a step looks the same"));
-        }
         let parts = &self.explanation.parts;
-        let steps = parts.atoms.iter().any(|a| a.oscillation().is_none());
+        let is_slow = |a: &Atom| match a {
+            Atom::Oscillation(o) => o.is_single_swing(),
+            Atom::Course(_) => false,
+            _ => true,
+        };
+        let steps = parts.atoms.iter().any(is_slow);
         let columns = parts.trend.column_count();
         let grown = columns > CUBIC_COLUMNS || steps;
         if grown && o.cycles < SLOW_CYCLES.max(SLOW_CYCLES_PER_COLUMN * columns as f64) {
@@ -295,22 +412,19 @@ impl Decomposition {
             );
         }
         let others = || parts.atoms.iter().filter_map(Atom::oscillation).filter(|other| *other != o);
-        if let Some(apart) = others().map(|other| greatest_distance(o, other)).min_by(f64::total_cmp)
-            && apart < LEAST_APART
-        {
-            doubts.push(format!("another lies {apart:.2} resolutions from it: pieces of one look the same"));
-        }
-        let neighbour = |other: &&OscillationAtom| {
-            greatest_distance(o, other) < lobe_half_width(o).max(lobe_half_width(other))
-        };
-        if others().filter(|other| is_transient(other) || is_transient(o)).any(|other| neighbour(&other)) {
-            doubts.push(
-                "another overlaps it, and one of the two begins or is over within the record: pieces of one \
-                 look the same"
-                    .to_owned(),
-            );
-        }
-        if self.count_cluster(o) >= CLUSTER {
+        if reading.pieces > 1 {
+            if reading.cycles_sd > MOST_SPREAD {
+                doubts.push(format!(
+                    "several oscillations describe it (deviation {:.2e} Hz): it changes, or it is several",
+                    reading.cycles_sd * resolution_hz
+                ));
+            }
+        } else if let Some(other) = others().find(|other| may_be_one(o, other)) {
+            let apart = greatest_distance(o, other);
+            doubts.push(format!(
+                "another oscillation lies {apart:.2} resolutions from it: pieces of one look the same"
+            ));
+        } else if self.count_cluster(o) >= CLUSTER {
             doubts.push(
                 "it is one of several close together: a single one that changes looks the same".to_owned(),
             );
@@ -434,6 +548,7 @@ impl Decomposition {
         for (column, a) in columns.iter().zip(amplitudes).take(2) {
             value.iter_mut().zip(column).for_each(|(x, c)| *x += a * c);
         }
+        let plain = problem::dot(&value, &value);
         let white = self.problem.whiten_values(value);
         let energy = problem::dot(&white, &white) / variance;
         let cycles = o.mean_cycles();
@@ -457,18 +572,25 @@ impl Decomposition {
         let (low, high) = if o.phase.is_empty() { (0.0, 0.0) } else { o.cycles_range() };
         let half_frame = 0.5 * (high - low) / self.problem.at.frames as f64;
         let own_cycles_sd = math::hypot(own.max(0.0).sqrt(), half_frame);
+        let range = (!o.phase.is_empty()).then(|| read_range(o, &covariance.into_owned()));
         let (spread, lead) = self.average_rivals(o, cycles);
         let scatter = self.frequency_scatter(o, amplitudes, &columns, variance);
-        let own_cycles_sd = own_cycles_sd * scatter.max(1.0).sqrt();
+        let own_cycles_sd =
+            if scatter > CHANCE_SCATTER { own_cycles_sd * scatter.sqrt() } else { own_cycles_sd };
         OscillationReading {
             cycles,
             cycles_sd: math::hypot(own_cycles_sd, spread),
             own_cycles_sd,
+            range,
+            has_ridge: false,
             nepers_sd: o.nepers.map_or((12.0 / energy).sqrt(), |_| covariance[(1, 1)].max(0.0).sqrt()),
             amplitude_sd_m: amplitude_sd(amplitudes, all) * self.scale_m,
             // (the energy is that of the oscillation over the variance of the noise; two resolutions hold
             // four of its degrees of freedom)
+            energy,
+            pieces: 1,
             snr_db: 10.0 * math::log10((energy / 4.0).max(1e-9)),
+            noise_m: (plain / energy.max(1e-300)).sqrt() * self.scale_m,
             amplitudes_m: amplitudes.chunks(2).map(|c| [c[0] * self.scale_m, c[1] * self.scale_m]).collect(),
             lead,
             scatter,
