@@ -163,24 +163,6 @@ pub enum HeadMotionError {
 /// # Errors
 /// [`HeadMotionError`] if too few frames show the head.
 pub fn smooth_head_motion(recording: &Recording) -> Result<HeadSpline, HeadMotionError> {
-    fit_head_motion(recording, None)
-}
-
-/// Smooth curve like that of [`smooth_head_motion`] for many short runs, which end their steps at knots.
-/// Where there are too few frames to average, its knots are farther apart. The error of the cubics between
-/// them is about a hundredth of that of the curve, but the spectrum of a run without noise shows it.
-///
-/// # Errors
-/// [`HeadMotionError`] if too few frames show the head.
-pub(crate) fn smooth_head_sparsely(recording: &Recording) -> Result<HeadSpline, HeadMotionError> {
-    /// Time between knots, as a fraction of the length of a piece of the smooth curve.
-    const KNOT_SHARE: f64 = 0.125;
-    fit_head_motion(recording, Some(KNOT_SHARE))
-}
-
-/// Smooth curve with knots at all blocks of frames or, if blocks have one frame, at the distance `knot_share`
-/// in units of the length of a piece of the curve.
-fn fit_head_motion(recording: &Recording, knot_share: Option<f64>) -> Result<HeadSpline, HeadMotionError> {
     let recording = &*recording.resample_to_grid();
     let (grid, frames) = (recording.grid(), recording.traces().head_x_m.iter().enumerate());
     let points: Vec<(usize, f64)> = frames.filter_map(|(frame, x)| Some((frame, (*x)?))).collect();
@@ -191,11 +173,8 @@ fn fit_head_motion(recording: &Recording, knot_share: Option<f64>) -> Result<Hea
     let block = (BLOCK_S * grid.frame_rate_hz).round() as usize;
     let (first, last) = (points[0].0, points[points.len() - 1].0);
     let block = if block < 3 || (last - first) / block < FEWEST_FRAMES { 1 } else { block };
-    let knots = |piece_frames: f64| {
-        let sparse = knot_share.filter(|_| block == 1).map(|share| (share * piece_frames) as usize);
-        let apart = sparse.unwrap_or(block).max(1);
-        (first..last).step_by(apart).filter(|knot| last - knot > apart / 2).chain([last]).collect()
-    };
+    let knots =
+        |_| (first..last).step_by(block).filter(|knot| last - knot > block / 2).chain([last]).collect();
     Ok(HeadSpline::from_points(&grid, &points, block, knots))
 }
 

@@ -29,7 +29,8 @@ const NOT_COMPUTED: [(&str, &str); 13] = [
     ("twins", "counts of the fits of twins"),
 ];
 /// The same for whole tables.
-const TABLES_NOT_COMPUTED: [(&str, &str); 4] = [
+const TABLES_NOT_COMPUTED: [(&str, &str); 5] = [
+    ("chatter.", "a branch of cycles, which `stability` computes again"),
     ("condition", "sensitivities"),
     ("sensitivities.", "evaluations around the estimates"),
     ("correlations.", "sensitivities"),

@@ -17,7 +17,7 @@ use crate::recording::channel::ReversalInstants;
 use crate::recording::cycles::MOST_UNLIKE;
 use crate::recording::noise::{AutoregressiveNoise, mean_square_noise, measure_noise};
 use crate::recording::quality::{CameraTilt, measure_quality, measure_tilt};
-use crate::simulate::drive::{Drive, HeadMotionError, smooth_head_sparsely};
+use crate::simulate::drive::{Drive, HeadMotionError, smooth_head_motion};
 use crate::simulate::scene::{Scene, StartKind};
 use portable_math as math;
 use std::collections::BTreeMap;
@@ -93,7 +93,7 @@ fn build_recording(source: &TraceSource<'_>) -> Result<TraceRecording, HeadMotio
     scene.start = StartKind::Upright;
     let own_head = traced.head == HeadSource::Recording;
     if own_head {
-        scene.drive = Drive::Recorded(Arc::new(smooth_head_sparsely(recording)?));
+        scene.drive = Drive::Recorded(Arc::new(smooth_head_motion(recording)?));
     }
     let found = traced.noise.clone().unwrap_or_else(|| Arc::new(measure_noise(recording)));
     let head_m = match &scene.drive {
