@@ -160,10 +160,11 @@ fn two_loads_share_the_stiffness_and_each_has_its_own_friction() {
         assert_eq!(number("friction", "c"), found(&name)[1]);
         let text = project.read(&format!("fit/fitted-scene-{}.toml", at + 1));
         let [low, _, high] = found(&name);
-        let note = text.lines().find(|line| line.starts_with("# fitted")).unwrap();
-        let stated: Vec<f64> = note.split(' ').filter_map(|word| word.parse().ok()).collect();
-        let [.., stated_low, stated_high] = stated[..] else { panic!("{note}") };
-        assert!((stated_low - low).abs() < 1e-3 && (stated_high - high).abs() < 1e-3, "{note}");
+        let is_stated = |note: &str| {
+            let stated: Vec<f64> = note.split(' ').filter_map(|word| word.parse().ok()).collect();
+            matches!(stated[..], [.., a, b] if (a - low).abs() < 1e-3 && (b - high).abs() < 1e-3)
+        };
+        assert!(text.lines().filter(|line| line.starts_with("# fitted")).any(is_stated), "{text}");
     }
     run(&project, &["report", "fit", "--out", "page"]);
     let report: Value = serde_json::from_str(&project.read("page/report.json")).unwrap();
