@@ -213,14 +213,11 @@ impl SpectrumRequest {
         let frames = frames.start + analysis.skipped_frames..frames.end;
         let (from_s, to_s) = (grid.time_s(frames.start), grid.time_s(frames.end));
         let (stride, removed, count) = (analysis.stride, &analysis.removed, frames.len());
-        let behind_flip = ", cut behind a flip that no trend describes";
-        let cut = if analysis.skipped_frames >= stride { behind_flip } else { "" };
         let rate = grid.frame_rate_hz / stride as f64;
         let every = || format!(" (one of {stride} is tracked: {rate:.6} frames/s)");
         let kept = if stride == 1 { String::new() } else { every() };
         let uneven = recording.describe_resampling().map_or_else(String::new, |said| format!("; {said}"));
-        let note =
-            format!("{from_s:.4} s to {to_s:.4} s{cut}, {count} frames{kept}, {removed} removed{uneven}");
+        let note = format!("{from_s:.4} s to {to_s:.4} s, {count} frames{kept}, {removed} removed{uneven}");
         let cycle = recording.count_cycles(frames.clone());
         Ok(StudiedWindow { recording, exposure_s, frames, analysis, cycle, note, hint })
     }
@@ -258,8 +255,8 @@ impl SpectrumRequest {
     }
 }
 
-/// Advice for a window that contains a whole flip of the blade: no smooth trend fits the motion on both sides
-/// of the flip.
+/// Advice for a window that contains a whole flip of the blade: the flip hides oscillations that occur during
+/// it.
 fn flip_hint(instants: &ReversalInstants, (from_s, to_s): (f64, f64)) -> Option<String> {
     let mut flips = (1..).zip(&instants.reversals).filter_map(|(k, reversal)| Some((k, reversal.flip?)));
     let (k, flip) = flips.find(|(_, flip)| from_s < flip.start_s && flip.end_s < to_s)?;

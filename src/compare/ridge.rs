@@ -8,7 +8,7 @@ use crate::recording::cycles::median_interval_s;
 use short_spectra::time_frequency::{
     Ridge, RidgePoint, Spectrogram, SpectrogramSettings, SpeedPoint, course, default_band_hz,
 };
-use short_spectra::{Oscillation, SpectralAnalysis, SpectrumSettings};
+use short_spectra::{SpectralAnalysis, SpectrumSettings};
 use std::ops::Range;
 
 /// Segment lengths to try, relative to the default length, in ascending order.
@@ -136,7 +136,7 @@ fn track_ridge(
     };
     let band_hz = if band_hz.0 < band_hz.1 { band_hz } else { top_hz };
     // components below the band would disturb the ridge
-    let fast = remove_slow_components(&analysis, rate_hz, band_hz.0);
+    let fast = analysis.fast_motion_m(rate_hz, band_hz.0);
     let mut ridge =
         choose_ridge(&fast, rate_hz, band_hz, segment_s.or(job_segment_s(case)), min_segment_s(case))?;
     let settings = SpectrogramSettings {
@@ -208,23 +208,6 @@ fn choose_ridge(
         lengths.filter(|s| *s >= shortest_s && *s <= most_s).filter_map(|s| cut(Some(s))).collect();
     let most = all.iter().map(|(share, _)| *share).fold(0.0, f64::max);
     all.into_iter().find(|(share, _)| *share >= NEARLY_BEST * most).or(Some(first)).map(|(_, ridge)| ridge)
-}
-
-/// Decay, in nepers per cycle, above which an oscillation counts as dying out within a cycle; it corresponds
-/// to a damping ratio of 0.22.
-const MAX_DECAY_PER_CYCLE: f64 = 1.4;
-
-/// Returns the record, m, after three parts are removed: the trend, oscillations with a frequency below
-/// `low_hz`, and oscillations that die out within a cycle.
-fn remove_slow_components(analysis: &SpectralAnalysis, rate_hz: f64, low_hz: f64) -> Vec<Option<f64>> {
-    // an oscillation that dies out within a cycle belongs to the flip of the blade
-    let rings =
-        |o: &&Oscillation| o.frequency_hz >= low_hz && o.decay_per_s < MAX_DECAY_PER_CYCLE * o.frequency_hz;
-    let kept: Vec<_> = analysis.oscillations.iter().filter(rings).collect();
-    let at = |(i, left): (usize, &Option<f64>)| {
-        left.map(|left| left + kept.iter().map(|o| o.displacement_m(i as f64 / rate_hz)).sum::<f64>())
-    };
-    analysis.residual_m.iter().enumerate().map(at).collect()
 }
 
 /// A frequency counts as that of the stick-slip cycle if its ratio to the rate of the model's sticks is at

@@ -295,7 +295,7 @@ impl AnalysedWindow<'_> {
         let mut fitted =
             analysis.spectrum.components.iter().filter(|c| c.estimator == Estimator::LeastSquares);
         let component = fitted.find(decays)?;
-        let off = |o: &&Oscillation| (o.frequency_hz - component.frequency_hz).abs();
+        let off = |o: &&Oscillation| (o.frequency_hz() - component.frequency_hz).abs();
         let own = analysis.oscillations.iter().min_by(|a, b| off(a).total_cmp(&off(b)))?;
         let start_s = time_s.first().copied()?;
         let data = analysis.residual_m.iter().zip(time_s);
@@ -326,7 +326,7 @@ impl AnalysedWindow<'_> {
         let grid = self.recording.grid();
         let (start_s, length_s) =
             (grid.time_s(self.frames.start), self.frames.len().saturating_sub(1) as f64 / grid.frame_rate_hz);
-        let fastest_hz = self.analysis.oscillations.iter().fold(0.0, |f: f64, o| f.max(o.frequency_hz));
+        let fastest_hz = self.analysis.oscillations.iter().fold(0.0, |f: f64, o| f.max(o.frequency_hz()));
         let points =
             (POINTS_A_CYCLE * fastest_hz * length_s).max(self.frames.len() as f64).min(MOST_POINTS) as usize;
         let times: Vec<f64> = (0..=points).map(|i| length_s * i as f64 / points.max(1) as f64).collect();

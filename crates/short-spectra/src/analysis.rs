@@ -1,22 +1,20 @@
 //! The complete analysis of a record: its parts, their standard deviations, and the reliability of each
 //! frequency.
 
-mod component_estimates;
 mod long_record;
 
+use super::decomposition::{Decomposition, DecompositionSettings, RecordParts};
 use super::error::check_record;
-use super::frequency_drift::{self, DriftCourse};
-use super::model_selection::{FRAMES_PER_COLUMN, ModelFit, ModelSelector};
+use super::frequency_drift::{choose_ridge_band, select_best_ridge};
 use super::multitaper::{Multitaper, TAPERS};
+use super::peaks::find_peaks;
 use super::periodogram::Periodogram;
 use super::settings::ROUNDING;
 use super::time_frequency::Ridge;
-use super::{Detrend, MIN_SAMPLES, Spectrum, SpectrumError, SpectrumSettings, decimation, step_detection};
+use super::{Component, Detrend, MIN_SAMPLES, Spectrum, SpectrumError, SpectrumSettings, decimation};
+pub use crate::decomposition::Oscillation;
 use crate::record::SampledRecord;
-use component_estimates::FitReading;
 use portable_math as math;
-use std::f64::consts::TAU;
-use std::ops::Range;
 
 /// Length, in frames, of the longest record that is fitted: three seconds at 5,000 frames/s, which take about
 /// one second. The computing time grows faster than the length; longer records are analysed by their windowed
@@ -28,23 +26,24 @@ pub const LONGEST_DECOMPOSED: usize = 1 << 14;
 pub struct SpectralAnalysis {
     /// Amplitude spectrum of the record without the removed parts, with the components.
     pub spectrum: Spectrum,
-    /// Number of frames left out at the start of the record, because they contain a step that no model
-    /// describes. All fields below refer to the remaining frames.
+    /// Number of frames left out at the start of the record: those before the first frame with a value, if
+    /// only every second, third ... frame has one. All fields below refer to the remaining frames.
     pub skipped_frames: usize,
     /// Distance, in frames, between frames that may have a value: 1, or more if for example only every second
     /// frame has a value.
     pub stride: usize,
-    /// Trend and relaxations that were removed before the components were estimated.
+    /// Trend, steps and relaxations.
     pub removed: RemovedTrend,
-    /// Sum of trend and relaxations in every frame, m.
+    /// Sum of trend, steps and relaxations in every frame, m.
     pub removed_m: Vec<f64>,
     /// Amplitude, m, that the removed parts would have in each bin of the spectrum.
     pub leakage_m: Vec<f64>,
-    /// The sum of the components in every frame, m; zero for a long record.
+    /// Sum of the oscillations in every frame, m; zero for a long record.
     pub model_m: Vec<f64>,
-    /// Residual in each frame, m.
+    /// Residual in each frame, m; `None` for a frame without a value and for one that is left out, as an
+    /// outlier or within a jump.
     pub residual_m: Vec<Option<f64>>,
-    /// The oscillations among the components, except a drifting one; empty for a long record.
+    /// The oscillations of the record; empty for a long record.
     pub oscillations: Vec<Oscillation>,
     /// Frequency over time of the strongest component above the slow components, if there is one.
     pub ridge: Option<Ridge>,
@@ -56,60 +55,50 @@ pub struct SpectralAnalysis {
     pub noise_floor_m: Vec<f64>,
 }
 
-/// A fitted oscillation.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Oscillation {
-    /// Frequency, Hz.
-    pub frequency_hz: f64,
-    /// Decay of the amplitude, 1/s; zero for a steady oscillation.
-    pub decay_per_s: f64,
-    /// Amplitude at the start of the oscillation, m.
-    pub amplitude_m: f64,
-    /// Phase of the cosine at the start of the record, rad.
-    pub phase_rad: f64,
-    /// Start of the oscillation, s from the record's first frame; 0 if it is present from that frame on.
-    pub begins_s: f64,
-}
+/// Smallest number of frames with a value, per column of the trend, in a record that is analysed.
+const FRAMES_PER_COLUMN: usize = 2;
 
-impl Oscillation {
-    /// Displacement, m, at the time `time_s` after the first frame of the record.
-    #[must_use]
-    pub fn displacement_m(&self, time_s: f64) -> f64 {
-        self.envelope_m(time_s) * math::cos(TAU * self.frequency_hz * time_s + self.phase_rad)
-    }
-
-    /// Amplitude, m, at the time `time_s` after the first frame of the record.
-    pub fn envelope_m(&self, time_s: f64) -> f64 {
-        if time_s < self.begins_s {
-            return 0.0;
-        }
-        self.amplitude_m * math::exp(-self.decay_per_s * (time_s - self.begins_s))
-    }
-}
-
-/// Parts that were removed before the components were estimated.
+/// Slow parts that were removed before the spectrum was computed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RemovedTrend {
     /// The trend.
     pub detrend: Detrend,
-    /// Number of exponential relaxations removed with the trend.
+    /// Number of exponential relaxations.
     pub relaxations: usize,
+    /// Number of steps, including jumps and swings that end within a cycle.
+    pub steps: usize,
+}
+
+impl RemovedTrend {
+    fn from_parts(parts: &RecordParts, settings: &SpectrumSettings) -> Self {
+        let detrend = settings.detrend.unwrap_or(match parts.trend.column_count() {
+            0 => Detrend::None,
+            1 => Detrend::Mean,
+            2 => Detrend::Line,
+            4 => Detrend::Cubic,
+            columns => Detrend::Polynomial(columns - 1),
+        });
+        Self { detrend, relaxations: parts.relaxations, steps: parts.steps }
+    }
 }
 
 impl std::fmt::Display for RemovedTrend {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match (self.detrend, self.relaxations) {
-            (Detrend::None, 0) => f.write_str("nothing"),
-            (detrend, 0) => write!(f, "{detrend}"),
-            (detrend, 1) => write!(f, "{detrend} and a relaxation"),
-            (detrend, count) => write!(f, "{detrend} and {count} relaxations"),
+        let count = |count: usize, one: &str| match count {
+            0 => None,
+            1 => Some(format!("a {one}")),
+            more => Some(format!("{more} {one}s")),
+        };
+        let trend = (self.detrend != Detrend::None).then(|| self.detrend.to_string());
+        let parts = [trend, count(self.steps, "step"), count(self.relaxations, "relaxation")];
+        let parts: Vec<String> = parts.into_iter().flatten().collect();
+        match parts.as_slice() {
+            [] => f.write_str("nothing"),
+            [one] => f.write_str(one),
+            [first @ .., last] => write!(f, "{} and {last}", first.join(", ")),
         }
     }
 }
-
-/// Largest allowed number of columns of a smooth trend. With more, a trend bends as fast as a component, so
-/// the frames after a step are tried instead.
-const MAX_SMOOTH_TREND_COLUMNS: usize = 20;
 
 impl SpectralAnalysis {
     /// The record without the removed parts, m.
@@ -155,97 +144,116 @@ impl SpectralAnalysis {
     }
 
     fn analyse_frames(record: &SampledRecord, settings: &SpectrumSettings) -> Result<Self, SpectrumError> {
+        let (padded, trend) = check_record(record.samples, record.frame_rate_hz, settings)?;
         if record.samples.len() > LONGEST_DECOMPOSED {
-            let (_, trend) = check_record(record.samples, record.frame_rate_hz, settings)?;
             return long_record::analyse_long_record(record, settings, trend);
         }
-        let whole = Self::decompose(record, settings)?;
-        if whole.leaves_only_noise && !whole.trend_competes || settings.detrend.is_some() {
-            return Ok(whole.analysis.with_densities(record.frame_rate_hz));
+        let found = record.samples.iter().flatten().count();
+        let least = MIN_SAMPLES.max(FRAMES_PER_COLUMN * trend.column_count());
+        if found < least {
+            return Err(SpectrumError::TooFew { found, least });
         }
-        let starts = step_detection::starts_after_step(record.samples).into_iter();
-        let behind =
-            starts.filter_map(|start| Self::read_part(record, settings, start..record.samples.len()));
-        let mut plain = None;
-        for part in behind {
-            if part.leaves_only_noise {
-                return Ok(part.analysis.with_densities(record.frame_rate_hz));
-            }
-            plain.get_or_insert(part.analysis);
-        }
-        // a low-order trend after a step is better than a high-order trend through the step
-        let best = plain.filter(|_| whole.trend_competes).unwrap_or(whole.analysis);
-        Ok(best.with_densities(record.frame_rate_hz))
+        let search = DecompositionSettings::new(found, trend, settings.detrend.is_none());
+        let decomposition = Decomposition::from_record(record, search);
+        let parts = decomposition
+            .as_ref()
+            .map_or_else(|| RecordParts::from_trend(record.samples, trend), Decomposition::record_parts);
+        let mut components = decomposition.map_or_else(Vec::new, |found| found.components(record, settings));
+        let (low_hz, high_hz) = settings.band_hz.unwrap_or((0.0, record.frame_rate_hz / 2.0));
+        components.retain(|c| (low_hz..=high_hz).contains(&c.frequency_hz));
+        components.truncate(settings.max_components);
+        Ok(Self::from_parts(record, settings, padded, parts, components))
     }
 
-    /// Analyses each stretch between the steps of a piece. The result for a stretch is that of the first
-    /// range of frames whose fit leaves only noise, or else of the first range whose trend has no waves as
-    /// fast as a component. Fitting a trend through a step would take many times as long as fitting the
-    /// oscillation that the step starts.
-    fn analyse_between_steps(record: &SampledRecord, settings: &SpectrumSettings) -> Vec<Self> {
-        let of_stretch = |tries: &Vec<Range<usize>>| {
-            let mut parts =
-                tries.iter().filter_map(|frames| Self::read_part(record, settings, frames.clone()));
-            let first = parts.next()?;
-            let best = if first.leaves_only_noise {
-                first
-            } else {
-                parts.find(|part| part.leaves_only_noise).unwrap_or(first)
-            };
-            Some(best.analysis.with_densities(record.frame_rate_hz))
-        };
-        step_detection::stretches_between_steps(record.samples).iter().filter_map(of_stretch).collect()
-    }
-
-    /// Analyses some frames of a record; `None` if that fails or if their trend has waves as fast as a
-    /// component.
-    fn read_part(
+    /// The analysis of a record from its parts and components. The spectrum has `padded / 2 + 1` bins.
+    fn from_parts(
         record: &SampledRecord,
         settings: &SpectrumSettings,
-        frames: Range<usize>,
-    ) -> Option<Attempt> {
-        let skipped_frames = frames.start;
-        let part =
-            Self::decompose(&SampledRecord { samples: &record.samples[frames], ..*record }, settings).ok()?;
-        let analysis = Self { skipped_frames, ..part.analysis };
-        (!part.trend_competes).then_some(Attempt { analysis, ..part })
-    }
-    fn decompose(record: &SampledRecord, settings: &SpectrumSettings) -> Result<Attempt, SpectrumError> {
-        let (padded, trend) = check_record(record.samples, record.frame_rate_hz, settings)?;
-        let periodogram = Periodogram::new(record.samples, padded);
+        padded: usize,
+        parts: RecordParts,
+        mut components: Vec<Component>,
+    ) -> Self {
+        let (frames, frame_rate_hz) = (record.samples.len(), record.frame_rate_hz);
+        let resolution_hz = frame_rate_hz / frames as f64;
+        let model = |i: usize| -> f64 {
+            parts.oscillations.iter().map(|o| o.displacement_m(i as f64 / frame_rate_hz)).sum()
+        };
+        let model_m: Vec<f64> = (0..frames).map(model).collect();
+        let residual = |i: usize| {
+            let value = record.samples[i].filter(|_| parts.is_used[i]);
+            value.map(|x| x - parts.slow_m[i] - model_m[i])
+        };
+        let residual_m: Vec<Option<f64>> = (0..frames).map(residual).collect();
+        // The spectrum shows the components in every frame, so that gaps do not broaden their peaks. The
+        // residual is divided by the share of the weights on frames that have one. All weights of a Hann
+        // window add up to half the number of frames.
+        let periodogram = Periodogram::new(&residual_m, padded);
+        let share = periodogram.sums.first / (frames as f64 / 2.0);
+        let shown = residual_m.iter().zip(&model_m).map(|(left, m)| m + left.unwrap_or(0.0) / share);
+        let whole = Periodogram::new(&vec![Some(0.0); frames], padded);
+        let amplitude_m = whole.amplitudes(&shown.collect::<Vec<f64>>());
+        let leakage_m = whole.amplitudes(&parts.slow_m);
+        let left_m =
+            periodogram.amplitudes(&residual_m.iter().map(|x| x.unwrap_or(0.0)).collect::<Vec<f64>>());
         let largest = record.samples.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
         let least_m = (ROUNDING * largest).max(f64::MIN_POSITIVE);
-        let mut search =
-            ModelSelector::new(record.samples, record.frame_rate_hz, &periodogram, trend, least_m);
-        search.trend_grows = settings.detrend.is_none();
-        let least = MIN_SAMPLES.max(FRAMES_PER_COLUMN * trend.column_count());
-        let too_few = || SpectrumError::TooFew { found: record.samples.iter().flatten().count(), least };
-        let mut fit = search.select_model(trend).ok_or_else(too_few)?;
-        let mut course = frequency_drift::find_drift_course(&search, &fit, settings.band_hz);
-        search.noise_is_coloured = true;
-        let drift = course.as_ref().and_then(|course| Some((course.drift_region()?, course.range?)));
-        let smooth = |fit: &ModelFit| fit.model.trend().column_count() <= MAX_SMOOTH_TREND_COLUMNS;
-        if let Some((drifting, range)) = drift {
-            if let Some(pair) = search.split_into_pair(&fit, &range) {
-                // two oscillations that beat look like one with a drifting frequency
-                course = course.map(|course| DriftCourse { range: None, ..course });
-                fit = search.run_second_pass(pair).ok_or_else(too_few)?;
-            } else {
-                search.drift_region = Some(drifting);
-                fit = search.select_without_drift(&fit).ok_or_else(too_few)?;
-            }
-        } else if !search.trend_grows || smooth(&fit) {
-            // if no trend describes a step, a second pass would split the motion into pieces
-            fit = search.run_second_pass(fit).ok_or_else(too_few)?;
+        let band_hz = settings.band_hz.unwrap_or((0.0, frame_rate_hz / 2.0));
+        let left = periodogram.windowed_spectrum(&left_m, frame_rate_hz, least_m);
+        let noise_floor_m = find_peaks(&left, band_hz, 1).floor_m;
+        let bin_hz = frame_rate_hz / padded as f64;
+        for component in components.iter_mut().filter(|c| c.range_hz.is_none()) {
+            component.leakage_m = leakage_m.get((component.frequency_hz / bin_hz).round() as usize).copied();
         }
-        let exhausted = search.trend_grows && fit.model.trend().next_richer().is_none();
-        let trend_competes = search.trend_grows && (!smooth(&fit) || search.trend_competes(&fit));
-        let leaves_only_noise = !exhausted
-            && !search.contains_step(&fit)
-            && (search.drift_region.is_some() || search.leaves_only_noise(&fit));
-        let fitted = FitReading::new(&search, fit).ok_or_else(too_few)?;
-        let analysis = fitted.to_analysis(record, settings, course);
-        Ok(Attempt { leaves_only_noise, trend_competes, analysis })
+        let spectrum = Spectrum {
+            frequency_hz: (0..amplitude_m.len()).map(|k| k as f64 * bin_hz).collect(),
+            noise_floor_m,
+            resolution_hz,
+            noise_bandwidth_hz: periodogram.noise_bandwidth_hz(frame_rate_hz),
+            present: record.samples.iter().flatten().count() as f64 / frames as f64,
+            components,
+            amplitude_m,
+        };
+        let analysis = Self {
+            spectrum,
+            skipped_frames: 0,
+            stride: 1,
+            removed: RemovedTrend::from_parts(&parts, settings),
+            removed_m: parts.slow_m,
+            leakage_m,
+            model_m,
+            residual_m,
+            oscillations: parts.oscillations,
+            ridge: None,
+            multitaper: None,
+            noise_floor_m: Vec::new(),
+        };
+        let ridge = analysis.find_ridge(frame_rate_hz, settings.band_hz);
+        Self { ridge, ..analysis }.with_densities(frame_rate_hz)
+    }
+
+    /// The record, m, without the removed parts and without the oscillations below `low_hz`.
+    #[must_use]
+    pub fn fast_motion_m(&self, frame_rate_hz: f64, low_hz: f64) -> Vec<Option<f64>> {
+        let kept: Vec<&Oscillation> =
+            self.oscillations.iter().filter(|o| o.frequency_hz() >= low_hz).collect();
+        let at = |(i, left): (usize, &Option<f64>)| {
+            let fast = || kept.iter().map(|o| o.displacement_m(i as f64 / frame_rate_hz)).sum::<f64>();
+            left.map(|left| left + fast())
+        };
+        self.residual_m.iter().enumerate().map(at).collect()
+    }
+
+    /// Frequency over time of the strongest component above the slow ones.
+    fn find_ridge(&self, frame_rate_hz: f64, band_hz: Option<(f64, f64)>) -> Option<Ridge> {
+        let frames = self.residual_m.len();
+        let size = |o: &Oscillation| {
+            let square = |i: usize| math::powi(o.displacement_m(i as f64 / frame_rate_hz), 2);
+            (2.0 * (0..frames).map(square).sum::<f64>() / frames as f64).sqrt()
+        };
+        let strong: Vec<(f64, f64)> = self.oscillations.iter().map(|o| (o.frequency_hz(), size(o))).collect();
+        let band = choose_ridge_band(frames, frame_rate_hz, &strong, band_hz)?;
+        let record = self.fast_motion_m(frame_rate_hz, band.0);
+        select_best_ridge(&record, frame_rate_hz, band).map(|(_, ridge)| ridge)
     }
 
     /// Adds the power density, the noise floor and, for each component without a drift range, the probability
@@ -273,17 +281,10 @@ impl SpectralAnalysis {
     }
 }
 
-/// An analysis, whether its residual is only noise, and whether its trend has waves as fast as a component. A
-/// trend with such waves and a component may cancel each other even where the record is flat.
-struct Attempt {
-    leaves_only_noise: bool,
-    trend_competes: bool,
-    analysis: SpectralAnalysis,
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::TAU;
 
     const RATE_HZ: f64 = 5000.0;
 
@@ -306,7 +307,7 @@ mod tests {
     #[test]
     fn of_pairs_closer_than_a_resolution_no_clear_frequency_is_off_by_four_deviations() {
         let mut clear = 0;
-        for k in 0..12 {
+        for k in 0..12_u32 {
             let (low_hz, apart_hz, phase) =
                 (300.0 + 37.3 * f64::from(k), [0.5, 0.7, 0.9][k as usize % 3] / 0.16, f64::from(k));
             let pair = |t: f64| {

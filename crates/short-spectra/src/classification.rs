@@ -2,7 +2,6 @@
 
 use super::SampledRecord;
 use super::component::{AliasSource, Component, ComponentReason, ComponentVerdict};
-use super::frequency_drift::FULLY_FOLLOWED;
 use super::relations::{describe_relations, find_relations};
 use super::settings::{CLEAR_DB, MIN_CYCLES, SpectrumSettings};
 use crate::sampling::{aliased_frequencies_hz, exposure_gain};
@@ -10,20 +9,9 @@ use crate::sampling::{aliased_frequencies_hz, exposure_gain};
 /// Exposure gain below which a component counts as attenuated: a loss of 10 % exceeds the uncertainty of the
 /// scale (m per pixel) of a recording.
 const ATTENUATED_BELOW: f64 = 0.9;
-/// Largest allowed shift of a frequency by a richer trend, in standard deviations.
-const MOST_TREND_SHIFT: f64 = 3.0;
-/// Largest allowed ratio of the residual around a component to the amplitude of the component. If the ratio
-/// is larger, a second line or a drift is as good an explanation.
-const MOST_RESIDUAL: f64 = 0.25;
-/// Distance in frequency, in resolutions, below which two oscillations may be a single one. At half a
-/// resolution and 50 dB, a single oscillation fits a pair of equal amplitudes as well as two oscillations do.
-const LEAST_SEPARATION: f64 = 0.5;
 /// Smallest range of a drift, in resolutions, that two steady lines cannot imitate: pairs up to 1.7
 /// resolutions apart looked like one component that drifts by up to five resolutions.
 pub(super) const LEAST_CLEAR_DRIFT: f64 = 5.0;
-/// Damping ratio above which an oscillation is over within a cycle: at this ratio its amplitude falls to a
-/// quarter in one cycle.
-pub(super) const SINGLE_CYCLE_DAMPING: f64 = 0.22;
 /// Largest allowed median distance, in resolutions of the segments, of a drifting frequency from the value
 /// extrapolated with its rate. For noise in bands of 5 to 40 resolutions this distance is 0.35 or more, for a
 /// measured oscillation up to 0.26.
@@ -51,36 +39,8 @@ impl RecordContext {
 pub(super) struct Evidence {
     /// Further reasons for which the frequency is ambiguous.
     pub doubts: Vec<String>,
-    /// Whether the trend could not grow further and the component is slow enough to be a part of a step.
-    pub trend_exhausted: bool,
-    /// Shift of the frequency with a richer trend, in standard deviations of the frequency.
-    pub trend_shift: f64,
-    /// Ratio of the largest residual peak within the lobe around the component to its amplitude; only peaks
-    /// that stand out from the noise count.
-    pub residual_ratio: f64,
-    /// Whether an oscillation with a constant frequency drift or a linearly falling amplitude explains more
-    /// than this component does.
-    pub unsteady: bool,
-    /// Distance in frequency from the nearest other oscillation, in resolutions.
-    pub nearest: Option<f64>,
-    /// Distance in frequency from another oscillation, in resolutions, if one of the two may be a part of the
-    /// other.
-    pub fragment_distance: Option<f64>,
-    /// Fraction of the segments in which the ridge of a drifting component has points.
-    pub followed_share: Option<f64>,
-    /// Whether the component is as slow as the waves of a trend to which columns had to be added.
-    pub slow: bool,
-    /// Whether the component and two others near it begin late or end soon.
-    pub crowded: bool,
-    /// Median distance, in resolutions of the segments, of a drifting frequency from the value extrapolated
-    /// with its rate.
-    pub median_stray: Option<f64>,
-    /// Range of the drift, in resolutions.
-    pub drift: Option<f64>,
     /// Whether the component changes over a record that is too long for a fit.
     pub changes: bool,
-    /// Whether the frequency of the component stayed within the peak at which the component was found.
-    pub keeps_peak: bool,
 }
 
 /// Sets the verdict and the reasons of each component from its evidence. The components are sorted by falling
@@ -117,63 +77,14 @@ fn collect_reasons(c: &Component, evidence: &Evidence, at: &RecordContext) -> Ve
     found
 }
 
-/// Reasons for which a frequency is ambiguous.
-fn describe_ambiguities(c: &Component, evidence: &Evidence) -> [Option<String>; 15] {
-    let shift_hz = c.trend_shift_hz.unwrap_or_default();
-    let near = evidence.nearest.filter(|nearest| *nearest < LEAST_SEPARATION);
-    let followed = evidence.followed_share.filter(|followed| *followed < FULLY_FOLLOWED);
-    let stray = evidence.median_stray.filter(|by| *by > MOST_STRAY);
-    let drift = evidence.drift.filter(|drift| *drift < LEAST_CLEAR_DRIFT);
-    let single = c.damping_ratio.filter(|ratio| *ratio > SINGLE_CYCLE_DAMPING);
-    let (left, unknown) = (100.0 * evidence.residual_ratio, 100.0 * c.amplitude_sd_m / c.amplitude_m);
+/// Reasons why a frequency is ambiguous, in addition to `evidence.doubts`.
+fn describe_ambiguities(c: &Component, evidence: &Evidence) -> [Option<String>; 2] {
+    let unknown = 100.0 * c.amplitude_sd_m / c.amplitude_m;
     let unsure = c.amplitude_m < LEAST_DEVIATIONS * c.amplitude_sd_m;
-    let fixed = |holds: bool, words: &str| holds.then(|| words.to_owned());
+    let changes = "its amplitude or phase changes over the window, which is too long for a fit of decay or \
+                   drift; choose a shorter window";
     [
-        fixed(!evidence.keeps_peak, "no oscillation that keeps its frequency and decays steadily explains it"),
-        fixed(
-            evidence.changes,
-            "its amplitude or phase changes over the window, which is too long for a decay or a drift to be \
-             tried; choose a shorter one",
-        ),
-        fixed(
-            evidence.trend_exhausted,
-            "no trend describes what it rides on; choose a window behind the flip",
-        ),
-        (evidence.trend_shift > MOST_TREND_SHIFT)
-            .then(|| format!("a trend of two columns more moves it by {shift_hz:.2e} Hz")),
-        near.map(|n| format!("another lies {n:.2} resolutions from it, closer than the window tells apart")),
-        evidence.fragment_distance.map(|by| {
-            format!(
-                "another lies {by:.1} resolutions from it, and they are not both steady: pieces of one look \
-                 the same"
-            )
-        }),
-        followed.map(|s| format!("followed in {:.0} % of the window only: its range may be wider", 100.0 * s)),
-        single.map(|r| format!("it is over within a cycle (damping ratio {r:.2}): a step looks the same")),
-        fixed(
-            evidence.slow,
-            "it is slow, and the trend had to grow: it may be a piece of what that describes",
-        ),
-        fixed(
-            evidence.crowded,
-            "one of several that begin or are over within the record: noise of a narrow band looks the same",
-        ),
-        stray.map(|by| {
-            format!(
-                "its frequency strays from its own rate by {by:.2} resolutions: noise of a narrow band does so"
-            )
-        }),
-        drift.map(|by| format!("it drifts by {by:.1} resolutions: two that beat may look the same")),
-        fixed(
-            evidence.unsteady,
-            "a frequency that drifts or an amplitude that falls in a line explains more",
-        ),
-        (evidence.residual_ratio > MOST_RESIDUAL).then(|| {
-            format!(
-                "{left:.0} % of its amplitude is left around it: it drifts, or two lie closer than the window \
-                 tells apart"
-            )
-        }),
+        evidence.changes.then(|| changes.to_owned()),
         unsure.then(|| format!("its amplitude is known to {unknown:.0} % only")),
     ]
 }

@@ -10,12 +10,12 @@ use std::f64::consts::TAU;
 pub struct Component {
     /// Frequency, Hz.
     pub frequency_hz: f64,
-    /// Standard deviation of the frequency, Hz. For least squares it follows from the residual around the
-    /// component and from the shift with a richer trend; for a periodogram it is 1.6 times the Cramér-Rao
-    /// bound, plus the effect of a removed trend.
+    /// Standard deviation of the frequency, Hz. For least squares it follows from the noise, from the scatter
+    /// of the frequency within the record, and from other explanations that are nearly as probable; for a
+    /// periodogram it is 1.6 times the Cramér-Rao bound, plus the effect of a removed trend.
     pub frequency_sd_hz: f64,
     /// Lowest and highest frequency of a component that drifts. `frequency_hz` is then the mean: the number
-    /// of cycles counted along the ridge of the component, divided by the duration of the ridge.
+    /// of cycles divided by their duration.
     pub range_hz: Option<FrequencyRange>,
     /// Start, s from the first frame analysed; `None` for a component present from the first frame on. If the
     /// component was found in a piece of a long record and is present when the piece starts, the start of the
@@ -33,15 +33,14 @@ pub struct Component {
     /// Ratio of the amplitude in the spectrum to the noise floor of the spectrum, dB (`20 log10`).
     pub snr_db: f64,
     /// Cramér-Rao bound of the frequency, Hz. It assumes that the record has no gaps and contains only this
-    /// component and white noise, as large as the noise measured around the component.
+    /// component and white noise that disturbs it as much as the noise of the record does. For a component
+    /// along a ridge, it is `frequency_sd_hz` instead.
     pub cramer_rao_hz: f64,
     /// Probability that noise alone produces a line as steady as this component (Thomson's F over the
     /// tapers): small for a steady oscillation, near one for a ring-down.
     pub line_probability: Option<f64>,
     /// Method that estimated the component.
     pub estimator: Estimator,
-    /// Shift, Hz, of the frequency if the trend has two more columns.
-    pub trend_shift_hz: Option<f64>,
     /// Amplitude of the removed trend at this frequency, m.
     pub leakage_m: Option<f64>,
     /// Exposure gain at this frequency, 0 to 1; `None` if the exposure is not known.
@@ -123,10 +122,9 @@ pub enum ComponentVerdict {
     NotResolvable,
     /// A faster oscillation that the motion may contain would appear at the same frequency.
     AliasSuspected,
-    /// No trend describes the motion under the component, or a richer trend shifts its frequency by more than
-    /// three standard deviations; its amplitude is within three standard deviations of zero; the residual
-    /// around it exceeds a quarter of its amplitude; or no oscillation of constant frequency and steady decay
-    /// explains it.
+    /// An explanation of the record without the component, or with another frequency, is nearly as probable;
+    /// the component may be a piece of another motion or of noise; or its amplitude is within three standard
+    /// deviations of zero.
     Ambiguous,
     /// A multiple of the frequency of a stronger component, to within four standard deviations.
     Harmonic,

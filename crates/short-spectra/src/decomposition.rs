@@ -9,22 +9,22 @@ mod column_products;
 mod course;
 mod problem;
 mod reading;
+mod record_parts;
 mod search;
 #[cfg(test)]
 mod tests;
 
-use crate::component::Component;
-use crate::decimation;
-use crate::error::{SpectrumError, check_record};
 use crate::noise::{MOST_COEFFICIENTS, raise_order};
 use crate::periodogram::upper_median;
 use crate::record::SampledRecord;
-use crate::settings::{ROUNDING, SpectrumSettings};
+use crate::settings::ROUNDING;
 use crate::transform::RealTransform;
 use crate::trend::Trend;
 use atom::Atom;
 use portable_math as math;
 use problem::{Explanation, NoisyRecord, Parts};
+pub use record_parts::Oscillation;
+pub(crate) use record_parts::RecordParts;
 use search::{PartSearch, Rival};
 
 /// Largest number of oscillations; it bounds the time of a search.
@@ -40,6 +40,8 @@ pub(crate) struct Decomposition {
     rivals: Vec<Rival>,
     /// Size, m, of one unit of the scaled values: the standard deviation of the record.
     scale_m: f64,
+    /// Mean, m, that is subtracted from the record before it is scaled; 0 without a trend.
+    mean_m: f64,
     frame_rate_hz: f64,
 }
 
@@ -51,38 +53,6 @@ pub(crate) struct DecompositionSettings {
     pub trend_grows: bool,
     /// Largest number of oscillations.
     pub most_oscillations: usize,
-}
-
-/// The components of a record inside the band of the settings with their verdicts, the largest first, at most
-/// `settings.max_components`. Trend, oscillations, steps and noise are chosen together by their posterior
-/// probability. `settings.detrend`, if given, is the only trend; without it the trend starts as a cubic and
-/// may grow. The list is empty if too few frames have a value or all values are equal.
-///
-/// # Errors
-/// [`SpectrumError`] if the record, the frame rate or the band allows no spectrum.
-pub fn decompose_record(
-    record: &SampledRecord,
-    settings: &SpectrumSettings,
-) -> Result<Vec<Component>, SpectrumError> {
-    let samples;
-    let mut kept = *record;
-    if let Some(stride) = decimation::find_stride(record.samples) {
-        samples = decimation::decimate(record.samples, stride);
-        kept = SampledRecord {
-            samples: &samples,
-            frame_rate_hz: record.frame_rate_hz / stride.1 as f64,
-            exposure_s: record.exposure_s,
-        };
-    }
-    let (_, trend) = check_record(kept.samples, kept.frame_rate_hz, settings)?;
-    let frames = kept.samples.iter().flatten().count();
-    let search = DecompositionSettings::new(frames, trend, settings.detrend.is_none());
-    let found = Decomposition::from_record(&kept, search);
-    let mut components = found.map_or_else(Vec::new, |parts| parts.components(&kept, settings));
-    let (low_hz, high_hz) = settings.band_hz.unwrap_or((0.0, kept.frame_rate_hz / 2.0));
-    components.retain(|c| (low_hz..=high_hz).contains(&c.frequency_hz));
-    components.truncate(settings.max_components);
-    Ok(components)
 }
 
 impl DecompositionSettings {
@@ -100,7 +70,9 @@ impl Decomposition {
         let samples = record.samples;
         let used: Vec<usize> = (0..samples.len()).filter(|i| samples[*i].is_some()).collect();
         let values: Vec<f64> = samples.iter().flatten().copied().collect();
-        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        // without a trend, the mean stays in the record
+        let is_centred = settings.trend.column_count() > 0;
+        let mean = if is_centred { values.iter().sum::<f64>() / values.len() as f64 } else { 0.0 };
         let scale_m =
             (values.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / values.len() as f64).sqrt();
         if scale_m.is_nan() || scale_m <= 1e-12 * mean.abs() || used.len() < settings.trend.column_count() + 4
@@ -112,7 +84,8 @@ impl Decomposition {
         let mut white = NoisyRecord::new(samples.len(), used, values);
         white.least_variance = math::powi(ROUNDING * largest / scale_m, 2).max(1e-300);
         let Contest { problem, best: explanation, rivals, .. } = select_explanation(white, settings);
-        let mut found = Self { problem, explanation, rivals, scale_m, frame_rate_hz: record.frame_rate_hz };
+        let mut found =
+            Self { problem, explanation, rivals, scale_m, mean_m: mean, frame_rate_hz: record.frame_rate_hz };
         found.add_rivals();
         Some(found)
     }

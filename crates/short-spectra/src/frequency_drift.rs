@@ -1,12 +1,8 @@
-//! Search for an oscillation whose frequency changes over the record, in addition to steady and decaying
-//! oscillations. It is treated as one component.
-//!
-//! Sinusoids can only split such an oscillation into pieces. If they leave a large peak, or if three or more
-//! of them lie within the range of a drifting ridge, the ridge is the component and the pieces are dropped.
+//! The ridge of the strongest oscillation above the slow ones, and the means along a ridge that describe it
+//! as one component.
 
-use super::model_selection::{DriftRegion, LOBE, ModelFit, ModelSelector};
 use super::periodogram::upper_median;
-use super::time_frequency::{self, FrequencyRange, Ridge, RidgeEnd, RidgePoint, Spectrogram};
+use super::time_frequency::{self, Ridge, RidgeEnd, RidgePoint, Spectrogram};
 use portable_math as math;
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
@@ -30,51 +26,6 @@ pub(super) const CYCLE_INSTANT_SD: f64 = 0.05;
 /// Distance of two points, in segment lengths, at which their segments share so few frames that the noise of
 /// the points is independent.
 const INDEPENDENT_SEGMENTS: f64 = 0.5;
-/// A drift counts only if its ridge has points in more than this fraction of the segments.
-const LEAST_FOLLOWED: f64 = 0.08;
-/// Smallest range of a drift, in resolutions; a smaller range is that of a slightly broadened line.
-const LEAST_RANGE: f64 = 2.0;
-/// If at least this number of sinusoids lie within the frequency range of a drift, they count as pieces of
-/// one oscillation.
-const FRAGMENTS: usize = 3;
-/// Ratio of the largest residual peak within the frequency range of a drift to the largest sinusoid there.
-/// Above this ratio, sinusoids do not explain the oscillation.
-const LARGE_RESIDUAL: f64 = 0.25;
-
-/// The frequency over time of the strongest component above the slow components.
-pub(super) struct DriftCourse {
-    pub ridge: Ridge,
-    /// Fraction of the segments in which the ridge of the component has points.
-    pub followed_share: f64,
-    /// Frequency range, if the component drifts.
-    pub range: Option<FrequencyRange>,
-}
-
-impl DriftCourse {
-    /// The frequencies that the component covers in a spectrum, if it drifts.
-    pub(super) fn drift_region(&self) -> Option<DriftRegion> {
-        let FrequencyRange { low_hz, high_hz, .. } = self.range?;
-        Some(DriftRegion { low_hz, high_hz, lobe_hz: LOBE / self.ridge.segment_s })
-    }
-}
-
-/// Subtracts the trend and the slow oscillations from a record and finds the ridge of the strongest component
-/// that remains.
-pub(super) fn find_drift_course(
-    search: &ModelSelector,
-    fit: &ModelFit,
-    band_hz: Option<(f64, f64)>,
-) -> Option<DriftCourse> {
-    let peaks = prominent_peaks(search, fit);
-    let band = choose_ridge_band(search.samples.len(), search.frame_rate_hz, &peaks, band_hz)?;
-    let record = remove_slow_parts(search, fit, band.0);
-    let (followed_share, ridge) = select_best_ridge(&record, search.frame_rate_hz, band)?;
-    let range = ridge.range_hz().filter(|range| {
-        followed_share > LEAST_FOLLOWED && ridge.is_drifting() && is_fragmented(search, fit, range)
-    });
-    Some(DriftCourse { ridge, followed_share, range })
-}
-
 /// The ridge for the segment length that shows the component best. If too few segments have a point of this
 /// ridge, shorter segments are tried, and the ridge with the largest share of segments is returned. The
 /// component may be weak or change fast in a part of the record.
@@ -119,46 +70,11 @@ pub(super) fn choose_ridge_band(
     (low < high).then_some((low, high))
 }
 
-/// Frequencies, Hz, and amplitudes, m, of the fitted sinusoids and of the peaks of the residual.
-fn prominent_peaks(search: &ModelSelector, fit: &ModelFit) -> Vec<(f64, f64)> {
-    let model = &fit.model;
-    let sinusoid = |k: usize| (model.terms()[k].cycles * search.resolution_hz(), model.amplitude_m(k));
-    let sinusoids = model.oscillations().into_iter().map(sinusoid);
-    let left = fit.peaks.accepted.iter().map(|p| (p.frequency_hz, p.amplitude_m));
-    sinusoids.chain(left).collect()
-}
-
 /// Frequency, Hz, of the largest component, if that component is slow.
 fn dominant_slow_hz(components: &[(f64, f64)]) -> Option<f64> {
     let largest = components.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
     let mut above = components.iter().filter(|(hz, _)| *hz > SLOW_COMPONENT.0 * largest.0).peekable();
     (above.peek().is_some() && above.all(|(_, m)| *m < SLOW_COMPONENT.1 * largest.1)).then_some(largest.0)
-}
-
-/// The record, m, without the trend, the relaxations and the sinusoids below a given frequency.
-fn remove_slow_parts(search: &ModelSelector, fit: &ModelFit, low_hz: f64) -> Vec<Option<f64>> {
-    let (model, low) = (&fit.model, low_hz / search.resolution_hz());
-    let mut record = fit.residual_m.clone();
-    for k in (0..model.terms().len()).filter(|k| model.terms()[*k].cycles >= low) {
-        let of_term = model.term_values(k);
-        record.iter_mut().zip(of_term).for_each(|(x, value)| *x = x.map(|x| x + value));
-    }
-    record
-}
-
-/// Whether sinusoids only split the drifting oscillation into pieces.
-fn is_fragmented(search: &ModelSelector, fit: &ModelFit, range: &FrequencyRange) -> bool {
-    let resolution_hz = search.resolution_hz();
-    if range.high_hz - range.low_hz < LEAST_RANGE * resolution_hz {
-        return false;
-    }
-    let inside = |hz: f64| hz > range.low_hz - resolution_hz && hz < range.high_hz + resolution_hz;
-    let terms = fit.model.terms();
-    let pieces = || (0..terms.len()).filter(|k| inside(terms[*k].cycles * resolution_hz));
-    let largest_m = pieces().map(|k| search.windowed_amplitude_m(&fit.model, k)).fold(0.0, f64::max);
-    let left = fit.peaks.accepted.iter().filter(|p| inside(p.frequency_hz));
-    let left_m = left.map(|p| p.amplitude_m).fold(0.0, f64::max);
-    pieces().count() >= FRAGMENTS || left_m > LARGE_RESIDUAL * largest_m
 }
 
 /// Means along a ridge that describe it as one component.

@@ -16,7 +16,7 @@
 //! alone, and 0.07 and 0.06 Hz refined. The mean of a chirp from 870 to 930 Hz is off by 1.7 Hz with filling
 //! alone, and by 1.4 Hz refined.
 
-use super::least_squares::{FreeSet, SineProblem, SineSolution, SineTerm, Tolerance};
+use super::least_squares::{FreeSet, SineProblem, SineSolution, SineTerm};
 use super::settings::MAX_COMPONENTS;
 use super::trend::Trend;
 use super::{gap_filling, periodogram};
@@ -112,7 +112,7 @@ fn fit_components(
     let measured = trend.residual(samples);
     let hann = periodogram::hann_weights(samples);
     let problem = SineProblem::new(&measured, &hann, trend);
-    let mut solved = problem.gauss_newton(&terms, Tolerance::Fine)?;
+    let mut solved = problem.gauss_newton(&terms)?;
     let rest = |model: &[f64]| -> Vec<Option<f64>> {
         samples.iter().zip(measured.iter().zip(model)).map(|(sample, (x, m))| sample.map(|_| x - m)).collect()
     };
@@ -121,7 +121,7 @@ fn fit_components(
     if is_white(&left) {
         let weights: Vec<f64> = samples.iter().map(|x| f64::from(u8::from(x.is_some()))).collect();
         let problem = SineProblem::new(&measured, &weights, trend);
-        let solved = problem.gauss_newton(&solved.terms, Tolerance::Fine)?;
+        let solved = problem.gauss_newton(&solved.terms)?;
         return refinement_outcomes(&problem, &solved, starts, true);
     }
     let mut outcome = None;
@@ -130,7 +130,7 @@ fn fit_components(
         let data: Vec<f64> =
             bridged.iter().zip(&model).map(|(left, m)| left.map_or(0.0, |left| left + m)).collect();
         let problem = SineProblem::new(&data, &periodogram::hann_weights(&bridged), trend);
-        solved = problem.gauss_newton(&solved.terms, Tolerance::Fine)?;
+        solved = problem.gauss_newton(&solved.terms)?;
         model = problem.model_values(&solved);
         left = rest(&model);
         outcome = refinement_outcomes(&problem, &solved, starts, false);

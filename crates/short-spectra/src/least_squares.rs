@@ -103,27 +103,12 @@ pub(super) fn nepers_from_damping_ratio(cycles: f64, damping_ratio: f64) -> f64 
     TAU * cycles * damping_ratio / (1.0 - damping_ratio * damping_ratio).sqrt()
 }
 
-/// Accuracy with which a fit approaches the minimum of the misfit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Tolerance {
-    /// To a few hundredths of a standard deviation, while terms are still added.
-    Coarse,
-    /// To the last step that lowers the misfit.
-    Fine,
-}
-
-impl Tolerance {
-    /// Relative decrease of the misfit below which a step is the last, and maximum number of steps.
-    /// [`Self::Fine`] reaches a thousandth of a standard deviation for 450 frames, a hundredth for a million.
-    /// A steady tone takes four steps, a drifting tone a dozen; for a signal that is not a sinusoid, the
-    /// steps may never converge.
-    fn least_decrease_and_most_steps(self) -> (f64, usize) {
-        match self {
-            Self::Coarse => (1e-6, 8),
-            Self::Fine => (1e-10, 30),
-        }
-    }
-}
+/// Relative decrease of the misfit below which the iteration ends. If only noise is left, such a step moves
+/// a parameter by at most 0.0002 standard deviations for 450 frames, and by at most 0.01 for a million.
+const LEAST_DECREASE: f64 = 1e-10;
+/// Maximum number of steps: a steady tone takes four, a drifting tone a dozen; for a signal that is not a
+/// sinusoid, the steps may never converge.
+const MOST_STEPS: usize = 30;
 
 /// A record with the weights of its frames, and its trend. The trend is fitted together with the sinusoids,
 /// because it is not orthogonal to them.
@@ -156,10 +141,9 @@ impl SineProblem {
     /// Minimises the misfit over the free parameters; `None` if the normal matrix is not finite. A term whose
     /// step would leave its peak returns to the peak and keeps that frequency. A term that would decay or
     /// grow beyond its bounds becomes steady, or keeps its decay if only the decay was free.
-    pub(super) fn gauss_newton(&self, terms: &[SineTerm], care: Tolerance) -> Option<SineSolution> {
-        let (least_decrease, most_steps) = care.least_decrease_and_most_steps();
+    pub(super) fn gauss_newton(&self, terms: &[SineTerm]) -> Option<SineSolution> {
         let mut solved = self.solve_amplitudes(terms.to_vec())?;
-        for _ in 0..most_steps {
+        for _ in 0..MOST_STEPS {
             let step = self.gauss_newton_step(&solved)?;
             let constrain = |k: usize| Some((k, constrain_step(&terms[k], &solved.terms[k], step[k])?));
             if let Some((k, constrained)) = (0..terms.len()).find_map(constrain) {
@@ -169,7 +153,7 @@ impl SineProblem {
                 continue;
             }
             let Some(next) = self.halve_until_descent(&solved, &step) else { break };
-            let settled = next.misfit > (1.0 - least_decrease) * solved.misfit
+            let settled = next.misfit > (1.0 - LEAST_DECREASE) * solved.misfit
                 || step.iter().flatten().all(|s| s.abs() < SMALLEST_STEP);
             solved = next;
             if settled {

@@ -1,13 +1,8 @@
 //! Finds the oscillations, called components, in short records with missing frames.
 //!
-//! [`SpectralAnalysis::from_record`] fits a trend and steady or decaying oscillations to the frames present
-//! by least squares, and follows a component whose frequency drifts through short-time spectra. Every
-//! component has standard deviations and a verdict.
-//!
-//! [`decompose_record`] describes a whole record at once: trend, oscillations with decay, onset, drift and
-//! harmonics, smooth steps, frames left out, and coloured noise. The posterior probability chooses among all
-//! of them. It will take the place of [`SpectralAnalysis::from_record`], which it does not yet match on the
-//! hardest scenes.
+//! [`SpectralAnalysis::from_record`] describes a whole record at once: trend, oscillations with decay, onset,
+//! drift and harmonics, smooth steps, frames left out, and coloured noise. The posterior probability chooses
+//! among all of them. Every component has standard deviations and a verdict.
 //!
 //! [`analyse_spectrum`] finds the peaks of one Hann-windowed spectrum. It is fast and makes no choices that
 //! depend on the data, so that a fit can compare thousands of records. Gaps of up to four frames are filled
@@ -44,7 +39,6 @@
 
 mod amplitude_spectrum;
 mod analysis;
-mod chirp_alternatives;
 mod classification;
 mod component;
 mod decimation;
@@ -54,8 +48,6 @@ mod frequency_drift;
 mod gap_filling;
 mod gap_refinement;
 mod least_squares;
-mod matrix_pencil;
-mod model_selection;
 mod multitaper;
 pub mod noise;
 mod peak_zoom;
@@ -63,12 +55,8 @@ mod peaks;
 mod periodogram;
 mod record;
 mod relations;
-mod residual_significance;
-mod ring_downs;
 pub mod sampling;
-mod second_pass;
 mod settings;
-mod step_detection;
 mod target;
 pub mod time_frequency;
 mod transform;
@@ -80,7 +68,6 @@ pub use component::{
     AliasSource, Component, ComponentReason, ComponentVerdict, Estimator, Harmonic, MainsMultiple, Sideband,
     Subharmonic,
 };
-pub use decomposition::decompose_record;
 pub use error::SpectrumError;
 pub use record::SampledRecord;
 

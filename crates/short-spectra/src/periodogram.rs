@@ -115,14 +115,8 @@ impl Periodogram {
         frame_rate_hz / self.padded as f64
     }
 
-    /// Amplitude, m, in the spectrum at the frequency of `cycles` cycles in the record: `2 * |sum(w * x *
-    /// exp(-2 pi i n t))| / sum(w)`.
-    pub(super) fn amplitude_at(&self, values: &[f64], cycles: f64) -> f64 {
-        Self::amplitude_with_weights(&self.weights, values, cycles)
-    }
-
     /// Amplitude, m, in the spectrum with the given weights at the frequency of `cycles` cycles in the
-    /// record.
+    /// record: `2 * |sum(w * x * exp(-2 pi i n t))| / sum(w)`.
     pub(super) fn amplitude_with_weights(weights: &[f64], values: &[f64], cycles: f64) -> f64 {
         let turn = std::f64::consts::TAU * cycles / values.len() as f64;
         let add = |(re, im): (f64, f64), (i, (x, w)): (usize, (&f64, &f64))| {

@@ -140,13 +140,6 @@ impl Trend {
         }
     }
 
-    /// Number of waves over the record of the fastest motion that the trend can describe; the trend absorbs
-    /// slower components.
-    pub(super) fn fastest_waves(self) -> f64 {
-        let (Self::Polynomial(count) | Self::Cosines(count)) = self;
-        count as f64 / 2.0
-    }
-
     /// Fills in the columns at `s`, which runs over the record from -1 to 1; other entries are unchanged.
     pub(super) fn fill_row(self, s: f64, row: &mut TrendBasis) {
         match self {

@@ -9,7 +9,6 @@ pub struct Listed {
     pub hz: f64,
     pub sd_hz: f64,
     pub clear: bool,
-    pub drifts: bool,
 }
 
 /// Counts over the records of a kind.
@@ -25,8 +24,6 @@ pub struct Counts {
     /// Errors of the frequencies over their bounds, and over their stated deviations.
     pub over_bound: Vec<f64>,
     pub scaled: Vec<f64>,
-    /// Records that were cut.
-    pub cut: usize,
 }
 
 impl Counts {
@@ -35,17 +32,14 @@ impl Counts {
         let read = |made: &Made| {
             let record =
                 SampledRecord { samples: &made.samples, frame_rate_hz: made.rate_hz, exposure_s: None };
-            let analysis = SpectralAnalysis::from_record(&record, &SpectrumSettings::default());
-            analysis.map_or_else(
-                |_| (Vec::new(), false),
-                |a| (a.spectrum.components.iter().map(listed).collect(), a.skipped_frames > 0),
-            )
+            SpectralAnalysis::from_record(&record, &SpectrumSettings::default())
+                .map_or_else(|_| Vec::new(), |a| a.spectrum.components.iter().map(listed).collect())
         };
         Self::over(kind, seeds, read)
     }
 
-    /// Of what `read` lists, and whether it left a part of the record out.
-    pub fn over(kind: &Kind, seeds: u64, read: impl Fn(&Made) -> (Vec<Listed>, bool) + Sync) -> Self {
+    /// Counts of the components that `read` lists in the records of a kind with the seeds below `seeds`.
+    pub fn over(kind: &Kind, seeds: u64, read: impl Fn(&Made) -> Vec<Listed> + Sync) -> Self {
         let one = |seed| {
             let made = kind.made(seed);
             let read = read(&made);
@@ -53,8 +47,7 @@ impl Counts {
         };
         let all: Vec<_> = (0..seeds).into_par_iter().map(one).collect();
         let mut counts = Self::default();
-        for (made, (listed, cut)) in &all {
-            counts.cut += usize::from(*cut);
+        for (made, listed) in &all {
             counts.add(made, listed);
         }
         counts
@@ -65,7 +58,7 @@ impl Counts {
         for truth in &made.truths {
             let off_hz = |k: &usize| (listed[*k].hz - truth.hz).abs();
             let nearest = (0..listed.len())
-                .filter(|k| !taken[*k] && !listed[*k].drifts)
+                .filter(|k| !taken[*k])
                 .min_by(|a, b| off_hz(a).total_cmp(&off_hz(b)))
                 .filter(|k| off_hz(k) < near_hz(truth, made));
             self.sought += usize::from(truth.sought);
@@ -89,12 +82,7 @@ impl Counts {
 }
 
 fn listed(c: &Component) -> Listed {
-    Listed {
-        hz: c.frequency_hz,
-        sd_hz: c.frequency_sd_hz,
-        clear: c.verdict == ComponentVerdict::Clear,
-        drifts: c.range_hz.is_some(),
-    }
+    Listed { hz: c.frequency_hz, sd_hz: c.frequency_sd_hz, clear: c.verdict == ComponentVerdict::Clear }
 }
 
 /// Within so many hertz a component is this oscillation.

@@ -229,14 +229,14 @@ fn pair(resolutions: f64, snr_db: f64, draw: &mut Draw) -> Made {
     plain(truths, snr_db, draw)
 }
 
-/// A frequency that rises evenly by less than a ridge shows.
+/// A frequency that rises evenly by a few resolutions.
 fn drift(resolutions: f64, draw: &mut Draw) -> Made {
     let (hz, phase) = (draw.within(300.0, 1500.0), draw.phase());
     let rate = resolutions / DURATION_S / DURATION_S;
     let mut made = record(FRAMES, Vec::new(), noise_m(30.0), draw, |t| {
         AMPLITUDE_M * (TAU * (hz + rate * (t - DURATION_S) / 2.0) * t + phase).cos()
     });
-    made.truths.push(Truth { sought: false, ..Truth::steady(hz, phase) });
+    made.truths.push(Truth::steady(hz, phase));
     made
 }
 

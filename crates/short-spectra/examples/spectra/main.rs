@@ -5,9 +5,9 @@
 //! 200 hard noise` the lines of one group. A record is 0.15 s at 5,000 frames/s (750 frames) with 20 dB
 //! unless the line says otherwise.
 //!
-//! `-- mixtures 2000` scores methods on 2,000 random records, `-- mixtures 2000 1 today drift` the present
-//! analysis on those from seed 1 that hold a drift. `list` at the end prints the records on which it fails,
-//! `-- mixtures 1 57 dump` the samples of record 57.
+//! `-- mixtures 2000` scores all methods on 2,000 random records. `-- mixtures 2000 1 wiperlab drift` scores
+//! wiperlab alone, on those of the 2,000 records from seed 1 on that contain a drift. `list` at the end
+//! prints the records on which it fails. `-- mixtures 1 57 dump` prints the samples of record 57.
 
 mod counts;
 mod hard;

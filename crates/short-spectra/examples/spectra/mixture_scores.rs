@@ -34,26 +34,17 @@ use std::time::Instant;
 /// it gives deviations and verdicts.
 type Method = (&'static str, fn(&[Option<f64>], f64) -> Reading, bool);
 
-const METHODS: [Method; 4] = [
-    ("today", read_today, true),
-    ("likelihood", read_by_likelihood, true),
+const METHODS: [Method; 3] = [
+    ("wiperlab", read_completely, true),
     ("ESPRIT", |samples, rate_hz| list_frequencies(rivals::esprit(samples, rate_hz)), false),
     ("Lomb-Scargle", |samples, rate_hz| list_frequencies(rivals::lomb_scargle(samples, rate_hz)), false),
 ];
 
 /// The complete analysis. A frequency above the fold counts at the frequency at which it appears, so no
 /// component is suspected of folding.
-fn read_today(samples: &[Option<f64>], rate_hz: f64) -> Reading {
+fn read_completely(samples: &[Option<f64>], rate_hz: f64) -> Reading {
     let settings = SpectrumSettings { fastest_hz: 0.0, ..SpectrumSettings::default() };
     read_record(&SampledRecord { samples, frame_rate_hz: rate_hz, exposure_s: None }, &settings)
-}
-
-/// The parts chosen by their posterior probability.
-fn read_by_likelihood(samples: &[Option<f64>], rate_hz: f64) -> Reading {
-    let settings = SpectrumSettings { fastest_hz: 0.0, ..SpectrumSettings::default() };
-    let record = SampledRecord { samples, frame_rate_hz: rate_hz, exposure_s: None };
-    let components = short_spectra::decompose_record(&record, &settings).unwrap_or_default();
-    Reading { components, from_s: 0.0 }
 }
 
 /// Frequencies without deviations and verdicts.

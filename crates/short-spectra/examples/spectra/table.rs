@@ -11,10 +11,8 @@ pub type Method = (&'static str, fn(&[Option<f64>], f64) -> Vec<f64>);
 const LONGEST: usize = 2000;
 
 fn of_method(kind: &Kind, seeds: u64, (_, list): &Method) -> Counts {
-    let named = |hz: f64| Listed { hz, sd_hz: f64::INFINITY, clear: false, drifts: false };
-    Counts::over(kind, seeds, |made| {
-        (list(&made.samples, made.rate_hz).into_iter().map(named).collect(), false)
-    })
+    let named = |hz: f64| Listed { hz, sd_hz: f64::INFINITY, clear: false };
+    Counts::over(kind, seeds, |made| list(&made.samples, made.rate_hz).into_iter().map(named).collect())
 }
 
 /// Prints the table of the kinds whose group or name holds `only`.
@@ -22,11 +20,11 @@ pub fn print(seeds: u64, only: Option<&str>, methods: &[Method]) {
     println!("\n## Hard records\n");
     let names: Vec<&str> = std::iter::once("wiperlab").chain(methods.iter().map(|(name, _)| *name)).collect();
     println!(
-        "Records of a line: {seeds}. Numbers with slashes: {}. Missed: of the oscillations sought. Others: listed, but none. rms/CRB: of the frequencies found, over the bound of each alone. Wrong: records with one that is none and that wiperlab calls clear. Scaled: deviation of its error over its stated deviation. Cut: records of which it left out a part.\n",
+        "Records per row: {seeds}. Numbers with slashes: {}. Missed: oscillations sought but not listed. Others: listed components that are not in the record. rms/CRB: rms error of the frequencies found, each error divided by the bound for that component alone. Wrong: records with a false component that wiperlab calls clear. Scaled: standard deviation of the errors of wiperlab, each divided by its stated standard deviation.\n",
         names.join(" / ")
     );
-    println!("| record | sought | missed | others | rms/CRB | wrong | scaled | cut |");
-    println!("|---|{}", "---:|".repeat(7));
+    println!("| record | sought | missed | others | rms/CRB | wrong | scaled |");
+    println!("|---|{}", "---:|".repeat(6));
     let chosen = |kind: &&Kind| only.is_none_or(|only| kind.group == only || kind.name.contains(only));
     for kind in KINDS.iter().filter(chosen) {
         let ours = Counts::of(kind, seeds);
@@ -43,14 +41,13 @@ pub fn print(seeds: u64, only: Option<&str>, methods: &[Method]) {
         let over_bound =
             if ours.sought == 0 { "-".to_owned() } else { cells(&|c| number(&c.over_bound, rms)) };
         println!(
-            "| {} | {} | {} | {} | {over_bound} | {} | {} | {} |",
+            "| {} | {} | {} | {} | {over_bound} | {} | {} |",
             kind.name,
             ours.sought,
             if ours.sought == 0 { "-".to_owned() } else { cells(&|c| c.missed.to_string()) },
             cells(&|c| c.others.to_string()),
             ours.wrong,
-            number(&ours.scaled, deviation),
-            ours.cut
+            number(&ours.scaled, deviation)
         );
     }
 }

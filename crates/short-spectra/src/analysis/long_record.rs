@@ -54,7 +54,11 @@ pub(super) fn analyse_long_record(
         spectrum,
         skipped_frames: 0,
         stride: 1,
-        removed: RemovedTrend { detrend: settings.detrend.unwrap_or(Detrend::Cubic), relaxations: 0 },
+        removed: RemovedTrend {
+            detrend: settings.detrend.unwrap_or(Detrend::Cubic),
+            relaxations: 0,
+            steps: 0,
+        },
         leakage_m: Vec::new(),
         model_m: vec![0.0; record.samples.len()],
         residual_m: left_m,
@@ -105,7 +109,7 @@ fn assess_component(
     let changes = !is_steady(left_m, frame_rate_hz, c, floor_m);
     let width_hz = if changes { half_maximum_width_hz(spectrum, c) } else { 0.0 };
     let frequency_sd_hz = math::hypot(c.frequency_sd_hz, width_hz / UNIFORM_WIDTH_IN_SD);
-    let evidence = Evidence { keeps_peak: true, changes, ..Evidence::default() };
+    let evidence = Evidence { changes, ..Evidence::default() };
     Some((Component { frequency_sd_hz, ..c.clone() }, evidence))
 }
 

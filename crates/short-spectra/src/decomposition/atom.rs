@@ -212,6 +212,11 @@ impl OscillationAtom {
         sum
     }
 
+    /// Factor of the amplitude by decay and polynomial at position `s`; 0 before the onset.
+    pub(crate) fn size_at(&self, s: f64) -> f64 {
+        self.decay_at(s) * self.modulation_at(s)
+    }
+
     /// Cosine and sine columns of the oscillation, then those of each multiple; one value per frame used.
     fn columns(&self, at: &FramePlaces) -> Vec<Vec<f64>> {
         let mut columns = vec![vec![0.0; at.places.len()]; 2 * (1 + self.multiples.len())];
@@ -336,6 +341,15 @@ impl Atom {
         match self {
             Self::Course(course) => Some(course),
             _ => None,
+        }
+    }
+
+    /// Harmonics of an oscillation, as multiples of its frequency from 2 on.
+    pub(crate) fn multiples(&self) -> &[usize] {
+        match self {
+            Self::Oscillation(o) => &o.multiples,
+            Self::Course(course) => &course.multiples,
+            _ => &[],
         }
     }
 

@@ -100,6 +100,16 @@ impl CourseAtom {
         columns
     }
 
+    /// Phase, cycles, and amplitude, interpolated linearly between frames; `frame` need not be whole.
+    pub(crate) fn phase_and_size(&self, frame: f64) -> (f64, f64) {
+        let last = self.phase.len() - 1;
+        let before = (frame.max(0.0) as usize).min(last);
+        let after = (before + 1).min(last);
+        let part = frame - before as f64;
+        let between = |values: &[f64]| values[before] + part * (values[after] - values[before]);
+        (between(&self.phase), between(&self.envelope))
+    }
+
     pub(crate) fn column_count(&self) -> usize {
         1 + 2 * self.multiples.len()
     }

@@ -271,7 +271,7 @@ impl Decomposition {
         }
         read.sort_by(|a, b| b.0.amplitude_m.total_cmp(&a.0.amplitude_m));
         let (mut components, doubts): (Vec<_>, Vec<_>) = read.into_iter().unzip();
-        let evidence = |doubts| Evidence { doubts, keeps_peak: true, ..Evidence::default() };
+        let evidence = |doubts| Evidence { doubts, ..Evidence::default() };
         let evidence: Vec<Evidence> = doubts.into_iter().map(evidence).collect();
         classify_components(&mut components, &evidence, &RecordContext::new(record, resolution_hz, settings));
         components

@@ -1,7 +1,6 @@
 //! Oscillations that last only for a short time, estimated from pieces of a long record.
 
 use crate::analysis::SpectralAnalysis;
-use crate::classification::SINGLE_CYCLE_DAMPING;
 use crate::periodogram::{Periodogram, upper_median};
 use crate::record::SampledRecord;
 use crate::settings::ROUNDING;
@@ -43,10 +42,10 @@ const NEPERS_OF_DECAY: f64 = 1.0;
 #[derive(Debug)]
 pub(super) struct Transient {
     pub component: Component,
-    /// First frame of the stretch that was analysed.
+    /// First frame of the piece that was analysed.
     first: usize,
     resolution_hz: f64,
-    /// Decay, in nepers, of the component up to the end of the stretch.
+    /// Decay, in nepers, of the component up to the end of the piece.
     nepers: f64,
 }
 
@@ -71,7 +70,7 @@ impl Transient {
         self.matches_component(other) || (c.frequency_hz - other.frequency_hz).abs() < width_hz
     }
 
-    /// Adds a doubt to a component that does not decay within the stretch: outside the stretch, the component
+    /// Adds a doubt to a component that does not decay within the piece: outside the piece, the component
     /// may have another frequency.
     fn with_persistence_doubt(mut self) -> Self {
         if self.nepers < NEPERS_OF_DECAY {
@@ -125,26 +124,23 @@ pub(super) fn find_transients(record: &SampledRecord, settings: &SpectrumSetting
 }
 
 /// The components of a piece that do not last for the whole record: those whose power exceeds the normal
-/// power at their frequency, and those that end within the piece. A component that dies out within one cycle
-/// of its own oscillation is left out, because any step in the record produces such a component.
+/// power at their frequency, and those that end within the piece.
 fn read_piece(record: &SampledRecord, settings: &SpectrumSettings, piece: &UnusualPiece) -> Vec<Transient> {
     let rate_hz = record.frame_rate_hz;
     let passes = |brief: &Transient| {
         let c = &brief.component;
         let (low_hz, high_hz) =
             c.range_hz.map_or((c.frequency_hz, c.frequency_hz), |range| (range.low_hz, range.high_hz));
-        !c.damping_ratio.is_some_and(|ratio| ratio > SINGLE_CYCLE_DAMPING)
-            && (brief.nepers > NEPERS_UNTIL_OVER
-                || piece.exceeds_normal_power(low_hz / rate_hz, high_hz / rate_hz))
+        brief.nepers > NEPERS_UNTIL_OVER || piece.exceeds_normal_power(low_hz / rate_hz, high_hz / rate_hz)
     };
-    let stretches = SpectralAnalysis::analyse_between_steps(record, settings).into_iter();
-    let found = stretches.flat_map(|stretch| stretch_transients(stretch, piece.frames.start, rate_hz));
+    let found = SpectralAnalysis::from_record(record, settings).ok().into_iter();
+    let found = found.flat_map(|analysis| list_transients(analysis, piece.frames.start, rate_hz));
     found.filter(passes).map(Transient::with_persistence_doubt).collect()
 }
 
-/// The components of `analysis`, which covers the frames between two steps of a piece of the record. `start`
-/// is the index in the record of the first frame of the piece.
-fn stretch_transients(
+/// The components that `analysis` lists for a piece of the record. `start` is the index, in the record, of
+/// the first frame of the piece.
+fn list_transients(
     analysis: SpectralAnalysis,
     start: usize,
     rate_hz: f64,
