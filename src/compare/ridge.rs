@@ -5,10 +5,11 @@ use crate::feature::{FeatureBand, Reading};
 use crate::model::modes::body_frequencies;
 use crate::recording::channel::{Channel, InstantKind, Window, WindowEnd, mean_speed_m_per_s};
 use crate::recording::cycles::median_interval_s;
+use short_spectra::exceeds_noise;
 use short_spectra::time_frequency::{
     Ridge, RidgePoint, Spectrogram, SpectrogramSettings, SpeedPoint, course, default_band_hz,
+    subtract_slow_motion,
 };
-use short_spectra::{SpectralAnalysis, SpectrumSettings};
 use std::ops::Range;
 
 /// Segment lengths to try, relative to the default length, in ascending order.
@@ -123,9 +124,7 @@ fn track_ridge(
 ) -> Option<TrackedRidge> {
     let rate_hz = side.recording.grid().frame_rate_hz;
     let samples = side.samples(case.cycle_channel());
-    let (inside, exposure_s) = (samples.get(frames.clone())?, case.exposure_s());
-    let analysis = side.recording.analyse_samples(inside, exposure_s, &SpectrumSettings::default()).ok()?;
-    let frames = frames.start + analysis.skipped_frames..frames.end;
+    let inside = samples.get(frames.clone())?;
     let top_hz = default_band_hz(frames.len(), rate_hz, None);
     let band_hz = match fastest_band(case) {
         Some(band) => (band.band_hz.0, band.band_hz.1.min(top_hz.1)),
@@ -135,8 +134,8 @@ fn track_ridge(
         ),
     };
     let band_hz = if band_hz.0 < band_hz.1 { band_hz } else { top_hz };
-    // components below the band would disturb the ridge
-    let fast = analysis.fast_motion_m(rate_hz, band_hz.0);
+    // slower motion would disturb the ridge
+    let fast = subtract_slow_motion(inside, rate_hz, band_hz.0);
     let mut ridge =
         choose_ridge(&fast, rate_hz, band_hz, segment_s.or(job_segment_s(case)), min_segment_s(case))?;
     let settings = SpectrogramSettings {
@@ -144,12 +143,14 @@ fn track_ridge(
         band_hz: Some(band_hz),
         overlap: Some(DRAWN_OVERLAP),
     };
-    let spectrogram = Spectrogram::new(&analysis.detrended_m(), rate_hz, &settings).ok()?;
+    // a segment cannot show a motion with a longer period
+    let shown = subtract_slow_motion(inside, rate_hz, ridge.segment_s.recip());
+    let spectrogram = Spectrogram::new(&shown, rate_hz, &settings).ok()?;
     let mut courses = course::coherent_parts(&ridge, &spectrogram);
     for point in ridge.points.iter_mut().chain(courses.iter_mut().flatten()) {
         point.frequency_sd_hz = side.recording.add_clock_sd(point.frequency_hz, point.frequency_sd_hz);
     }
-    if is_measured && !is_listed(&analysis, &courses, ridge.segment_s) {
+    if is_measured && !exceeds_noise(&fast, rate_hz, &ridge, &courses) {
         courses.clear();
     }
     let start_s = side.recording.grid().time_s(frames.start);
@@ -169,16 +170,6 @@ fn track_ridge(
     let cycle: Vec<RidgePoint> = courses.iter().flatten().filter(is_cycle).copied().collect();
     let over_speed = ridge_over_speed(side, frames.start, &cycle, ridge.segment_s);
     Some(TrackedRidge { start_s, spectrogram, ridge, courses, band_hz, over_speed })
-}
-
-/// Whether the analysis of the whole record lists a component within the frequencies of a ridge, with a
-/// margin of a resolution of its segments. The strongest peaks of noise can follow each other like a ridge,
-/// too, but noise has no component.
-fn is_listed(analysis: &SpectralAnalysis, courses: &[Vec<RidgePoint>], segment_s: f64) -> bool {
-    let all = || courses.iter().flatten().map(|point| point.frequency_hz);
-    let [low, high] = [all().fold(f64::INFINITY, f64::min), all().fold(0.0, f64::max)];
-    let within = (low - segment_s.recip())..(high + segment_s.recip());
-    analysis.spectrum.components.iter().any(|component| within.contains(&component.frequency_hz))
 }
 
 /// The ridge in segments of the given length. Without a given length, chooses the shortest segments in which

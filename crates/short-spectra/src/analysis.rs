@@ -232,8 +232,7 @@ impl SpectralAnalysis {
     }
 
     /// The record, m, without the removed parts and without the oscillations below `low_hz`.
-    #[must_use]
-    pub fn fast_motion_m(&self, frame_rate_hz: f64, low_hz: f64) -> Vec<Option<f64>> {
+    fn fast_motion_m(&self, frame_rate_hz: f64, low_hz: f64) -> Vec<Option<f64>> {
         let kept: Vec<&Oscillation> =
             self.oscillations.iter().filter(|o| o.frequency_hz() >= low_hz).collect();
         let at = |(i, left): (usize, &Option<f64>)| {

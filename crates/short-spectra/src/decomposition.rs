@@ -21,6 +21,7 @@ use crate::settings::ROUNDING;
 use crate::transform::RealTransform;
 use crate::trend::Trend;
 use atom::Atom;
+pub use course::exceeds_noise;
 use portable_math as math;
 use problem::{Explanation, NoisyRecord, Parts};
 pub use record_parts::Oscillation;
@@ -67,22 +68,7 @@ impl Decomposition {
     /// Finds the most probable explanation of a record; `None` if too few frames have a value or all values
     /// are equal.
     pub(crate) fn from_record(record: &SampledRecord, settings: DecompositionSettings) -> Option<Self> {
-        let samples = record.samples;
-        let used: Vec<usize> = (0..samples.len()).filter(|i| samples[*i].is_some()).collect();
-        let values: Vec<f64> = samples.iter().flatten().copied().collect();
-        // without a trend, the mean stays in the record
-        let is_centred = settings.trend.column_count() > 0;
-        let mean = if is_centred { values.iter().sum::<f64>() / values.len() as f64 } else { 0.0 };
-        let scale_m =
-            (values.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / values.len() as f64).sqrt();
-        if scale_m.is_nan() || scale_m <= 1e-12 * mean.abs() || used.len() < settings.trend.column_count() + 4
-        {
-            return None;
-        }
-        let values = values.iter().map(|x| (x - mean) / scale_m).collect();
-        let largest = samples.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
-        let mut white = NoisyRecord::new(samples.len(), used, values);
-        white.least_variance = math::powi(ROUNDING * largest / scale_m, 2).max(1e-300);
+        let (white, mean, scale_m) = scale_record(record, settings.trend)?;
         let Contest { problem, best: explanation, rivals, .. } = select_explanation(white, settings);
         let mut found =
             Self { problem, explanation, rivals, scale_m, mean_m: mean, frame_rate_hz: record.frame_rate_hz };
@@ -96,6 +82,26 @@ impl Decomposition {
         let frames = self.problem.at.frames as f64;
         (self.frame_rate_hz / frames, frames / self.frame_rate_hz, self.scale_m)
     }
+}
+
+/// The record in units of its standard deviation, without its mean, in white noise; its mean, m, or 0 without
+/// a trend; and its standard deviation, m. `None` if too few frames have a value or all values are equal.
+fn scale_record(record: &SampledRecord, trend: Trend) -> Option<(NoisyRecord, f64, f64)> {
+    let samples = record.samples;
+    let used: Vec<usize> = (0..samples.len()).filter(|i| samples[*i].is_some()).collect();
+    let values: Vec<f64> = samples.iter().flatten().copied().collect();
+    // without a trend, the mean stays in the record
+    let is_centred = trend.column_count() > 0;
+    let mean = if is_centred { values.iter().sum::<f64>() / values.len() as f64 } else { 0.0 };
+    let scale_m = (values.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / values.len() as f64).sqrt();
+    if scale_m.is_nan() || scale_m <= 1e-12 * mean.abs() || used.len() < trend.column_count() + 4 {
+        return None;
+    }
+    let values = values.iter().map(|x| (x - mean) / scale_m).collect();
+    let largest = samples.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
+    let mut white = NoisyRecord::new(samples.len(), used, values);
+    white.least_variance = math::powi(ROUNDING * largest / scale_m, 2).max(1e-300);
+    Some((white, mean, scale_m))
 }
 
 /// Explanations that compete: with and without a jump, in white and in coloured noise.
@@ -130,8 +136,13 @@ impl Contest {
                 break;
             }
             let (coloured, parts) = self.refine_courses(coloured, &found);
+            let same = coloured.fit_parts(&parts, FEW_ITERATIONS);
+            if same.criterion > found.criterion - Self::LEAST_FALL {
+                break;
+            }
             let mut again = PartSearch::new(coloured, trend_grows, most_oscillations);
-            let next = again.find_parts(parts);
+            again.bound = self.best.criterion;
+            let next = again.find_parts(same.parts);
             let falls = next.criterion < found.criterion - Self::LEAST_FALL;
             if falls {
                 std::mem::swap(&mut search, &mut again);

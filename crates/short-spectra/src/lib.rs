@@ -68,6 +68,7 @@ pub use component::{
     AliasSource, Component, ComponentReason, ComponentVerdict, Estimator, Harmonic, MainsMultiple, Sideband,
     Subharmonic,
 };
+pub use decomposition::exceeds_noise;
 pub use error::SpectrumError;
 pub use record::SampledRecord;
 

@@ -20,6 +20,7 @@ mod chirp;
 pub mod course;
 mod ridge;
 mod ridge_tracking;
+mod slow_motion;
 
 use super::error::{SpectrumError, check_record};
 use super::periodogram;
@@ -28,6 +29,7 @@ use super::transform::RealTransform;
 pub use course::SpeedPoint;
 use portable_math as math;
 pub use ridge::{FrequencyRange, Ridge, RidgeEnd, RidgePoint};
+pub use slow_motion::subtract_slow_motion;
 use std::ops::RangeInclusive;
 
 /// Maximum number of frames of a segment whose length is chosen from the data; it limits the bins of a

@@ -2,11 +2,14 @@
 
 use super::atom::{Atom, FramePlaces, OscillationAtom};
 use super::problem::{Explanation, NoisyRecord, Parts, dot};
+use super::{scale_record, with_noise_of};
 use crate::classification::MOST_STRAY;
 use crate::frequency_drift::{
     FULLY_FOLLOWED, RidgeMean, choose_ridge_band, count_cycles, median_stray, select_best_ridge,
 };
+use crate::record::SampledRecord;
 use crate::time_frequency::{FrequencyRange, Ridge, RidgeEnd, RidgePoint};
+use crate::trend::Trend;
 use portable_math as math;
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -29,6 +32,10 @@ impl CourseAtom {
     /// range of frequencies.
     pub(crate) fn from_ridge(ridge: Ridge, frames: usize) -> Option<Self> {
         let range = ridge.range_hz()?;
+        Some(Self::along_ridge(ridge, range, frames))
+    }
+
+    fn along_ridge(ridge: Ridge, range: FrequencyRange, frames: usize) -> Self {
         let (mut phase, mut envelope) = (vec![0.0; frames], vec![0.0; frames]);
         for part in ridge.unbroken_parts() {
             let (Some(first), Some(last)) = (part.first(), part.last()) else { continue };
@@ -77,7 +84,7 @@ impl CourseAtom {
         }
         let (phase, envelope) = (phase.into(), envelope.into());
         let ridge = Arc::new(ridge);
-        Some(Self { ridge, range, phase, envelope, multiples: Vec::new() })
+        Self { ridge, range, phase, envelope, multiples: Vec::new() }
     }
 
     /// The column of the oscillation, then cosine and sine of each multiple; one value per frame used.
@@ -132,6 +139,38 @@ impl CourseAtom {
     pub(crate) fn covers(&self, cycles: f64) -> bool {
         cycles > self.range.low_hz - 1.0 && cycles < self.range.high_hz + 1.0
     }
+}
+
+/// Whether an oscillation along parts of a ridge of this record describes it better than noise alone. The
+/// strongest peaks of noise can follow each other like a ridge.
+#[must_use]
+pub fn exceeds_noise(
+    samples: &[Option<f64>],
+    frame_rate_hz: f64,
+    ridge: &Ridge,
+    courses: &[Vec<RidgePoint>],
+) -> bool {
+    let record = SampledRecord { samples, frame_rate_hz, exposure_s: None };
+    let Some((problem, ..)) = scale_record(&record, Trend::Polynomial(1)) else { return false };
+    let length_s = samples.len() as f64 / frame_rate_hz;
+    let point = |p: &RidgePoint| RidgePoint {
+        time_s: p.time_s / length_s,
+        frequency_hz: p.frequency_hz * length_s,
+        rate_hz_per_s: p.rate_hz_per_s * length_s * length_s,
+        ..*p
+    };
+    let points: Vec<RidgePoint> = courses.iter().flatten().map(point).collect();
+    let (segment_s, hop_s) = (ridge.segment_s / length_s, ridge.hop_s / length_s);
+    let ridge = Ridge { points, start: None, end: None, segment_s, hop_s };
+    let all = || ridge.points.iter().map(|p| p.frequency_hz);
+    let (low_hz, high_hz) = (all().fold(f64::INFINITY, f64::min), all().fold(0.0, f64::max));
+    let range = FrequencyRange { low_hz, low_sd_hz: 0.0, high_hz, high_sd_hz: 0.0 };
+    let course = CourseAtom::along_ridge(ridge, range, samples.len());
+    let criterion = |atoms: Vec<Atom>| {
+        let parts = Parts { trend: Trend::Polynomial(1), atoms };
+        with_noise_of(&problem, &parts).fit_parts(&parts, 0).criterion
+    };
+    criterion(vec![Atom::Course(course)]) < criterion(Vec::new())
 }
 
 /// The values of a record minus its trend and minus each part `k` for which `is_subtracted(k)` holds; `None`
