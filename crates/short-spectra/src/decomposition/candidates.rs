@@ -151,12 +151,20 @@ impl Search<'_> {
         for drift in DRIFTS.into_iter().filter(|drift| *drift < frames as f64 / 8.0) {
             // phase `drift u^2`, u from -1/2 to 1/2
             let (mut cosines, mut sines) = (Vec::with_capacity(frames), Vec::with_capacity(frames));
+            // from one frame to the next, the phase grows by an angle that itself grows by a constant angle
+            let phasor = |turn: f64| math::sin_cos(TAU * (turn - turn.floor()));
+            let width = 1.0 / frames as f64;
+            let bend = phasor(2.0 * drift * width * width);
+            let (mut turned, mut by) = ((0.0, 1.0), (0.0, 1.0));
             for (i, r) in self.residual.iter().enumerate() {
-                let u = (i as f64 + 0.5) / frames as f64 - 0.5;
-                let turn = drift * u * u;
-                let (sine, cosine) = math::sin_cos(TAU * (turn - turn.floor()));
-                cosines.push(r * cosine);
-                sines.push(r * sine);
+                if i % ANEW == 0 {
+                    let u = (i as f64 + 0.5) * width - 0.5;
+                    (turned, by) = (phasor(drift * u * u), phasor(drift * width * (2.0 * u + width)));
+                }
+                cosines.push(r * turned.1);
+                sines.push(r * turned.0);
+                turned = add_angles(turned, by);
+                by = add_angles(by, bend);
             }
             let a = transform.spectrum_values(cosines.into_iter());
             let b = transform.spectrum_values(sines.into_iter());
@@ -258,21 +266,17 @@ impl Search<'_> {
         let cut = |template: &[f64], block: usize| -> Vec<f64> {
             template[count + 2 * outside - block..].iter().zip(&root).map(|(x, n)| x * n).collect()
         };
-        let explained = |columns: Vec<Vec<f64>>| {
-            let mut extended = Basis::default();
-            let mut sum = 0.0;
-            for mut column in columns {
-                let before = dot(&column, &column);
-                basis.project_out(&mut column);
-                extended.project_out(&mut column);
-                let left = dot(&column, &column);
-                if left > 1e-6 * before {
-                    let along = dot(&column, &residual);
-                    sum += along * along / left;
-                    extended.push_column(column);
-                }
+        let of_residual: Vec<f64> = basis.columns.iter().map(|q| dot(q, &residual)).collect();
+        let project = |column: Vec<f64>| {
+            let along: Vec<f64> = basis.columns.iter().map(|q| dot(q, &column)).collect();
+            let length = dot(&column, &column);
+            let left = length - dot(&along, &along);
+            PooledColumn {
+                left: if left > LEAST_LEFT * length { left } else { 0.0 },
+                product: dot(&column, &residual) - dot(&along, &of_residual),
+                along,
+                column,
             }
-            sum
         };
         let mut steps = Vec::new();
         for width in STEP_WIDTHS.into_iter().filter(|width| *width > 2.0 / frames as f64) {
@@ -284,24 +288,67 @@ impl Search<'_> {
                     continue;
                 }
                 let atom = Atom::Step { shape: StepShape::Tanh, centre: place(block), width };
-                steps.push((explained(vec![cut(&step, block)]), atom));
+                steps.push((project(cut(&step, block)).own_squares(), atom));
             }
         }
         let mut relaxations = Vec::new();
         let after = template(&|s| f64::from(u8::from(s >= 0.0)));
+        let after: Vec<PooledColumn> =
+            (outside..outside + count).map(|block| project(cut(&after, block))).collect();
         for nepers in RELAXATIONS {
             let decay = template(&|s| if s >= 0.0 { math::exp(-nepers * s) } else { 0.0 });
             let spacing = ((0.5 / nepers * count as f64) as usize).max(1);
             let last = if nepers < 8.0 { 1 } else { count - count / 16 };
-            for block in (outside..outside + last).step_by(spacing) {
-                let mut columns = vec![cut(&decay, block)];
-                if block > outside {
-                    columns.insert(0, cut(&after, block));
-                }
-                relaxations.push((explained(columns), Atom::Relaxation { onset: place(block), nepers }));
+            for block in (0..last).step_by(spacing) {
+                let column = project(cut(&decay, outside + block));
+                let explained =
+                    if block > 0 { column.squares_with(&after[block]) } else { column.own_squares() };
+                let onset = place(outside + block);
+                relaxations.push((explained, Atom::Relaxation { onset, nepers }));
             }
         }
         self.keep_best(steps.into_iter());
         self.keep_best(relaxations.into_iter());
+    }
+}
+
+/// Sine and cosine of the sum of two angles from those of both.
+fn add_angles((sine, cosine): (f64, f64), (by_sine, by_cosine): (f64, f64)) -> (f64, f64) {
+    (sine * by_cosine + cosine * by_sine, cosine * by_cosine - sine * by_sine)
+}
+
+/// Number of frames after which a recurrence of phases begins anew: rounding errors stay below 1e-13.
+const ANEW: usize = 64;
+
+/// A column of sums over blocks, with its products with the fixed parts and with the residual.
+struct PooledColumn {
+    column: Vec<f64>,
+    /// Products with the orthonormal columns of the fixed parts.
+    along: Vec<f64>,
+    /// Squared length of what the fixed parts leave of it; 0 for a column that depends on them.
+    left: f64,
+    /// Product of what they leave with the residual.
+    product: f64,
+}
+
+/// A column depends on the fixed parts if they leave at most this fraction of its squared length.
+const LEAST_LEFT: f64 = 1e-6;
+
+impl PooledColumn {
+    /// Sum of squares that the column explains.
+    fn own_squares(&self) -> f64 {
+        if self.left > 0.0 { self.product * self.product / self.left } else { 0.0 }
+    }
+
+    /// Sum of squares that the column and another one explain together.
+    fn squares_with(&self, other: &Self) -> f64 {
+        if self.left == 0.0 || other.left == 0.0 {
+            return self.own_squares() + other.own_squares();
+        }
+        let common = (dot(&self.column, &other.column) - dot(&self.along, &other.along)) / other.left;
+        let left = self.left - common * common * other.left;
+        let product = self.product - common * other.product;
+        let own = if left > LEAST_LEFT * self.left { product * product / left } else { 0.0 };
+        own + other.own_squares()
     }
 }

@@ -112,7 +112,8 @@ fn two_cycles_that_cross_are_two_and_a_line_between_them_is_a_third() {
         let list = listed(&found, &samples);
         assert_eq!(list.len(), 3, "seed {seed}: {list:?}");
         for ((hz, sd_hz), exact) in list.iter().zip([480.0, 500.0, 500.0]) {
-            assert!((hz - exact).abs() < 4.0 * sd_hz && *sd_hz < 0.5, "seed {seed}: {list:?}");
+            // the instants of cycles alone give a mean over 0.15 s a deviation of 0.47 Hz
+            assert!((hz - exact).abs() < 4.0 * sd_hz && *sd_hz < 0.6, "seed {seed}: {list:?}");
         }
     }
 }

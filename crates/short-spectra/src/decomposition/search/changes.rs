@@ -1,7 +1,7 @@
 //! The changes that a round of the search offers: additions of parts, richer trends, oscillations with more
 //! parameters, divisions and unions.
 
-use super::{Change, LOCAL_ITERATIONS, PartSearch, atoms_without};
+use super::{Change, JOINT_ITERATIONS, LOCAL_ITERATIONS, PartSearch, atoms_without};
 use crate::decomposition::atom::{Atom, MOST_ENVELOPE_DEGREE, MOST_PHASE_DEGREE, OscillationAtom};
 use crate::decomposition::candidates::{Candidate, find_candidates};
 use crate::decomposition::problem::{Explanation, Fixed, Parts, dot};
@@ -54,7 +54,7 @@ impl PartSearch {
     /// Changes that give an oscillation a decay, a drift or harmonics, or divide or unite oscillations.
     pub(super) fn list_enrichments(&mut self, current: &Explanation, fixed: &Fixed) -> Vec<Change> {
         let atoms = &current.parts.atoms;
-        let mut changes = Vec::new();
+        let mut changes = self.list_slow_unions(current);
         for (k, (atom, amplitudes)) in current.atoms_with_amplitudes().enumerate() {
             changes.extend(self.list_course_harmonics(current, fixed, k));
             let Some(o) = atom.oscillation() else { continue };
@@ -250,6 +250,31 @@ impl PartSearch {
         [(-half, half), (-1.0, 0.2), (-0.2, 1.0)].into_iter().map(offer).collect()
     }
 
+    /// Unions of all steps and relaxations into one step: a step whose middle lies before the record has a
+    /// tail that looks like several of them.
+    fn list_slow_unions(&mut self, current: &Explanation) -> Vec<Change> {
+        let atoms = &current.parts.atoms;
+        let is_slow = |k: &usize| matches!(atoms[*k], Atom::Step { .. } | Atom::Relaxation { .. });
+        let slow: Vec<usize> = (0..atoms.len()).filter(is_slow).collect();
+        let group: Vec<Atom> = slow.iter().map(|k| atoms[*k].clone()).collect();
+        if slow.len() < 2 || !self.trend_grows || !self.is_new_group(&group) {
+            return Vec::new();
+        }
+        let trend = current.parts.trend;
+        let fixed = self.problem.fix_parts(trend, &atoms_without(atoms, &slow));
+        let found = find_candidates(&self.problem, &fixed, (f64::INFINITY, 0.0), true);
+        let step = found.into_iter().find(|candidate| matches!(candidate.atom, Atom::Step { .. }));
+        let change = |Candidate { atom, gain }: Candidate| {
+            let change = Change { gain, trend, replaced: slow.clone(), fitted: vec![atom], is_fitted: false };
+            // the shapes of the oscillations follow those of the slow parts, so all are fitted together
+            let tried = self.try_change(current, &fixed, &change);
+            let found = self.problem.fit_parts(&tried.parts, 3 * JOINT_ITERATIONS);
+            let (gain, replaced) = (current.criterion - found.criterion, (0..atoms.len()).collect());
+            Change { gain, trend, replaced, fitted: found.parts.atoms, is_fitted: true }
+        };
+        step.into_iter().map(change).collect()
+    }
+
     /// Unions of an oscillation with its neighbours into one drifting or decaying oscillation. Neighbours are
     /// oscillations whose peaks overlap its own.
     fn list_unions(&mut self, current: &Explanation, k: usize, o: &OscillationAtom) -> Vec<Change> {
@@ -347,10 +372,18 @@ fn amplitude_of(current: &Explanation, o: &OscillationAtom) -> f64 {
 /// Whether two groups have atoms of the same kind with nearly the same frequencies.
 fn is_similar(a: &[Atom], b: &[Atom]) -> bool {
     /// Difference of frequencies, resolutions, below which atoms are nearly the same: an oscillation that
-    /// moves by less keeps its neighbours.
+    /// moves by less keeps its neighbours. For other atoms, a fraction of their width.
     const SAME: f64 = 0.1;
-    let same = |(a, b): (&Atom, &Atom)| match (a.oscillation(), b.oscillation()) {
-        (Some(a), Some(b)) => {
+    let near = |a: f64, b: f64, scale: f64| (a - b).abs() < SAME * scale;
+    let same = |(a, b): (&Atom, &Atom)| match (a, b) {
+        (
+            Atom::Step { shape: a, centre, width },
+            Atom::Step { shape: b, centre: other, width: other_width },
+        ) => a == b && near(*centre, *other, *width) && near(*width, *other_width, *width),
+        (Atom::Relaxation { onset, nepers }, Atom::Relaxation { onset: other, nepers: other_nepers }) => {
+            near(*onset, *other, nepers.recip()) && near(*nepers, *other_nepers, *nepers)
+        }
+        (Atom::Oscillation(a), Atom::Oscillation(b)) => {
             let kind = |o: &OscillationAtom| {
                 (o.nepers.is_some(), o.onset > 0.0, o.phase.len(), o.envelope.len(), o.multiples.len())
             };
