@@ -10,7 +10,6 @@ use crate::model::friction::FrictionLaw;
 use crate::recording::channel::Channel;
 use crate::simulate::equilibrium::static_deflections;
 use portable_math as math;
-use std::array;
 
 /// Coefficient of friction at a speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -163,32 +162,24 @@ pub(crate) const COEFFICIENTS: [LawCoefficient; 4] = [
 pub(crate) type HalfInterval = Box<dyn Fn(f64) -> f64>;
 
 /// Half width of the 95 % interval of the coefficient of friction, propagated linearly from the intervals and
-/// correlations of the fitted coefficients. `None` if no coefficient is fitted, if one of the intervals is
-/// open, or if the linear model does not determine a fitted coefficient.
+/// correlations of the fitted coefficients. `None` if no coefficient is fitted, if the fit does not identify
+/// one of them, or if a correlation is unknown.
 pub(crate) fn friction_half_95(job: &Job, result: &FitResult, law: &FrictionLaw) -> Option<HalfInterval> {
-    let half = |coefficient: &LawCoefficient| {
-        if !is_fitted(job, coefficient) {
-            return Some(0.0);
-        }
-        let found = result.parameters.get(coefficient.name).filter(|found| found.has_interval())?;
-        Some((found.estimate - found.lower_95?).max(found.upper_95? - found.estimate))
+    /// A speed, m/s, at which every coefficient has an effect.
+    const ANY_SPEED: f64 = 0.1;
+    let (spread, law) = (result.parameter_spread(), *law);
+    let slope = |(name, half): (&String, &Option<f64>)| {
+        let fitted = COEFFICIENTS.iter().find(|c| c.name == name && is_fitted(job, c));
+        fitted.map_or(Some(None), |fitted| Some(Some((fitted.slope, (*half)?))))
     };
-    let [a, b, c, viscous] = COEFFICIENTS.each_ref().map(half);
-    let halves = [a?, b?, c?, viscous?];
-    let correlation = |i: usize, j: usize| {
-        if i == j || halves[i] == 0.0 || halves[j] == 0.0 {
-            return Some(f64::from(u8::from(i == j)));
-        }
-        result.correlations.get(COEFFICIENTS[i].name)?.get(COEFFICIENTS[j].name).copied()
-    };
-    let row = |i: usize| (0..halves.len()).map(|j| correlation(i, j)).collect::<Option<Vec<f64>>>();
-    let (correlations, law) = ([row(0)?, row(1)?, row(2)?, row(3)?], *law);
+    let slopes: Vec<_> = spread.names.iter().zip(&spread.halves_95).map(slope).collect::<Option<_>>()?;
+    let is_any_fitted = slopes.iter().any(Option::is_some);
     let half = move |v: f64| {
-        let moved: [f64; 4] = array::from_fn(|i| (COEFFICIENTS[i].slope)(&law, v) * halves[i]);
-        let row = |i: usize| (0..4).map(|j| moved[i] * moved[j] * correlations[i][j]).sum::<f64>();
-        (0..4).map(row).sum::<f64>().max(0.0).sqrt()
+        let moved = slopes.iter().map(|fitted| fitted.map_or(0.0, |(slope, half)| slope(&law, v) * half));
+        spread.propagate_95(&moved.collect::<Vec<f64>>())
     };
-    COEFFICIENTS.iter().any(|c| is_fitted(job, c)).then(|| Box::new(half) as HalfInterval)
+    half(ANY_SPEED).filter(|_| is_any_fitted)?;
+    Some(Box::new(move |v| half(v).unwrap_or(f64::NAN)))
 }
 
 /// Whether a job fits a coefficient.
