@@ -30,7 +30,7 @@ pub mod tangent;
 
 use friction::FrictionLaw;
 use portable_math as math;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use shoulder::{Shoulder, ShoulderContact};
 pub(crate) use slider::Slider;
 
@@ -81,7 +81,7 @@ pub struct Spring {
 }
 
 /// Angles and rates of both links, rad and rad/s.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
     /// Angle of the neck from the vertical, `theta`, rad.
     pub theta: f64,

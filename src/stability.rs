@@ -8,6 +8,7 @@
 pub mod changes;
 pub mod chatter;
 pub mod cycle_branch;
+pub mod journal;
 pub mod outputs;
 pub mod shooting;
 pub mod speed_intervals;

@@ -17,6 +17,8 @@ pub enum CheckpointKind {
     Fit,
     /// Points of a study.
     Sweep,
+    /// Evaluations of a study of stability.
+    Stability,
 }
 
 impl CheckpointKind {
@@ -25,6 +27,7 @@ impl CheckpointKind {
         match self {
             Self::Fit => ["fit", "evaluation", "job"],
             Self::Sweep => ["sweep", "point", "study"],
+            Self::Stability => ["stability study", "evaluation", "range"],
         }
     }
 

@@ -80,6 +80,12 @@ impl CheckpointSink for NullSink {
     }
 }
 
+impl<S: CheckpointSink> CheckpointSink for &mut S {
+    fn append(&mut self, lines: &str) -> Result<(), String> {
+        (**self).append(lines)
+    }
+}
+
 /// Collects the lines of a journal in memory.
 impl CheckpointSink for String {
     fn append(&mut self, lines: &str) -> Result<(), String> {

@@ -1,5 +1,6 @@
 //! `wiperlab stability`.
 
+use super::checkpoint::{CHECKPOINT_FILE, CheckpointWriter};
 use super::files::RESULT_FILE;
 use super::job::job_path;
 use super::load::{print_warnings, read_scene};
@@ -10,6 +11,7 @@ use crate::model::parameter_spread::ParameterSpread;
 use crate::simulate::scene::Scene;
 use crate::stability::chatter::ChatterSummary;
 use crate::stability::cycle_branch::CycleBranch;
+use crate::stability::journal::{EvaluationLog, StudyStop};
 use crate::stability::outputs::{
     describe_cycle_end, write_cycles_csv, write_stability_csv, write_stability_json,
 };
@@ -41,6 +43,10 @@ pub(crate) struct StabilityArgs {
     pub fit: Option<PathBuf>,
     #[command(flatten)]
     pub overwrite: Overwrite,
+    /// Continue an interrupted study from DIR/journal.jsonl, which contains its finished evaluations; without
+    /// this option a study starts anew, and the old journal is kept as journal.previous-1.jsonl
+    #[arg(long)]
+    pub resume: bool,
 }
 
 /// Two numbers, the second above the first.
@@ -83,7 +89,12 @@ impl StabilityArgs {
         }
         let preloads_n = self.preload_n.map(|range| range.0);
         let range = StudyRange { speeds_m_per_s, preloads_n, points: usize::from(self.points) };
-        let study = StabilityStudy::from_scene(&scene, range).map_err(Failure::input)?;
+        let journal = self.out.join(CHECKPOINT_FILE);
+        let is_new = !self.out.exists();
+        let solved = self.solve(&scene, range, spread.as_ref(), &journal, global)?;
+        let Some((study, chatter)) = solved else { return Ok(CommandOutcome::StoppedEarly) };
+        let remove_journal =
+            || std::fs::remove_file(&journal).map_err(|error| Failure::at(journal.display(), error));
         if let Some(reason) = study.why_impossible() {
             let [from, to] = speeds_m_per_s;
             let preloads = preloads_n
@@ -94,9 +105,12 @@ impl StabilityArgs {
                  slides steadily; change preload, friction or speeds",
                 reason.meaning()
             );
+            remove_journal()?;
+            if is_new {
+                let _ = std::fs::remove_dir(&self.out); // another program may have written a file to it
+            }
             return Err(Failure::at(self.scene.display(), problem));
         }
-        let chatter = study.summarise_chatter(&scene, spread.as_ref());
         let json = write_stability_json(&study, &chatter);
         let json = serde_json::to_vec_pretty(&json).map_err(Failure::internal)?;
         let mut outputs =
@@ -104,12 +118,59 @@ impl StabilityArgs {
         outputs.push((CYCLES.to_owned(), write_cycles_csv(&study).into_bytes()));
         outputs.extend(files::figure_files("stability", &draw_figure(scene.title(), &study)));
         files::write_outputs(&self.out, &writer, &outputs)?;
+        remove_journal()?; // the outputs contain its results
         if !global.quiet {
             print_study(scene.title(), &study, &chatter);
             print_line!("written to {}", self.out.display());
         }
         Ok(CommandOutcome::Done)
     }
+
+    /// Makes the evaluations that the journal does not contain; `None` if interrupted.
+    fn solve(
+        &self,
+        scene: &Scene,
+        range: StudyRange,
+        spread: Option<&ParameterSpread>,
+        journal: &Path,
+        global: &GlobalArgs,
+    ) -> Outcome<Option<(StabilityStudy, ChatterSummary)>> {
+        let name = journal.display().to_string();
+        let kept = {
+            let name = name.clone();
+            move || format!("{name} holds the finished evaluations; go on with --resume")
+        };
+        let (mut sink, found) = CheckpointWriter::open(journal, self.resume)?;
+        let stops = interrupt::register_stoppable(kept.clone());
+        let solve = || {
+            let problem = (scene, &range, spread);
+            let mut log = EvaluationLog::open(problem, (&name, found), &mut sink, interrupt::control_flow)?;
+            if log.written > 0 {
+                let line = format!("{} evaluations are taken from the journal", log.written);
+                progress::print_progress(global.quiet, &line);
+            }
+            let study = StabilityStudy::from_scene(scene, range.clone(), &mut log)?;
+            let chatter = study.summarise_chatter(scene, spread, &mut log)?;
+            Ok((study, chatter))
+        };
+        match solve() {
+            Ok(solved) => {
+                sink.finish()?;
+                Ok(Some(solved))
+            }
+            Err(StudyStop::Interrupted) => {
+                stops.announce_stop(&kept());
+                Ok(None)
+            }
+            Err(failed @ StudyStop::JournalWrite(_)) => Err(Failure::internal(failed)),
+            Err(refused) => Err(Failure::input(refused)),
+        }
+    }
+}
+
+/// A number with this number of digits, for the terminal.
+fn format_ascii(value: f64, digits: usize) -> String {
+    to_ascii(&format_digits(value, digits)).to_string()
 }
 
 fn print_study(title: &str, study: &StabilityStudy, chatter: &ChatterSummary) {
@@ -121,14 +182,14 @@ fn print_study(title: &str, study: &StabilityStudy, chatter: &ChatterSummary) {
             _ => "forward",
         };
         print_line!("");
-        print_line!("steady sliding, {direction}, preload {} N", format_digits(survey.preload_n, 3));
+        print_line!("steady sliding, {direction}, preload {} N", format_ascii(survey.preload_n, 3));
         survey.intervals.iter().for_each(print_interval);
     }
     print_line!("");
     match study.unstable_range() {
         None => print_line!("no instability of steady sliding at these speeds"),
         Some([onset, end]) => {
-            print_line!("unstable between {} and {} m/s", format_digits(onset, 4), format_digits(end, 4));
+            print_line!("unstable between {} and {} m/s", format_ascii(onset, 4), format_ascii(end, 4));
             if end == study.range.speeds_m_per_s[1] {
                 print_line!("the range ends there; name higher speeds with --speed-m-per-s");
             }
@@ -155,10 +216,10 @@ fn print_study(title: &str, study: &StabilityStudy, chatter: &ChatterSummary) {
 /// Prints where the cycle ends, why there is one, and what ends it sooner.
 fn print_chatter(study: &StabilityStudy, chatter: &ChatterSummary) {
     let end = match study.leading_branch().and_then(CycleBranch::fold_m_per_s) {
-        Some(speed) => format!("the stick-slip cycle goes on up to {} m/s: ", format_digits(speed, 4)),
+        Some(speed) => format!("the stick-slip cycle goes on up to {} m/s: ", format_ascii(speed, 4)),
         None => String::new(),
     };
-    print_line!("{end}{}", describe_cycle_end(study));
+    print_line!("{end}{}", to_ascii(&describe_cycle_end(study)));
     print_line!("");
     chatter.sentences.iter().for_each(|sentence| print_line!("{}", to_ascii(sentence)));
 }
@@ -195,16 +256,15 @@ fn read_spread(fit: &Path, path: &Path, scene: &Scene) -> Outcome<Option<Paramet
 }
 
 fn print_interval(interval: &SpeedInterval) {
-    let [from, to] = interval.speeds_m_per_s.map(|speed| format_digits(speed, 4));
-    let words = match (interval.state, interval.modes.zip(interval.instabilities())) {
-        (SlidingState::Unstable, Some((modes, kinds))) => {
-            // the growth is usually zero at the upper end, so the mode at the lower end is printed
-            let (growth, (kind, band)) = (format_digits(modes[0].growth_per_s, 3), kinds[0]);
-            let hz = format_digits(modes[0].frequency_hz, 4);
-            match kind {
+    let [from, to] = interval.speeds_m_per_s.map(|speed| format_ascii(speed, 4));
+    let words = match (interval.state, interval.modes) {
+        // the growth is usually zero at the upper end, so the mode at the lower end is printed
+        (SlidingState::Unstable, Some([mode, _])) => {
+            let [growth, hz] = [format_ascii(mode.growth_per_s, 3), format_ascii(mode.frequency_hz, 4)];
+            match mode.instability {
                 Instability::Divergence => format!("unstable: divergence, {growth} 1/s"),
                 Instability::Flutter => {
-                    format!("unstable: flutter at {hz} Hz ({}), {growth} 1/s", band.name())
+                    format!("unstable: flutter at {hz} Hz ({}), {growth} 1/s", mode.band.name())
                 }
             }
         }

@@ -5,7 +5,7 @@ use super::sweep_map::colour_limits;
 use crate::stability::cycle_branch::CycleBranch;
 use crate::stability::shooting::PeriodicMotion;
 use crate::stability::speed_intervals::{SlidingState, unstable_range};
-use crate::stability::steady_sliding::{NoSliding, NoiseBand, SlidingMode, SteadySlide};
+use crate::stability::steady_sliding::NoSliding;
 use crate::stability::study::{StabilityStudy, StudyPoint};
 use crate::text::format_digits;
 use plain_charts::{
@@ -52,7 +52,7 @@ fn claim_sentence(study: &StabilityStudy) -> String {
     let band = modes
         .reduce(|a, b| if b.growth_per_s > a.growth_per_s { b } else { a })
         .filter(|mode| mode.frequency_hz > 0.0)
-        .map(|mode| format!(" ({})", NoiseBand::from_frequency(mode.frequency_hz).name()));
+        .map(|mode| format!(" ({})", mode.band.name()));
     let [onset, end] = [onset, end].map(|speed| format_digits(speed, 3));
     let sentence =
         format!("Steady sliding is unstable between {onset} and {end} m/s{}", band.unwrap_or_default());
@@ -69,12 +69,6 @@ fn speed_axis(study: &StabilityStudy) -> ChartAxis {
     ChartAxis::linear("speed of the head, m/s").with_range(from, to)
 }
 
-/// Points of sliding towards +v.
-fn forward_points(study: &StabilityStudy) -> Vec<&StudyPoint> {
-    let length = study.points.len() / study.own.len().max(1);
-    study.points.iter().take(length).collect()
-}
-
 /// One curve for each mode, in rising order of frequency.
 fn draw_curves(study: &StabilityStudy) -> Panel {
     const STYLES: [(Colour, Mark); 4] = [
@@ -83,9 +77,9 @@ fn draw_curves(study: &StabilityStudy) -> Panel {
         (Colour::Green, Mark::Dashed),
         (Colour::Orange, Mark::Dotted),
     ];
-    let points = forward_points(study);
-    let modes =
-        |point: &StudyPoint| point.slide.iter().flat_map(SteadySlide::modes).collect::<Vec<SlidingMode>>();
+    // the first survey is that towards +v
+    let points = study.own.first().map_or(&[][..], |survey| &survey.points);
+    let modes = |point: &StudyPoint| point.slide.as_ref().map_or(Vec::new(), |slide| slide.modes.clone());
     let count = points.iter().map(|point| modes(point).len()).max().unwrap_or(0);
     let curves = STYLES.iter().enumerate().take(count).map(|(i, (colour, mark))| {
         let found: Vec<_> =
@@ -155,14 +149,16 @@ fn draw_cycle(study: &StabilityStudy) -> Vec<Panel> {
 /// Growth of the mode that grows fastest as colours, with the highest unstable speed of each preload as a
 /// line.
 fn draw_map(study: &StabilityStudy) -> Panel {
-    let (points, rows) = (forward_points(study), study.range.points);
+    let rows = study.range.points;
+    // the first surveys are those towards +v
+    let surveys = &study.by_preload[..rows];
     let growth = |point: &StudyPoint| Some(point.slide.as_ref().ok()?.leading_mode().growth_per_s);
-    let at = |speed: usize, preload: usize| points[preload * rows + speed];
-    let all: Vec<Option<f64>> = points.iter().map(|point| growth(point)).collect();
+    let at = |speed: usize, preload: usize| &surveys[preload].points[speed];
+    let all: Vec<Option<f64>> = surveys.iter().flat_map(|survey| survey.points.iter().map(growth)).collect();
     let largest = all.iter().flatten().fold(0.0, |largest: f64, value| largest.max(value.abs()));
     // the colour range is symmetric about zero, so the hue changes where the growth changes sign
     let limit = colour_limits(&all).map_or(largest, |(low, high)| low.abs().max(high.abs()));
-    let preloads: Vec<f64> = (0..rows).map(|row| at(0, row).preload_n).collect();
+    let preloads: Vec<f64> = surveys.iter().map(|survey| survey.preload_n).collect();
     let speeds: Vec<f64> = (0..rows).map(|column| at(column, 0).speed_m_per_s).collect();
     let values = (0..rows).map(|column| (0..rows).map(|row| growth(at(column, row))).collect());
     let heat = HeatMap {
@@ -190,7 +186,7 @@ fn draw_map(study: &StabilityStudy) -> Panel {
         .map(|(reason, label, pattern)| Hatch { label: label.to_owned(), pattern, cells: cells(reason) })
         .filter(|hatch| !hatch.cells.is_empty());
     let [_, top] = study.range.speeds_m_per_s;
-    let ends = study.by_preload.iter().take(rows).map(|survey| {
+    let ends = surveys.iter().map(|survey| {
         let [_, end] = unstable_range(&survey.intervals)?;
         (end < top).then_some((end, survey.preload_n))
     });

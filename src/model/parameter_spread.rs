@@ -1,7 +1,9 @@
 //! Uncertainty of fitted parameters, for its propagation to other numbers.
 
+use serde::Serialize;
+
 /// 95 % intervals and correlations of the parameters that a fit estimated.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct ParameterSpread {
     /// Names of the parameters.
     pub names: Vec<String>,

@@ -4,7 +4,7 @@
 //! moment `k_s (|theta| - theta_s) sign(theta) + c_s dtheta/dt` is added to the neck's.
 
 use portable_math as math;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A shoulder on both sides of the neck.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -43,7 +43,8 @@ impl Shoulder {
 }
 
 /// Whether the neck leans on the shoulder, and on which side of it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum ShoulderContact {
     /// The neck does not touch the shoulder.
     Off,

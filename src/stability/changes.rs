@@ -2,35 +2,29 @@
 
 use super::chatter::CycleRemedy;
 use super::cycle_branch::CycleBranch;
+use super::journal::{EvaluationLog, StudyStop};
 use super::speed_intervals::{SlidingState, unstable_range};
 use super::steady_sliding::SlideFinder;
 use super::study::SlidingSurvey;
 use crate::model::Linkage;
-use crate::model::parameters::{ModelParameter, PARAMETERS, damping_from_ratio, find_parameter};
+use crate::model::parameters::{ModelParameter, PARAMETERS, damping_from_ratio};
 use crate::simulate::scene::Scene;
 use crate::simulate::scene::error::SceneError;
 
-/// Masses, stiffnesses, dampings, the preload and the angle of the shoulder. Each changes alone, while all
-/// other parameters keep their values. The numbers of the friction law are added to these.
-const PARTS: [&str; 17] = [
-    "blade.head_mass_kg",
-    "blade.neck_mass_kg",
-    "blade.lip_mass_kg",
-    "blade.head_stiffness_n_per_m",
-    "blade.neck_stiffness_n_m_per_rad",
-    "blade.lip_stiffness_n_m_per_rad",
-    "shoulder.stiffness_n_m_per_rad",
-    "blade.head_damping_n_s_per_m",
-    "blade.neck_damping_n_m_s_per_rad",
-    "blade.lip_damping_n_m_s_per_rad",
-    "shoulder.damping_n_m_s_per_rad",
-    "blade.preload_force_n",
-    "shoulder.contact_angle_rad",
-    "slider.mass_kg",
-    "slider.stiffness_n_per_m",
-    "slider.damping_n_s_per_m",
-    "slider.normal_force_n",
-];
+/// Masses, stiffnesses, dampings, the preload and the angle of the shoulder, in SI units, and the numbers of
+/// the friction law. Each changes alone, while all other parameters keep their values.
+fn changed_parameters() -> impl Iterator<Item = &'static ModelParameter> {
+    /// Parts of the names of other parameters, or of other forms of the same ones.
+    const OTHERS: [&str; 6] =
+        ["length", "centre", "inertia", "frequency", "damping_ratio", "stiffness_ratio"];
+    PARAMETERS.iter().filter(|parameter| match parameter.name.split_once('.') {
+        Some(("friction", _)) => true,
+        Some(("blade" | "shoulder" | "slider", key)) => {
+            key != "preload_displacement_m" && !OTHERS.iter().any(|part| key.contains(part))
+        }
+        _ => false,
+    })
+}
 
 /// Step of a change, as a fraction of the value.
 const SHARE: f64 = 0.01;
@@ -79,11 +73,11 @@ impl ParameterChange {
 /// # Errors
 /// As [`Scene::with_parameter`].
 pub fn write_in_physical_units(scene: &Scene) -> Result<Scene, SceneError> {
-    let convert = |converted: Scene, name: &&str| match scene.value(name) {
-        Some(value) => converted.with_parameter(name, value),
+    let convert = |converted: Scene, parameter: &ModelParameter| match scene.value(parameter.name) {
+        Some(value) => converted.with_parameter(parameter.name, value),
         None => Ok(converted),
     };
-    PARTS.iter().try_fold(scene.clone(), convert)
+    changed_parameters().try_fold(scene.clone(), convert)
 }
 
 /// Effects of all parameters on the unstable range and on the end of the cycle, the largest first; parameters
@@ -94,7 +88,8 @@ pub(super) fn rank_changes(
     own: &[SlidingSurvey],
     cycle: Option<&CycleBranch>,
     speeds_m_per_s: [f64; 2],
-) -> Result<Vec<ParameterChange>, SceneError> {
+    log: &mut EvaluationLog<'_>,
+) -> Result<Vec<ParameterChange>, StudyStop> {
     let ranges = own.iter().filter_map(|survey| Some((survey.direction, unstable_range(&survey.intervals)?)));
     let range = ranges.max_by(|a, b| a.1[1].total_cmp(&b.1[1]));
     let [lowest, highest] = speeds_m_per_s;
@@ -102,22 +97,26 @@ pub(super) fn rank_changes(
         [(onset, 1.0, onset > lowest), (end, -1.0, end < highest)].map(|boundary| (direction, boundary))
     });
     let physical = write_in_physical_units(scene)?;
-    let laws = PARAMETERS.iter().map(|row| row.name).filter(|name| name.starts_with("friction."));
     let mut changes = Vec::new();
-    for name in PARTS.into_iter().chain(laws) {
-        let (Some(parameter), Some(value)) = (find_parameter(name), physical.value(name)) else { continue };
+    for parameter in changed_parameters() {
+        let name = parameter.name;
+        let Some(value) = physical.value(name) else { continue };
         let Some(step) = change_step(&physical, name, value) else { continue };
         let change = |(direction, (speed, inwards, is_found)): (f64, (f64, f64, bool))| {
             let find = |linkage: &Linkage| find_boundary(linkage, direction, speed, inwards);
             is_found
                 .then(|| number_change(&physical, name, [value, step], speed, |scene| find(&scene.linkage)))?
         };
-        let [onset_m_per_s, end_m_per_s] = boundaries.map_or([None; 2], |both| both.map(change));
-        let fold = cycle.and_then(|cycle| {
-            let find = |scene: &Scene| cycle.find_changed_end(scene);
-            number_change(&physical, name, [value, step], cycle.end_m_per_s, find)
-        });
-        let fold_m_per_s = fold.map(|moved| if moved.abs() > LEAST_FOLD * highest { moved } else { 0.0 });
+        let compute = || {
+            let [onset, end] = boundaries.map_or([None; 2], |both| both.map(change));
+            let fold = cycle.and_then(|cycle| {
+                let find = |scene: &Scene| cycle.find_changed_end(scene);
+                number_change(&physical, name, [value, step], cycle.end_m_per_s, find)
+            });
+            [onset, end, fold.map(|moved| if moved.abs() > LEAST_FOLD * highest { moved } else { 0.0 })]
+        };
+        let [onset_m_per_s, end_m_per_s, fold_m_per_s] =
+            log.evaluate(format!("change of {name}"), compute)?;
         changes.push(ParameterChange { parameter, value, step, onset_m_per_s, end_m_per_s, fold_m_per_s });
     }
     changes.retain(|change| change.size() > LEAST_EFFECT * highest);
@@ -133,10 +132,11 @@ pub(super) fn find_remedy(
     changes: &[ParameterChange],
     cycle: &CycleBranch,
     speeds_m_per_s: [f64; 2],
-) -> Option<CycleRemedy> {
+    log: &mut EvaluationLog<'_>,
+) -> Result<Option<CycleRemedy>, StudyStop> {
     const CANDIDATES: usize = 3;
     const FIFTH: f64 = 1.2;
-    let physical = write_in_physical_units(scene).ok()?;
+    let physical = write_in_physical_units(scene)?;
     let own = changes.iter().filter(|change| !change.parameter.name.starts_with("friction."));
     let mut guesses: Vec<(f64, &ParameterChange, f64)> = own
         .filter_map(|change| {
@@ -153,7 +153,7 @@ pub(super) fn find_remedy(
         .filter(|(moved, ..)| *moved < 0.0)
         .collect();
     guesses.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let computed = guesses.into_iter().take(CANDIDATES).filter_map(|(_, change, factor)| {
+    let compute = |change: &ParameterChange, factor: f64| {
         let changed = physical.with_parameter(change.parameter.name, factor * change.value).ok()?;
         let intervals =
             SlideFinder::new(&changed.linkage, cycle.direction).find_intervals(speeds_m_per_s, 100);
@@ -166,9 +166,15 @@ pub(super) fn find_remedy(
         };
         let parameter = change.parameter.name.to_owned();
         Some(CycleRemedy { parameter, factor, cycle_fold_m_per_s })
-    });
+    };
+    let mut computed: Vec<CycleRemedy> = Vec::new();
+    for (_, change, factor) in guesses.into_iter().take(CANDIDATES) {
+        let name = format!("{factor} times {}", change.parameter.name);
+        computed.extend(log.evaluate(name, || compute(change, factor))?);
+    }
     let speed = |remedy: &CycleRemedy| remedy.cycle_fold_m_per_s.unwrap_or(0.0);
-    computed.min_by(|a, b| speed(a).total_cmp(&speed(b))).filter(|best| speed(best) < cycle.end_m_per_s)
+    let best = computed.into_iter().min_by(|a, b| speed(a).total_cmp(&speed(b)));
+    Ok(best.filter(|best| speed(best) < cycle.end_m_per_s))
 }
 
 /// The step of a parameter; `None` if its value is zero and it is not a damping.
@@ -227,7 +233,7 @@ mod tests {
 
     fn study(scene: &Scene) -> StabilityStudy {
         let range = StudyRange { speeds_m_per_s: [0.0, 1.0], preloads_n: None, points: 40 };
-        StabilityStudy::from_scene(scene, range).unwrap()
+        StabilityStudy::from_scene(scene, range, &mut EvaluationLog::without_journal()).unwrap()
     }
 
     /// If a parameter of the scene changes by 0.02 of its step, the end of the instability moves as computed.

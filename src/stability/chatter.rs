@@ -3,6 +3,7 @@
 
 use super::changes::{find_boundary, number_change};
 use super::cycle_branch::{CycleBranch, CycleEnd};
+use super::journal::{EvaluationLog, StudyStop};
 use super::steady_sliding::SlideFinder;
 use super::study::{StabilityStudy, StudyRange, default_top_speed};
 use crate::model::Linkage;
@@ -37,9 +38,7 @@ impl ChatterCause {
         unstable: Option<[f64; 2]>,
     ) -> Option<Self> {
         let wanted = 0.5 * unstable.map_or(branch.end_m_per_s, |[_, end]| end);
-        let away = |speed: f64| (speed - wanted).abs();
-        let cycle =
-            branch.cycles().iter().min_by(|a, b| away(a.speed_m_per_s).total_cmp(&away(b.speed_m_per_s)))?;
+        let cycle = branch.nearest_cycle(wanted)?;
         let vibrations = cycle.sticks_s.len().max(1) as f64;
         let distance = |hz: f64| math::ln(hz / (vibrations * cycle.frequency_hz())).abs();
         let parts = natural_frequencies(linkage).into_iter();
@@ -61,9 +60,9 @@ fn natural_frequencies(linkage: &Linkage) -> Vec<(String, f64)> {
 
 /// Change of the friction coefficient per change of the speed, s/m.
 fn friction_slope(linkage: &Linkage, direction: f64, speed: f64) -> f64 {
-    let mu = |speed: f64| linkage.friction.dynamic_coefficient(speed, direction);
-    let step = 1e-4 * speed;
-    (mu(speed + step) - mu(speed - step)) / (2.0 * step)
+    let law = &linkage.friction;
+    let falling = law.a * law.b_s_per_m * law.varying_part(speed)[1];
+    law.direction_factor(direction) * (falling + law.viscous_s_per_m)
 }
 
 /// Growth by falling friction of the mode of steady sliding that grows fastest or decays most slowly, divided
@@ -76,7 +75,7 @@ fn feeding_over_damping(linkage: &Linkage, direction: f64, speed: f64) -> Option
     level.friction = FrictionLaw::exponential(0.0, 0.0, mu);
     let still = SlideFinder::new(&level, direction).find_slide(speed).ok()?;
     let far = |hz: f64| (hz - mode.frequency_hz).abs();
-    let same = still.modes().min_by(|a, b| far(a.frequency_hz).total_cmp(&far(b.frequency_hz)))?;
+    let same = still.modes.iter().min_by(|a, b| far(a.frequency_hz).total_cmp(&far(b.frequency_hz)))?;
     let damping = -same.growth_per_s;
     (damping > 0.0).then(|| (mode.growth_per_s + damping) / damping)
 }
@@ -187,25 +186,36 @@ impl ChatterSummary {
         const POINTS: usize = 100;
         let top = Some(default_top_speed(scene)).filter(|top| *top > 0.0)?;
         let range = StudyRange { speeds_m_per_s: [0.0, top], preloads_n: None, points: POINTS };
-        let study = StabilityStudy::from_scene(scene, range).ok()?;
-        Some(study.summarise_chatter(scene, Some(spread)))
+        let log = &mut EvaluationLog::without_journal();
+        StabilityStudy::from_scene(scene, range, log).ok()?.summarise_chatter(scene, Some(spread), log).ok()
     }
 }
 
 impl StabilityStudy {
     /// Summarises a study of a scene. `spread` is the uncertainty of the scene's parameters after a fit.
-    #[must_use]
-    pub fn summarise_chatter(&self, scene: &Scene, spread: Option<&ParameterSpread>) -> ChatterSummary {
-        let known = ChatterNumber::ALL.into_iter().filter_map(|which| {
-            let value = self.chatter_number(which, scene)?;
-            let half_95 = spread.and_then(|spread| self.propagate_number(which, value, scene, spread));
-            Some((which, ChatterEstimate { value, half_95 }))
-        });
+    ///
+    /// # Errors
+    /// [`StudyStop`] if the log stops the study.
+    pub fn summarise_chatter(
+        &self,
+        scene: &Scene,
+        spread: Option<&ParameterSpread>,
+        log: &mut EvaluationLog<'_>,
+    ) -> Result<ChatterSummary, StudyStop> {
+        let mut numbers = BTreeMap::new();
+        for which in ChatterNumber::ALL {
+            let Some(value) = self.chatter_number(which, scene) else { continue };
+            let half_95 = match spread {
+                Some(spread) => self.propagate_number(which, value, scene, spread, log)?,
+                None => None,
+            };
+            numbers.insert(which, ChatterEstimate { value, half_95 });
+        }
         let mut summary = ChatterSummary {
             sentences: Vec::new(),
             part: self.cause.as_ref().map(|cause| cause.part.clone()),
             speed_m_per_s: self.cause.as_ref().map(|cause| cause.speed_m_per_s),
-            numbers: known.collect(),
+            numbers,
             remedy: self.remedy.clone(),
         };
         // an end of the range of speeds has no interval even if the fit determines all parameters
@@ -217,7 +227,7 @@ impl StabilityStudy {
             .into_iter()
             .flatten()
             .collect();
-        summary
+        Ok(summary)
     }
 
     /// A number of the scene of this study; `None` if it is not known.
@@ -262,12 +272,13 @@ impl StabilityStudy {
         value: f64,
         scene: &Scene,
         spread: &ParameterSpread,
-    ) -> Option<f64> {
+        log: &mut EvaluationLog<'_>,
+    ) -> Result<Option<f64>, StudyStop> {
         /// Smallest step, as a fraction of the value of a parameter. A number that changes by less than
         /// `NOTHING` of its value in such a step does not depend on the parameter.
         const LEAST_STEP: f64 = 0.01;
         const NOTHING: f64 = 1e-6;
-        let moved = spread.names.iter().zip(&spread.halves_95).map(|(name, half)| {
+        let compute = |name: &str, half: &Option<f64>| {
             let at = scene.value(name)?;
             let step = half.unwrap_or(0.0).max(LEAST_STEP * at.abs());
             let change =
@@ -277,8 +288,15 @@ impl StabilityStudy {
                 Some(half) => Some(change * half / step),
                 None => None,
             }
-        });
-        spread.propagate_95(&moved.collect::<Option<Vec<f64>>>()?)
+        };
+        let mut moved = Vec::new();
+        for (name, half) in spread.names.iter().zip(&spread.halves_95) {
+            match log.evaluate(format!("{which:?} by {name}"), || compute(name, half))? {
+                Some(change) => moved.push(change),
+                None => return Ok(None),
+            }
+        }
+        Ok(spread.propagate_95(&moved))
     }
 
     /// At which speeds the blade chatters, and what ends it soonest.

@@ -4,15 +4,15 @@
 //! lower speeds at a fold, where a multiplier is 1, or at a corner, where the cycle loses its stick: there it
 //! meets a motion without stick. Above this speed chatter does not go on.
 
-use super::shooting::{CycleShooter, PeriodicMotion, Solution, Unknowns};
+use super::shooting::{CycleShooter, PeriodicMotion, Solution, Unknowns, by_speed};
 use super::speed_intervals::unstable_range;
 use super::steady_sliding::{SlideFinder, SteadySlide};
 use crate::model::{LinkDirections, Linkage, Pose};
 use crate::simulate::scene::Scene;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// How a stick-slip cycle ends.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CycleEnd {
     /// A fold: a stable and an unstable cycle meet, and a multiplier is 1.
@@ -28,8 +28,15 @@ pub enum CycleEnd {
     Undecided,
 }
 
+impl CycleEnd {
+    /// Whether the branch turns back at the end.
+    fn is_turn(self) -> bool {
+        !matches!(self, Self::EndOfRange | Self::Undecided)
+    }
+}
+
 /// The cycle over speed, in one direction.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct CycleBranch {
     /// Direction of sliding, +1 or -1.
     pub direction: f64,
@@ -42,14 +49,14 @@ pub struct CycleBranch {
     /// The speed at which the cycle ends, m/s, or the highest speed at which it was found.
     pub end_m_per_s: f64,
     /// Why the branch could not be followed; empty for other ends.
-    pub problem: &'static str,
+    pub problem: String,
 }
 
 impl CycleBranch {
     /// The speed at which the cycle ends, m/s; `None` if no end was found.
     #[must_use]
     pub fn fold_m_per_s(&self) -> Option<f64> {
-        (!matches!(self.end, CycleEnd::EndOfRange | CycleEnd::Undecided)).then_some(self.end_m_per_s)
+        self.end.is_turn().then_some(self.end_m_per_s)
     }
 
     /// The cycle just below its end. The last motions are so close to the end that their multipliers and
@@ -57,6 +64,12 @@ impl CycleBranch {
     fn cycle_below_end(&self) -> Option<&PeriodicMotion> {
         let below = |cycle: &&PeriodicMotion| cycle.speed_m_per_s < 0.999 * self.end_m_per_s;
         self.cycles().iter().rev().find(below)
+    }
+
+    /// The cycle of the branch whose speed is nearest to a speed, m/s.
+    pub(super) fn nearest_cycle(&self, speed_m_per_s: f64) -> Option<&PeriodicMotion> {
+        let away = |cycle: &&PeriodicMotion| (cycle.speed_m_per_s - speed_m_per_s).abs();
+        self.cycles().iter().min_by(|a, b| away(a).total_cmp(&away(b)))
     }
 
     /// Whether the cycle just below its end is stable.
@@ -140,8 +153,7 @@ impl CycleBranch {
     /// `None` if none is found next to the branch.
     #[must_use]
     pub fn find_cycle(&self, scene: &Scene, speed_m_per_s: f64) -> Option<PeriodicMotion> {
-        let away = |motion: &&PeriodicMotion| (motion.speed_m_per_s - speed_m_per_s).abs();
-        let near = self.cycles().iter().min_by(|a, b| away(a).total_cmp(&away(b)))?;
+        let near = self.nearest_cycle(speed_m_per_s)?;
         let (mut walker, found) = self.solve_near(scene, near, speed_m_per_s, [0.0, speed_m_per_s])?;
         Some(walker.shooter.describe(&found))
     }
@@ -159,16 +171,9 @@ impl CycleBranch {
         let range = [0.0, 2.0 * self.end_m_per_s];
         let (mut walker, start) = self.solve_near(scene, near, near.speed_m_per_s, range)?;
         let by_speed = by_speed(start.unknowns.len());
-        let (found, end) = walker.walk(start, &by_speed);
-        matches!(end, WalkEnd::Turn(..)).then(|| walker.shooter.speed_of(&found[found.len() - 1].unknowns))
+        let (found, end, _) = walker.walk(start, &by_speed);
+        end.is_turn().then(|| walker.shooter.speed_of(&found[found.len() - 1].unknowns))
     }
-}
-
-/// The direction in which the speed alone rises.
-fn by_speed(unknowns: usize) -> Unknowns {
-    let mut direction = Unknowns::zeros(unknowns);
-    direction[unknowns - 1] = 1.0;
-    direction
 }
 
 /// The pose of steady sliding with the tip at rest on the glass.
@@ -182,17 +187,6 @@ fn stop_tip(linkage: &Linkage, slide: &SteadySlide, velocity_m_per_s: f64) -> Po
     Pose { theta_rate: rate, phi_rate: rate, ..slide.pose }
 }
 
-/// How a walk along a branch ends.
-enum WalkEnd {
-    /// The branch turns back to speeds that it has passed; with the first solution beyond the turn and the
-    /// direction of the branch there, if it is found.
-    Turn(CycleEnd, Option<(Solution, Unknowns)>),
-    EndOfRange,
-    /// The motion has become steady sliding.
-    Vanishes,
-    Undecided,
-}
-
 struct BranchWalker {
     shooter: CycleShooter,
     finder: SlideFinder,
@@ -201,6 +195,8 @@ struct BranchWalker {
 
 /// A point of a walk: a solution and the direction of the branch there.
 type BranchPoint = (Solution, Unknowns);
+
+type FinishedWalk = (Vec<Solution>, CycleEnd, Option<BranchPoint>);
 
 /// Longest step along a branch, in scales.
 const LONGEST: f64 = 0.15;
@@ -225,41 +221,29 @@ impl BranchWalker {
         /// Largest number of times that a walk starts again from a simulated run.
         const RESTARTS: usize = 4;
         let by_speed = by_speed(start.unknowns.len());
-        let (mut found, _) = self.walk(start.clone(), &-&by_speed);
+        let (mut found, ..) = self.walk(start.clone(), &-&by_speed);
         found.reverse();
         found.pop();
         let (mut next, mut restarts) = (start, 0);
-        let end = loop {
-            let (up, end) = self.walk(next.clone(), &by_speed);
+        let (last, end, problem, beyond) = loop {
+            let (up, end, beyond) = self.walk(next, &by_speed);
             found.extend(up);
-            if matches!(end, WalkEnd::EndOfRange) || restarts == RESTARTS {
-                break end;
-            }
+            let (last, problem) = (found[found.len() - 1].clone(), self.shooter.problem);
             // a run above the last cycle shows whether the blade still chatters, in another cycle
-            let Some(last) = found.last() else { break end };
-            let problem = self.shooter.problem;
-            let Some(above) = self.settle_above(&last.unknowns) else {
-                self.shooter.problem = problem;
-                break end;
+            let may_go_on = end != CycleEnd::EndOfRange && restarts < RESTARTS;
+            let Some(above) = may_go_on.then(|| self.settle_above(&last.unknowns)).flatten() else {
+                break (last, end, problem, beyond);
             };
             (next, restarts) = (above, restarts + 1);
         };
         let before_end = found.len();
-        let last = found.last().map(|last| last.unknowns.clone());
-        let end_m_per_s = last.map_or(0.0, |last| self.shooter.speed_of(&last));
-        let problem = self.shooter.problem;
-        let end = match end {
-            WalkEnd::Turn(kind, next) => {
-                let next = next.or_else(|| self.leave_corner(found.last()?));
-                if let Some((first, along)) = next {
-                    found.extend(self.walk(first, &along).0);
-                }
-                kind
-            }
-            WalkEnd::EndOfRange => CycleEnd::EndOfRange,
-            WalkEnd::Vanishes | WalkEnd::Undecided => CycleEnd::Undecided,
-        };
-        let problem = if end == CycleEnd::Undecided { problem } else { "" };
+        let end_m_per_s = self.shooter.speed_of(&last.unknowns);
+        if end.is_turn()
+            && let Some((first, along)) = beyond.or_else(|| self.leave_corner(&last))
+        {
+            found.extend(self.walk(first, &along).0);
+        }
+        let problem = if end == CycleEnd::Undecided { problem.to_owned() } else { String::new() };
         let motions = found.iter().map(|solution| self.shooter.describe(solution)).collect();
         CycleBranch { direction, motions, before_end, end, end_m_per_s, problem }
     }
@@ -276,7 +260,7 @@ impl BranchWalker {
         let rest = self.shooter.unknowns_from(&slide.pose, period_s, end);
         let along = self.shooter.small_vibration_at(&rest)?;
         let first = self.shooter.solve(&(&rest + SIZE * &along), &along)?;
-        let (found, _) = self.walk(first, &along);
+        let (found, ..) = self.walk(first, &along);
         let last = found.last()?.unknowns.clone();
         let by_speed = by_speed(last.len());
         let start = SLOWER.iter().find_map(|factor| {
@@ -322,8 +306,9 @@ impl BranchWalker {
         Some(self.shooter.unknowns_from(&slide.pose, self.shooter.period_of(&solution.unknowns), speed))
     }
 
-    /// Follows a branch until it turns back, ends or leaves the range of speed.
-    fn walk(&mut self, start: Solution, along: &Unknowns) -> (Vec<Solution>, WalkEnd) {
+    /// Follows a branch until it turns back, ends or leaves the range of speed. Returns the solutions, how
+    /// the walk ends, and the first point beyond a turn, if it is found.
+    fn walk(&mut self, start: Solution, along: &Unknowns) -> FinishedWalk {
         /// Largest number of points of a walk.
         const POINTS: usize = 150;
         /// First step, step below which the branch counts as interrupted, and factor of growth of a step.
@@ -336,7 +321,7 @@ impl BranchWalker {
         const NEAR: f64 = 0.02;
         let mut found = vec![start.clone()];
         let Some(tangent) = self.shooter.tangent_of(&start, along) else {
-            return (found, WalkEnd::Undecided);
+            return (found, CycleEnd::Undecided, None);
         };
         let (mut at, mut step): (BranchPoint, f64) = ((start, tangent), FIRST);
         while found.len() < POINTS && self.shooter.runs < MOST_RUNS {
@@ -345,11 +330,11 @@ impl BranchWalker {
             let is_slow = speed < lowest.max(SLOW * highest) && speed_rate(&at) < 0.0;
             if speed > highest || is_slow {
                 found.truncate((found.len() - 1).max(1));
-                return (found, WalkEnd::EndOfRange);
+                return (found, CycleEnd::EndOfRange, None);
             }
             let slide = self.slide_unknowns(&at.0);
             if slide.is_none_or(|slide| (slide - &at.0.unknowns).norm() < NEAR) {
-                return (found, WalkEnd::Vanishes);
+                break;
             }
             let next = self.advance(&at, step);
             let is_same = next.as_ref().is_some_and(|next| has_gone_on(&at, next));
@@ -370,22 +355,18 @@ impl BranchWalker {
                 Some(beyond) if turns_back(&before, &beyond) => {
                     let is_fold = beyond.0.sticks_s.len() == before.0.sticks_s.len();
                     let kind = if is_fold { CycleEnd::Fold } else { CycleEnd::StickLost };
-                    return (found, WalkEnd::Turn(kind, Some(beyond)));
+                    return (found, kind, Some(beyond));
                 }
                 Some(beyond) => {
                     found.push(beyond.0.clone());
                     (at, step) = (beyond, FIRST.min(step));
                 }
-                None if self.has_short_stick(&before.0) => {
-                    return (found, WalkEnd::Turn(CycleEnd::StickLost, None));
-                }
-                None if self.misses_stick(&before.0) => {
-                    return (found, WalkEnd::Turn(CycleEnd::Grazing, None));
-                }
-                None => return (found, WalkEnd::Undecided),
+                None if self.has_short_stick(&before.0) => return (found, CycleEnd::StickLost, None),
+                None if self.misses_stick(&before.0) => return (found, CycleEnd::Grazing, None),
+                None => break,
             }
         }
-        (found, WalkEnd::Undecided)
+        (found, CycleEnd::Undecided, None)
     }
 
     /// The direction of the branch beyond a change of the number of sticks: that in which this number stays.

@@ -2,10 +2,12 @@
 
 use super::chatter::ChatterSummary;
 use super::cycle_branch::CycleEnd;
-use super::speed_intervals::{SlidingState, SpeedInterval, unstable_range};
-use super::steady_sliding::SteadySlide;
+use super::shooting::PeriodicMotion;
+use super::speed_intervals::unstable_range;
+use super::steady_sliding::{SlidingMode, SteadySlide};
 use super::study::{SlidingSurvey, StabilityStudy};
 use crate::model::shoulder::ShoulderContact;
+use crate::text::format_digits;
 use serde_json::{Value, json};
 use std::fmt::Write;
 
@@ -24,7 +26,7 @@ pub fn describe_cycle_end(study: &StabilityStudy) -> String {
         CycleEnd::Grazing => "above it the tip slows down but does not stop".to_owned(),
         CycleEnd::EndOfRange => "the cycle goes on at the highest speed of the range".to_owned(),
         CycleEnd::Undecided => {
-            let speed = branch.end_m_per_s;
+            let speed = format_digits(branch.end_m_per_s, 4);
             format!("undecided: the cycle was followed up to {speed} m/s only; {}", branch.problem)
         }
     };
@@ -43,18 +45,12 @@ pub fn write_cycles_csv(study: &StabilityStudy) -> String {
         "speed_m_per_s,period_s,frequency_hz,amplitude_m,sticks,stick_s,largest_multiplier\n".to_owned();
     for branch in &study.branches {
         for motion in &branch.motions {
+            let (speed, sticks) = (branch.direction * motion.speed_m_per_s, motion.sticks_s.len());
+            let (hz, stick_s) = (motion.frequency_hz(), motion.stick_s());
+            let PeriodicMotion { period_s, amplitude_m, .. } = motion;
             let largest = motion.largest_multiplier();
-            let _ = writeln!(
-                text,
-                "{},{:e},{},{:e},{},{:e},{}",
-                branch.direction * motion.speed_m_per_s,
-                motion.period_s,
-                motion.frequency_hz(),
-                motion.amplitude_m,
-                motion.sticks_s.len(),
-                motion.stick_s(),
-                largest
-            );
+            let _ =
+                writeln!(text, "{speed},{period_s:e},{hz},{amplitude_m:e},{sticks},{stick_s:e},{largest}");
         }
     }
     text
@@ -65,19 +61,16 @@ pub fn write_cycles_csv(study: &StabilityStudy) -> String {
 #[must_use]
 pub fn write_stability_csv(study: &StabilityStudy) -> String {
     let mut text = "speed_m_per_s,preload_n,shoulder,mode,growth_per_s,frequency_hz\n".to_owned();
-    for point in &study.points {
+    let surveys = study.surveys().iter();
+    for (survey, point) in surveys.flat_map(|survey| survey.points.iter().map(move |point| (survey, point))) {
+        // the sum makes a negative zero positive
+        let speed = survey.direction * point.speed_m_per_s + 0.0;
         for slide in point.slide.iter().chain(&point.others) {
-            for (i, mode) in slide.modes().enumerate() {
-                let _ = writeln!(
-                    text,
-                    "{},{},{},{},{:e},{}",
-                    point.speed_m_per_s,
-                    point.preload_n,
-                    shoulder_word(study, slide),
-                    i + 1,
-                    mode.growth_per_s,
-                    mode.frequency_hz
-                );
+            let (preload_n, shoulder) = (survey.preload_n, shoulder_word(study, slide));
+            for (i, SlidingMode { growth_per_s, frequency_hz, .. }) in slide.modes.iter().enumerate() {
+                let mode = i + 1;
+                let _ =
+                    writeln!(text, "{speed},{preload_n},{shoulder},{mode},{growth_per_s:e},{frequency_hz}");
             }
         }
     }
@@ -138,33 +131,6 @@ fn describe_survey(survey: &SlidingSurvey) -> Value {
         "preload_n": survey.preload_n,
         "onset_m_per_s": range.map(|range| range[0]),
         "end_m_per_s": range.map(|range| range[1]),
-        "intervals": survey.intervals.iter().map(describe_interval).collect::<Vec<_>>(),
-    })
-}
-
-fn describe_interval(interval: &SpeedInterval) -> Value {
-    let [from, to] = interval.speeds_m_per_s;
-    let (state, reason) = match interval.state {
-        SlidingState::Stable => ("stable", None),
-        SlidingState::Unstable => ("unstable", None),
-        SlidingState::Impossible(reason) => ("impossible", Some(reason)),
-    };
-    let ends = interval.modes.zip(interval.instabilities()).map(|(modes, kinds)| {
-        let end = |i: usize| {
-            json!({
-                "instability": kinds[i].0,
-                "band": kinds[i].1,
-                "growth_per_s": modes[i].growth_per_s,
-                "frequency_hz": modes[i].frequency_hz,
-            })
-        };
-        [end(0), end(1)]
-    });
-    json!({
-        "from_m_per_s": from,
-        "to_m_per_s": to,
-        "state": state,
-        "reason": reason,
-        "modes_at_ends": ends,
+        "intervals": survey.intervals,
     })
 }

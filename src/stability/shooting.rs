@@ -10,6 +10,8 @@ use crate::model::{HeadMotion, LinkDirections, Linkage, Pose};
 use crate::simulate::drive::Drive;
 use crate::simulate::equilibrium::shoulder_contact;
 use crate::simulate::mode::TipMode;
+use crate::simulate::outputs::SampleObserver;
+use crate::simulate::phases::{DrivenBlade, SlipPhase, pose_from_states};
 use crate::simulate::scene::contact::ContactLossRule;
 use crate::simulate::scene::{Scene, StartKind};
 use crate::simulate::sensitivity::{
@@ -18,8 +20,10 @@ use crate::simulate::sensitivity::{
 use crate::simulate::{
     Observer, RunResult, RunStatus, SolutionSegment, SolverOptions, Transition, run_scene_with,
 };
-use nalgebra::{Complex, DMatrix, DVector, Schur};
+use hybrid_ode::HybridPhase;
+use nalgebra::{DMatrix, DVector, Schur};
 use portable_math as math;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
@@ -29,7 +33,7 @@ const TOLERANCE: f64 = 1e-12;
 const MOST_EVALUATIONS: u64 = 40_000;
 
 /// A periodic motion.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct PeriodicMotion {
     /// Speed of the head, m/s, without sign.
     pub speed_m_per_s: f64,
@@ -42,8 +46,9 @@ pub struct PeriodicMotion {
     /// Half the range of the distance between tip and head, m.
     pub amplitude_m: f64,
     /// Multipliers of the return map on the instants at which the tip is as fast as the head: factors by
-    /// which a small deviation changes in a period. Their number is one less than that of the states.
-    pub multipliers: Vec<Complex<f64>>,
+    /// which a small deviation changes in a period, as real and imaginary part. Their number is one less than
+    /// that of the states.
+    pub multipliers: Vec<[f64; 2]>,
 }
 
 impl PeriodicMotion {
@@ -56,13 +61,13 @@ impl PeriodicMotion {
     /// Time of stick in a period, s.
     #[must_use]
     pub fn stick_s(&self) -> f64 {
-        self.sticks_s.iter().sum()
+        self.sticks_s.iter().fold(0.0, |sum, stick_s| sum + stick_s)
     }
 
     /// Size of the largest multiplier.
     #[must_use]
     pub fn largest_multiplier(&self) -> f64 {
-        self.multipliers.iter().map(complex_size).fold(0.0, f64::max)
+        self.multipliers.iter().map(|[re, im]| math::hypot(*re, *im)).fold(0.0, f64::max)
     }
 
     /// Whether small deviations die out.
@@ -70,10 +75,6 @@ impl PeriodicMotion {
     pub fn is_stable(&self) -> bool {
         self.largest_multiplier() < 1.0
     }
-}
-
-fn complex_size(value: &Complex<f64>) -> f64 {
-    math::hypot(value.re, value.im)
 }
 
 /// The unknowns of a periodic motion, divided by their scales: the states, the period, the speed.
@@ -174,7 +175,7 @@ impl CycleShooter {
         for (place, &i) in self.states.iter().enumerate() {
             all[i] = unknowns[place] * self.scales[place];
         }
-        Pose { theta: all[0], phi: all[1], theta_rate: all[2], phi_rate: all[3] }
+        pose_from_states(&all)
     }
 
     /// Velocity of the tip minus that of the head in the direction of slip, divided by the speed scale.
@@ -186,19 +187,12 @@ impl CycleShooter {
 
     /// Rates of the states while the tip slips at about the speed of the head, in scales per s.
     fn slip_rates(&self, pose: &Pose) -> Vec<f64> {
-        let (linkage, head) = (&self.scene.linkage, self.scene.drive.motion_at(0.0));
-        let directions = LinkDirections::from_pose(pose);
-        let contact =
-            linkage.friction_response(pose, &directions, &head, shoulder_contact(linkage, pose.theta));
-        let speed = self.direction * linkage.tip_velocity_m_per_s(pose, &directions, &head);
-        let mu = self.direction * linkage.friction.dynamic_coefficient(speed, self.direction);
-        let friction = -mu * contact.n_free / (1.0 + mu * contact.nu);
-        let all = [
-            pose.theta_rate,
-            pose.phi_rate,
-            contact.free[0] + friction * contact.per_force[0],
-            contact.free[1] + friction * contact.per_force[1],
-        ];
+        let Scene { linkage, drive, .. } = &self.scene;
+        let (linkage, drive) = (*linkage, drive.clone());
+        let system = DrivenBlade { linkage, drive, angle_scale: 1.0, rate_scale: 1.0 };
+        let lean = shoulder_contact(&linkage, pose.theta);
+        let phase = SlipPhase { system: &system, direction: self.direction, lean, piece: 0 };
+        let all = phase.derivative(0.0, &pose_states(pose));
         self.states.iter().zip(&self.scales).map(|(&i, scale)| all[i] / scale).collect()
     }
 
@@ -332,31 +326,38 @@ impl CycleShooter {
 
     /// Multipliers of a solution: eigenvalues of the monodromy, projected along the motion on states at which
     /// the tip is as fast as the head.
-    fn multipliers_of(&self, solution: &Solution) -> Vec<Complex<f64>> {
+    fn multipliers_of(&self, solution: &Solution) -> Vec<[f64; 2]> {
         let n = self.state_count();
         let rates = DVector::from_vec(self.slip_rates(&self.pose_of(&solution.unknowns)));
         let gradient = DVector::from_vec(self.lead_gradient(&solution.unknowns));
         let onto = DMatrix::identity(n, n) - &rates * gradient.transpose() / gradient.dot(&rates);
         let map = onto * &solution.monodromy;
         let found = Schur::try_new(map, f64::EPSILON, 400).map(|schur| schur.complex_eigenvalues());
-        let mut found: Vec<_> = found.iter().flat_map(|all| all.iter().copied()).collect();
-        found.sort_by(|a, b| complex_size(b).total_cmp(&complex_size(a)));
+        let mut found: Vec<_> = found.iter().flat_map(|all| all.iter().map(|e| [e.re, e.im])).collect();
+        found.sort_by(|a, b| math::hypot(b[0], b[1]).total_cmp(&math::hypot(a[0], a[1])));
         found.truncate(n - 1); // the projection makes the last one zero
         found
     }
 
     /// The motion of a solution.
     pub(super) fn describe(&mut self, solution: &Solution) -> PeriodicMotion {
+        /// Number of the instants of a period at which the distance between tip and head is read.
+        const INSTANTS: u32 = 1000;
         let (period_s, pose) = (self.period_of(&solution.unknowns), self.pose_of(&solution.unknowns));
         let speed = self.speed_of(&solution.unknowns);
-        let mut range = DeflectionRange([f64::INFINITY, f64::NEG_INFINITY]);
-        self.run_from(pose, speed, period_s, MOST_EVALUATIONS, &mut range);
+        let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+        let instants = (0..=INSTANTS).map(|i| period_s * f64::from(i) / f64::from(INSTANTS));
+        let mut sampler = SampleObserver::new(instants, |sample| {
+            let deflection = sample.tip_x_m - sample.head_x_m;
+            range = [range[0].min(deflection), range[1].max(deflection)];
+        });
+        self.run_from(pose, speed, period_s, MOST_EVALUATIONS, &mut sampler);
         PeriodicMotion {
             speed_m_per_s: speed,
             period_s,
             pose,
             sticks_s: solution.sticks_s.clone(),
-            amplitude_m: 0.5 * (range.0[1] - range.0[0]),
+            amplitude_m: 0.5 * (range[1] - range[0]),
             multipliers: self.multipliers_of(solution),
         }
     }
@@ -415,8 +416,7 @@ impl CycleShooter {
                     continue;
                 }
                 let guess = self.unknowns_from(&last.1, period_s, speed);
-                let mut by_speed = Unknowns::zeros(guess.len());
-                by_speed[guess.len() - 1] = 1.0;
+                let by_speed = by_speed(guess.len());
                 if let Some(solution) = self.solve(&guess, &by_speed).filter(|s| !s.sticks_s.is_empty()) {
                     return Some(solution);
                 }
@@ -433,6 +433,13 @@ fn border(jacobian: &DMatrix<f64>, row: &Unknowns) -> DMatrix<f64> {
     let mut matrix = jacobian.clone().insert_row(last, 0.0);
     matrix.set_row(last, &row.transpose());
     matrix
+}
+
+/// The direction in which the speed alone rises.
+pub(super) fn by_speed(unknowns: usize) -> Unknowns {
+    let mut direction = Unknowns::zeros(unknowns);
+    direction[unknowns - 1] = 1.0;
+    direction
 }
 
 fn pose_states(pose: &Pose) -> [f64; 4] {
@@ -473,22 +480,6 @@ impl TangentObserver for PeriodEnd {
     }
     fn observe_transition(&mut self, transition: &Transition, _: Option<&[f64]>) {
         self.transitions.push(*transition);
-    }
-}
-
-/// Smallest and largest distance between tip and head, m.
-struct DeflectionRange([f64; 2]);
-
-impl Observer for DeflectionRange {
-    fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
-        const PARTS: u32 = 24;
-        let path = piece.path();
-        for part in 0..=PARTS {
-            let t = piece.start_s + (piece.end_s - piece.start_s) * f64::from(part) / f64::from(PARTS);
-            let points = path.points_at(t);
-            let deflection = points.tip_x_m - points.head_x_m;
-            self.0 = [self.0[0].min(deflection), self.0[1].max(deflection)];
-        }
     }
 }
 

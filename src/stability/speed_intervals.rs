@@ -1,11 +1,11 @@
 //! Intervals of speed in which steady sliding is stable, unstable or impossible.
 
-use super::steady_sliding::{Instability, NoSliding, NoiseBand, SlideFinder, SlidingMode};
-use serde::Serialize;
+use super::steady_sliding::{NoSliding, SlideFinder, SlidingMode, SteadySlide};
+use serde::{Deserialize, Serialize};
 
 /// What happens to steady sliding at the speeds of an interval.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "state", content = "reason", rename_all = "kebab-case")]
 pub enum SlidingState {
     /// Every small vibration decays.
     Stable,
@@ -16,35 +16,37 @@ pub enum SlidingState {
 }
 
 /// An interval of speed with one state.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SpeedInterval {
     /// Lowest and highest speed, m/s.
     pub speeds_m_per_s: [f64; 2],
     /// State of steady sliding.
+    #[serde(flatten)]
     pub state: SlidingState,
     /// The mode that grows fastest, just inside the lowest and the highest speed; `None` unless the state is
     /// unstable.
+    #[serde(rename = "modes_at_ends")]
     pub modes: Option<[SlidingMode; 2]>,
-}
-
-impl SpeedInterval {
-    /// Kind and band of the instability just inside the lowest and the highest speed.
-    #[must_use]
-    pub fn instabilities(&self) -> Option<[(Instability, NoiseBand); 2]> {
-        let both = |mode: SlidingMode| (mode.instability(), NoiseBand::from_frequency(mode.frequency_hz));
-        self.modes.map(|modes| modes.map(both))
-    }
 }
 
 /// A mode counts as growing if its growth, divided by the highest natural angular frequency of the links, is
 /// above this value. The value is far above the rounding errors of an undamped mode.
 const NEUTRAL: f64 = 1e-9;
 
+/// Equally spaced values of a range; both ends are exact.
+pub(super) fn spread_values([from, to]: [f64; 2], points: usize) -> impl Iterator<Item = f64> {
+    let last = points.max(2) - 1;
+    (0..=last).map(move |i| if i == last { to } else { from + (to - from) * i as f64 / last as f64 })
+}
+
 impl SlideFinder {
-    /// Growth of the leading mode at a speed, m/s, minus the least growth that counts as growing, 1/s.
+    /// Growth of the leading mode of a slide minus the least growth that counts as growing, 1/s.
+    fn excess_of(&self, slide: &SteadySlide) -> f64 {
+        slide.leading_mode().growth_per_s - NEUTRAL * self.fastest_rad_per_s
+    }
+
     fn excess_per_s(&mut self, speed_m_per_s: f64) -> Result<f64, NoSliding> {
-        let mode = self.find_slide(speed_m_per_s)?.leading_mode();
-        Ok(mode.growth_per_s - NEUTRAL * self.fastest_rad_per_s)
+        self.find_slide(speed_m_per_s).map(|slide| self.excess_of(&slide))
     }
 
     /// State of steady sliding at a speed, m/s.
@@ -78,16 +80,28 @@ impl SlideFinder {
     /// spaced speeds and at extrema of the growth between them; a boundary between two of these speeds is
     /// found by bisection. An interval narrower than the spacing can be missed.
     #[must_use]
-    pub fn find_intervals(&mut self, [from, to]: [f64; 2], points: usize) -> Vec<SpeedInterval> {
-        let last = points.max(2) - 1;
-        let speed = |i: usize| if i == last { to } else { from + (to - from) * i as f64 / last as f64 };
+    pub fn find_intervals(&mut self, range: [f64; 2], points: usize) -> Vec<SpeedInterval> {
+        let slides: Vec<_> =
+            spread_values(range, points).map(|speed| (speed, self.find_slide(speed))).collect();
+        self.divide_range(slides.iter().map(|(speed, slide)| (*speed, slide.as_ref())))
+    }
+
+    /// As [`Self::find_intervals`], with the slides at equally spaced speeds.
+    pub(super) fn divide_range<'a>(
+        &mut self,
+        slides: impl Iterator<Item = (f64, Result<&'a SteadySlide, &'a NoSliding>)>,
+    ) -> Vec<SpeedInterval> {
+        let excess = |slide: Result<&SteadySlide, &NoSliding>| match slide {
+            Ok(slide) => Ok(self.excess_of(slide)),
+            Err(reason) => Err(*reason),
+        };
         let mut samples: Vec<(f64, Result<f64, NoSliding>)> =
-            (0..=last).map(|i| (speed(i), self.excess_per_s(speed(i)))).collect();
+            slides.map(|(speed, slide)| (speed, excess(slide))).collect();
         let hidden: Vec<_> = samples.windows(3).filter_map(|three| self.find_hidden_state(three)).collect();
         samples.extend(hidden);
         samples.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut found = Vec::new();
-        let mut start = from;
+        let mut start = samples[0].0;
         for pair in samples.windows(2) {
             let [(a, before), (b, after)] = [pair[0], pair[1]];
             let (mut state, mut at) = (state_from_excess(before), a);
@@ -100,8 +114,8 @@ impl SlideFinder {
                 state = if next < b { beyond } else { last };
             }
         }
-        let state = samples.last().map_or(SlidingState::Stable, |(_, excess)| state_from_excess(*excess));
-        found.push(self.describe_interval([start, to], state));
+        let (to, excess) = samples[samples.len() - 1];
+        found.push(self.describe_interval([start, to], state_from_excess(excess)));
         found
     }
 

@@ -12,11 +12,11 @@ use crate::model::tangent::{LaneVector, ReferenceMotion};
 use crate::model::{HeadMotion, LinkDirections, Linkage, Pose};
 use crate::simulate::equilibrium::{StaticPose, is_upright, shoulder_contact};
 use nalgebra::{Complex, DMatrix, Schur};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// Why a blade or slider cannot slide steadily.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NoSliding {
     /// There is no equilibrium, for a blade none with both links above level.
@@ -40,24 +40,29 @@ impl NoSliding {
 }
 
 /// Growth and frequency of a mode of small vibrations about steady sliding.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SlidingMode {
     /// Rate of growth, 1/s; negative for a mode that decays.
     pub growth_per_s: f64,
     /// Frequency, Hz; 0 for a mode that does not oscillate.
     pub frequency_hz: f64,
+    /// Kind of the instability if the mode grows.
+    pub instability: Instability,
+    /// Frequency band of the noise.
+    pub band: NoiseBand,
 }
 
 impl SlidingMode {
-    /// Kind of the instability if the mode grows.
-    #[must_use]
-    pub fn instability(&self) -> Instability {
-        if self.frequency_hz > 0.0 { Instability::Flutter } else { Instability::Divergence }
+    fn from_eigenvalue(value: Complex<f64>) -> Self {
+        let frequency_hz = value.im / TAU;
+        let instability = if frequency_hz > 0.0 { Instability::Flutter } else { Instability::Divergence };
+        let band = NoiseBand::from_frequency(frequency_hz);
+        Self { growth_per_s: value.re, frequency_hz, instability, band }
     }
 }
 
 /// Kind of an instability.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Instability {
     /// A growing oscillation.
@@ -67,7 +72,7 @@ pub enum Instability {
 }
 
 /// Frequency band of wiper noise (Goto, Takahashi and Oya 2001, Analysis of Wiper Vibration).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NoiseBand {
     /// Chatter, below 100 Hz.
@@ -105,7 +110,7 @@ impl NoiseBand {
 }
 
 /// An equilibrium of steady sliding.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct SteadySlide {
     /// The pose, at rest relative to the head.
     pub pose: Pose,
@@ -113,22 +118,18 @@ pub struct SteadySlide {
     pub shoulder: ShoulderContact,
     /// Normal force on the tip, N.
     pub normal_n: f64,
-    /// Eigenvalues in rising order of frequency, 1/s.
-    eigenvalues: Vec<Complex<f64>>,
+    /// The modes in rising order of frequency; a pair of conjugate eigenvalues is one mode.
+    pub modes: Vec<SlidingMode>,
 }
 
 impl SteadySlide {
-    /// The modes in rising order of frequency; a pair of conjugate eigenvalues is one mode.
-    pub fn modes(&self) -> impl Iterator<Item = SlidingMode> {
-        let upper = self.eigenvalues.iter().filter(|e| e.im >= 0.0);
-        upper.map(|e| SlidingMode { growth_per_s: e.re, frequency_hz: e.im / TAU })
-    }
-
     /// The mode that grows fastest.
     #[must_use]
     pub fn leading_mode(&self) -> SlidingMode {
-        let first = SlidingMode { growth_per_s: f64::NEG_INFINITY, frequency_hz: 0.0 };
-        self.modes().fold(first, |best, mode| if mode.growth_per_s > best.growth_per_s { mode } else { best })
+        let faster = |best: SlidingMode, mode: &SlidingMode| {
+            if mode.growth_per_s > best.growth_per_s { *mode } else { best }
+        };
+        self.modes.iter().fold(self.modes[0], faster)
     }
 }
 
@@ -233,21 +234,20 @@ impl SlideFinder {
             DMatrix::from_fn(2 - first, 2 - first, |i, j| rows[first + i][first + j][0])
         };
         let [mass, damping, stiffness] = [&matrices.mass, &matrices.damping, &matrices.stiffness].map(square);
-        let eigenvalues = solve_eigenvalues(mass, &damping, &stiffness, self.fastest_rad_per_s);
-        let eigenvalues = eigenvalues.ok_or(NoSliding::Jammed)?;
-        Ok(SteadySlide { pose, shoulder, normal_n, eigenvalues })
+        let modes = solve_modes(mass, &damping, &stiffness, self.fastest_rad_per_s);
+        Ok(SteadySlide { pose, shoulder, normal_n, modes: modes.ok_or(NoSliding::Jammed)? })
     }
 }
 
-/// Eigenvalues of `M y'' + D y' + K y = 0`, 1/s, in rising order of frequency; `None` if they are not finite.
+/// Modes of `M y'' + D y' + K y = 0` in rising order of frequency; `None` if they are not finite.
 /// `scale` is an angular frequency of the blade, 1/s. Time in units of `1 / scale` makes the entries of the
 /// state matrix similar in size.
-fn solve_eigenvalues(
+fn solve_modes(
     mass: DMatrix<f64>,
     damping: &DMatrix<f64>,
     stiffness: &DMatrix<f64>,
     scale: f64,
-) -> Option<Vec<Complex<f64>>> {
+) -> Option<Vec<SlidingMode>> {
     /// Largest number of steps of the QR iteration; four eigenvalues take about ten.
     const MOST_STEPS: usize = 400;
     let size = mass.nrows();
@@ -260,9 +260,12 @@ fn solve_eigenvalues(
         return None;
     }
     let found = Schur::try_new(state, f64::EPSILON, MOST_STEPS)?.complex_eigenvalues();
-    let mut found: Vec<Complex<f64>> = found.iter().map(|value| value * scale).collect();
-    found.sort_by(|a, b| a.im.abs().total_cmp(&b.im.abs()).then(a.re.total_cmp(&b.re)));
-    Some(found)
+    let upper = found.iter().filter(|value| value.im >= 0.0).map(|value| value * scale);
+    let mut modes: Vec<SlidingMode> = upper.map(SlidingMode::from_eigenvalue).collect();
+    modes.sort_by(|a, b| {
+        a.frequency_hz.total_cmp(&b.frequency_hz).then(a.growth_per_s.total_cmp(&b.growth_per_s))
+    });
+    Some(modes)
 }
 
 #[cfg(test)]
@@ -294,7 +297,7 @@ mod tests {
             let squared = (blade.lip.stiffness - normal_n * blade.l2_m) / blade.m_phi - growth * growth;
             let scale = squared.sqrt();
             let distance = |mode: &SlidingMode| (mode.frequency_hz * TAU - scale).abs();
-            let mode = slide.modes().min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap();
+            let mode = slide.modes.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap();
             assert!((mode.growth_per_s - growth).abs() < 1e-7 * scale, "{slope}: {mode:?}, {growth}");
             assert!((mode.frequency_hz * TAU - scale).abs() < 1e-7 * scale, "{slope}: {mode:?}, {scale}");
         }

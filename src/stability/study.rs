@@ -3,12 +3,14 @@
 use super::changes::{ParameterChange, find_remedy, rank_changes};
 use super::chatter::{ChatterCause, CycleRemedy};
 use super::cycle_branch::CycleBranch;
-use super::speed_intervals::{SpeedInterval, unstable_range};
+use super::journal::{EvaluationLog, StudyStop};
+use super::speed_intervals::{SpeedInterval, spread_values, unstable_range};
 use super::steady_sliding::{NoSliding, SlideFinder, SteadySlide};
 use crate::model::Linkage;
 use crate::simulate::drive::Drive;
 use crate::simulate::scene::Scene;
 use crate::simulate::scene::error::SceneError;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// Name of the parameter that holds the preload of a scene's blade, or the normal force of its slider.
@@ -17,7 +19,7 @@ pub(super) fn preload_name(scene: &Scene) -> &'static str {
 }
 
 /// Speeds and preloads of a study.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StudyRange {
     /// Lowest and highest speed of the head, m/s; 0 stands for the limit of slow sliding.
     pub speeds_m_per_s: [f64; 2],
@@ -27,13 +29,11 @@ pub struct StudyRange {
     pub points: usize,
 }
 
-/// Steady sliding at one speed and preload.
-#[derive(Debug, Clone)]
+/// Steady sliding at one speed.
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct StudyPoint {
-    /// Speed of the head, m/s, negative for sliding towards -v.
+    /// Speed of the head, m/s, without sign.
     pub speed_m_per_s: f64,
-    /// Preload, N.
-    pub preload_n: f64,
     /// The equilibrium that the blade reaches, or why it reaches none.
     pub slide: Result<SteadySlide, NoSliding>,
     /// Equilibria with the neck on other sides of the shoulder.
@@ -41,7 +41,7 @@ pub struct StudyPoint {
 }
 
 /// Steady sliding in one direction with one preload.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct SlidingSurvey {
     /// Direction of sliding, +1 or -1.
     pub direction: f64,
@@ -49,6 +49,23 @@ pub struct SlidingSurvey {
     pub preload_n: f64,
     /// Intervals of speed.
     pub intervals: Vec<SpeedInterval>,
+    /// Points of equally spaced speeds.
+    pub points: Vec<StudyPoint>,
+}
+
+impl SlidingSurvey {
+    fn from_linkage(linkage: &Linkage, direction: f64, preload_n: f64, range: &StudyRange) -> Self {
+        let mut finder = SlideFinder::new(linkage, direction);
+        let point = |speed_m_per_s: f64| {
+            let slide = finder.find_slide(speed_m_per_s);
+            let others = if slide.is_ok() { finder.find_other_slides(speed_m_per_s) } else { Vec::new() };
+            StudyPoint { speed_m_per_s, slide, others }
+        };
+        let points: Vec<StudyPoint> = spread_values(range.speeds_m_per_s, range.points).map(point).collect();
+        let slides = points.iter().map(|point| (point.speed_m_per_s, point.slide.as_ref()));
+        let intervals = finder.divide_range(slides);
+        Self { direction, preload_n, intervals, points }
+    }
 }
 
 /// The stability of a blade or slider.
@@ -65,8 +82,6 @@ pub struct StabilityStudy {
     /// The blade with each preload of the range, in the directions of `own`; empty without a range of
     /// preloads.
     pub by_preload: Vec<SlidingSurvey>,
-    /// All points, by direction, preload and speed.
-    pub points: Vec<StudyPoint>,
     /// Effects of changes of the parameters on the instability at the scene's preload, the largest first.
     pub changes: Vec<ParameterChange>,
     /// The stick-slip cycle at the scene's preload, in the directions of `own` in which one is found.
@@ -81,9 +96,8 @@ pub struct StabilityStudy {
 #[must_use]
 pub fn default_top_speed(scene: &Scene) -> f64 {
     /// Number of intervals between the instants at which the speed of any drive but a cosine is read.
-    const INSTANTS: u32 = 2000;
-    let length_s = scene.run.stop_s - scene.start_s;
-    let instants = (0..=INSTANTS).map(|i| scene.start_s + length_s * f64::from(i) / f64::from(INSTANTS));
+    const INSTANTS: usize = 2000;
+    let instants = spread_values([scene.start_s, scene.run.stop_s], INSTANTS + 1);
     2.0 * match scene.drive {
         Drive::Cosine { amplitude_m, frequency_hz, .. } => TAU * frequency_hz * amplitude_m,
         _ => instants.map(|t| scene.drive.motion_at(t).velocity_m_per_s.abs()).fold(0.0, f64::max),
@@ -91,71 +105,59 @@ pub fn default_top_speed(scene: &Scene) -> f64 {
 }
 
 impl StabilityStudy {
-    /// Studies the blade of a scene.
+    /// Studies the blade of a scene. `log` holds the finished evaluations.
     ///
     /// # Errors
-    /// [`SceneError`] if the scene does not admit a preload of the range, or a parameter in its SI unit.
-    pub fn from_scene(scene: &Scene, range: StudyRange) -> Result<Self, SceneError> {
+    /// [`StudyStop`] if the scene does not admit a preload of the range, or a parameter in its SI unit, or if
+    /// the log stops the study.
+    pub fn from_scene(
+        scene: &Scene,
+        range: StudyRange,
+        log: &mut EvaluationLog<'_>,
+    ) -> Result<Self, StudyStop> {
         let preload = preload_name(scene);
-        let own_n = scene.value(preload).unwrap_or(0.0);
+        let preload_n = scene.value(preload).unwrap_or(0.0);
         let directions: &[f64] =
             if scene.linkage.friction.backward_ratio == 1.0 { &[1.0] } else { &[1.0, -1.0] };
-        let last = range.points.max(2) - 1;
-        let spread = |[from, to]: [f64; 2], i: usize| {
-            if i == last { to } else { from + (to - from) * i as f64 / last as f64 }
+        let preloads = range.preloads_n.map(|ends| spread_values(ends, range.points));
+        let blade = |preload_n| Ok((preload_n, scene.with_parameter(preload, preload_n)?.linkage));
+        let blades = preloads.into_iter().flatten().map(blade).collect::<Result<Vec<_>, SceneError>>()?;
+        let mut survey = |name: &str, direction: f64, preload_n: f64, linkage: &Linkage| {
+            let compute = || SlidingSurvey::from_linkage(linkage, direction, preload_n, &range);
+            log.evaluate(format!("{name} {direction}"), compute)
         };
-        let blades: Vec<(f64, Linkage)> = match range.preloads_n {
-            None => vec![(own_n, scene.linkage)],
-            Some(ends) => (0..=last)
-                .map(|i| {
-                    let preload_n = spread(ends, i);
-                    Ok((preload_n, scene.with_parameter(preload, preload_n)?.linkage))
-                })
-                .collect::<Result<_, SceneError>>()?,
-        };
-        let survey = |direction: f64, preload_n: f64, linkage: &Linkage| SlidingSurvey {
-            direction,
-            preload_n,
-            intervals: SlideFinder::new(linkage, direction)
-                .find_intervals(range.speeds_m_per_s, range.points),
-        };
-        let own: Vec<SlidingSurvey> =
-            directions.iter().map(|&direction| survey(direction, own_n, &scene.linkage)).collect();
-        let (mut points, mut by_preload) = (Vec::new(), Vec::new());
+        let (mut own, mut by_preload) = (Vec::new(), Vec::new());
         for &direction in directions {
-            for (preload_n, linkage) in &blades {
-                if range.preloads_n.is_some() {
-                    by_preload.push(survey(direction, *preload_n, linkage));
-                }
-                let mut finder = SlideFinder::new(linkage, direction);
-                points.extend((0..=last).map(|i| {
-                    let speed = spread(range.speeds_m_per_s, i);
-                    let slide = finder.find_slide(speed);
-                    let others = if slide.is_ok() { finder.find_other_slides(speed) } else { Vec::new() };
-                    let speed_m_per_s = if speed == 0.0 { 0.0 } else { direction * speed };
-                    StudyPoint { speed_m_per_s, preload_n: *preload_n, slide, others }
-                }));
+            own.push(survey("sliding", direction, preload_n, &scene.linkage)?);
+            for (row, (preload_n, linkage)) in blades.iter().enumerate() {
+                by_preload.push(survey(&format!("row {row}"), direction, *preload_n, linkage)?);
             }
         }
         let speeds = range.speeds_m_per_s;
-        let branches: Vec<CycleBranch> = own
-            .iter()
-            .filter_map(|survey| {
-                let unstable = unstable_range(&survey.intervals);
-                CycleBranch::from_scene(scene, survey.direction, speeds, unstable)
-            })
-            .collect();
+        let mut branches = Vec::new();
+        for SlidingSurvey { direction, intervals, .. } in &own {
+            let compute = || CycleBranch::from_scene(scene, *direction, speeds, unstable_range(intervals));
+            branches.extend(log.evaluate(format!("cycle {direction}"), compute)?);
+        }
         let leading = leading_branch(&branches);
         let cycle = leading.filter(|branch| branch.fold_m_per_s().is_some());
-        let changes = rank_changes(scene, &own, cycle, speeds)?;
-        let remedy = cycle.and_then(|cycle| find_remedy(scene, &changes, cycle, speeds));
+        let changes = rank_changes(scene, &own, cycle, speeds, log)?;
+        let remedy = match cycle {
+            Some(cycle) => find_remedy(scene, &changes, cycle, speeds, log)?,
+            None => None,
+        };
         let cause = leading.and_then(|branch| {
             let survey = own.iter().find(|survey| survey.direction == branch.direction)?;
             ChatterCause::from_branch(&scene.linkage, branch, unstable_range(&survey.intervals))
         });
         let has_shoulder = scene.linkage.shoulder.is_some();
-        let preload_n = own_n;
-        Ok(Self { range, preload_n, has_shoulder, own, by_preload, points, changes, branches, remedy, cause })
+        Ok(Self { range, preload_n, has_shoulder, own, by_preload, changes, branches, remedy, cause })
+    }
+
+    /// The surveys whose points are tabulated: those of the range of preloads, or those of the scene.
+    #[must_use]
+    pub fn surveys(&self) -> &[SlidingSurvey] {
+        if self.by_preload.is_empty() { &self.own } else { &self.by_preload }
     }
 
     /// The cycle that goes on to the highest speed, of those in both directions.
@@ -184,9 +186,9 @@ impl StabilityStudy {
     /// Why the blade cannot slide steadily at the first point; `None` if it can at any point of the study.
     #[must_use]
     pub fn why_impossible(&self) -> Option<NoSliding> {
-        let mut reasons = self.points.iter().map(|point| point.slide.as_ref().err().copied());
-        let first = reasons.next()?;
-        if reasons.all(|reason| reason.is_some()) { first } else { None }
+        let mut points = self.surveys().iter().flat_map(|survey| &survey.points);
+        let first = points.next()?.slide.as_ref().err().copied();
+        if points.all(|point| point.slide.is_err()) { first } else { None }
     }
 }
 

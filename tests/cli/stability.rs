@@ -3,6 +3,9 @@
 use crate::small_fit::Project;
 use serde_json::Value;
 use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Duration;
 
 const SCENE: &str = "data/scenes/actual-blade.toml";
 
@@ -75,6 +78,65 @@ fn a_fit_gives_intervals_to_the_numbers_of_its_scene() {
         assert!(code == 2 && err.contains(said), "{err}");
     }
     assert!(!project.path("none").exists());
+}
+
+/// Contents of the files of a study.
+fn outputs(folder: &Path) -> Vec<Vec<u8>> {
+    let names = ["stability.csv", "cycles.csv", "stability.json", "stability.svg"];
+    names.iter().map(|name| fs::read(folder.join(name)).unwrap()).collect()
+}
+
+/// A study that is killed during its rows, during its changes, or with a line half-written, and then resumed,
+/// ends with the files of one that was left alone, and without a journal. Its journal belongs to one range
+/// only.
+#[test]
+fn a_killed_study_goes_on_to_the_same_bytes() {
+    let project = Project::of("twin");
+    let arguments = |out| {
+        let range = ["--speed-m-per-s", "0..0.5", "--preload-n", "0.05..0.25", "--points", "25"];
+        [&["stability", SCENE, "--out", out][..], &range[..]].concat()
+    };
+    let (code, out, _) = project.run(&arguments("whole"));
+    assert_eq!(code, 0, "{out}");
+    let whole = outputs(&project.path("whole"));
+    assert!(!project.path("whole/journal.jsonl").exists());
+    let journal = project.path("killed/journal.jsonl");
+    let lines = || fs::read_to_string(&journal).map_or(0, |text| text.lines().count());
+    let resume = || project.run(&[&arguments("killed")[..], &["--resume"]].concat());
+    // 26 rows and the cycle come before the changes
+    for (kill, after) in [3, 15, 30].into_iter().enumerate() {
+        let mut child = Command::new(assert_cmd::cargo::cargo_bin!("wiperlab"))
+            .current_dir(project.folder.path())
+            .args(arguments("killed"))
+            .stdout(Stdio::null())
+            .spawn()
+            .unwrap();
+        while lines() < after && child.try_wait().unwrap().is_none() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        child.kill().unwrap(); // SIGKILL: nothing is tidied up
+        child.wait().unwrap();
+        assert!(journal.exists() && !project.path("killed/stability.json").exists(), "too fast to be killed");
+        let text = fs::read_to_string(&journal).unwrap();
+        match kill {
+            1 => fs::write(&journal, &text[..text.len() - 40]).unwrap(),
+            2 => {
+                let other: Vec<&str> = arguments("killed")
+                    .into_iter()
+                    .map(|word| if word == "25" { "24" } else { word })
+                    .collect();
+                let (code, _, err) = project.run(&[&other[..], &["--resume"]].concat());
+                assert!(code == 2 && err.contains("the range, a scene or a recording has changed"), "{err}");
+            }
+            _ => {}
+        }
+        let (code, out, err) = resume();
+        assert_eq!(code, 0, "{out}{err}");
+        assert!(err.contains("evaluations are taken from the journal"), "{err}");
+        assert!(outputs(&project.path("killed")) == whole, "kill {kill}");
+        assert!(!journal.exists());
+        fs::remove_dir_all(project.path("killed")).unwrap();
+    }
 }
 
 #[test]

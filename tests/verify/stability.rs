@@ -9,6 +9,7 @@ use std::f64::consts::TAU;
 use wiperlab::model::parameter_spread::ParameterSpread;
 use wiperlab::simulate::scene::Scene;
 use wiperlab::stability::chatter::ChatterNumber;
+use wiperlab::stability::journal::EvaluationLog;
 use wiperlab::stability::speed_intervals::{SlidingState, unstable_range};
 use wiperlab::stability::steady_sliding::SlideFinder;
 use wiperlab::stability::study::{StabilityStudy, StudyRange};
@@ -71,15 +72,18 @@ fn intervals_of_a_fit_are_propagated_to_end_and_slope() {
     );
     let scene = Scene::parse("belt.toml", &text).unwrap();
     let range = StudyRange { speeds_m_per_s: [0.0, 1.0], preloads_n: None, points: 50 };
-    let study = StabilityStudy::from_scene(&scene, range).unwrap();
+    let study = StabilityStudy::from_scene(&scene, range, &mut EvaluationLog::without_journal()).unwrap();
     let spread = |share: f64, correlation: Option<f64>| ParameterSpread {
         names: vec!["friction.a".to_owned(), "slider.damping_n_s_per_m".to_owned()],
         estimates: vec![a, d],
         halves_95: vec![Some(share * a), Some(share * d)],
         correlations: vec![vec![Some(1.0), correlation], vec![correlation, Some(1.0)]],
     };
+    let summarise = |spread: &ParameterSpread| {
+        study.summarise_chatter(&scene, Some(spread), &mut EvaluationLog::without_journal()).unwrap()
+    };
     for correlation in [-0.5_f64, 0.0, 0.9] {
-        let found = study.summarise_chatter(&scene, Some(&spread(0.01, Some(correlation))));
+        let found = summarise(&spread(0.01, Some(correlation)));
         let end = found.numbers[&ChatterNumber::End].half_95.unwrap();
         let expected = 0.01 / b * (2.0 - 2.0 * correlation).sqrt();
         assert!((end / expected - 1.0).abs() < 1e-4, "{end}, expected {expected}");
@@ -89,10 +93,10 @@ fn intervals_of_a_fit_are_propagated_to_end_and_slope() {
         assert!((slope.half_95.unwrap() / (0.01 * expected.abs()) - 1.0).abs() < 1e-4, "{slope:?}");
         assert!(found.sentences.iter().all(|sentence| !sentence.contains("undecided")), "{found:?}");
     }
-    let unknown = study.summarise_chatter(&scene, Some(&spread(0.01, None)));
+    let unknown = summarise(&spread(0.01, None));
     assert_eq!(unknown.numbers[&ChatterNumber::End].half_95, None);
     assert!(unknown.numbers[&ChatterNumber::FrictionSlope].half_95.is_some());
-    let wide = study.summarise_chatter(&scene, Some(&spread(1.5, Some(0.0))));
+    let wide = summarise(&spread(1.5, Some(0.0)));
     assert!(wide.sentences[1].contains("whether friction falls with speed there is undecided"), "{wide:?}");
 }
 
@@ -107,7 +111,7 @@ fn a_slider_grows_and_ends_as_a_mass_on_a_belt() {
     let scene = Scene::parse("belt.toml", TEXT).unwrap();
     for speed in [0.0_f64, 0.05, 0.19, 0.3, 1.0] {
         let slide = SlideFinder::new(&scene.linkage, 1.0).find_slide(speed).unwrap();
-        let modes: Vec<_> = slide.modes().collect();
+        let modes = &slide.modes;
         let growth = (normal * a * b * (-b * speed).exp() - d) / (2.0 * m);
         let omega = (k / m - growth * growth).sqrt();
         assert_eq!(modes.len(), 1, "{modes:?}");
@@ -116,7 +120,7 @@ fn a_slider_grows_and_ends_as_a_mass_on_a_belt() {
         assert_eq!(slide.normal_n, normal);
     }
     let range = StudyRange { speeds_m_per_s: [0.0, 1.0], preloads_n: None, points: 50 };
-    let study = StabilityStudy::from_scene(&scene, range).unwrap();
+    let study = StabilityStudy::from_scene(&scene, range, &mut EvaluationLog::without_journal()).unwrap();
     let [onset, end] = study.unstable_range().unwrap();
     let expected = (normal * a * b / d).ln() / b;
     assert_eq!(onset, 0.0);
