@@ -143,10 +143,14 @@ impl ChatterEstimate {
         });
         let words =
             |value: f64| if value == 0.0 { "0".to_owned() } else { format_digits(value, digits as usize) };
-        let range = self.half_95.map_or_else(String::new, |half| {
-            format!(" ({})", format_interval(Some(self.value - half), Some(self.value + half), words))
-        });
-        format!("{}{unit}{range}", words(self.value))
+        let value = words(self.value);
+        match self.half_95.map(|half| [self.value - half, self.value + half]) {
+            // an interval that rounds to the value is left out
+            Some([low, high]) if words(low) != words(high) => {
+                format!("{value}{unit} ({})", format_interval(Some(low), Some(high), words))
+            }
+            _ => format!("{value}{unit}"),
+        }
     }
 }
 
@@ -366,4 +370,18 @@ fn describe_cause(found: &ChatterSummary) -> Option<String> {
     Some(format!(
         "At {speed} m/s the cycle has {cycle} and feeds on the {part}, whose natural frequency of {natural} is nearest: {why}."
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_interval_that_rounds_to_the_value_is_left_out() {
+        let words = |value, half_95| ChatterEstimate { value, half_95 }.describe_value(" Hz");
+        assert_eq!(words(519.0, Some(0.0)), "519 Hz");
+        assert_eq!(words(519.0, Some(1e-9)), "519.000 Hz");
+        assert_eq!(words(519.0, None), "519 Hz");
+        assert_eq!(words(519.0, Some(2.0)), "519 Hz (517 to 521)");
+    }
 }
