@@ -100,15 +100,16 @@ impl CycleBranch {
         range: [f64; 2],
         unstable: Option<[f64; 2]>,
     ) -> Option<Self> {
-        /// Fractions of the speed at which the instability ends, or of the highest speed: the
-        /// speeds of the runs.
+        /// Speeds of the runs, as fractions of the range up to the speed at which the instability ends, or up
+        /// to the highest speed.
         const SHARES: [f64; 7] = [0.9, 0.6, 0.3, 0.1, 0.03, 0.01, 0.003];
         let top = unstable.map_or(range[1], |[_, end]| end);
-        let mut speeds = SHARES.iter().map(|share| share * top).filter(|speed| *speed > range[0]);
-        let settled = speeds.find_map(|speed| {
+        let settled = SHARES.iter().find_map(|share| {
+            let speed = range[0] + share * (top - range[0]);
             let mut walker = BranchWalker::new(scene, direction, range, speed)?;
             let slide = walker.finder.find_slide(speed).ok()?;
-            let start = walker.shooter.settle(stop_tip(&scene.linkage, &slide, direction * speed), speed)?;
+            let stopped = stop_tip(&scene.linkage, &slide, direction * speed);
+            let start = walker.shooter.settle(stopped, speed).ok()?;
             Some(walker.follow_cycle(start, direction))
         });
         // a run does not settle if a slower vibration makes its cycles unequal
@@ -146,7 +147,8 @@ impl CycleBranch {
         let mut walker = BranchWalker::new(scene, self.direction, range, speed_m_per_s)?;
         let guess = walker.shooter.unknowns_from(&near.pose, near.period_s, speed_m_per_s);
         let found = walker.shooter.solve(&guess, &by_speed(guess.len()))?;
-        Some((walker, found))
+        // steady sliding also meets the conditions, without stick
+        (found.sticks_s.is_empty() == near.sticks_s.is_empty()).then_some((walker, found))
     }
 
     /// The cycle of the scene of this branch, or of a scene that differs little from it, at a speed, m/s.
@@ -219,7 +221,8 @@ impl BranchWalker {
     /// Follows a cycle down and up, and the motions beyond its end.
     fn follow_cycle(&mut self, start: Solution, direction: f64) -> CycleBranch {
         /// Largest number of times that a walk starts again from a simulated run.
-        const RESTARTS: usize = 4;
+        const RESTARTS: usize = 12;
+        const IRREGULAR: &str = "beyond it the blade goes on in other cycles, or in unequal periods";
         let by_speed = by_speed(start.unknowns.len());
         let (mut found, ..) = self.walk(start.clone(), &-&by_speed);
         found.reverse();
@@ -229,10 +232,14 @@ impl BranchWalker {
             let (up, end, beyond) = self.walk(next, &by_speed);
             found.extend(up);
             let (last, problem) = (found[found.len() - 1].clone(), self.shooter.problem);
-            // a run above the last cycle shows whether the blade still chatters, in another cycle
-            let may_go_on = end != CycleEnd::EndOfRange && restarts < RESTARTS;
-            let Some(above) = may_go_on.then(|| self.settle_above(&last.unknowns)).flatten() else {
+            if end == CycleEnd::EndOfRange {
                 break (last, end, problem, beyond);
+            }
+            // a run above the last cycle shows whether the blade still chatters
+            let above = match self.settle_above(&last.unknowns) {
+                Ok(above) if restarts < RESTARTS => above,
+                Ok(_) | Err(true) => break (last, CycleEnd::Undecided, IRREGULAR, None),
+                Err(false) => break (last, end, problem, beyond),
             };
             (next, restarts) = (above, restarts + 1);
         };
@@ -272,11 +279,15 @@ impl BranchWalker {
     }
 
     /// A cycle with stick at a slightly higher speed, which a run reaches from the state of another.
-    fn settle_above(&mut self, unknowns: &Unknowns) -> Option<Solution> {
+    ///
+    /// # Errors
+    /// Whether the tip still sticks without such a cycle.
+    fn settle_above(&mut self, unknowns: &Unknowns) -> Result<Solution, bool> {
         /// Factors by which the speed rises.
         const RISES: [f64; 2] = [1.003, 1.02];
         let (pose, speed) = (self.shooter.pose_of(unknowns), self.shooter.speed_of(unknowns));
-        RISES.iter().find_map(|rise| self.shooter.settle(pose, rise * speed))
+        let [near, far] = RISES.map(|rise| rise * speed);
+        self.shooter.settle(pose, near).or_else(|_| self.shooter.settle(pose, far))
     }
 
     /// The first motion without stick beyond a corner, with the direction of the branch there. The branch is

@@ -391,7 +391,10 @@ impl CycleShooter {
     }
 
     /// A cycle with stick that the blade reaches at a speed, m/s, from a state.
-    pub(super) fn settle(&mut self, start: Pose, speed: f64) -> Option<Solution> {
+    ///
+    /// # Errors
+    /// Whether the tip still sticks at the end of the last run.
+    pub(super) fn settle(&mut self, start: Pose, speed: f64) -> Result<Solution, bool> {
         /// Instants at which the tip is as fast as the head in each run. After only a few of them, a slower
         /// vibration has not yet grown, and the run can still be near an unstable cycle.
         const INSTANTS: [usize; 5] = [8, 30, 300, 300, 300];
@@ -399,13 +402,14 @@ impl CycleShooter {
         const LONGEST: usize = 6;
         /// Distance, in scales, below which a state may be one period after another.
         const NEAR: f64 = 3.0;
-        let mut pose = start;
+        let (mut pose, mut still_sticks) = (start, false);
         for instants in INSTANTS {
             let mut passes = self.watch_passes(instants);
             let longest_s = 20.0 * instants as f64 * self.scales[self.state_count()];
             self.run_from(pose, speed, longest_s, 3_000_000, &mut passes);
             let found = &passes.found;
-            let last = found.last()?;
+            let Some(last) = found.last() else { return Err(false) };
+            still_sticks = found[found.len() / 2].2 < last.2;
             let at = self.unknowns_from(&last.1, 0.0, speed);
             let most = LONGEST.min(found.len() - 1);
             for apart in 1..=most {
@@ -418,12 +422,12 @@ impl CycleShooter {
                 let guess = self.unknowns_from(&last.1, period_s, speed);
                 let by_speed = by_speed(guess.len());
                 if let Some(solution) = self.solve(&guess, &by_speed).filter(|s| !s.sticks_s.is_empty()) {
-                    return Some(solution);
+                    return Ok(solution);
                 }
             }
             pose = last.1;
         }
-        None
+        Err(still_sticks)
     }
 }
 

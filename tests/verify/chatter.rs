@@ -6,6 +6,7 @@ use nalgebra::Matrix4;
 use wiperlab::model::Pose;
 use wiperlab::simulate::drive::Drive;
 use wiperlab::simulate::mode::TipMode;
+use wiperlab::simulate::outputs::StickIntervals;
 use wiperlab::simulate::scene::{Scene, StartKind};
 use wiperlab::simulate::{Observer, RunStatus, SolutionSegment, SolverOptions, run_scene_with};
 use wiperlab::stability::chatter::ChatterNumber;
@@ -88,6 +89,39 @@ fn a_cycle_at_the_low_end_of_a_wide_range_ends_where_it_does_in_a_narrow_one() {
     assert_eq!((narrow.end, wide.end), (CycleEnd::StickLost, CycleEnd::StickLost));
     let [found, expected] = [&wide, &narrow].map(|branch| branch.fold_m_per_s().unwrap());
     assert!((found / expected - 1.0).abs() < 1e-6, "{found} m/s, {expected} m/s");
+}
+
+/// Between the end of the instability and that of the cycle steady sliding is stable, but the blade can
+/// chatter. A range of such speeds alone also has the cycle.
+#[test]
+fn a_range_above_the_instability_has_its_cycle() {
+    let scene = committed("actual-blade");
+    let whole = branch_of(&scene, 1.0);
+    let part = CycleBranch::from_scene(&scene, 1.0, [0.26, 0.27], None).unwrap();
+    assert_eq!(part.end, CycleEnd::EndOfRange);
+    assert!(part.motions.iter().all(|motion| (0.26..=0.27).contains(&motion.speed_m_per_s)), "{part:?}");
+    let cycle = part.cycles().first().unwrap();
+    let expected = whole.find_cycle(&scene, cycle.speed_m_per_s).unwrap();
+    assert!((cycle.period_s / expected.period_s - 1.0).abs() < 1e-8, "{cycle:?}, {expected:?}");
+}
+
+/// With a lip that is stiffer by a fifth, runs of the actual blade above 0.175 m/s still stick, in unequal
+/// periods, although a cycle ends there. No end of chatter is given below the speeds at which runs stick.
+#[test]
+fn chatter_in_unequal_periods_has_no_end_below_it() {
+    let scene = committed("actual-blade");
+    let name = "blade.lip_stiffness_n_m_per_rad";
+    let physical = wiperlab::stability::changes::write_in_physical_units(&scene).unwrap();
+    let stiffer = physical.with_parameter(name, 1.2 * scene.value(name).unwrap()).unwrap();
+    let branch = branch_of(&stiffer, 0.5);
+    let mut late = stiffer.clone();
+    late.drive = Drive::Uniform { speed_m_per_s: 0.2 };
+    (late.start_s, late.run.stop_s) = (0.0, 2.0);
+    late.start = StartKind::State(branch.cycles()[branch.before_end / 2].pose);
+    let mut sticks = StickIntervals::default();
+    assert_eq!(run_scene_with(&late, SolverOptions::new(1e-9), &mut sticks).status, RunStatus::Completed);
+    assert!(sticks.0.last().unwrap()[1] > 1.9, "{sticks:?}");
+    assert!(branch.fold_m_per_s().is_none_or(|end| end > 0.2), "{:?} {}", branch.end, branch.end_m_per_s);
 }
 
 /// Whether a tip sticks, and for how long after its release it does not.
