@@ -198,6 +198,82 @@ fn the_cycle_of_a_damped_coulomb_belt_ends_where_the_crest_of_its_slip_grazes_th
     assert!((end / sticks - 1.0).abs() < 1e-7, "{end} m/s, exact {sticks} m/s");
 }
 
+/// Deflections at the instants at which the tip becomes faster than the head.
+struct SlowestInstants {
+    speed: f64,
+    deflections_m: Vec<f64>,
+}
+
+impl Observer for SlowestInstants {
+    fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
+        let lead = |t: f64| piece.sample_at(t).tip_velocity_m_per_s - self.speed;
+        // a run starts at such an instant
+        if piece.start_s == 0.0 || lead(piece.start_s) >= 0.0 || lead(piece.end_s) < 0.0 {
+            return;
+        }
+        let [mut before, mut after] = [piece.start_s, piece.end_s];
+        for _ in 0..60 {
+            let middle = 0.5 * (before + after);
+            if lead(middle) < 0.0 { before = middle } else { after = middle }
+        }
+        let sample = piece.sample_at(after);
+        self.deflections_m.push(sample.tip_x_m - sample.head_x_m);
+    }
+}
+
+/// The return map of a belt from one instant at which the mass is as fast as the head to the next: how much
+/// further the mass is from steady sliding then.
+fn gain_of_a_period(scene: &Scene, speed: f64, deflection_m: f64) -> f64 {
+    let mut scene = scene.clone();
+    scene.drive = Drive::Uniform { speed_m_per_s: speed };
+    scene.start = StartKind::Slider { deflection_m, tip_velocity_m_per_s: speed };
+    (scene.start_s, scene.run.stop_s) = (0.0, 12.0);
+    let mut seen = SlowestInstants { speed, deflections_m: Vec::new() };
+    run_scene_with(&scene, SolverOptions::new(1e-12), &mut seen);
+    deflection_m - seen.deflections_m[0]
+}
+
+/// The largest gain of a period of vibrations of about this size, by golden section over the deflection.
+fn largest_gain(scene: &Scene, speed: f64, [mut low, mut high]: [f64; 2]) -> f64 {
+    const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    let gain = |deflection: f64| gain_of_a_period(scene, speed, deflection);
+    for _ in 0..36 {
+        let [a, b] = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
+        if gain(a) > gain(b) { high = b } else { low = a }
+    }
+    gain(0.5 * (low + high))
+}
+
+/// A belt whose friction falls most steeply at a speed of its own vibrates without stick up to a smooth fold:
+/// the speed above which no vibration gains on itself in a period. The return map of one number gives it
+/// without any derivative. The multiplier at the fold is 1.
+#[test]
+fn a_cycle_ends_in_a_smooth_fold_where_no_vibration_gains_in_a_period() {
+    let scene = belt(
+        "law = \"stribeck\"\nlimit_at_zero = 0.5\ncoulomb_level = 0.2\nstribeck_speed_m_per_s = 0.5\n\
+         stribeck_exponent = 4.0",
+        0.3,
+    );
+    let branch = branch_of(&scene, 2.0);
+    let end = branch.fold_m_per_s().unwrap();
+    assert_eq!((branch.end, branch.sticks_below_end()), (CycleEnd::Fold, false));
+    let last = branch.cycles().last().unwrap();
+    assert!((last.largest_multiplier() - 1.0).abs() < 1e-4, "{last:?}");
+    // steady sliding is where the spring holds the friction
+    let slide_m = |speed: f64| -scene.linkage.friction.dynamic_coefficient(speed, 1.0);
+    let gain = |speed: f64| {
+        let sizes = [1.6, 1.0].map(|factor| slide_m(speed) - factor * last.amplitude_m);
+        largest_gain(&scene, speed, sizes)
+    };
+    let [mut gains, mut decays] = [0.99 * end, 1.01 * end];
+    assert!(gain(gains) > 0.0 && gain(decays) < 0.0);
+    while decays - gains > 1e-9 {
+        let middle = 0.5 * (gains + decays);
+        if gain(middle) > 0.0 { gains = middle } else { decays = middle }
+    }
+    assert!((end - gains).abs() < 1e-6, "{end} m/s, by the return map {gains} m/s");
+}
+
 /// Integral over a run of the rate at which the motion of the belt contracts areas.
 struct AreaGrowth<'a> {
     scene: &'a Scene,
