@@ -1,6 +1,7 @@
 //! Compares the speed at which steady sliding of random blades becomes stable, from eigenvalues, with the
-//! speed at which perturbations of simulated runs stop growing; and the speed at which the stick-slip cycle
-//! ends with the end of chatter in runs whose head becomes faster.
+//! speed at which perturbations of simulated runs stop growing and with the start of chatter in runs whose
+//! head becomes slower; and the speed at which the stick-slip cycle ends with the end of chatter in runs
+//! whose head becomes faster.
 //!
 //! `cargo run --release --example sliding -- [BLADES]`
 
@@ -11,7 +12,7 @@ mod chatter;
 mod growth;
 
 use blade::{Parts, STROKE};
-use chatter::simulated_chatter_end;
+use chatter::{simulated_chatter_end, simulated_chatter_start};
 use growth::simulated_end;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -26,37 +27,59 @@ const TOP: f64 = 2.0;
 fn main() {
     let count: usize = std::env::args().nth(1).and_then(|n| n.parse().ok()).unwrap_or(200);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
-    let (mut compared, mut worst, mut stable, mut at_top, mut not_smooth) = (0, 0f64, 0, 0, 0);
+    let (mut stable, mut at_top) = (0, 0);
+    let (mut growth, mut start, mut end) =
+        (Comparison::default(), Comparison::default(), Comparison::default());
     let mut chatter = ChatterCount::default();
     for _ in 0..count {
         let scene = Parts::random(&mut rng).scene(STROKE);
         let intervals = SlideFinder::new(&scene.linkage, 1.0).find_intervals([0.0, TOP], 100);
-        chatter.add(&scene, unstable_range(&intervals));
-        let Some([_, end]) = unstable_range(&intervals) else {
-            stable += 1;
-            continue;
-        };
-        if end >= TOP {
-            at_top += 1;
-            continue;
-        }
-        match simulated_end(&scene, [0.97 * end, 1.03 * end]) {
-            Some(found) => {
-                compared += 1;
-                worst = worst.max((found / end - 1.0).abs());
+        chatter.add(&scene, unstable_range(&intervals), &mut end);
+        match unstable_range(&intervals) {
+            None => stable += 1,
+            Some([_, end]) if end >= TOP => at_top += 1,
+            Some([_, end]) => {
+                // a run has a transition, or the blade cannot slide steadily near the end
+                growth.add("perturbations grow up to", end, simulated_end(&scene, [0.97 * end, 1.03 * end]));
+                start.add("chatter starts at", end, simulated_chatter_start(&scene, end));
             }
-            // a run has a transition, or the blade cannot slide steadily near the end
-            None => not_smooth += 1,
         }
     }
     println!("blades {count}: never unstable {stable}, unstable up to {TOP} m/s {at_top}");
-    println!(
-        "compared {compared}: largest relative difference of the end {worst:.1e}; not comparable {not_smooth}"
-    );
+    println!("end of the instability against perturbations: {growth:?}");
+    println!("end of the instability against the start of chatter in sweeps down: {start:?}");
+    println!("end of the cycle against the end of chatter in sweeps up: {end:?}");
     println!("cycles: {chatter:?}");
 }
 
-/// Ends of the cycles of the blades, and their comparison with simulated sweeps.
+/// Computed speeds against those of simulated runs.
+#[derive(Debug, Default)]
+struct Comparison {
+    compared: usize,
+    within_two_percent: usize,
+    /// Largest relative difference.
+    worst: f64,
+    /// Speeds that the runs do not give.
+    not_comparable: usize,
+}
+
+impl Comparison {
+    fn add(&mut self, what: &str, computed: f64, simulated: Option<f64>) {
+        let Some(simulated) = simulated else {
+            self.not_comparable += 1;
+            return;
+        };
+        let difference = (simulated / computed - 1.0).abs();
+        self.compared += 1;
+        self.within_two_percent += usize::from(difference < 0.02);
+        self.worst = self.worst.max(difference);
+        if difference >= 0.02 {
+            println!("{what} {simulated:.4} m/s in runs, computed {computed:.4} m/s");
+        }
+    }
+}
+
+/// Ends of the cycles of the blades.
 #[derive(Debug, Default)]
 struct ChatterCount {
     no_cycle: usize,
@@ -65,17 +88,15 @@ struct ChatterCount {
     folds: usize,
     corners: usize,
     grazing: usize,
+    /// Cycles that are unstable below their end, which no run follows.
     unstable_cycles: usize,
-    /// Cycles that lose their stick below their end; a sweep finds the loss of the stick, not the end.
+    /// Cycles that lose their stick below their end.
     without_stick: usize,
-    compared: usize,
-    within_two_percent: usize,
-    not_comparable: usize,
     slowest_s: f64,
 }
 
 impl ChatterCount {
-    fn add(&mut self, scene: &Scene, unstable: Option<[f64; 2]>) {
+    fn add(&mut self, scene: &Scene, unstable: Option<[f64; 2]>, ends: &mut Comparison) {
         let clock = std::time::Instant::now();
         let branch = CycleBranch::from_scene(scene, 1.0, [0.0, TOP], unstable);
         self.slowest_s = self.slowest_s.max(clock.elapsed().as_secs_f64());
@@ -90,25 +111,15 @@ impl ChatterCount {
             CycleEnd::StickLost => self.corners += 1,
             CycleEnd::Grazing => self.grazing += 1,
         }
-        let Some(fold) = branch.fold_m_per_s() else {
+        let Some(end) = branch.fold_m_per_s() else {
             println!("{:?} at {:.4} m/s {}", branch.end, branch.end_m_per_s, branch.problem);
             return;
         };
-        if !branch.is_stable_below_end() {
+        self.without_stick += usize::from(!branch.sticks_below_end());
+        if branch.is_stable_below_end() {
+            ends.add("chatter ends at", end, simulated_chatter_end(scene, &branch));
+        } else {
             self.unstable_cycles += 1;
-            return;
-        }
-        if !branch.sticks_below_end() {
-            self.without_stick += 1;
-            return;
-        }
-        match simulated_chatter_end(scene, &branch) {
-            Some(found) => {
-                self.compared += 1;
-                self.within_two_percent += usize::from((found / fold - 1.0).abs() < 0.02);
-                println!("{:?} at {fold:.4} m/s, in sweeps {found:.4} m/s", branch.end);
-            }
-            None => self.not_comparable += 1,
         }
     }
 }
