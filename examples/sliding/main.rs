@@ -39,7 +39,7 @@ fn main() {
             None => stable += 1,
             Some([_, end]) if end >= TOP => at_top += 1,
             Some([_, end]) => {
-                // a run has a transition, or the blade cannot slide steadily near the end
+                // not comparable if a run has a transition or no steady sliding is found near the end
                 growth.add("perturbations grow up to", end, simulated_end(&scene, [0.97 * end, 1.03 * end]));
                 start.add("chatter starts at", end, simulated_chatter_start(&scene, end));
             }

@@ -143,7 +143,7 @@ fn track_ridge(
         band_hz: Some(band_hz),
         overlap: Some(DRAWN_OVERLAP),
     };
-    // a segment cannot show a motion with a longer period
+    // a segment cannot show a motion whose period is longer than the segment
     let shown = subtract_slow_motion(inside, rate_hz, ridge.segment_s.recip());
     let spectrogram = Spectrogram::new(&shown, rate_hz, &settings).ok()?;
     let mut courses = course::coherent_parts(&ridge, &spectrogram);

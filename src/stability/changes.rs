@@ -14,7 +14,8 @@ use crate::simulate::scene::error::SceneError;
 /// Masses, stiffnesses, dampings, the preload and the angle of the shoulder, in SI units, and the numbers of
 /// the friction law. Each changes alone, while all other parameters keep their values.
 fn changed_parameters() -> impl Iterator<Item = &'static ModelParameter> {
-    /// Parts of the names of other parameters, or of other forms of the same ones.
+    /// Parts of the names of parameters that are left out: lengths and inertias, and other forms of the
+    /// parameters that are changed.
     const OTHERS: [&str; 6] =
         ["length", "centre", "inertia", "frequency", "damping_ratio", "stiffness_ratio"];
     PARAMETERS.iter().filter(|parameter| match parameter.name.split_once('.') {

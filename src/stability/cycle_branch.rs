@@ -222,7 +222,7 @@ impl BranchWalker {
     fn follow_cycle(&mut self, start: Solution, direction: f64) -> CycleBranch {
         /// Largest number of times that a walk starts again from a simulated run.
         const RESTARTS: usize = 12;
-        const IRREGULAR: &str = "beyond it the blade goes on in other cycles, or in unequal periods";
+        const IRREGULAR: &str = "above it the blade still chatters, in other cycles or in unequal periods";
         let by_speed = by_speed(start.unknowns.len());
         let (mut found, ..) = self.walk(start.clone(), &-&by_speed);
         found.reverse();
@@ -281,7 +281,7 @@ impl BranchWalker {
     /// A cycle with stick at a slightly higher speed, which a run reaches from the state of another.
     ///
     /// # Errors
-    /// Whether the tip still sticks without such a cycle.
+    /// If no such cycle is found: whether the tip still sticks.
     fn settle_above(&mut self, unknowns: &Unknowns) -> Result<Solution, bool> {
         /// Factors by which the speed rises.
         const RISES: [f64; 2] = [1.003, 1.02];

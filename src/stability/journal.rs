@@ -19,7 +19,7 @@ use std::ops::ControlFlow;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StabilityEvaluation {
-    /// What is computed: a row of speeds, a branch, or the effect of a parameter.
+    /// What is computed: a row of speeds, a cycle, a remedy, or the effect of a parameter.
     pub name: String,
     /// Result.
     pub result: Value,
@@ -49,7 +49,7 @@ pub enum StudyStop {
     /// The scene does not admit a preload of the range, or a parameter in its SI unit.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// An evaluation of the journal cannot be reproduced.
+    /// The journal belongs to another study, or one of its evaluations cannot be reproduced.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
     /// The journal cannot be written, with the reason.
@@ -80,7 +80,8 @@ impl<'a> EvaluationLog<'a> {
     }
 
     /// Begins the journal of a study or, if `found` is its earlier part, continues it. `file` is the name of
-    /// the journal in errors, and `flow` is called before each evaluation and may stop the study.
+    /// the journal in errors. `flow` is called before each evaluation that is computed, and may stop the
+    /// study.
     ///
     /// # Errors
     /// [`StudyStop`] if the journal belongs to another study or cannot be written.
@@ -123,7 +124,8 @@ impl<'a> EvaluationLog<'a> {
             return Err(StudyStop::Interrupted);
         }
         let result = compute();
-        // a number that is not finite becomes null, which is computed again when the study is resumed
+        // a number that is not finite becomes null: it is computed again when the study is resumed, or, where
+        // null means that there is no effect, has none
         let record = StabilityEvaluation { name, result: serde_json::to_value(&result).unwrap_or_default() };
         match stored {
             Some((stored, _)) => check_recomputed(self.file, &stored, &record)?,

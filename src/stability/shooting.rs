@@ -341,7 +341,7 @@ impl CycleShooter {
 
     /// The motion of a solution.
     pub(super) fn describe(&mut self, solution: &Solution) -> PeriodicMotion {
-        /// Number of the instants of a period at which the distance between tip and head is read.
+        /// Number of intervals of a period between the instants at which the deflection is read.
         const INSTANTS: u32 = 1000;
         let (period_s, pose) = (self.period_of(&solution.unknowns), self.pose_of(&solution.unknowns));
         let speed = self.speed_of(&solution.unknowns);
@@ -393,7 +393,7 @@ impl CycleShooter {
     /// A cycle with stick that the blade reaches at a speed, m/s, from a state.
     ///
     /// # Errors
-    /// Whether the tip still sticks at the end of the last run.
+    /// Whether the tip still sticks in the second half of the last run.
     pub(super) fn settle(&mut self, start: Pose, speed: f64) -> Result<Solution, bool> {
         /// Instants at which the tip is as fast as the head in each run. After only a few of them, a slower
         /// vibration has not yet grown, and the run can still be near an unstable cycle.

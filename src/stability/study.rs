@@ -49,7 +49,7 @@ pub struct SlidingSurvey {
     pub preload_n: f64,
     /// Intervals of speed.
     pub intervals: Vec<SpeedInterval>,
-    /// Points of equally spaced speeds.
+    /// Steady sliding at equally spaced speeds.
     pub points: Vec<StudyPoint>,
 }
 

@@ -65,7 +65,8 @@ fn two_steady_tones_are_each_read_as_well_as_the_bound_of_one_allows() {
     assert_reaches_the_bound(&Signal::of(&[Tone::steady(LOW_HZ), Tone::steady(HIGH_HZ)]), 100);
 }
 
-/// Ring-downs on a flip a hundred times as high, at 30 dB, with frequencies right to this share.
+/// Ring-downs on a flip a hundred times as high, at 30 dB. `share` is the largest relative error of a
+/// frequency.
 fn assert_ring_downs(flip: usize, share: f64) {
     for damping in [0.02, 0.05, 0.1] {
         let tone = Tone::ring_down(LOW_HZ, damping);
@@ -73,7 +74,7 @@ fn assert_ring_downs(flip: usize, share: f64) {
         let lists = read_all(&signal, 40);
         assert_complete(&signal, &lists);
         let errors = Errors::of(&tone, &lists);
-        // one that is described as drifting or by a polynomial amplitude has no damping
+        // a ring-down that is described by a drift or by a polynomial amplitude has no damping
         assert!(20 * errors.damping.len() >= 19 * lists.len(), "{} dampings", errors.damping.len());
         assert!(
             largest(&errors.hz) < share * LOW_HZ,
@@ -427,12 +428,16 @@ fn no_polynomial_swings_through_a_whole_reversal() {
                 let is_trusted =
                     |c: &Component| c.reasons.iter().all(|r| r.verdict > ComponentVerdict::Ambiguous);
                 let what = format!("{channel:?} at {frame_rate_hz} frames/s, seed {seed}: {}", found.removed);
-                // its frequency rises a little as it decays: one that is followed says from where to where
-                let is_read =
-                    ringing.range_hz.map_or(off_hz(ringing) < 0.2 + ringing.frequency_sd_hz, |range| {
+                // its frequency rises a little as it decays: one that is followed says from where to where, and
+                // one in doubt is right to a resolution
+                let allowed_hz = if is_trusted(ringing) { 0.2 } else { found.spectrum.resolution_hz };
+                let is_read = ringing.range_hz.map_or(
+                    off_hz(ringing) < allowed_hz + ringing.frequency_sd_hz,
+                    |range| {
                         let high_hz = range.high_hz - 2.0 * range.high_sd_hz;
                         range.low_hz < 74.6 && range.high_hz > 74.6 && high_hz < 76.5
-                    });
+                    },
+                );
                 assert!(is_read, "{what}: {ringing:?}");
                 assert!(slower.clone().all(|c| !is_trusted(c)), "{what}: {list:?}");
                 let degree = match found.removed.detrend {

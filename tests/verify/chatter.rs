@@ -199,12 +199,12 @@ fn the_cycle_of_a_damped_coulomb_belt_ends_where_the_crest_of_its_slip_grazes_th
 }
 
 /// Deflections at the instants at which the tip becomes faster than the head.
-struct SlowestInstants {
+struct LeastDeflections {
     speed: f64,
     deflections_m: Vec<f64>,
 }
 
-impl Observer for SlowestInstants {
+impl Observer for LeastDeflections {
     fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
         let lead = |t: f64| piece.sample_at(t).tip_velocity_m_per_s - self.speed;
         // a run starts at such an instant
@@ -228,12 +228,12 @@ fn gain_of_a_period(scene: &Scene, speed: f64, deflection_m: f64) -> f64 {
     scene.drive = Drive::Uniform { speed_m_per_s: speed };
     scene.start = StartKind::Slider { deflection_m, tip_velocity_m_per_s: speed };
     (scene.start_s, scene.run.stop_s) = (0.0, 12.0);
-    let mut seen = SlowestInstants { speed, deflections_m: Vec::new() };
+    let mut seen = LeastDeflections { speed, deflections_m: Vec::new() };
     run_scene_with(&scene, SolverOptions::new(1e-12), &mut seen);
     deflection_m - seen.deflections_m[0]
 }
 
-/// The largest gain of a period of vibrations of about this size, by golden section over the deflection.
+/// The largest gain of a period, by golden section over the initial deflection between `low` and `high`.
 fn largest_gain(scene: &Scene, speed: f64, [mut low, mut high]: [f64; 2]) -> f64 {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     let gain = |deflection: f64| gain_of_a_period(scene, speed, deflection);
@@ -244,8 +244,8 @@ fn largest_gain(scene: &Scene, speed: f64, [mut low, mut high]: [f64; 2]) -> f64
     gain(0.5 * (low + high))
 }
 
-/// A belt whose friction falls most steeply at a speed of its own vibrates without stick up to a smooth fold:
-/// the speed above which no vibration gains on itself in a period. The return map of one number gives it
+/// If friction falls most steeply at a speed above zero, a belt vibrates without stick up to a smooth fold:
+/// the speed above which no vibration grows in a period. A one-dimensional return map gives this speed
 /// without any derivative. The multiplier at the fold is 1.
 #[test]
 fn a_cycle_ends_in_a_smooth_fold_where_no_vibration_gains_in_a_period() {

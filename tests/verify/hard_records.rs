@@ -48,8 +48,8 @@ fn nothing_sought_is_missed_and_nothing_is_wrongly_clear() {
     }
 }
 
-/// Records of the mixtures in which ring-downs overlap, begin late and are large, or lie on a smooth step:
-/// each was missed or off by many deviations before terms were placed again.
+/// Records of the mixtures in which ring-downs overlap, begin late and are large, or lie on a smooth step.
+/// Such ring-downs are hard to separate.
 const MIXED: [(&str, &[u64]); 2] = [
     ("one of any kind, on any flip, 30 dB", &[72, 177]),
     ("up to three of any kind, on any flip, 30 dB", &[29, 69, 170, 178, 284, 327, 334, 386]),

@@ -17,7 +17,7 @@ use crate::record::SampledRecord;
 use portable_math as math;
 
 /// Length, in frames, of the longest record that is fitted: three seconds at 5,000 frames/s, which take about
-/// one second. The computing time grows faster than the length; longer records are analysed by their windowed
+/// two seconds. The computing time grows faster than the length; longer records are analysed by their windowed
 /// periodogram.
 pub const LONGEST_DECOMPOSED: usize = 1 << 14;
 
@@ -26,8 +26,9 @@ pub const LONGEST_DECOMPOSED: usize = 1 << 14;
 pub struct SpectralAnalysis {
     /// Amplitude spectrum of the record without the removed parts, with the components.
     pub spectrum: Spectrum,
-    /// Number of frames left out at the start of the record: those before the first frame with a value, if
-    /// only every second, third ... frame has one. All fields below refer to the remaining frames.
+    /// Number of frames left out at the start of the record. If only every second, third ... frame has a
+    /// value, these are the frames before the first value; otherwise 0. All fields below refer to the
+    /// remaining frames.
     pub skipped_frames: usize,
     /// Distance, in frames, between frames that may have a value: 1, or more if for example only every second
     /// frame has a value.
@@ -185,8 +186,8 @@ impl SpectralAnalysis {
         };
         let residual_m: Vec<Option<f64>> = (0..frames).map(residual).collect();
         // The spectrum shows the components in every frame, so that gaps do not broaden their peaks. The
-        // residual is divided by the share of the weights on frames that have one. All weights of a Hann
-        // window add up to half the number of frames.
+        // residual is known in some frames only, so it is divided by the share of the Hann weights on these
+        // frames. All weights of a Hann window add up to half the number of frames.
         let periodogram = Periodogram::new(&residual_m, padded);
         let share = periodogram.sums.first / (frames as f64 / 2.0);
         let shown = residual_m.iter().zip(&model_m).map(|(left, m)| m + left.unwrap_or(0.0) / share);

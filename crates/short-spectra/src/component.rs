@@ -33,8 +33,8 @@ pub struct Component {
     /// Ratio of the amplitude in the spectrum to the noise floor of the spectrum, dB (`20 log10`).
     pub snr_db: f64,
     /// Cramér-Rao bound of the frequency, Hz. It assumes that the record has no gaps and contains only this
-    /// component and white noise that disturbs it as much as the noise of the record does. For a component
-    /// along a ridge, it is `frequency_sd_hz` instead.
+    /// component and white noise that disturbs it as much as the noise of the record does. A component along
+    /// a ridge has no bound; this field then equals `frequency_sd_hz`.
     pub cramer_rao_hz: f64,
     /// Probability that noise alone produces a line as steady as this component (Thomson's F over the
     /// tapers): small for a steady oscillation, near one for a ring-down.

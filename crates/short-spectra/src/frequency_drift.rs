@@ -1,5 +1,5 @@
-//! The ridge of the strongest oscillation above the slow ones, and the means along a ridge that describe it
-//! as one component.
+//! The ridge of the strongest oscillation above the slow ones, and the means along this ridge, which describe
+//! the oscillation as one component.
 
 use super::periodogram::upper_median;
 use super::time_frequency::{self, Ridge, RidgeEnd, RidgePoint, Spectrogram};
@@ -13,7 +13,7 @@ const SLOW_COMPONENT: (f64, f64) = (4.0, 0.25);
 /// the window hides lower frequencies near the ends of a record.
 const BAND_MARGIN: f64 = 2.0;
 /// If a ridge has points in at least this fraction of the segments, it counts as complete: no shorter
-/// segments are tried, and missing points are no reason against the component.
+/// segments are tried. Only a complete ridge may become an oscillation of the decomposition.
 pub(super) const FULLY_FOLLOWED: f64 = 0.9;
 /// Fractions of the best segment length that are tried if the ridge has points in less than `FULLY_FOLLOWED`
 /// of the segments. A shorter length is used only if it increases this share by more than `LEAST_GAIN`,

@@ -312,7 +312,7 @@ impl Search<'_> {
     }
 }
 
-/// Sine and cosine of the sum of two angles from those of both.
+/// Sine and cosine of the sum of two angles, from the sine and cosine of each.
 fn add_angles((sine, cosine): (f64, f64), (by_sine, by_cosine): (f64, f64)) -> (f64, f64) {
     (sine * by_cosine + cosine * by_sine, cosine * by_cosine - sine * by_sine)
 }
@@ -327,7 +327,7 @@ struct PooledColumn {
     along: Vec<f64>,
     /// Squared length of what the fixed parts leave of it; 0 for a column that depends on them.
     left: f64,
-    /// Product of what they leave with the residual.
+    /// Scalar product of the residual with what the fixed parts leave of the column.
     product: f64,
 }
 

@@ -141,8 +141,8 @@ impl CourseAtom {
     }
 }
 
-/// Whether an oscillation along parts of a ridge of this record describes it better than noise alone. The
-/// strongest peaks of noise can follow each other like a ridge.
+/// Whether an oscillation along `courses`, parts of a ridge of the record, describes the record better than
+/// noise alone. The strongest peaks of noise can follow each other like a ridge.
 #[must_use]
 pub fn exceeds_noise(
     samples: &[Option<f64>],

@@ -266,7 +266,7 @@ impl PartSearch {
         let step = found.into_iter().find(|candidate| matches!(candidate.atom, Atom::Step { .. }));
         let change = |Candidate { atom, gain }: Candidate| {
             let change = Change { gain, trend, replaced: slow.clone(), fitted: vec![atom], is_fitted: false };
-            // the shapes of the oscillations follow those of the slow parts, so all are fitted together
+            // the best shapes of the oscillations depend on the slow parts, so all are fitted together
             let tried = self.try_change(current, &fixed, &change);
             let found = self.problem.fit_parts(&tried.parts, 3 * JOINT_ITERATIONS);
             let (gain, replaced) = (current.criterion - found.criterion, (0..atoms.len()).collect());
@@ -372,7 +372,8 @@ fn amplitude_of(current: &Explanation, o: &OscillationAtom) -> f64 {
 /// Whether two groups have atoms of the same kind with nearly the same frequencies.
 fn is_similar(a: &[Atom], b: &[Atom]) -> bool {
     /// Difference of frequencies, resolutions, below which atoms are nearly the same: an oscillation that
-    /// moves by less keeps its neighbours. For other atoms, a fraction of their width.
+    /// moves by less keeps its neighbours. For steps and relaxations, the difference as a fraction of their
+    /// width.
     const SAME: f64 = 0.1;
     let near = |a: f64, b: f64, scale: f64| (a - b).abs() < SAME * scale;
     let same = |(a, b): (&Atom, &Atom)| match (a, b) {
