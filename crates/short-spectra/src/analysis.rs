@@ -17,8 +17,8 @@ use crate::record::SampledRecord;
 use portable_math as math;
 
 /// Length, in frames, of the longest record that is fitted: three seconds at 5,000 frames/s, which take about
-/// two seconds. The computing time grows faster than the length; longer records are analysed by their windowed
-/// periodogram.
+/// two seconds. The computing time grows faster than the length; longer records are analysed by their
+/// windowed periodogram.
 pub const LONGEST_DECOMPOSED: usize = 1 << 14;
 
 /// A record decomposed into trend, components and residual.

@@ -8,8 +8,8 @@ use std::f64::consts::PI;
 /// lower end of the band. With Hann weights and many frames per period, the cubic removes 6 % of an
 /// oscillation with this period, 91 % of one 2.5 times as slow and 98 % of one four times as slow.
 const HALF_WIDTH: f64 = 1.25;
-/// Minimum number of frames with a value around a frame: two for each coefficient of the cubic. It is also the
-/// smallest half width, frames, so that half of the frames may be lost.
+/// Minimum number of frames with a value around a frame: two for each coefficient of the cubic. It is also
+/// the smallest half width, frames, so that half of the frames may be lost.
 const FEWEST_FRAMES: usize = 8;
 
 /// A record without the motion that is slower than `low_hz`. From the value of each frame, a cubic that is
