@@ -231,7 +231,7 @@ impl OscillationAtom {
             let (mut turned, mut re, mut im) = (1, cosine, sine);
             for (k, multiple) in self.multiples.iter().enumerate() {
                 while turned < *multiple {
-                    (re, im) = (re * cosine - im * sine, re * sine + im * cosine);
+                    (im, re) = add_angles((im, re), (sine, cosine));
                     turned += 1;
                 }
                 columns[2 * k + 2][i] = envelope * re;
@@ -281,6 +281,11 @@ impl OscillationAtom {
     }
 }
 
+/// Sine and cosine of the sum of two angles, from the sine and cosine of each.
+pub(super) fn add_angles((sine, cosine): (f64, f64), (by_sine, by_cosine): (f64, f64)) -> (f64, f64) {
+    (sine * by_cosine + cosine * by_sine, cosine * by_cosine - sine * by_sine)
+}
+
 /// Cosine and sine of the phase of an oscillation, and its decay, frame by frame. From one frame to the next,
 /// a phase without drift turns by a constant angle, and a decay shrinks by a constant factor. After a gap and
 /// after `MOST_STEPS` frames both are computed anew, so that rounding errors do not grow.
@@ -316,12 +321,11 @@ impl<'a> Phasors<'a> {
         if anew {
             self.since = 0;
         }
-        let (cosine, sine) = if anew || !self.atom.phase.is_empty() {
+        let (sine, cosine) = if anew || !self.atom.phase.is_empty() {
             let turn = self.atom.phase_at(s);
-            let (sine, cosine) = math::sin_cos(TAU * (turn - turn.floor()));
-            (cosine, sine)
+            math::sin_cos(TAU * (turn - turn.floor()))
         } else {
-            (cosine * by_cosine - sine * by_sine, cosine * by_sine + sine * by_cosine)
+            add_angles((sine, cosine), (by_sine, by_cosine))
         };
         let decay = if anew { self.atom.decay_at(s) } else { decay * shrink };
         self.latest = (cosine, sine, decay);

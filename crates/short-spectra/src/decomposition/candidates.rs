@@ -1,7 +1,7 @@
 //! Parts that a residual may contain, found by matched filters. Oscillations (steady, decaying, late,
 //! drifting) are found by transforms, steps and relaxations in sums over blocks of frames.
 
-use super::atom::{Atom, FEWEST_CYCLES, OUTSIDE, OscillationAtom, StepShape};
+use super::atom::{Atom, FEWEST_CYCLES, OUTSIDE, OscillationAtom, StepShape, add_angles};
 use super::problem::{Basis, Fixed, NoisyRecord, dot};
 use crate::transform::RealTransform;
 use portable_math as math;
@@ -310,11 +310,6 @@ impl Search<'_> {
         self.keep_best(steps.into_iter());
         self.keep_best(relaxations.into_iter());
     }
-}
-
-/// Sine and cosine of the sum of two angles, from the sine and cosine of each.
-fn add_angles((sine, cosine): (f64, f64), (by_sine, by_cosine): (f64, f64)) -> (f64, f64) {
-    (sine * by_cosine + cosine * by_sine, cosine * by_cosine - sine * by_sine)
 }
 
 /// Number of frames after which a recurrence of phases begins anew: rounding errors stay below 1e-13.

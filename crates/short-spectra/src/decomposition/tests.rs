@@ -3,6 +3,7 @@
 use super::atom::{Atom, FramePlaces, OscillationAtom, StepShape};
 use super::{Decomposition, DecompositionSettings};
 use crate::record::SampledRecord;
+use crate::time_frequency::{Spectrogram, SpectrogramSettings, course};
 use crate::trend::Trend;
 use crate::{ComponentVerdict, SpectrumSettings};
 use portable_math::StandardNormal;
@@ -189,4 +190,40 @@ fn a_frequency_that_no_polynomial_follows_is_one_component_along_its_ridge() {
     let line = found.iter().find(|c| (c.frequency_hz - 1510.0).abs() < 1.0).unwrap();
     assert!((line.frequency_hz - 1510.0).abs() < 4.0 * line.frequency_sd_hz, "{line:?}");
     assert_eq!(found.len(), 2, "{found:?}");
+}
+
+/// Whether the ridge in the band from 300 to 1,500 Hz has parts that follow one component, and whether these
+/// exceed noise.
+fn find_courses(samples: &[Option<f64>]) -> (bool, bool) {
+    const BAND_HZ: (f64, f64) = (300.0, 1500.0);
+    let settings = SpectrogramSettings { segment_s: Some(0.03), band_hz: Some(BAND_HZ), overlap: None };
+    let spectrogram = Spectrogram::new(samples, RATE_HZ, &settings).unwrap();
+    let ridge = spectrogram.find_ridge(samples, BAND_HZ).unwrap();
+    let courses = course::coherent_parts(&ridge, &spectrogram);
+    (!courses.is_empty(), super::exceeds_noise(samples, RATE_HZ, &ridge, &courses))
+}
+
+#[test]
+fn a_ridge_of_a_drifting_oscillation_exceeds_noise_and_one_of_noise_does_not() {
+    let record = |amplitude: f64, colour: f64, seed: u64| -> Vec<Option<f64>> {
+        let mut generator = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let mut noise = 0.0;
+        let mut value = |i: usize| {
+            noise = colour * noise + generator.sample::<f64, _>(StandardNormal);
+            amplitude * (TAU * chirp(500.0, 900.0, i as f64 / RATE_HZ)).cos() + noise
+        };
+        (0..FRAMES).map(|i| Some(value(i))).collect()
+    };
+    let mut courses_of_noise = 0;
+    for seed in 0..100 {
+        for colour in [0.0, 0.5, 0.9] {
+            let (has_courses, exceeds) = find_courses(&record(0.0, colour, seed));
+            assert!(!exceeds, "noise of colour {colour}, {seed}");
+            courses_of_noise += usize::from(has_courses);
+        }
+    }
+    assert!(courses_of_noise > 0);
+    for (seed, colour) in (0..30).zip([0.0, 0.5].into_iter().cycle()) {
+        assert!(find_courses(&record(1.5, colour, seed)).1, "drift in noise of colour {colour}, {seed}");
+    }
 }
