@@ -81,6 +81,8 @@ struct StudiedWindow {
     note: String,
     /// Advice on a better window, if the analysed window contains a whole flip of the blade.
     hint: Option<String>,
+    /// Largest number of components in the list.
+    most_components: usize,
 }
 
 impl SpectrumArgs {
@@ -219,7 +221,8 @@ impl SpectrumRequest {
         let uneven = recording.describe_resampling().map_or_else(String::new, |said| format!("; {said}"));
         let note = format!("{from_s:.4} s to {to_s:.4} s, {count} frames{kept}, {removed} removed{uneven}");
         let cycle = recording.count_cycles(frames.clone());
-        Ok(StudiedWindow { recording, exposure_s, frames, analysis, cycle, note, hint })
+        let most_components = self.settings.max_components;
+        Ok(StudiedWindow { recording, exposure_s, frames, analysis, cycle, note, hint, most_components })
     }
 
     fn output_files(&self, studied: &StudiedWindow) -> Outcome<Vec<(String, Vec<u8>)>> {
@@ -263,7 +266,7 @@ fn flip_hint(instants: &ReversalInstants, (from_s, to_s): (f64, f64)) -> Option<
     let after = if instants.reversals.len() > 1 { format!("after[{k}]") } else { "after".to_owned() };
     let (start_s, end_s) = (flip.start_s, flip.end_s);
     Some(format!(
-        "the window holds the flip from {start_s:.4} s to {end_s:.4} s; `--window {after}` starts behind it"
+        "the window contains the flip from {start_s:.4} s to {end_s:.4} s, which hides small oscillations; `--window {after}` begins after it"
     ))
 }
 

@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 
 const RATE_HZ: f64 = 5000.0;
 /// Seeds of a kind in the tests of every change and in the thorough ones; long records take a few.
-const SEEDS: (u64, u64) = (4, 25);
+const SEEDS: (u64, u64) = (2, 25);
 const LONG_SEEDS: (u64, u64) = (1, 3);
 
 fn analysed(frames: usize, value: impl Fn(f64) -> f64) -> SpectralAnalysis {
@@ -174,7 +174,7 @@ fn each_relation_is_named_with_its_numbers() {
             (of.numerator, of.denominator, c.verdict),
             (numerator, denominator, ComponentVerdict::Subharmonic)
         );
-        assert!(c.reasons[0].words.contains("beat differs or is dropped"), "{:?}", c.reasons);
+        assert!(c.reasons[0].words.contains("beat differs or is missing"), "{:?}", c.reasons);
     }
     // with the modulation in the list, and without
     let list = tones(&[(902.0, 10.0), (78.0, 6.0), (824.0, 2.0), (980.0, 2.0), (1058.0, 1.0)]);

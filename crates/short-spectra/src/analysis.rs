@@ -154,7 +154,7 @@ impl SpectralAnalysis {
         if found < least {
             return Err(SpectrumError::TooFew { found, least });
         }
-        let search = DecompositionSettings::new(found, trend, settings.detrend.is_none());
+        let search = DecompositionSettings::new(found, trend, settings);
         let decomposition = Decomposition::from_record(record, search);
         let parts = decomposition
             .as_ref()
@@ -171,15 +171,12 @@ impl SpectralAnalysis {
         record: &SampledRecord,
         settings: &SpectrumSettings,
         padded: usize,
-        parts: RecordParts,
+        mut parts: RecordParts,
         mut components: Vec<Component>,
     ) -> Self {
         let (frames, frame_rate_hz) = (record.samples.len(), record.frame_rate_hz);
         let resolution_hz = frame_rate_hz / frames as f64;
-        let model = |i: usize| -> f64 {
-            parts.oscillations.iter().map(|o| o.displacement_m(i as f64 / frame_rate_hz)).sum()
-        };
-        let model_m: Vec<f64> = (0..frames).map(model).collect();
+        let model_m = std::mem::take(&mut parts.fast_m);
         let residual = |i: usize| {
             let value = record.samples[i].filter(|_| parts.is_used[i]);
             value.map(|x| x - parts.slow_m[i] - model_m[i])

@@ -85,7 +85,7 @@ fn describe_ambiguities(c: &Component, evidence: &Evidence) -> [Option<String>; 
                    drift; choose a shorter window";
     [
         evidence.changes.then(|| changes.to_owned()),
-        unsure.then(|| format!("its amplitude is known to {unknown:.0} % only")),
+        unsure.then(|| format!("the standard deviation of its amplitude is {unknown:.0} %")),
     ]
 }
 

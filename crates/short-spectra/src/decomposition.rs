@@ -17,7 +17,7 @@ mod tests;
 use crate::noise::{MOST_COEFFICIENTS, raise_order};
 use crate::periodogram::upper_median;
 use crate::record::SampledRecord;
-use crate::settings::ROUNDING;
+use crate::settings::{MAX_COMPONENTS, ROUNDING, SpectrumSettings};
 use crate::transform::RealTransform;
 use crate::trend::Trend;
 use atom::Atom;
@@ -28,8 +28,6 @@ pub use record_parts::Oscillation;
 pub(crate) use record_parts::RecordParts;
 use search::{PartSearch, Rival};
 
-/// Largest number of oscillations; it bounds the time of a search.
-const MOST_OSCILLATIONS: usize = 8;
 /// Frames per oscillation: an oscillation with decay, onset and linear drift has six parameters, so this
 /// allows about three frames per parameter.
 const FRAMES_PER_OSCILLATION: usize = 16;
@@ -57,10 +55,12 @@ pub(crate) struct DecompositionSettings {
 }
 
 impl DecompositionSettings {
-    /// Settings for a record with values in `frames` frames.
-    pub(crate) fn new(frames: usize, trend: Trend, trend_grows: bool) -> Self {
-        let most_oscillations = MOST_OSCILLATIONS.min(frames / FRAMES_PER_OSCILLATION);
-        Self { trend, trend_grows, most_oscillations }
+    /// Settings for a record with values in `frames` frames. A list that is shorter than usual needs as many
+    /// oscillations as the usual one: those that are not listed would disturb the others.
+    pub(crate) fn new(frames: usize, trend: Trend, settings: &SpectrumSettings) -> Self {
+        let most_oscillations =
+            settings.max_components.max(MAX_COMPONENTS).min(frames / FRAMES_PER_OSCILLATION);
+        Self { trend, trend_grows: settings.detrend.is_none(), most_oscillations }
     }
 }
 
@@ -398,6 +398,10 @@ fn estimate_coefficients(used: &[usize], residual: &[f64]) -> Vec<f64> {
 fn find_jump(problem: &NoisyRecord, start: &Parts) -> Option<(NoisyRecord, Parts)> {
     /// Lengths, frames, of the intervals from which the search starts: from one frame to a slow jump.
     const WIDTHS: [usize; 9] = [1, 2, 6, 15, 30, 60, 100, 150, 250];
+    /// Smallest number of frames on each side: as many as the cubic that begins there has coefficients.
+    const SIDE: usize = 4;
+    /// Divisor of the number of frames that gives the longest interval left out.
+    const MOST_LEFT_OUT: usize = 4;
     /// Smallest fall of the criterion, nats, with which a jump is tried: each jump costs another search.
     const WORTHWHILE: f64 = 8.0;
     let n = problem.len();
@@ -422,9 +426,11 @@ fn find_jump(problem: &NoisyRecord, start: &Parts) -> Option<(NoisyRecord, Parts
         let criterion = without.fit_parts(&parts, 0).criterion;
         (criterion, without, parts)
     };
-    let usable = |from: usize, to: usize| from >= 4 && from < to && to + 4 <= frames;
+    let usable = |from: usize, to: usize| {
+        from >= SIDE && from < to && to + SIDE <= frames && to - from <= frames / MOST_LEFT_OUT
+    };
     let around = |width: &usize| {
-        (middle.saturating_sub(width / 2).max(4), (middle + width.div_ceil(2)).min(frames - 4))
+        (middle.saturating_sub(width / 2).max(SIDE), (middle + width.div_ceil(2)).min(frames - SIDE))
     };
     let mut best = WIDTHS
         .iter()

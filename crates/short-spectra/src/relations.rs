@@ -82,12 +82,16 @@ pub(super) fn describe_relations(c: &Component) -> [(ComponentVerdict, Option<St
     let fraction = |s: &Subharmonic| {
         let beats = if s.denominator == 2 { "second" } else { "third" };
         format!(
-            "{}/{} of {:.3} Hz: every {beats} beat differs or is dropped",
+            "{}/{} of {:.3} Hz: every {beats} beat differs or is missing",
             s.numerator, s.denominator, s.frequency_hz
         )
     };
     let sideband = |s: &Sideband| {
-        format!("a sideband: {:.3} Hz modulated with {:.3} Hz", s.frequency_hz, s.modulation_hz)
+        let apart_hz = c.frequency_hz - s.frequency_hz;
+        let side = if apart_hz < 0.0 { "minus" } else { "plus" };
+        let order = (apart_hz.abs() / s.modulation_hz).round();
+        let times = if order > 1.0 { format!("{order} times ") } else { String::new() };
+        format!("{:.3} Hz {side} {times}{:.3} Hz", s.frequency_hz, s.modulation_hz)
     };
     let mains = |m: &MainsMultiple| {
         format!("{} times {} Hz: a lamp on the mains flickers so", m.multiple, m.frequency_hz)

@@ -38,7 +38,7 @@ pub enum Detrend {
 /// Error: a text that is not the name of a detrending.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "unknown detrending `{found}`; expected `none`, `mean`, `line`, `cubic`, `polynomial:N` (N up to {HIGHEST_DEGREE}) or `high-pass:HZ`"
+    "unknown detrending `{found}`; expected `none`, `mean`, `line`, `cubic`, `polynomial:N` (N up to {HIGHEST_DEGREE}) or `high-pass:HZ` (HZ above 0)"
 )]
 pub struct UnknownDetrend {
     /// The name as written.

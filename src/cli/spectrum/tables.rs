@@ -160,8 +160,19 @@ pub(crate) fn print_summary(channel: Channel, studied: &StudiedWindow) {
     print_line!(
         "resolution {resolution_hz:.2} Hz, noise floor {floor_um:.4} um, {missing:.1} % of the frames missing"
     );
+    let analysis = &studied.analysis;
+    let used = analysis.residual_m.iter().flatten().count();
+    let analysed = analysis.residual_m.len().div_ceil(analysis.stride);
+    let tracked = (spectrum.present * analysed as f64).round() as usize;
+    if let left_out @ 1.. = tracked.saturating_sub(used) {
+        let frames = pluralise("frame", left_out);
+        print_line!("{left_out} {frames} left out: mis-tracked, or within a jump");
+    }
     studied.hint.iter().for_each(|hint| print_line!("{hint}"));
     print_components(from_s, spectrum);
+    if spectrum.components.len() >= studied.most_components {
+        print_line!("the list is full; a larger --max-components may show more lines");
+    }
     print_cycle(&studied.cycle);
 }
 

@@ -161,6 +161,11 @@ impl OscillationAtom {
         self.nepers.filter(over).map_or(1.0, |nepers| (self.onset + OVER_NEPERS / nepers).min(1.0))
     }
 
+    /// Time from its onset until it is over, as a fraction of the record.
+    pub(crate) fn duration(&self) -> f64 {
+        self.end_place() - self.onset
+    }
+
     /// Whether it ends within a cycle. It then counts as slow motion, because a step looks the same.
     pub(crate) fn is_single_swing(&self) -> bool {
         /// Damping ratio above which an oscillation is over within a cycle: its amplitude falls to a quarter
@@ -181,7 +186,7 @@ impl OscillationAtom {
     pub(crate) fn extreme_places(&self) -> (f64, f64) {
         /// Number of positions compared: several between two extremes of a phase of degree nine.
         const POINTS: usize = 33;
-        let lasts = self.end_place() - self.onset;
+        let lasts = self.duration();
         let places = || (0..POINTS).map(|k| self.onset + lasts * k as f64 / (POINTS - 1) as f64);
         let by_frequency = |a: &f64, b: &f64| self.cycles_at(*a).total_cmp(&self.cycles_at(*b));
         (places().min_by(by_frequency).unwrap_or(0.0), places().max_by(by_frequency).unwrap_or(0.0))

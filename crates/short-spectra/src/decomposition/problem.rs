@@ -16,6 +16,14 @@ pub(crate) struct Parts {
     pub atoms: Vec<Atom>,
 }
 
+impl Parts {
+    /// Number of amplitudes and shape parameters.
+    pub(crate) fn parameter_count(&self) -> usize {
+        let of_atom = |atom: &Atom| atom.column_count() + atom.parameters().len();
+        self.trend.column_count() + self.atoms.iter().map(of_atom).sum::<usize>()
+    }
+}
+
 /// Fitted parts of a record.
 #[derive(Debug, Clone)]
 pub(crate) struct Explanation {
@@ -399,8 +407,14 @@ impl NoisyRecord {
 
     /// Negative logarithm of the posterior probability of parts that leave this sum of whitened squares,
     /// nats: the likelihood with the estimated level of the noise, Djurić's penalty and the price of the
-    /// frames left out.
+    /// frames left out. Infinite for too many parts.
     pub(crate) fn criterion(&self, parts: &Parts, squares: f64) -> f64 {
+        /// Smallest number of frames per parameter: with fewer, a fit follows the noise, and the sum of
+        /// squares says little about it.
+        const FRAMES_PER_PARAMETER: usize = 2;
+        if FRAMES_PER_PARAMETER * (parts.parameter_count() + self.order) > self.len() {
+            return f64::INFINITY;
+        }
         let n = self.len() as f64;
         let linear = (parts.trend.column_count() + self.order) as f64;
         let price = 0.5 * linear + parts.atoms.iter().map(Atom::price).sum::<f64>();

@@ -61,8 +61,8 @@ const MOST_SCATTER: f64 = 5.5;
 /// Scatter of the frequencies of parts of the record above which the standard deviation of the frequency
 /// includes the scatter: chance exceeds this value in one of twenty.
 const CHANCE_SCATTER: f64 = 2.6;
-/// Number of frames per parameter below which every part is in doubt: the odds hold only for many frames per
-/// parameter.
+/// Number of frames per parameter below which every part is in doubt, or a late oscillation with few frames
+/// of its own: the odds hold only for many frames per parameter.
 const PARAMETERS_WITHIN: usize = 6;
 /// Standard deviation, cycles, of the number of cycles between two instants: if the shape of the cycles
 /// changes, so does the phase of the fundamental at which a cycle begins, at either instant.
@@ -392,7 +392,7 @@ impl Decomposition {
         let mut doubts = Vec::new();
         if reading.lead < CLEAR_LEAD {
             doubts.push(format!(
-                "without it, other parts or noise explain the record nearly as well (odds 1 to {:.0})",
+                "the description of the window is only {:.0} times as probable with it as without it",
                 math::exp(reading.lead.max(0.0))
             ));
         }
@@ -407,7 +407,7 @@ impl Decomposition {
         let grown = columns > CUBIC_COLUMNS || steps;
         if grown && o.cycles < SLOW_CYCLES.max(SLOW_CYCLES_PER_COLUMN * columns as f64) {
             doubts.push(
-                "it is slow, and the slow motion is more than a cubic: it may be a piece of that motion"
+                "it is slow and the slow motion is more than a cubic, so it may be a piece of that motion"
                     .to_owned(),
             );
         }
@@ -415,49 +415,59 @@ impl Decomposition {
         if reading.pieces > 1 {
             if reading.cycles_sd > MOST_SPREAD {
                 doubts.push(format!(
-                    "several oscillations describe it (deviation {:.2e} Hz): it changes, or it is several",
+                    "it combines several oscillations whose frequencies spread by {:.2e} Hz: one that changes, or several",
                     reading.cycles_sd * resolution_hz
                 ));
             }
         } else if let Some(other) = others().find(|other| may_be_one(o, other)) {
             let apart = greatest_distance(o, other);
             doubts.push(format!(
-                "another oscillation lies {apart:.2} resolutions from it: pieces of one look the same"
+                "another component is within {apart:.2} resolutions of it: both may be pieces of one"
             ));
         } else if self.count_cluster(o) >= CLUSTER {
             doubts.push(
-                "it is one of several close together: a single one that changes looks the same".to_owned(),
+                "it is one of several that lie close together: they may be pieces of one that changes"
+                    .to_owned(),
             );
         }
         if self.crosses_larger(reading) {
             doubts.push(
-                "it drifts across a much larger one: a piece of the larger one looks the same".to_owned(),
+                "its frequency crosses that of a much larger component: it may be a piece of that one"
+                    .to_owned(),
             );
         }
         if is_transient(o) && others().filter(|other| is_transient(other)).count() >= CROWD {
             doubts.push(
-                "it is one of several that begin or are over within the record: noise and jumps look the same"
+                "four or more components begin or end within the window: they may be noise or a jump"
                     .to_owned(),
+            );
+        }
+        // two amplitudes of each multiple, the shape and the onset
+        let own = reading.amplitudes_m.len() * 2 + Atom::Oscillation(o.clone()).parameters().len() + 1;
+        if o.onset > 0.0 && (PARAMETERS_WITHIN * own) as f64 > o.duration() * self.problem.len() as f64 {
+            doubts.push(
+                "it begins within the window and lasts for few frames, like a burst of noise".to_owned(),
             );
         }
         let lasts = o.nepers.map_or(0.0, |d| d * (1.0 - o.onset));
         if o.onset > 0.0 && lasts < LEAST_DECAY {
             doubts.push(
-                "it begins within the record and hardly decays: two lines that beat look the same".to_owned(),
+                "it begins within the window and hardly decays: it may be a beat of two lines".to_owned(),
             );
         }
         if reading.scatter > MOST_SCATTER {
-            doubts
-                .push("parts of the record have different frequencies: it is not one oscillation".to_owned());
-        }
-        if PARAMETERS_WITHIN * self.parameter_count() > self.problem.len() {
             doubts.push(
-                "the record has too few frames for the number of parameters that describe it".to_owned(),
+                "its frequency differs between parts of the window: it is not one oscillation".to_owned(),
+            );
+        }
+        if PARAMETERS_WITHIN * (parts.parameter_count() + self.problem.order) > self.problem.len() {
+            doubts.push(
+                "the window has too few frames for the number of parameters that describe it".to_owned(),
             );
         }
         if reading.cycles_sd > (2.0 * reading.own_cycles_sd).max(0.05) {
             doubts.push(format!(
-                "explanations that are nearly as probable widen its standard deviation to {:.2e} Hz",
+                "descriptions that are nearly as probable widen its standard deviation to {:.2e} Hz",
                 reading.cycles_sd * resolution_hz
             ));
         }
@@ -502,13 +512,6 @@ impl Decomposition {
             next += 1;
         }
         cluster.len()
-    }
-
-    /// Number of parameters of trend, parts and noise.
-    fn parameter_count(&self) -> usize {
-        let parts = &self.explanation.parts;
-        let shapes: usize = parts.atoms.iter().map(|a| a.parameters().len()).sum();
-        self.explanation.amplitudes.len() + parts.trend.column_count() + shapes + self.problem.order
     }
 
     /// The oscillations of the explanation.

@@ -15,6 +15,8 @@ pub(crate) struct RecordParts {
     pub steps: usize,
     /// Sum of trend, relaxations and steps in every frame, m.
     pub slow_m: Vec<f64>,
+    /// Sum of the oscillations in every frame, m.
+    pub fast_m: Vec<f64>,
     pub oscillations: Vec<Oscillation>,
     /// For each frame, whether the parts were fitted to its value.
     pub is_used: Vec<bool>,
@@ -39,6 +41,7 @@ impl RecordParts {
             relaxations: 0,
             steps: 0,
             slow_m: trend.fit_values(samples),
+            fast_m: vec![0.0; samples.len()],
             oscillations: Vec::new(),
             is_used: vec![true; samples.len()],
         }
@@ -51,8 +54,12 @@ impl Decomposition {
         let frames = self.problem.at.frames;
         let (trend, atoms) = self.problem.values_everywhere(&self.explanation);
         let mut slow_m: Vec<f64> = trend.iter().map(|x| self.mean_m + self.scale_m * x).collect();
+        let mut fast_m = vec![0.0; frames];
         let (mut relaxations, mut steps, mut oscillations) = (0, 0, Vec::new());
         for ((atom, amplitudes), values) in self.explanation.atoms_with_amplitudes().zip(atoms) {
+            let add_to = |sum_m: &mut [f64]| {
+                sum_m.iter_mut().zip(values).for_each(|(sum, x)| *sum += self.scale_m * x);
+            };
             match atom {
                 Atom::Oscillation(o) if o.is_single_swing() => steps += 1,
                 Atom::Oscillation(_) | Atom::Course(_) => {
@@ -64,16 +71,18 @@ impl Decomposition {
                         frames,
                         frame_rate_hz,
                     });
+                    add_to(&mut fast_m);
                     continue;
                 }
                 Atom::Relaxation { .. } => relaxations += 1,
                 Atom::Step { .. } | Atom::Break { .. } => steps += 1,
             }
-            slow_m.iter_mut().zip(values).for_each(|(sum, x)| *sum += self.scale_m * x);
+            add_to(&mut slow_m);
         }
         let mut is_used = vec![false; frames];
         self.problem.used.iter().for_each(|i| is_used[*i] = true);
-        RecordParts { trend: self.explanation.parts.trend, relaxations, steps, slow_m, oscillations, is_used }
+        let trend = self.explanation.parts.trend;
+        RecordParts { trend, relaxations, steps, slow_m, fast_m, oscillations, is_used }
     }
 }
 
@@ -108,9 +117,9 @@ impl Oscillation {
     pub fn displacement_m(&self, time_s: f64) -> f64 {
         let (turn, size) = self.phase_and_size(time_s);
         let multiples = self.atom.multiples();
-        // the fundamental of an oscillation along a ridge has a sine column and no cosine column
+        // the fundamental of an oscillation along a ridge has a cosine column and no sine column
         let (fundamental_m, harmonics_m) = match &self.atom {
-            Atom::Course(_) => ([0.0, self.amplitudes_m[0]], &self.amplitudes_m[1..]),
+            Atom::Course(_) => ([self.amplitudes_m[0], 0.0], &self.amplitudes_m[1..]),
             _ => ([self.amplitudes_m[0], self.amplitudes_m[1]], &self.amplitudes_m[2..]),
         };
         let pairs = harmonics_m.chunks(2).map(|pair| [pair[0], pair[1]]);

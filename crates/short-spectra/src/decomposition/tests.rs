@@ -62,7 +62,7 @@ fn taken_apart(value: impl Fn(f64) -> f64, noise: f64, seed: u64) -> (Decomposit
     let mut generator = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut draw = || noise * generator.sample::<f64, _>(StandardNormal);
     let samples: Vec<Option<f64>> = (0..FRAMES).map(|i| Some(value(i as f64 / RATE_HZ) + draw())).collect();
-    let settings = DecompositionSettings::new(FRAMES, Trend::Polynomial(4), true);
+    let settings = DecompositionSettings::new(FRAMES, Trend::Polynomial(4), &SpectrumSettings::default());
     let found = Decomposition::from_record(&record(&samples), settings).unwrap();
     (found, samples)
 }
@@ -127,7 +127,7 @@ fn mistracked_frames_are_left_out_and_both_tones_are_clear() {
     for i in (5..FRAMES).step_by(93) {
         *samples[i].as_mut().unwrap() += 3e-4 * (generator.random::<f64>() + 0.5);
     }
-    let settings = DecompositionSettings::new(FRAMES, Trend::Polynomial(4), true);
+    let settings = DecompositionSettings::new(FRAMES, Trend::Polynomial(4), &SpectrumSettings::default());
     let found = Decomposition::from_record(&record(&samples), settings).unwrap();
     // nine frames are mistracked; at most three good ones are left out with them
     assert!((FRAMES - 12..=FRAMES - 9).contains(&found.problem.len()), "{}", found.problem.len());
@@ -139,7 +139,7 @@ fn mistracked_frames_are_left_out_and_both_tones_are_clear() {
 #[test]
 fn a_record_without_variation_has_no_parts() {
     let samples = vec![Some(3.0); 100];
-    let settings = DecompositionSettings::new(100, Trend::Polynomial(4), true);
+    let settings = DecompositionSettings::new(100, Trend::Polynomial(4), &SpectrumSettings::default());
     assert!(Decomposition::from_record(&record(&samples), settings).is_none());
 }
 
@@ -225,5 +225,47 @@ fn a_ridge_of_a_drifting_oscillation_exceeds_noise_and_one_of_noise_does_not() {
     assert!(courses_of_noise > 0);
     for (seed, colour) in (0..30).zip([0.0, 0.5].into_iter().cycle()) {
         assert!(find_courses(&record(1.5, colour, seed)).1, "drift in noise of colour {colour}, {seed}");
+    }
+}
+
+#[test]
+fn an_oscillation_between_frames_is_the_one_that_was_fitted_to_them() {
+    let ring = |t: f64| 2e-5 * (-60.0 * t).exp() * (TAU * 90.0 * t).cos();
+    // the frequency swings too often for a polynomial
+    let phase = |t: f64| 900.0 * t + 2.5 * (TAU * 17.0 * t).sin() + 4.0 * (TAU * 5.0 * t).cos();
+    let value = |t: f64| ring(t) + 1e-5 * (TAU * phase(t)).cos() + 3e-6 * (2.0 * TAU * phase(t)).sin();
+    let (found, samples) = taken_apart(value, 2e-7, 1);
+    let parts = found.record_parts();
+    let has_course = found.explanation.parts.atoms.iter().any(|atom| atom.course().is_some());
+    assert!(has_course, "{:?}", found.explanation.parts.atoms);
+    for (i, sample) in samples.iter().enumerate().filter(|(i, _)| parts.is_used[*i]) {
+        let fast_m: f64 = parts.oscillations.iter().map(|o| o.displacement_m(i as f64 / RATE_HZ)).sum();
+        assert!((fast_m - parts.fast_m[i]).abs() < 1e-9, "frame {i}: {fast_m:e} {:e}", parts.fast_m[i]);
+        assert!((sample.unwrap() - parts.slow_m[i] - fast_m).abs() < 5e-6, "frame {i}");
+    }
+}
+
+/// A description with more than half as many parameters as frames follows the noise: its floor would be 0,
+/// and a strong line would be lost.
+#[test]
+fn windows_of_a_few_dozen_frames_keep_their_line_and_their_noise() {
+    const NOISE_M: f64 = 2e-6;
+    for frames in [24, 30, 40, 60, 90] {
+        let (mut found, mut floors) = (0, Vec::new());
+        for seed in 0..20 {
+            let mut generator = Xoshiro256PlusPlus::seed_from_u64(seed);
+            let mut draw = || NOISE_M * generator.sample::<f64, _>(StandardNormal);
+            let value = |i: usize| 1.2e-5 * (TAU * 700.0 * i as f64 / RATE_HZ + seed as f64).sin();
+            let samples: Vec<Option<f64>> = (0..frames).map(|i| Some(value(i) + draw())).collect();
+            let spectrum =
+                crate::SpectralAnalysis::from_record(&record(&samples), &SpectrumSettings::default());
+            let spectrum = spectrum.unwrap().spectrum;
+            let is_it = |c: &crate::Component| (c.frequency_hz - 700.0).abs() < 0.3 * RATE_HZ / frames as f64;
+            found += usize::from(spectrum.components.iter().any(is_it));
+            floors.push(spectrum.noise_floor_m);
+        }
+        floors.sort_by(f64::total_cmp);
+        assert!(found >= 19, "{frames} frames: the line is found in {found} of 20 windows");
+        assert!(floors[0] > 0.0, "{frames} frames: {floors:?}");
     }
 }

@@ -25,11 +25,13 @@ impl OscillationReading {
             own.low_hz < other.high_hz && other.low_hz < own.high_hz
         };
         if readings.iter().any(changes) {
-            return Some("a much larger oscillation nearby changes: a piece of it looks the same".to_owned());
+            return Some(
+                "a much larger oscillation nearby changes: it may be a piece of that one".to_owned(),
+            );
         }
         let own = self.range.filter(|_| !self.has_ridge)?;
         followed.iter().any(|other| crosses(&own, other)).then(|| {
-            "it crosses an oscillation followed along a ridge: a piece of that one looks the same".to_owned()
+            "it crosses an oscillation followed along a ridge: it may be a piece of that one".to_owned()
         })
     }
 
