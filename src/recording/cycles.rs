@@ -12,6 +12,7 @@
 use super::Recording;
 use super::channel::{central_moments, median_in_place, value_range};
 use super::noise::{noise_floor, quantisation_step};
+use super::quality::{ChannelQuality, outlier_frames};
 use crate::text::pluralise;
 use portable_math as math;
 use serde::Serialize;
@@ -188,8 +189,15 @@ impl Recording {
             Some(_) if self.synthetic => 0.0,
             _ => tip_m,
         };
-        let step_m = quantisation_step(tip).unwrap_or(0.0);
-        let travel = TipTravel::from_samples(inside, noise_m.max(step_m / 12_f64.sqrt()).max(ROUNDING_M));
+        let step_m = quantisation_step(tip);
+        // a jump of the tracker and its return look like a slip
+        let quality = ChannelQuality { missing_frames: 0, noise_m: Some(noise_m), step_m };
+        let mut inside = inside.to_vec();
+        outlier_frames(&inside, &quality, None).into_iter().for_each(|frame| inside[frame] = None);
+        let travel = TipTravel::from_samples(
+            &inside,
+            noise_m.max(step_m.unwrap_or(0.0) / 12_f64.sqrt()).max(ROUNDING_M),
+        );
         let (rises, slips) = travel.find_slips()?;
         let rate_hz = self.grid.frame_rate_hz;
         let intervals = travel.tracked_intervals(&rises, &slips);
@@ -578,7 +586,9 @@ fn summarise_slips(
     let frames = if stick < 1.0 { "a frame" } else { "five frames" };
     let untimed = format!("sticks are shorter than {frames}, so that sticks and slips have no durations");
     let percent = 100.0 * period_scatter;
-    let no_line = format!("the period scatters by {percent:.0} %: the slips have a rate, but no line");
+    let no_line = format!(
+        "the period scatters by {percent:.0} %, so the spectrum has no line at the rate of the slips"
+    );
     let paused = format!("{pauses} {} between slips left out", pluralise("pause", pauses));
     // (the local period of an interval is the interval over its ratio)
     let (shortest, longest) = value_range(&compared.iter().map(|(ratio, x)| x / ratio).collect::<Vec<_>>());
