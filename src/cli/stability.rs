@@ -15,7 +15,7 @@ use crate::stability::journal::{EvaluationLog, StudyStop};
 use crate::stability::outputs::{
     describe_cycle_end, write_cycles_csv, write_stability_csv, write_stability_json,
 };
-use crate::stability::speed_intervals::{SlidingState, SpeedInterval};
+use crate::stability::speed_intervals::{SlidingState, SpeedInterval, unstable_range};
 use crate::stability::steady_sliding::Instability;
 use crate::stability::study::{StabilityStudy, StudyRange, default_top_speed};
 use crate::text::{format_digits, to_ascii};
@@ -34,7 +34,7 @@ pub(crate) struct StabilityArgs {
     /// Preloads of the blade, or normal forces of the slider, N (default: that of the scene alone)
     #[arg(long, value_name = "FROM..TO", value_parser = parse_range, allow_hyphen_values = true)]
     pub preload_n: Option<NumberRange>,
-    /// Number of speeds, and number of preloads of a range
+    /// Number of speeds, and number of preloads of a range, from 2 to 1000
     #[arg(long, value_name = "N", default_value_t = 100,
           value_parser = clap::value_parser!(u16).range(2..=1000))]
     pub points: u16,
@@ -195,10 +195,13 @@ fn print_study(title: &str, study: &StabilityStudy, chatter: &ChatterSummary) {
             }
         }
     }
+    print_preloads(study);
     print_chatter(study, chatter);
     if !study.changes.is_empty() {
         print_line!("");
-        print_line!("largest effects on onset, end, end of cycle; a damping of 0 becomes a ratio of 0.001");
+        print_line!(
+            "largest changes of the onset, the end and the end of the cycle (a damping of 0 becomes a ratio of 0.001):"
+        );
     }
     for change in study.changes.iter().take(PRINTED_CHANGES) {
         let shown = |moved: Option<f64>| moved.map_or_else(|| "-".to_owned(), |v| format!("{v:+.2e} m/s"));
@@ -211,6 +214,32 @@ fn print_study(title: &str, study: &StabilityStudy, chatter: &ChatterSummary) {
             shown(change.fold_m_per_s)
         );
     }
+}
+
+/// Prints at how many preloads of a range steady sliding is unstable, and up to which speeds.
+fn print_preloads(study: &StabilityStudy) {
+    let Some([from, to]) = study.range.preloads_n else { return };
+    let mut ends: Vec<(f64, f64)> = Vec::new();
+    for survey in &study.by_preload {
+        let Some([_, end]) = unstable_range(&survey.intervals) else { continue };
+        match ends.iter_mut().find(|(preload_n, _)| *preload_n == survey.preload_n) {
+            Some((_, known)) => *known = known.max(end),
+            None => ends.push((survey.preload_n, end)),
+        }
+    }
+    let [from, to, own] = [from, to, study.preload_n].map(|preload_n| format_ascii(preload_n, 3));
+    let points = study.range.points;
+    print_line!("at {} of {points} loads from {from} to {to} N steady sliding is unstable", ends.len());
+    let by_end = |a: &&(f64, f64), b: &&(f64, f64)| a.1.total_cmp(&b.1);
+    if let (Some(low), Some(high)) = (ends.iter().min_by(by_end), ends.iter().max_by(by_end)) {
+        let words = |(preload_n, end): &(f64, f64)| {
+            format!("{} m/s at {} N", format_ascii(*end, 4), format_ascii(*preload_n, 3))
+        };
+        let top = study.range.speeds_m_per_s[1];
+        let open = if high.1 == top { ", the highest speed examined" } else { "" };
+        print_line!("the instability ends between {} and {}{open}", words(low), words(high));
+    }
+    print_line!("what follows holds at {own} N, the load of the scene");
 }
 
 /// Prints where the cycle ends, why there is one, and what ends it sooner.
@@ -239,11 +268,12 @@ fn read_spread(fit: &Path, path: &Path, scene: &Scene) -> Outcome<Option<Paramet
     let result = FitResult::parse(&name, &files::read_json(&file)?).map_err(Failure::input)?;
     let spread = result.parameter_spread();
     for (key, estimate) in spread.names.iter().zip(&spread.estimates) {
-        let found = scene.value(key).unwrap_or(f64::NAN);
-        let is_same = (found - estimate).abs() <= SAME * estimate.abs();
+        let found = scene.value(key);
+        let is_same = found.is_some_and(|found| (found - estimate).abs() <= SAME * estimate.abs());
         if !is_same {
+            let found = found.map_or_else(|| format!("no {key}"), |found| format!("{key} = {found}"));
             let problem = format!(
-                "found {key} = {found}, expected {estimate}, the estimate in {name}; give the scene that this fit wrote"
+                "found {found}, expected {key} = {estimate}, the estimate in {name}; give the scene that this fit wrote"
             );
             return Err(Failure::at(path.display(), problem));
         }
@@ -264,7 +294,8 @@ fn print_interval(interval: &SpeedInterval) {
             match mode.instability {
                 Instability::Divergence => format!("unstable: divergence, {growth} 1/s"),
                 Instability::Flutter => {
-                    format!("unstable: flutter at {hz} Hz ({}), {growth} 1/s", mode.band.name())
+                    let band = mode.band.map_or_else(String::new, |band| format!(" ({})", band.name()));
+                    format!("unstable: flutter at {hz} Hz{band}, {growth} 1/s")
                 }
             }
         }

@@ -45,14 +45,14 @@ pub fn draw_figure(title: &str, study: &StabilityStudy) -> Figure {
 
 fn claim_sentence(study: &StabilityStudy) -> String {
     let Some([onset, end]) = study.unstable_range() else {
-        return "Steady sliding is stable at all speeds where it is possible".to_owned();
+        return "Steady sliding is stable at all these speeds where it is possible".to_owned();
     };
     let intervals = study.own.iter().flat_map(|survey| &survey.intervals);
     let modes = intervals.filter_map(|interval| Some(interval.modes?[0]));
     let band = modes
         .reduce(|a, b| if b.growth_per_s > a.growth_per_s { b } else { a })
-        .filter(|mode| mode.frequency_hz > 0.0)
-        .map(|mode| format!(" ({})", mode.band.name()));
+        .and_then(|mode| mode.band)
+        .map(|band| format!(" ({})", band.name()));
     let [onset, end] = [onset, end].map(|speed| format_digits(speed, 3));
     let sentence =
         format!("Steady sliding is unstable between {onset} and {end} m/s{}", band.unwrap_or_default());

@@ -20,7 +20,7 @@ use std::collections::BTreeMap;
 /// Cause of the chatter at a speed.
 #[derive(Debug, Clone)]
 pub struct ChatterCause {
-    /// Speed of the head, m/s: about half of that at which the instability ends or, without an
+    /// Speed of the head, m/s: half of that at which the instability ends or, without an
     /// instability, of that at which the cycle ends.
     pub speed_m_per_s: f64,
     /// Number of vibrations in a period: that of the sticks, but at least 1.
@@ -33,15 +33,16 @@ impl ChatterCause {
     /// The cause of the cycle of a scene. `unstable` are the speeds, m/s, between which steady sliding is
     /// unstable; the cause is examined at half of the higher one, or of the speed at which the cycle ends.
     pub(super) fn from_branch(
-        linkage: &Linkage,
+        scene: &Scene,
         branch: &CycleBranch,
         unstable: Option<[f64; 2]>,
     ) -> Option<Self> {
         let wanted = 0.5 * unstable.map_or(branch.end_m_per_s, |[_, end]| end);
-        let cycle = branch.nearest_cycle(wanted)?;
+        // the points of the branch lie apart by steps that grow with the range of speeds
+        let cycle = branch.find_cycle(scene, wanted).or_else(|| branch.nearest_cycle(wanted).cloned())?;
         let vibrations = cycle.sticks_s.len().max(1) as f64;
         let distance = |hz: f64| math::ln(hz / (vibrations * cycle.frequency_hz())).abs();
-        let parts = natural_frequencies(linkage).into_iter();
+        let parts = natural_frequencies(&scene.linkage).into_iter();
         let (part, _) = parts.min_by(|a, b| distance(a.1).total_cmp(&distance(b.1)))?;
         Some(Self { speed_m_per_s: cycle.speed_m_per_s, vibrations, part })
     }
@@ -307,15 +308,25 @@ impl StabilityStudy {
     fn describe_speeds(&self, found: &ChatterSummary) -> String {
         let number = |which| found.numbers.get(&which);
         let speed = |which| number(which).map_or_else(String::new, |known| known.describe_value(" m/s"));
-        let top = format_digits(self.range.speeds_m_per_s[1], 3);
+        let [lowest, highest] = self.range.speeds_m_per_s;
+        let top = format_digits(highest, 3);
+        let from =
+            if lowest > 0.0 { format!("from {} m/s ", format_digits(lowest, 3)) } else { String::new() };
         if let Some(reason) = self.why_impossible() {
-            return format!("Steady sliding is impossible up to {top} m/s: {}.", reason.meaning());
+            return format!("Steady sliding is impossible {from}up to {top} m/s: {}.", reason.meaning());
         }
         let onset = speed(ChatterNumber::Onset);
         let sliding = match self.unstable_range() {
-            None => format!("Steady sliding is stable up to {top} m/s"),
-            Some([_, end]) if end == self.range.speeds_m_per_s[1] => {
+            None => format!("Steady sliding is stable {from}up to {top} m/s, the highest speed examined"),
+            Some([start, end]) if start == lowest && lowest > 0.0 && end == highest => {
+                format!("Steady sliding is unstable at all speeds examined, from {onset} to {top} m/s")
+            }
+            Some([_, end]) if end == highest => {
                 format!("Steady sliding is unstable from {onset} up to {top} m/s, the highest speed examined")
+            }
+            Some([start, _]) if start == lowest && lowest > 0.0 => {
+                let end = speed(ChatterNumber::End);
+                format!("Steady sliding is unstable from {onset}, the lowest speed examined, to {end}")
             }
             Some(_) => format!("Steady sliding is unstable from {onset} to {}", speed(ChatterNumber::End)),
         };
@@ -363,7 +374,7 @@ fn describe_cause(found: &ChatterSummary) -> Option<String> {
                 if feeding.includes(1.0) { "; whether it outweighs damping is undecided" } else { "" };
             let feeding = feeding.describe_value("");
             format!(
-                "friction falls there by {falls}, which feeds it {feeding} times as fast as damping calms it{doubt}"
+                "friction falls there by {falls}, which feeds the vibration {feeding} times as strongly as damping weakens it{doubt}"
             )
         }
     };

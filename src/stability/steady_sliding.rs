@@ -48,15 +48,15 @@ pub struct SlidingMode {
     pub frequency_hz: f64,
     /// Kind of the instability if the mode grows.
     pub instability: Instability,
-    /// Frequency band of the noise.
-    pub band: NoiseBand,
+    /// Frequency band of the noise; `None` for a mode that does not oscillate.
+    pub band: Option<NoiseBand>,
 }
 
 impl SlidingMode {
     fn from_eigenvalue(value: Complex<f64>) -> Self {
         let frequency_hz = value.im / TAU;
         let instability = if frequency_hz > 0.0 { Instability::Flutter } else { Instability::Divergence };
-        let band = NoiseBand::from_frequency(frequency_hz);
+        let band = (frequency_hz > 0.0).then(|| NoiseBand::from_frequency(frequency_hz));
         Self { growth_per_s: value.re, frequency_hz, instability, band }
     }
 }

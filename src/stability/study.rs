@@ -143,12 +143,13 @@ impl StabilityStudy {
         let cycle = leading.filter(|branch| branch.fold_m_per_s().is_some());
         let changes = rank_changes(scene, &own, cycle, speeds, log)?;
         let remedy = match cycle {
-            Some(cycle) => find_remedy(scene, &changes, cycle, speeds, log)?,
+            // a remedy may end the cycle below the range
+            Some(cycle) => find_remedy(scene, &changes, cycle, [0.0, speeds[1]], log)?,
             None => None,
         };
         let cause = leading.and_then(|branch| {
             let survey = own.iter().find(|survey| survey.direction == branch.direction)?;
-            ChatterCause::from_branch(&scene.linkage, branch, unstable_range(&survey.intervals))
+            ChatterCause::from_branch(scene, branch, unstable_range(&survey.intervals))
         });
         let has_shoulder = scene.linkage.shoulder.is_some();
         Ok(Self { range, preload_n, has_shoulder, own, by_preload, changes, branches, remedy, cause })
