@@ -7,6 +7,7 @@ use crate::page::{blocks, code, commands};
 use crate::project::Project;
 use crate::small_fit;
 use crate::submit;
+use crate::thorough::is_thorough;
 use crate::traces;
 use crate::tracked::{root, tracked};
 use std::collections::BTreeMap;
@@ -57,7 +58,7 @@ const OTHERWISE: &[(&str, &str, How, &str)] = &[
         "README.md",
         "wiperlab fit fits/actual-blade-twin/job.toml",
         With("--max-evaluations 12", 3),
-        "many seconds",
+        MANY_SECONDS,
     ),
     ("docs/clusters.md", "wiperlab collect DIR", As(ALL_DONE, 0), "when all are done"),
     ("docs/clusters.md", SUBMIT_STUDY, With("--print", 0), NO_SCHEDULER),
@@ -83,18 +84,15 @@ const OTHERWISE: &[(&str, &str, How, &str)] = &[
         "two jobs",
     ),
     ("docs/fits.md", "wiperlab collect fits/*/job.toml --shards 20", With("", 3), FEW_EVALUATIONS),
-    (
-        "docs/gallery.md",
-        "wiperlab sweep data/sweeps/friction.toml --out data/sweeps/friction",
-        With("--shard 0/20", 0),
-        "many seconds; docs/sweeps.md has it whole",
-    ),
+    ("docs/gallery.md", "wiperlab report fits/actual-blade-twin", Elsewhere, "README.md has it"),
+    ("docs/gallery.md", SWEEP_FRICTION, With("--shard 0/20", 0), MANY_SECONDS),
     (
         "docs/gallery.md",
         "wiperlab sweep data/sweeps/speed-preload.toml --out data/sweeps/speed-preload",
         With("--shard 0/20", 0),
-        "many seconds",
+        MANY_SECONDS,
     ),
+    ("docs/gallery.md", REPORT_SEVERAL, Elsewhere, "README.md has it"),
     ("docs/hard-cases.md", "cargo test --test verify hard_cases", Elsewhere, "a test"),
     ("docs/install.md", "wiperlab demo", Elsewhere, "many seconds; .ci/run and tests/cli/demo.rs run it"),
     ("docs/install.md", ".ci/release", Elsewhere, "a build of minutes"),
@@ -113,13 +111,27 @@ const OTHERWISE: &[(&str, &str, How, &str)] = &[
     (
         "docs/reports.md",
         "wiperlab report fits/A fits/B [fits/C ...]",
-        As(REPORT_SEVERAL, 0),
-        "names of the reader",
+        Elsewhere,
+        "README.md has it with names",
     ),
+    ("docs/stability.md", STABILITY_MAP, As(SMALL_MAP, 0), MANY_SECONDS),
+    ("docs/stability.md", STABILITY_RESUMED, As(SMALL_MAP_RESUMED, 0), MANY_SECONDS),
+    ("docs/sweeps.md", SWEEP_FRICTION, With("--shard 0/20", 0), MANY_SECONDS),
     ("docs/sweeps.md", "wiperlab collect DIR", As(ALL_DONE, 0), "when all are done"),
     ("fuzz/README.md", "fuzz/run 60", Elsewhere, "needs a nightly toolchain"),
     ("fuzz/README.md", "fuzz/run 600 tracker scene", Elsewhere, "needs a nightly toolchain"),
 ];
+/// Reason for commands that `.ci/thorough` runs as they stand.
+const MANY_SECONDS: &str = "many seconds";
+const SWEEP_FRICTION: &str = "wiperlab sweep data/sweeps/friction.toml --out data/sweeps/friction";
+const STABILITY_MAP: &str = "wiperlab stability data/scenes/published-simulation.toml --out out/stability-map \
+                             --speed-m-per-s 0..1 --preload-n 0.1..1 --points 60";
+const STABILITY_RESUMED: &str = "wiperlab stability data/scenes/published-simulation.toml --out out/stability-map \
+                                 --speed-m-per-s 0..1 --preload-n 0.1..1 --points 60 --resume";
+const SMALL_MAP: &str = "wiperlab stability data/scenes/light-blade.toml --out out/stability-map --speed-m-per-s 0..1 \
+                         --preload-n 0.1..1 --points 6";
+const SMALL_MAP_RESUMED: &str = "wiperlab stability data/scenes/light-blade.toml --out out/stability-map \
+                                 --speed-m-per-s 0..1 --preload-n 0.1..1 --points 6 --resume";
 const MEASURED: &str = "the records of others are not in this repository";
 const IMPORT_MEASURED: &str = "wiperlab import load-250g.csv --out rec --frame-rate-hz 250 --scale m --time real \
                                --columns time=time_s,tip-x=mass_x_m,head-x=base_x_m";
@@ -201,7 +213,10 @@ fn run(project: &Project, command: &str, code: i32, of: &str) {
 fn runs(page: &str) {
     let project = project(page);
     for command in commands(&read_page(page)) {
-        let otherwise = OTHERWISE.iter().find(|(of, listed, ..)| *of == page && *listed == command);
+        let is_listed = |(of, listed, _, why): &&(&str, &str, How, &str)| {
+            *of == page && *listed == command && !(is_thorough() && *why == MANY_SECONDS)
+        };
+        let otherwise = OTHERWISE.iter().find(is_listed);
         let started = std::time::Instant::now();
         match otherwise.map(|(_, _, how, _)| how) {
             None => run(&project, &named(&command), 0, page),

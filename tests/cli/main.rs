@@ -6,6 +6,9 @@ mod project;
 mod sealed;
 #[path = "../common/small_fit.rs"]
 mod small_fit;
+#[allow(dead_code, reason = "no test of commands chooses between two numbers")]
+#[path = "../common/thorough.rs"]
+mod thorough;
 #[cfg_attr(not(unix), allow(dead_code, reason = "commands of pages run where there is a shell"))]
 #[path = "../common/tracked.rs"]
 mod tracked;

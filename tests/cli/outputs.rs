@@ -140,7 +140,11 @@ fn every_command_overwrites_what_it_made_and_nothing_else() {
     let commands: [(&[&str], &str, &str); 7] = [
         (&["simulate", SCENE, "--out", "out/simulate"], "out/simulate", "summary.json"),
         (&["twin", "specs/twin.toml", "--out", "out/twin"], "out/twin", "twin.toml"),
-        (&["spectrum", "data/twin", "--out", "out/spectrum"], "out/spectrum", "components.json"),
+        (
+            &["spectrum", "data/twin", "--window", "0.3..0.4", "--out", "out/spectrum"],
+            "out/spectrum",
+            "components.json",
+        ),
         (&["sweep", "specs/study.toml", "--out", "out/sweep"], "out/sweep", "sweep.csv"),
         (&["fit", "fits/x/job.toml", "--max-evaluations", "3"], "fits/x", "result.json"),
         (&["report", "fits/x"], "reports/x", "index.html"),
@@ -159,7 +163,7 @@ fn every_command_overwrites_what_it_made_and_nothing_else() {
         project.succeeds(command);
         // (a job's result is not asked for by another command)
         if folder.starts_with("out/") && command[0] != "spectrum" {
-            let other = ["spectrum", "data/twin", "--out", folder];
+            let other = ["spectrum", "data/twin", "--window", "0.3..0.4", "--out", folder];
             project.write(&format!("{folder}/ridge.csv"), "mine");
             project.leaves(folder, &other, &["ridge.csv", "--force"]);
         }

@@ -360,7 +360,7 @@ fn a_law_without_correlations_names_what_is_not_fixed() {
 
 #[test]
 fn a_fast_camera_makes_no_large_figure_and_none_of_noise() {
-    const TIMES: usize = 20;
+    const TIMES: usize = 8;
     /// Largest error of a place, m.
     const NOISE_M: f64 = 4e-6;
     let finer = |grid: FrameGrid, mut traces: Traces| {

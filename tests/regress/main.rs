@@ -2,6 +2,8 @@
 
 #[path = "../common/ringing.rs"]
 mod ringing;
+#[path = "../common/thorough.rs"]
+mod thorough;
 #[path = "../common/tracked.rs"]
 mod tracked;
 
