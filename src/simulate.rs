@@ -17,6 +17,7 @@ pub mod mode;
 pub(crate) mod motion;
 pub mod outputs;
 pub mod phases;
+pub mod predicted_error;
 pub mod scene;
 pub mod sensitivity;
 mod solution_segment;

@@ -13,8 +13,9 @@ use wiperlab::cli::read;
 use wiperlab::simulate::outputs::{
     EnergyAudit, SampleObserver, SimulationSummary, Transitions, recorded_points_m, sample_times,
 };
+use wiperlab::simulate::predicted_error::run_with_predicted_errors;
 use wiperlab::simulate::scene::Scene;
-use wiperlab::simulate::{ModelSample, Observer, SolutionSegment, SolverOptions, run_scene_with};
+use wiperlab::simulate::{ModelSample, Observer, SolutionSegment, SolverOptions, Transition, run_scene_with};
 
 /// Parts from which a scene is restored: the name and the text of its file, the folder of the recording that
 /// drives its head, and the parameter values that were replaced after reading.
@@ -160,20 +161,22 @@ const SLIDER_COLUMNS: &str = "time_s,tip_x_m,tip_y_m,head_x_m,head_y_m,deflectio
 type RunArrays<'py> = (Bound<'py, PyDict>, Vec<&'static str>, Bound<'py, PyDict>, String);
 
 /// Runs a scene and samples its motion at the sample rate of the scene or, if `times_s` is given, at these
-/// instants, s, in ascending order.
+/// instants, s, in ascending order. With `predict_errors`, the transitions have their predicted errors, NaN
+/// where there is none.
 #[pyfunction]
-#[pyo3(signature = (scene, times_s = None))]
+#[pyo3(signature = (scene, times_s = None, predict_errors = false))]
 pub fn simulate_scene<'py>(
     py: Python<'py>,
     scene: &PyScene,
     times_s: Option<PyReadonlyArray1<'py, f64>>,
+    predict_errors: bool,
 ) -> PyResult<RunArrays<'py>> {
     let given = times_s.map(|times| times.as_array().iter().copied().collect());
     let times: Vec<f64> = given.unwrap_or_else(|| sample_times(&scene.inner).collect());
     let scene = Arc::clone(&scene.inner);
     let is_slider = scene.linkage.is_slider();
     let names = if is_slider { SLIDER_COLUMNS } else { COLUMNS };
-    let (columns, modes, transitions, summary) = workers::run_interruptible(py, None, move |stop| {
+    let (columns, modes, transitions, errors, summary) = workers::run_interruptible(py, None, move |stop| {
         let mut columns: Vec<Vec<f64>> = names.split(',').map(|_| Vec::with_capacity(times.len())).collect();
         let mut modes = Vec::with_capacity(times.len());
         let sampler = SampleObserver::new(times.into_iter(), |sample: &ModelSample| {
@@ -190,10 +193,21 @@ pub fn simulate_scene<'py>(
         let (mut audit, mut transitions) = (EnergyAudit::default(), Transitions::default());
         let (effort, clock) = (SolverOptions::from_scene(&scene), std::time::Instant::now());
         let mut observers = ((sampler, StopFlag(stop)), (&mut audit, &mut transitions));
-        let run = run_scene_with(&scene, effort, &mut observers);
+        let mut errors_s = Vec::new();
+        let receive = |_: &Transition, error_s: Option<f64>| errors_s.push(error_s.unwrap_or(f64::NAN));
+        let predicted =
+            predict_errors.then(|| run_with_predicted_errors(&scene, effort, &mut observers, receive));
+        let run = match &predicted {
+            Some(predicted) => predicted.run,
+            None => run_scene_with(&scene, effort, &mut observers),
+        };
         let wall_s = clock.elapsed().as_secs_f64();
-        let summary = serde_json::to_string(&SimulationSummary::new(&scene, &run, &audit, wall_s, &effort));
-        (columns, modes, transitions.0, summary)
+        let mut summary = SimulationSummary::new(&scene, &run, &audit, wall_s, &effort);
+        if let Some(predicted) = &predicted {
+            summary.predicted_time_error_s = predicted.largest_error_s;
+            summary.undetermined_after_s = Some(predicted.undetermined_after_s);
+        }
+        (columns, modes, transitions.0, predicted.map(|_| errors_s), serde_json::to_string(&summary))
     })?;
     let summary = summary.map_err(|error| errors::internal_error(py, error))?;
     let samples = PyDict::new(py);
@@ -206,5 +220,8 @@ pub fn simulate_scene<'py>(
     events.set_item("from", transitions.iter().map(|t| t.from.name()).collect::<Vec<_>>())?;
     events.set_item("to", transitions.iter().map(|t| t.to.name()).collect::<Vec<_>>())?;
     events.set_item("cause", transitions.iter().map(|t| t.cause.name()).collect::<Vec<_>>())?;
+    if let Some(errors_s) = errors {
+        events.set_item("predicted_time_error_s", PyArray1::from_vec(py, errors_s))?;
+    }
     Ok((samples, modes, events, summary))
 }

@@ -24,7 +24,7 @@ def assert_same(column: np.ndarray, cells: list[str]) -> None:
 
 def test_a_run(scene: wl.Scene, tmp_path: Path) -> None:
     assert program("simulate", SCENE, "--out", tmp_path).returncode == 0
-    motion = wl.simulate(scene)
+    motion = wl.simulate(scene, predict_errors=True)
     for name in ["state.csv", "trace.csv"]:
         for column, cells in table(tmp_path / name).items():
             if column == "mode":
@@ -34,6 +34,9 @@ def test_a_run(scene: wl.Scene, tmp_path: Path) -> None:
     events = table(tmp_path / "events.csv")
     assert len(events["time_s"]) == 380
     assert_same(motion.events["time_s"], events["time_s"])
+    predicted = [float(cell) for cell in events["predicted_time_error_s"]]
+    assert np.allclose(motion.events["predicted_time_error_s"], predicted, rtol=1e-2, atol=0.0)
+    assert "undetermined_after_s" not in wl.simulate(scene).summary
     for column in ["from", "to", "cause"]:
         assert list(motion.events[column]) == events[column]
     summary = json.loads((tmp_path / "summary.json").read_text())

@@ -111,12 +111,21 @@ fn work_precision_diagram(
         error: error(row),
         wrong_transitions: if timed { row.lists.missed + row.lists.invented } else { 0 },
     };
+    let predicted = |row: &AccuracyRow| {
+        let is_shown = timed && row.predicted_time_error_s.is_some();
+        is_shown.then(|| WorkPrecisionRun {
+            method: format!("{}, predicted", row.setting.name()),
+            error: row.predicted_time_error_s,
+            wrong_transitions: 0,
+            ..point(row)
+        })
+    };
     let (title, transitions) = (scene.title(), run.transitions);
     WorkPrecision {
         title: diagram_title(rows, error, unit),
         subtitle: format!("work-precision of {title}: {transitions} transitions in {length_s} s of motion"),
         error_label: error_label.to_owned(),
-        points: rows.iter().map(point).collect(),
+        points: rows.iter().map(point).chain(rows.iter().filter_map(predicted)).collect(),
         floor: floor.filter(|floor| *floor > 0.0),
     }
 }
@@ -144,7 +153,7 @@ fn print_study(scene: &Scene, reference: &ReferenceRun<'_>, rows: &[AccuracyRow]
         .map(|i| reference.components.hz[i].map_or("none".to_owned(), |hz| format!("{hz:.3} Hz")));
     print_line!("components of the reference: low {low}, high {high}");
     print_line!(
-        "method            tolerance transitions worst time, s missed invented   deflection         rms   low, Hz  high, Hz   wall, ms         rhs"
+        "method            tolerance transitions worst time, s predicted, s missed invented   deflection         rms   low, Hz  high, Hz   wall, ms         rhs"
     );
     rows.iter().for_each(|row| print_row(reference, row));
     print_line!(
@@ -179,12 +188,13 @@ fn print_row(reference: &ReferenceRun<'_>, row: &AccuracyRow) {
     let small = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.1e}"));
     let bound = |s| if reference.resolves_error(s) { "" } else { "<" };
     let error = row.lists.worst_s.map_or("-".to_owned(), |s| format!("{}{s:.1e}", bound(s)));
+    let predicted = small(row.predicted_time_error_s);
     let step = || row.setting.method.step_s().map_or(String::new(), |h| format!("{h:e} s"));
     let sets = row.setting.relative_tolerance.map_or_else(step, |r| format!("{r:e}"));
     let [worst, rms] = [row.state_worst, row.state_rms].map(|error| small(Some(error)));
     let [low, high] = [LOW_COMPONENT, HIGH_COMPONENT].map(|i| small(row.components_hz[i]));
     print_line!(
-        "{:<17} {sets:>9} {:>11} {error:>13} {:>6} {:>8} {worst:>12} {rms:>11} {low:>9} {high:>9} {:>10.3} {:>11}",
+        "{:<17} {sets:>9} {:>11} {error:>13} {predicted:>12} {:>6} {:>8} {worst:>12} {rms:>11} {low:>9} {high:>9} {:>10.3} {:>11}",
         row.setting.name(),
         row.run.transitions,
         row.lists.missed,

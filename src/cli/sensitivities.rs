@@ -126,7 +126,6 @@ impl<I: Iterator<Item = f64>> TangentObserver for SensitivityTables<I> {
         let directions = self.row.len();
         self.events.add_row(|text| {
             push_event_row(text, transition);
-            text.truncate(text.trim_end().len());
             push_numbers(text, directions, d_time_s);
             text.push('\n');
         });

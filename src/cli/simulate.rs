@@ -12,11 +12,14 @@ use crate::simulate::outputs::{
     EVENTS_HEADER, EnergyAudit, SampleObserver, SimulationSummary, push_event_row, push_state_row,
     recorded_points_m, sample_times, state_header,
 };
+use crate::simulate::predicted_error::run_with_predicted_errors;
 use crate::simulate::scene::Scene;
 use crate::simulate::scene::contact::OutputTable;
 use crate::simulate::{
-    ModelSample, Observer, RunMotion, RunStatus, SolutionSegment, SolverOptions, Transition, run_scene_with,
+    IntegrationMethod, ModelSample, Observer, RunMotion, RunStatus, SolutionSegment, SolverOptions,
+    Transition, run_scene_with,
 };
+use std::fmt::Write as _;
 use std::time::Instant;
 
 #[derive(Debug, Args)]
@@ -34,6 +37,9 @@ pub(crate) struct SimulateArgs {
     /// such as friction.a,start.neck_angle_rad,drive.scale
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     pub sensitivities: Vec<String>,
+    /// Do not predict the errors of the transition times; the run then takes a quarter of the time
+    #[arg(long)]
+    pub no_predicted_errors: bool,
     #[command(flatten)]
     pub figures: FigureArgs,
 }
@@ -49,7 +55,8 @@ impl SimulateArgs {
         let place = OutputFolder::check(&self.out, &writer, &names)?;
         self.figures.check_folder(&[FIGURE], self.overwrite)?;
         print_warnings(&self.scene, &scene.find_implausible(), global);
-        let summary = run_to_files(&scene, effort, sensitivities.as_ref(), &place, watch)?;
+        let is_predicted = !self.no_predicted_errors && effort.method == IntegrationMethod::Taylor;
+        let summary = run_to_files(&scene, (effort, is_predicted), sensitivities.as_ref(), &place, watch)?;
         if !global.quiet {
             print_summary(&summary, &self.out);
         }
@@ -79,7 +86,7 @@ fn output_names(scene: &Scene, sensitivities: bool) -> Vec<&'static str> {
 /// Runs the scene, and writes every row as soon as it is known.
 fn run_to_files(
     scene: &Scene,
-    effort: SolverOptions,
+    (effort, is_predicted): (SolverOptions, bool),
     sensitivities: Option<&SensitivityRequest>,
     place: &OutputFolder,
     mut watch: ProgressObserver,
@@ -91,7 +98,8 @@ fn run_to_files(
     // a trace with only one row would have no frame rate
     let mut trace = table(OutputTable::Trace, "trace.csv", HEADER, 2)?;
     let mut state = table(OutputTable::State, "state.csv", state_header(scene), 1)?;
-    let mut events = table(OutputTable::Events, "events.csv", EVENTS_HEADER, 1)?;
+    let events_header = format!("{EVENTS_HEADER},predicted_time_error_s");
+    let mut events = table(OutputTable::Events, "events.csv", &events_header, 1)?;
     let wanted = trace.is_some() || state.is_some();
     let sampler = SampleObserver::new(sample_times(scene).take_while(|_| wanted), |sample: &ModelSample| {
         let points_m = recorded_points_m(&scene.linkage, sample).map(Some);
@@ -102,8 +110,26 @@ fn run_to_files(
     let late = "the run did not stop in time, and nothing of it is written";
     let stops = interrupt::register_stoppable(|| late.to_owned());
     let clock = Instant::now();
-    let mut observers = ((sampler, EventTableWriter(events.as_mut())), (&mut audit, &mut watch));
-    let run = run_scene_with(scene, effort, &mut observers);
+    let mut observers = (sampler, (&mut audit, &mut watch));
+    let mut receive = |transition: &Transition, predicted_s: Option<f64>| {
+        events.iter_mut().for_each(|table| {
+            table.add_row(|row| {
+                push_event_row(row, transition);
+                let _ = match predicted_s {
+                    Some(error) => writeln!(row, ",{error:.2e}"),
+                    None => writeln!(row, ","),
+                };
+            });
+        });
+    };
+    let (run, predicted) = if is_predicted {
+        let predicted = run_with_predicted_errors(scene, effort, &mut observers, receive);
+        (predicted.run, Some(predicted))
+    } else {
+        let mut observers =
+            (observers, TransitionReceiver(|transition: &Transition| receive(transition, None)));
+        (run_scene_with(scene, effort, &mut observers), None)
+    };
     let elapsed = clock.elapsed();
     if run.status == RunStatus::Interrupted {
         let (at_s, stop_s) = (run.stopped_at_s, scene.run.stop_s);
@@ -112,7 +138,11 @@ fn run_to_files(
 
     let mut tables: Vec<StreamedTable> = [trace, state, events].into_iter().flatten().collect();
     let wall_s = tables.iter().fold(elapsed, |left, table| left.saturating_sub(table.spent)).as_secs_f64();
-    let summary = SimulationSummary::new(scene, &run, &audit, wall_s, &effort);
+    let mut summary = SimulationSummary::new(scene, &run, &audit, wall_s, &effort);
+    if let Some(predicted) = predicted {
+        summary.predicted_time_error_s = predicted.largest_error_s;
+        summary.undetermined_after_s = Some(predicted.undetermined_after_s);
+    }
     let bytes = serde_json::to_vec_pretty(&summary).map_err(Failure::internal)?;
     if let Some(sensitivities) = sensitivities.filter(|_| run.status != RunStatus::Interrupted) {
         tables.extend(sensitivities.run_to_tables(scene, effort, place, sample_times(scene))?);
@@ -121,13 +151,13 @@ fn run_to_files(
     Ok(summary)
 }
 
-/// Writes transitions to their table.
-struct EventTableWriter<'a>(Option<&'a mut StreamedTable>);
+/// Calls a function with each transition.
+struct TransitionReceiver<F>(F);
 
-impl Observer for EventTableWriter<'_> {
+impl<F: FnMut(&Transition)> Observer for TransitionReceiver<F> {
     fn observe_segment(&mut self, _: &SolutionSegment<'_>) {}
     fn observe_transition(&mut self, transition: &Transition) {
-        self.0.iter_mut().for_each(|table| table.add_row(|row| push_event_row(row, transition)));
+        (self.0)(transition);
     }
 }
 
@@ -140,6 +170,16 @@ fn print_summary(summary: &SimulationSummary, out: &Path) {
     );
     let (energy, drift_m) = (summary.energy_residual_relative, summary.max_constraint_drift_m);
     print_line!("energy residual {energy:.1e}, drift in stick {drift_m:.1e} m");
+    let undetermined_after_s = summary.undetermined_after_s.flatten();
+    if let Some(error_s) = summary.predicted_time_error_s {
+        let until = undetermined_after_s.map_or_else(String::new, |after| format!(" up to {after:.6} s"));
+        print_line!("predicted error of the transition times: at most {error_s:.1e} s{until}");
+    }
+    if let Some(after) = undetermined_after_s {
+        print_line!(
+            "after {after:.6} s the order of the transitions is not determined at this tolerance; a lower --relative-tolerance may help"
+        );
+    }
     print_line!("model parts: {}", summary.model_parts.join(", "));
     print_line!("written to {}", out.display());
 }

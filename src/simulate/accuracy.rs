@@ -99,12 +99,14 @@ pub(crate) fn write_accuracy_csv(reference: &ReferenceRun<'_>, rows: &[AccuracyR
         let sure = r.lists.worst_s.map(|error| reference.resolves_error(error).to_string());
         let sure = sure.unwrap_or_default();
         let (name, status, lists) = (r.setting.name(), r.run.status.name(), &r.lists);
+        let [predicted, undetermined] =
+            [r.predicted_time_error_s, r.undetermined_after_s].map(format_optional);
         format!(
-            "{name},{tolerance},{step},{status},{error},{sure},{},{},{:e},{:e},{:e},{low},{high}\n",
+            "{name},{tolerance},{step},{status},{error},{sure},{},{},{:e},{:e},{:e},{low},{high},{predicted},{undetermined}\n",
             lists.missed, lists.invented, r.stop_error_s, r.state_rms, r.state_worst
         )
     };
     let header = "method,relative_tolerance,step_s,status,transition_error_s,above_reference_uncertainty,missed_transitions,\
-                  invented_transitions,stop_error_s,deflection_rms_relative,deflection_worst_relative,low_component_error_hz,high_component_error_hz\n";
+                  invented_transitions,stop_error_s,deflection_rms_relative,deflection_worst_relative,low_component_error_hz,high_component_error_hz,predicted_time_error_s,undetermined_after_s\n";
     std::iter::once(header.to_owned()).chain(rows.iter().map(row)).collect()
 }

@@ -216,6 +216,14 @@ pub struct SimulationSummary {
     pub step_s: Option<f64>,
     pub max_constraint_drift_m: f64,
     pub energy_residual_relative: f64,
+    /// Largest predicted error of a transition time up to `undetermined_after_s`, s; left out if there is
+    /// none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub predicted_time_error_s: Option<f64>,
+    /// Time, s, after which the order of the transitions is not determined at this tolerance, or `null` if it
+    /// is determined to the end; left out if no errors are predicted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub undetermined_after_s: Option<Option<f64>>,
     pub min_normal_force_n: Option<f64>,
     pub min_painleve_indicator: Option<f64>,
     pub model_parts: Vec<&'static str>,
@@ -226,7 +234,8 @@ pub struct SimulationSummary {
 }
 
 impl SimulationSummary {
-    /// Summary of a run with its audit; `wall_s` is the duration of the run alone, s.
+    /// Summary of a run with its audit; `wall_s` is the duration of the run, s, with the prediction of its
+    /// errors if there is one.
     #[must_use]
     pub fn new(
         scene: &Scene,
@@ -250,6 +259,8 @@ impl SimulationSummary {
             step_s: effort.method.step_s(),
             max_constraint_drift_m: audit.max_constraint_drift_m,
             energy_residual_relative: audit.energy_residual_relative(),
+            predicted_time_error_s: None,
+            undetermined_after_s: None,
             min_normal_force_n: audit.min_normal_force_n,
             min_painleve_indicator: audit.min_painleve_indicator,
             model_parts: model_parts(scene),
@@ -332,7 +343,7 @@ pub fn push_state_row(text: &mut String, linkage: &Linkage, sample: &ModelSample
 /// Appends a transition as a row of `events.csv`; the time has 17 significant digits.
 pub fn push_event_row(text: &mut String, Transition { time_s, from, to, cause }: &Transition) {
     let [from, to] = [from, to].map(|mode| mode.name());
-    let _ = writeln!(text, "{time_s:.16e},{from},{to},{}", cause.name()); // writing to a String cannot fail
+    let _ = write!(text, "{time_s:.16e},{from},{to},{}", cause.name()); // writing to a String cannot fail
 }
 
 /// Averages the positions of head and tip over the intervals in which a shutter is open, and passes the means

@@ -277,6 +277,11 @@ impl<'a> StickPhase<'a> {
         Self { system, place_m, lean, follower }
     }
 
+    /// Index of the free link: 0 for the neck, 1 for the lip.
+    pub(super) fn leader(&self) -> usize {
+        usize::from(self.follower == Link::Neck)
+    }
+
     /// States of a pose: angle and rate of the free link.
     #[must_use]
     pub fn free_states(&self, pose: &Pose) -> [f64; 2] {
@@ -334,7 +339,7 @@ impl HybridPhase<2, GUARDS> for StickPhase<'_> {
     fn derivative(&self, t: f64, y: &[f64; 2]) -> [f64; 2] {
         let (_, at) = self.contact_instant(t, y);
         let forces = self.holding_forces(&at);
-        [y[1], forces.accelerations[if self.follower == Link::Lip { 0 } else { 1 }]]
+        [y[1], forces.accelerations[self.leader()]]
     }
 
     #[inline]
@@ -365,7 +370,8 @@ impl TaylorPhase<2, GUARDS> for StickPhase<'_> {
     fn expand_series(&self, t: f64, y: &[f64; 2], motion: &mut TaylorMotion, out: &mut GuardedExpansion<2>) {
         let (pose, _) = self.full_pose(&self.system.drive.motion_at(t), y);
         self.system.expand_motion(t, &pose, ContactMode::Stick, self.lean, out.order + 1, motion);
-        let (leader, follower) = if self.follower == Link::Lip { (0, 1) } else { (1, 0) };
+        let leader = self.leader();
+        let follower = 1 - leader;
         let corners = self.system.corner_signs(self.lean);
         let [forwards, backwards] = self.system.static_limits();
         for k in 0..=out.order {

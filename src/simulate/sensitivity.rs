@@ -15,6 +15,7 @@
 //! the identity for other transitions. A guard that only grazes zero makes the derivative infinite; from then
 //! on, the derivatives are unknown.
 
+mod local_error;
 mod propagation;
 mod saltation;
 mod seeds;
@@ -23,7 +24,8 @@ mod stretch;
 mod tangent_blocks;
 mod tangent_segment;
 
-use super::event_loop::EventLoop;
+use super::event_loop::{EventLoop, RunWatcher};
+use super::phases::DrivenBlade;
 use super::scene::Scene;
 use super::{IntegrationMethod, RunResult, SolverOptions, Transition, build_system};
 use propagation::{TangentPropagator, TangentWorkspace};
@@ -39,6 +41,10 @@ pub trait TangentObserver {
     /// contains the derivatives of the time of this change, s per unit of each direction; `None` if they do
     /// not exist.
     fn observe_transition(&mut self, _transition: &Transition, _d_time_s: Option<&[f64]>) {}
+    /// Receives a minimum of a guard that has not fallen to zero: the values of the guard at the start of the
+    /// stretch and at the minimum, and the derivatives of the second. Only a run with errors of steps reports
+    /// minima.
+    fn observe_minimum(&mut self, _time_s: f64, _values: [f64; 2], _d_value: &[f64]) {}
     /// Called after every piece; `Break` ends the run as `RunStatus::Interrupted`.
     fn control_flow(&self) -> ControlFlow<()> {
         ControlFlow::Continue(())
@@ -81,6 +87,24 @@ impl TangentRunner {
         carrier.set_start(scene);
         EventLoop::new(&system, scene, effort, &mut carrier).run()
     }
+}
+
+/// Calls `run` with a watcher that carries the errors of the steps of a run of a scene. The observer receives
+/// the errors by truncation and by rounding of every transition time, s, computed minus exact.
+pub(super) fn run_with_step_errors(
+    scene: &Scene,
+    system: &DrivenBlade,
+    tolerance: f64,
+    observer: &mut impl TangentObserver,
+    run: impl FnOnce(&mut dyn RunWatcher) -> RunResult,
+) -> RunResult {
+    /// Relative accuracy of the propagated errors: the first digits are enough.
+    const ACCURACY: f64 = 1e-3;
+    let (seeds, mut room) = (TangentSeeds::of_step_errors(), TangentWorkspace::default());
+    let accuracies = [tolerance, ACCURACY.max(tolerance)];
+    let mut carrier = TangentPropagator::new(observer, system, &seeds, &mut room, accuracies);
+    carrier.set_start(scene);
+    run(&mut carrier)
 }
 
 /// Runs one scene with its derivatives; see [`TangentRunner::run_scene`].

@@ -81,6 +81,13 @@ fn every_method_is_held_against_the_reference() {
     let accuracy = table(&out.join("accuracy.csv"));
     assert_eq!((accuracy.len(), rows.len()), (38, 38));
     assert!(accuracy.iter().all(|row| row.len() == accuracy[0].len()));
+    let place = |name: &str| accuracy[0].iter().position(|column| column == name).unwrap();
+    let [error, predicted] = ["transition_error_s", "predicted_time_error_s"].map(place);
+    for row in accuracy[1..].iter().filter(|row| row[0] == "taylor") {
+        let [error, predicted]: [f64; 2] = [&row[error], &row[predicted]].map(|cell| cell.parse().unwrap());
+        // smaller errors are below the accuracy of the reference
+        assert!(error < predicted.max(1e-12) && predicted < 100.0 * error.max(1e-13), "{row:?}");
+    }
     let figure = fs::read_to_string(out.join("work-precision.svg")).unwrap();
     assert!(
         figure.contains("worst error of a transition time, s") && figure.contains("wall time of a run, s")

@@ -76,7 +76,9 @@ fn a_run_writes_the_files_of_the_contract() {
         state[0],
         "time_s,neck_angle_rad,lip_angle_rad,neck_rate_rad_per_s,lip_rate_rad_per_s,head_drop_m,tip_velocity_m_per_s,normal_force_n,friction_force_n,mode"
     );
-    assert_eq!(events[0], "time_s,from,to,cause");
+    assert_eq!(events[0], "time_s,from,to,cause,predicted_time_error_s");
+    let predicted = events[1..].iter().map(|row| row.rsplit(',').next().unwrap().parse::<f64>().unwrap());
+    assert!(predicted.into_iter().all(|error| (1e-16..1e-6).contains(&error)), "{events:?}");
     assert_eq!((trace.len(), state.len()), (252, 252), "0 to 0.25 s at 1000 1/s");
     assert!(trace[251].starts_with("0.25,") && state[251].starts_with("0.25,"));
     assert!(
@@ -87,7 +89,7 @@ fn a_run_writes_the_files_of_the_contract() {
     );
     let mantissa = events[1].split('e').next().unwrap();
     assert_eq!(mantissa.len(), 18, "17 significant digits: {}", events[1]);
-    assert!(events[1].ends_with(",stick,slip+,friction-limit"), "{}", events[1]);
+    assert!(events[1].contains(",stick,slip+,friction-limit,"), "{}", events[1]);
 
     let summary = summary(&out);
     assert_eq!(summary["status"], "completed");
@@ -120,6 +122,27 @@ fn a_second_run_writes_the_same_bytes_and_quiet_says_nothing() {
     );
     for name in ["trace.csv", "state.csv", "events.csv"] {
         assert_eq!(fs::read(out.join(name)).unwrap(), fs::read(again.join(name)).unwrap(), "{name}");
+    }
+}
+
+#[test]
+fn errors_of_transition_times_are_predicted_unless_that_is_declined() {
+    let (folder, file, out) = folder_with("scene.toml", &scene());
+    let (code, stdout, _) = run(&["simulate"], [&file, &out]);
+    assert!(code == 0 && stdout.contains("predicted error of the transition times: at most"), "{stdout}");
+    let found = summary(&out);
+    assert!(found["undetermined_after_s"].is_null() && found.get("undetermined_after_s").is_some());
+    assert!((1e-16..1e-6).contains(&found["predicted_time_error_s"].as_f64().unwrap()), "{found}");
+
+    let plain = folder.path().join("plain");
+    let (code, stdout, _) = run(&["simulate", "--no-predicted-errors"], [&file, &plain]);
+    assert!(code == 0 && !stdout.contains("predicted"), "{stdout}");
+    assert!(summary(&plain).get("undetermined_after_s").is_none());
+    let text = |folder: &Path, name: &str| fs::read_to_string(folder.join(name)).unwrap();
+    assert_eq!(text(&out, "state.csv"), text(&plain, "state.csv"));
+    let events = |folder: &Path| text(folder, "events.csv");
+    for (with, without) in events(&out).lines().skip(1).zip(events(&plain).lines().skip(1)) {
+        assert_eq!(format!("{},", with.rsplit_once(',').unwrap().0), without);
     }
 }
 
@@ -422,7 +445,7 @@ fn a_tip_that_may_fly_lands_and_its_files_say_so() {
     assert!(parts.contains(&"flight") && parts.contains(&"impacts"), "{parts:?}");
     let text = |name: &str| fs::read_to_string(out.join(name)).unwrap();
     let events = text("events.csv");
-    assert!(events.contains(",flight,lift-off\n") && events.contains(",flight,flight,landing\n"), "{events}");
+    assert!(events.contains(",flight,lift-off,") && events.contains(",flight,flight,landing,"), "{events}");
     assert_eq!(summary["transitions"], events.lines().count() - 1);
     // the tip is above its place on the glass in exactly the rows of flight
     let flight: Vec<bool> = text("state.csv").lines().skip(1).map(|row| row.ends_with(",flight")).collect();
@@ -452,7 +475,7 @@ fn a_jam_that_is_an_impact_does_not_end_the_run() {
     let (code, stdout, _) = run(&["simulate"], [&file, &out]);
     assert_eq!(code, 0, "{stdout}");
     let events = fs::read_to_string(out.join("events.csv")).unwrap();
-    assert_eq!(events.lines().filter(|row| row.ends_with(",jam-impact")).count(), 1, "{events}");
+    assert_eq!(events.lines().filter(|row| row.ends_with(",jam-impact,")).count(), 1, "{events}");
     assert!(stdout.contains("impacts") && !stdout.contains("flight"), "{stdout}");
 }
 

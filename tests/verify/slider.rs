@@ -9,8 +9,11 @@ use std::f64::consts::{PI, TAU};
 use wiperlab::model::modes::{TipConstraint, natural_modes};
 use wiperlab::simulate::mode::TipMode;
 use wiperlab::simulate::outputs::Transitions;
+use wiperlab::simulate::predicted_error::run_with_predicted_errors;
 use wiperlab::simulate::scene::Scene;
-use wiperlab::simulate::{IntegrationMethod, RunStatus, SolverOptions, TransitionCause, run_scene_with};
+use wiperlab::simulate::{
+    IntegrationMethod, RunStatus, SolverOptions, Transition, TransitionCause, run_scene_with,
+};
 
 /// Error, s, allowed in an instant at the tightest tolerance.
 const INSTANT_S: f64 = 1e-11;
@@ -315,11 +318,10 @@ fn errors_of_instants_stay_below_twenty_tolerances_with_both_methods() {
     }
 }
 
-/// The head moves at the speed `V`, and the static limit is above the friction of slip. The mass slips for
-/// `2 (pi - atan(B w / V)) / w` and sticks for `2 B / V`, where `w` is the natural angular frequency and `B`
-/// the jump of friction divided by the stiffness.
-#[test]
-fn a_slider_pulled_at_constant_speed_sticks_and_slips_with_the_known_period() {
+/// Stick-slip of a head that moves at the speed `V`, with a static limit above the friction of slip, and its
+/// exact transitions. The mass slips for `2 (pi - atan(B w / V)) / w` and sticks for `2 B / V`, where `w` is the
+/// natural angular frequency and `B` the jump of friction divided by the stiffness.
+fn pulled_slider() -> (Scene, Vec<(f64, TipMode)>) {
     const CYCLES: usize = 50;
     let (rig, speed, ratio) = (FRAME, 2e-3, 1.6);
     let (omega, kinetic) = (rig.omega(), rig.force() / rig.k);
@@ -336,8 +338,35 @@ fn a_slider_pulled_at_constant_speed_sticks_and_slips_with_the_known_period() {
     let friction = format!("a = 0\nb_s_per_m = 0\nc = {}\nstatic_ratio = {ratio}", rig.c);
     let stop = first + CYCLES as f64 * (slip_s + stick_s) - 0.5 * stick_s;
     let scene = rig.scene(&friction, &format!("speed_m_per_s = {speed}"), "kind = \"relaxed\"", stop);
+    (scene, expected)
+}
+
+#[test]
+fn a_slider_pulled_at_constant_speed_sticks_and_slips_with_the_known_period() {
+    let (scene, expected) = pulled_slider();
     let error = compare(&events(&seen(&scene, TIGHT)), &expected);
     assert!(error < INSTANT_S, "{error:e} s");
+}
+
+/// The predicted errors of 100 exact transition times lie above the errors, and not far above.
+#[test]
+fn errors_of_exact_instants_are_predicted_at_every_tolerance() {
+    const FAR: f64 = 30.0;
+    let (scene, expected) = pulled_slider();
+    for exponent in 4..=10 {
+        let tolerance = 10_f64.powi(-exponent);
+        let mut ratios = Vec::new();
+        let receive = |transition: &Transition, predicted_s: Option<f64>| {
+            let (exact_s, mode) = expected[ratios.len()];
+            assert_eq!(transition.to, mode);
+            ratios.push(predicted_s.unwrap() / (transition.time_s - exact_s).abs());
+        };
+        let run = run_with_predicted_errors(&scene, SolverOptions::new(tolerance), &mut (), receive);
+        assert_eq!((ratios.len(), run.undetermined_after_s), (expected.len(), None), "{tolerance:e}");
+        ratios.sort_by(f64::total_cmp);
+        let [least, median] = [ratios[0], ratios[ratios.len() / 2]];
+        assert!(least > 1.0 && median < FAR, "{tolerance:e}: predicted over true error {least} to {median}");
+    }
 }
 
 /// Friction that falls with speed reduces the damping `d` by `N a b exp(-b V)`. Below the speed `V` at which

@@ -83,7 +83,7 @@ class Job:
 
 def describe_verdict(file: str, text: str) -> tuple[str, list[str]]: ...
 def simulate_scene(
-    scene: Scene, times_s: _Row | None = None
+    scene: Scene, times_s: _Row | None = None, predict_errors: bool = False
 ) -> tuple[dict[str, _Row], list[str], dict[str, Any], str]: ...
 def simulate_points(
     scene: Scene, names: list[str], points: _Row, maps: str, workers: int | None = None

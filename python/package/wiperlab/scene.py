@@ -121,7 +121,7 @@ class Motion:
         self, columns: dict[str, NDArray[Any]], events: dict[str, NDArray[Any]], summary: dict[str, Any], title: str
     ) -> None:
         self.columns = columns
-        #: Changes of mode: ``time_s``, ``from``, ``to``, ``cause``.
+        #: Changes of mode: ``time_s``, ``from``, ``to``, ``cause``, and ``predicted_time_error_s`` if asked for.
         self.events = events
         #: What summary.json holds.
         self.summary = summary
@@ -179,14 +179,19 @@ class Motion:
         return tables.html(f"{self.title}, simulated", ["quantity", "value"], rows)
 
 
-def simulate(scene: Scene, times_s: ArrayLike | None = None) -> Motion:
+def simulate(scene: Scene, times_s: ArrayLike | None = None, *, predict_errors: bool = False) -> Motion:
     """Runs a scene, with samples at its own rate, or at rising instants ``times_s``.
+
+    With ``predict_errors``, ``motion.events`` has the predicted error of each transition time
+    (``predicted_time_error_s``; NaN where it is unknown), and ``motion.summary`` has the largest of them and the
+    time after which the order of the transitions is not determined (``undetermined_after_s``). The run then takes
+    longer. ``wiperlab simulate`` always predicts errors.
 
     A run that ends early is a result: ``motion.status`` says why. The numbers are those that
     ``wiperlab simulate`` writes. Other threads go on meanwhile, and Ctrl-C ends the run.
     """
     times = None if times_s is None else instants(times_s)
-    columns, modes, events, summary = simulate_scene(scene._native, times)
+    columns, modes, events, summary = simulate_scene(scene._native, times, predict_errors)
     return Motion(
         {**columns, "mode": np.array(modes, dtype=str)},
         {name: np.asarray(column) for name, column in events.items()},

@@ -48,6 +48,10 @@ pub(crate) struct AccuracyRow {
     /// Errors of the frequencies of the low and the high component, Hz; `None` unless the component is found
     /// in both the run and the reference.
     pub components_hz: [Option<f64>; 2],
+    /// Largest predicted error of a transition time, s; `None` for other methods than Taylor series.
+    pub predicted_time_error_s: Option<f64>,
+    /// Time after which the order of the transitions is predicted to be undetermined, s.
+    pub undetermined_after_s: Option<f64>,
 }
 
 impl<'a> ReferenceRun<'a> {
@@ -76,7 +80,7 @@ impl<'a> ReferenceRun<'a> {
 
     /// Summary of the reference run.
     pub(crate) fn run_result(&self) -> &RunResult {
-        &self.motion.run
+        &self.motion.predicted.run
     }
 
     /// Whether an error of the transition times exceeds the uncertainty of the reference.
@@ -94,16 +98,19 @@ impl<'a> ReferenceRun<'a> {
         let motion = SampledRun::run_scene(self.scene, setting.solver_options());
         let (state_rms, state_worst) = SampledRun::deflection_differences(&self.motion, &motion);
         let components = self.spectral.read_components(&motion.deflection_m, &motion.head_drop_m);
+        let predicted = Some(&motion.predicted).filter(|_| setting.method == IntegrationMethod::Taylor);
         let error = |i: usize| Some((components.hz[i]? - self.components.hz[i]?).abs());
         AccuracyRow {
             setting,
             wall_s: f64::INFINITY,
             lists: TransitionDifference::from_lists(&self.motion.transitions, &motion.transitions),
-            stop_error_s: (motion.run.stopped_at_s - self.motion.run.stopped_at_s).abs(),
+            stop_error_s: (motion.predicted.run.stopped_at_s - self.run_result().stopped_at_s).abs(),
             state_rms,
             state_worst,
             components_hz: [error(LOW_COMPONENT), error(HIGH_COMPONENT)],
-            run: motion.run,
+            predicted_time_error_s: predicted.and_then(|run| run.largest_error_s),
+            undetermined_after_s: predicted.and_then(|run| run.undetermined_after_s),
+            run: motion.predicted.run,
         }
     }
 }

@@ -1,16 +1,17 @@
 //! A run, sampled at the times at which the runs are compared.
 
 use crate::recording::{FrameGrid, Recording, Traces};
-use crate::simulate::outputs::{SampleObserver, Transitions};
+use crate::simulate::outputs::SampleObserver;
+use crate::simulate::predicted_error::{PredictedRun, run_with_predicted_errors};
 use crate::simulate::scene::Scene;
-use crate::simulate::{RunResult, SolverOptions, Transition, run_scene_with};
+use crate::simulate::{SolverOptions, Transition};
 
 /// Maximum number of samples of a comparison; in a long run, the sampling rate is lowered accordingly.
 const MOST_SAMPLES: f64 = 1e5;
 
 /// Transitions and samples of a run.
 pub(super) struct SampledRun {
-    pub run: RunResult,
+    pub predicted: PredictedRun,
     pub transitions: Vec<Transition>,
     pub deflection_m: Vec<f64>,
     pub head_drop_m: Vec<f64>,
@@ -28,14 +29,15 @@ impl SampledRun {
     pub(crate) fn run_scene(scene: &Scene, effort: SolverOptions) -> Self {
         let grid = comparison_grid(scene);
         let (mut deflection_m, mut head_drop_m) = (Vec::new(), Vec::new());
-        let mut transitions = Transitions::default();
+        let mut transitions = Vec::new();
         let times = (0..grid.frames).map(|i| grid.time_s(i).min(scene.run.stop_s));
-        let sampler = SampleObserver::new(times, |sample| {
+        let mut sampler = SampleObserver::new(times, |sample| {
             deflection_m.push(sample.tip_x_m - sample.head_x_m);
             head_drop_m.push(sample.head_drop_m);
         });
-        let run = run_scene_with(scene, effort, &mut (sampler, &mut transitions));
-        Self { run, transitions: transitions.0, deflection_m, head_drop_m }
+        let receive = |transition: &Transition, _| transitions.push(*transition);
+        let predicted = run_with_predicted_errors(scene, effort, &mut sampler, receive);
+        Self { predicted, transitions, deflection_m, head_drop_m }
     }
 
     /// Root-mean-square and largest difference of the deflection over the common samples of two runs,

@@ -1,8 +1,9 @@
 //! Propagates derivatives along a run, from piece to piece and through transitions.
 
 use super::TangentObserver;
-use super::saltation::{FallingGuard, StrikeTangent};
-use super::seeds::{TangentSeeds, steady_slip_tangent};
+use super::local_error::ErrorStep;
+use super::saltation::{GuardInstant, StrikeTangent};
+use super::seeds::{TRUNCATION_LANE, TangentSeeds, steady_slip_tangent};
 use super::stretch::{SeriesReference, StretchPlace, StretchPlanner, TangentStretch};
 use super::tangent_blocks::{StretchWorkspace, TangentBlock, TangentBlocks, rates_after};
 use super::tangent_segment::TangentSegment;
@@ -14,7 +15,7 @@ use crate::simulate::equilibrium::shoulder_contact;
 use crate::simulate::event_loop::{RunWatcher, TipStrike};
 use crate::simulate::impact::ImpactOrigin;
 use crate::simulate::mode::TipMode;
-use crate::simulate::phases::{DrivenBlade, TaylorMotion};
+use crate::simulate::phases::{DrivenBlade, GUARDS, TaylorMotion};
 use crate::simulate::scene::{Scene, StartKind};
 use crate::simulate::solution_segment::{SegmentSolution, SolutionSegment};
 use crate::simulate::{Impact, Transition, initial_pose};
@@ -45,12 +46,15 @@ enum TangentStatus {
 pub(super) struct TangentWorkspace {
     blocks: Vec<TangentBlock>,
     works: StretchWorkspace,
+    /// Series of a step with more terms, for its error.
+    longer: TaylorMotion,
 }
 
 /// Watches a run and propagates derivatives.
 pub(super) struct TangentPropagator<'a, O> {
     observer: &'a mut O,
     blocks: TangentBlocks<'a>,
+    longer: &'a mut TaylorMotion,
     stand: TangentStatus,
     fallen: Option<TriggeredGuard>,
     last: Option<(TipMode, ShoulderContact)>,
@@ -62,9 +66,11 @@ pub(super) struct TangentPropagator<'a, O> {
     /// the rate, is below this limit.
     grazing: f64,
     d_time_s: Vec<f64>,
+    /// Derivatives of a guard at a minimum.
+    d_minimum: Vec<f64>,
 }
 
-impl<'a, O> TangentPropagator<'a, O> {
+impl<'a, O: TangentObserver> TangentPropagator<'a, O> {
     pub(super) fn new(
         observer: &'a mut O,
         system: &'a DrivenBlade,
@@ -78,19 +84,24 @@ impl<'a, O> TangentPropagator<'a, O> {
         /// the transition time have relative errors of about a thousandth.
         const GRAZING: f64 = 1e-6;
         const TOLERANCES: f64 = 1e3;
-        let TangentWorkspace { blocks, works } = room;
+        /// The same factor for errors of steps, whose order of magnitude is enough.
+        const TOLERANCES_OF_ERRORS: f64 = 10.0;
+        let tolerances = if seeds.are_step_errors { TOLERANCES_OF_ERRORS } else { TOLERANCES };
+        let TangentWorkspace { blocks, works, longer } = room;
         blocks.resize_with(seeds.blocks.len(), TangentBlock::default);
         let pace = StretchPlanner::new(accuracy, time_scales_rad_per_s(&system.linkage).1);
         Self {
             observer,
             blocks: TangentBlocks { system, seeds, all: blocks, works, pace },
+            longer,
             stand: TangentStatus::Current,
             fallen: None,
             last: None,
             place: None,
             end_s: f64::NEG_INFINITY,
-            grazing: GRAZING.max(TOLERANCES * tolerance),
+            grazing: GRAZING.max(tolerances * tolerance),
             d_time_s: vec![0.0; seeds.len()],
+            d_minimum: vec![0.0; seeds.len()],
         }
     }
 
@@ -118,6 +129,40 @@ impl<'a, O> TangentPropagator<'a, O> {
                 None => self.stand = TangentStatus::Lost,
             }
         }
+    }
+
+    /// Reports a minimum of each guard that has one in a stretch.
+    fn find_minima(&mut self, piece: &SolutionSegment<'_>, span: &TangentStretch<'_>) {
+        let (x, end) = (span.place.from, span.place.from + span.place.length);
+        for guard in 0..GUARDS {
+            let start = GuardInstant { mode: piece.mode, guard, x, span };
+            let Some(minimum) = start.next_minimum(end) else { continue };
+            let values = [start, minimum].map(|at| at.value_along(span.course.motion));
+            let [Some(before), Some(value)] = values else { continue };
+            minimum.set_guard_derivatives(&mut self.blocks);
+            for (error, &(block, lane)) in self.d_minimum.iter_mut().zip(&self.blocks.seeds.places) {
+                *error = self.blocks.all[block].guard[lane];
+            }
+            self.observer.observe_minimum(piece.start_s + minimum.x, [before, value], &self.d_minimum);
+        }
+    }
+
+    /// Adds the errors of a step to the derivatives at its end.
+    fn add_step_errors(&mut self, piece: &SolutionSegment<'_>, course: &SeriesReference<'_>) {
+        let SeriesReference { lean, motion, .. } = *course;
+        let touch = match course.touch {
+            // derivatives need no rate of the head's drop, but the series does
+            ContactMode::Flight(drop_m, _) => ContactMode::Flight(drop_m, motion.drop_m[1]),
+            touch => touch,
+        };
+        let leader = match &piece.solution {
+            SegmentSolution::Stick(stick, _) => Some(stick.leader()),
+            _ => None,
+        };
+        let (start_s, length_s) = (piece.start_s, piece.end_s - piece.start_s);
+        let step = ErrorStep { touch, lean, start_s, length_s, motion, leader };
+        let errors = step.state_errors(self.blocks.system, self.longer);
+        self.blocks.all.iter_mut().for_each(|block| block.state.add(&errors));
     }
 
     /// Converts derivatives of the state at a fixed time to derivatives at the transition time, which itself
@@ -201,6 +246,9 @@ impl<O: TangentObserver> RunWatcher for TangentPropagator<'_, O> {
                 TangentStretch::new(system, &seeds.sources, course, place)
             };
             let to = span.place.from + span.place.length;
+            if self.blocks.seeds.are_step_errors && self.stand != TangentStatus::Lost {
+                self.find_minima(piece, &span);
+            }
             let is_last = to >= end;
             self.place = Some(span.place);
             self.observer.observe_segment(&TangentSegment {
@@ -214,9 +262,12 @@ impl<O: TangentObserver> RunWatcher for TangentPropagator<'_, O> {
                 seeds,
             });
             if is_last {
-                return;
+                break;
             }
             from = to;
+        }
+        if self.blocks.seeds.are_step_errors && self.stand != TangentStatus::Lost {
+            self.add_step_errors(piece, &course);
         }
     }
 
@@ -227,10 +278,16 @@ impl<O: TangentObserver> RunWatcher for TangentPropagator<'_, O> {
         let course = SeriesReference { linkage: &system.linkage, touch, lean, motion };
         let span = TangentStretch::new(system, &seeds.sources, course, place);
         let x = place.from + place.length;
-        let fall = FallingGuard { mode: contact.0, guard, x, span: &span };
+        let fall = GuardInstant { mode: contact.0, guard, x, span: &span };
         let rate = fall.guard_slope().filter(|slope| slope.rate.abs() > self.grazing * slope.size);
         if self.stand != TangentStatus::Lost {
             fall.set_guard_derivatives(&mut self.blocks);
+            if seeds.are_step_errors
+                && let Some(exact) = fall.value_along(self.longer)
+            {
+                // the guard's error by truncation of the last step: it is zero where it has this value
+                self.blocks.all[0].guard[TRUNCATION_LANE] -= exact;
+            }
         }
         let rates = rates_after(motion, contact.0, x);
         self.fallen = Some(TriggeredGuard { rate: rate.map(|slope| slope.rate), rates });
@@ -281,6 +338,6 @@ impl TangentWorkspace {
     /// A workspace filled with NaN, as after a run with lost derivatives.
     pub(super) fn of_no_numbers(blocks: usize) -> Self {
         let blocks = std::iter::repeat_with(TangentBlock::of_no_numbers).take(blocks).collect();
-        Self { blocks, works: StretchWorkspace::of_no_numbers() }
+        Self { blocks, works: StretchWorkspace::of_no_numbers(), longer: TaylorMotion::default() }
     }
 }

@@ -12,20 +12,21 @@ use crate::simulate::flight::LANDING;
 use crate::simulate::mode::TipMode;
 use crate::simulate::phases::{
     BACKWARD_LIMIT, DrivenBlade, FORWARD_LIMIT, SHOULDER_GUARDS, SLIP_CONTACT_LOST, STICK_CONTACT_LOST,
-    TIP_STOPS,
+    TIP_STOPS, TaylorMotion,
 };
 use hybrid_ode::WorkCounters;
 
-/// A guard that falls to zero at the end of a stretch.
-pub(super) struct FallingGuard<'a> {
+/// A guard at a time of a stretch, at which it is zero or has a minimum.
+#[derive(Clone, Copy)]
+pub(super) struct GuardInstant<'a> {
     pub mode: TipMode,
     pub guard: usize,
-    /// Time from the start of the motion's series to the zero of the guard, s.
+    /// Time from the start of the motion's series, s.
     pub x: f64,
     pub span: &'a TangentStretch<'a>,
 }
 
-/// Rate of change of a guard at its zero, per s.
+/// Rate of change of a guard, per s.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct GuardSlope {
     pub rate: f64,
@@ -37,7 +38,7 @@ pub(super) struct GuardSlope {
 /// A term of a guard: a channel and its factor.
 type GuardTerm = (Channel, f64);
 
-impl FallingGuard<'_> {
+impl GuardInstant<'_> {
     /// Terms of the guard; no terms for a guard without a derivative.
     fn guard_terms(&self) -> [Option<GuardTerm>; 2] {
         let TangentStretch { system, course, .. } = self.span;
@@ -58,8 +59,8 @@ impl FallingGuard<'_> {
         }
     }
 
-    /// Rate of the guard at its zero, with the sum of the absolute terms of the rate; `None` for a guard
-    /// without a derivative.
+    /// Rate of the guard, with the sum of the absolute terms of the rate; `None` for a guard without a
+    /// derivative.
     pub(crate) fn guard_slope(&self) -> Option<GuardSlope> {
         let (terms, motion) = (self.guard_terms(), self.span.course.motion);
         terms[0]?;
@@ -81,6 +82,52 @@ impl FallingGuard<'_> {
             power *= self.x;
         }
         Some(slope)
+    }
+
+    /// The guard at a minimum between its own time and `end`, s from the start of the motion's series; `None`
+    /// unless the guard falls at the first of these times and rises at the second.
+    pub(super) fn next_minimum(self, end: f64) -> Option<Self> {
+        /// Halvings of the interval: the value at a minimum hardly depends on its time.
+        const HALVINGS: usize = 20;
+        let at = |x: f64| Self { x, ..self };
+        let rises = |x: f64| at(x).guard_slope().is_some_and(|slope| slope.rate > 0.0);
+        if self.guard_slope()?.rate >= 0.0 || !rises(end) {
+            return None;
+        }
+        let (mut falling, mut rising) = (self.x, end);
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (falling + rising);
+            if rises(middle) { rising = middle } else { falling = middle }
+        }
+        Some(at(falling))
+    }
+
+    /// Value of the guard along a series about the start of the step, which may have more terms than that of
+    /// the step. `None` for a landing and for a guard without a derivative.
+    pub(super) fn value_along(&self, longer: &TaylorMotion) -> Option<f64> {
+        let (terms, TangentStretch { system, course, .. }) = (self.guard_terms(), self.span);
+        let mut sum = 0.0;
+        for (channel, factor) in terms.into_iter().flatten() {
+            let series: &dyn Fn(usize) -> f64 = match channel {
+                Channel::TipVelocity => &|k| longer.tip_velocity[k],
+                Channel::NormalForce => &|k| longer.normal_n(k),
+                Channel::FrictionForce => &|k| longer.friction_n[k],
+                Channel::NeckAngle => &|k| longer.angle[k][0],
+                _ => return None,
+            };
+            // forces are known to one order less
+            sum += factor * (0..longer.order).rev().fold(0.0, |sum, k| sum * self.x + series(k));
+        }
+        let constant = match terms[0]?.0 {
+            Channel::TipVelocity => -system.linkage.friction.piece_ends_m_per_s(longer.law_piece)[0],
+            Channel::NeckAngle => {
+                let side = SHOULDER_GUARDS.iter().position(|&corner| corner == self.guard)?;
+                let (theta, sign) = (longer.angle[0][0], system.corner_signs(course.lean)[side]);
+                system.corner_distances(theta, course.lean)[side] - sign * theta
+            }
+            _ => 0.0,
+        };
+        Some(sum + constant)
     }
 
     /// Sets the derivatives of the guard with respect to all directions.

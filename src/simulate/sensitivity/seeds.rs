@@ -57,7 +57,14 @@ pub struct TangentSeeds {
     pub(super) places: Vec<(usize, usize)>,
     /// Sources of all directions.
     pub(super) sources: Vec<TangentSource>,
+    /// Whether the directions are the errors of the steps instead of parameters.
+    pub(super) are_step_errors: bool,
 }
+
+/// Lane of the error by truncation in [`TangentSeeds::of_step_errors`].
+pub(super) const TRUNCATION_LANE: usize = 0;
+/// Lane of the error by rounding in [`TangentSeeds::of_step_errors`].
+pub(super) const ROUNDING_LANE: usize = 1;
 
 impl TangentSeeds {
     /// Prepares directions for a scene. Up to four directions cost as much as one.
@@ -72,6 +79,7 @@ impl TangentSeeds {
             blocks: vec![BlockSeed::default(); directions.len().div_ceil(LANES)],
             places: vec![(0, 0); directions.len()],
             sources: Vec::new(),
+            are_step_errors: false,
         };
         for (place, i) in order.into_iter().enumerate() {
             let (block, lane) = (place / LANES, place % LANES);
@@ -81,6 +89,17 @@ impl TangentSeeds {
         let Self { blocks, sources, .. } = &mut seeds;
         blocks.iter_mut().for_each(|block| block.list_changes(sources));
         Ok(seeds)
+    }
+
+    /// Two directions that carry the errors of the steps, computed minus exact: by truncation and by
+    /// rounding.
+    pub(super) fn of_step_errors() -> Self {
+        Self {
+            blocks: vec![BlockSeed::default()],
+            places: vec![(0, TRUNCATION_LANE), (0, ROUNDING_LANE)],
+            sources: Vec::new(),
+            are_step_errors: true,
+        }
     }
 
     pub(crate) fn len(&self) -> usize {

@@ -340,6 +340,16 @@ impl StateTangent {
         rows.into_iter().zip(rates).for_each(|(row, rate)| row.add_scaled(*rate, &time));
     }
 
+    /// Adds the derivatives of another state.
+    pub(super) fn add(&mut self, other: &Self) {
+        for i in 0..2 {
+            self.angle[i] += other.angle[i];
+            self.rate[i] += other.rate[i];
+        }
+        self.gap_m += other.gap_m;
+        self.gap_rate += other.gap_rate;
+    }
+
     fn is_finite(&self) -> bool {
         let Self { angle, rate, gap_m, gap_rate } = self;
         [angle[0], angle[1], rate[0], rate[1], *gap_m, *gap_rate].iter().all(LaneVector::is_finite)
