@@ -76,7 +76,7 @@ pub enum CheckpointError {
     },
     /// A line is not a valid record.
     #[error(
-        "{file}:{line}: {problem}; the line was damaged or edited: restore the file, or remove this line and all behind it (each {} in them is then made again)",
+        "{file}:{line}: {problem}; the line was damaged or edited: restore the file, or remove this line and all lines after it (each {} in them is then computed again)",
         kind.record()
     )]
     Line {

@@ -206,7 +206,7 @@ fn lock_existing(path: &Path, kind: CheckpointKind) -> Outcome<Option<File>> {
 fn lock_file(file: &File, kind: CheckpointKind) -> Result<(), String> {
     match file.try_lock() {
         Err(TryLockError::WouldBlock) => Err(format!(
-            "another {kind} is writing this journal; wait until it has ended, or use a folder of its own"
+            "another {kind} is writing this journal; wait until it has ended, or write to another folder"
         )),
         _ => Ok(()),
     }

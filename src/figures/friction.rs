@@ -183,9 +183,12 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
 /// The main result in one sentence, with its numbers.
 fn claim_sentence(law: &FrictionLaw, fastest: f64) -> String {
     let (rest, moving) = (law.static_coefficient(1.0), law.dynamic_coefficient(fastest, 1.0));
-    let how = if moving < rest { "falls" } else { "goes" };
-    let [rest, moving] = [rest, moving].map(|coefficient| format_digits(coefficient, 3));
-    format!("Friction {how} from {rest} at rest to {moving} at {}", format_speed(fastest))
+    let [from, to] = [rest, moving].map(|coefficient| format_digits(coefficient, 3));
+    if from == to {
+        return format!("Friction stays at {from} up to {}", format_speed(fastest));
+    }
+    let how = if moving < rest { "falls" } else { "rises" };
+    format!("Friction {how} from {from} at rest to {to} at {}", format_speed(fastest))
 }
 
 /// The true law of a synthetic blade; `None` if the description of the recording contains none.

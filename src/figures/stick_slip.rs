@@ -413,7 +413,7 @@ fn figure_text(
     let (low, high) = value_span(forces.map(|state| MILLI * state.friction_n));
     let whose = if case.recording().is_some() { "" } else { " (model alone)" };
     let [low, high] = [low, high].map(|mn| format_digits(mn, 3));
-    let caption = format!("{title}; friction on it runs from {low} to {high} mN{whose}.");
+    let caption = format!("{title}; the friction force on the tip lies between {low} and {high} mN{whose}.");
     let details = sd_n.map_or_else(String::new, |sd_n| {
         let sd = format_digits(MILLI * sd_n, 2);
         format!("The noise of the tip gives each measured friction a standard deviation of at most {sd} mN.")

@@ -288,7 +288,7 @@ fn a_journal_of_another_job_is_not_resumed_nor_touched() {
     project.write("fits/x/journal.jsonl", &damaged);
     project.refused(
         &["fit", "fits/x/job.toml", "--resume"],
-        &["journal.jsonl:2: the line has the checksum", "remove this line and all behind it"],
+        &["journal.jsonl:2: the line has the checksum", "remove this line and all lines after it"],
     );
 }
 

@@ -103,7 +103,7 @@ fn what_stands_before_a_damaged_line_is_resumed() {
         whole.replacen(line, &line.replacen("\"unit\":[0", "\"unit\":[1", 1), 1)
     };
     project.write(journal, &damaged);
-    refused(&project, &resume, &["fits/x/journal.jsonl:9: ", "remove this line and all behind it"]);
+    refused(&project, &resume, &["fits/x/journal.jsonl:9: ", "remove this line and all lines after it"]);
     let before: String = damaged.split_inclusive('\n').take(8).collect();
     project.write(journal, &before);
     let (code, _, stderr) = project.run(&resume);

@@ -371,7 +371,7 @@ fn a_journal_of_another_study_is_neither_resumed_nor_touched() {
     project.write("scenes/light-blade.toml", &short_scene());
     let edited = journal.replacen("\"index\"", "\"indx\"", 1);
     project.write("out/journal.jsonl", &edited);
-    refused(&["out/journal.jsonl:2: the line has the checksum", "remove this line and all behind it"]);
+    refused(&["out/journal.jsonl:2: the line has the checksum", "remove this line and all lines after it"]);
     project.write("out/journal.jsonl", &resealed(&edited));
     refused(&["out/journal.jsonl:2: no point: unknown field `indx`"]);
     // a journal of another kind is not overwritten, nor read
