@@ -215,7 +215,8 @@ mod tests {
     /// its transitions.
     #[test]
     fn the_order_of_a_sensitive_motion_is_undetermined_before_it_is_wrong() {
-        let scene = Scene::parse("s", include_str!("../../data/scenes/light-blade.toml")).unwrap();
+        let text = include_str!("../../data/scenes/light-blade-from-rest.toml");
+        let scene = Scene::parse("s", &text.replace("stop_s = 1.09", "stop_s = 0.6")).unwrap();
         let [lip_kg, stiffness] =
             ["blade.lip_mass_kg", "blade.head_stiffness_n_per_m"].map(|name| scene.value(name).unwrap());
         let scene = scene.with_parameter("blade.head_mass_kg", 1e6 * lip_kg).unwrap();
@@ -229,7 +230,7 @@ mod tests {
                 list[..count].iter().map(|(transition, _)| (transition.from, transition.to)).collect()
             };
             assert_eq!(kinds(&truth), kinds(&found), "{tolerance:e}");
-            assert!(found.last().unwrap().0.time_s > after_s);
+            assert_ne!(truth.len(), found.len(), "{tolerance:e}: the lists differ");
         }
     }
 }
