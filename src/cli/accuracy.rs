@@ -105,6 +105,7 @@ fn work_precision_diagram(
         ("", "worst error of the deflection over its range", Some(reference.state_apart))
     };
     let error = |row: &AccuracyRow| if timed { row.lists.worst_s } else { Some(row.state_worst) };
+    let drawn_error = |row: &AccuracyRow| Some(error(row)?.max(floor.unwrap_or(0.0)));
     let point = |row: &AccuracyRow| WorkPrecisionRun {
         method: row.setting.name().to_owned(),
         wall_s: row.wall_s,
@@ -122,7 +123,7 @@ fn work_precision_diagram(
     };
     let (title, transitions) = (scene.title(), run.transitions);
     WorkPrecision {
-        title: diagram_title(rows, error, unit),
+        title: diagram_title(rows, drawn_error, unit),
         subtitle: format!("work-precision of {title}: {transitions} transitions in {length_s} s of motion"),
         error_label: error_label.to_owned(),
         points: rows.iter().map(point).chain(rows.iter().filter_map(predicted)).collect(),
