@@ -45,6 +45,10 @@ fn interrupted(project: &Project, arguments: &[&str], name: &str, part: &str) ->
             continue; // it was reading or checking
         }
         assert!(matches!(ended.status.code(), Some(0) | None), "{arguments:?}: {said}");
+        // it was complete before the signal: what it wrote says nothing of the next attempt
+        if let Some(option) = arguments.iter().position(|argument| *argument == "--out") {
+            let _ = fs::remove_dir_all(project.path(arguments[option + 1]));
+        }
     }
     panic!("{arguments:?} was never met at work");
 }
@@ -190,9 +194,6 @@ fn a_command_without_anything_partial_ends_at_once_and_writes_nothing() {
         &["import", "export.csv", "--frame-rate-hz", "5000", "--out", "new"],
     ];
     for arguments in commands {
-        if project.path("new").exists() {
-            fs::remove_dir_all(project.path("new")).unwrap();
-        }
         let said = interrupted(&project, arguments, "-INT", "not complete is not written");
         assert!(!project.path("new").exists(), "{said}");
     }
