@@ -2,6 +2,7 @@
 //! early, blades that never stick, several conditions.
 
 use crate::claims::{MOST_FIGURES, assert_claims};
+use crate::thorough::pick;
 use plain_charts::{Figure, Medium};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -360,23 +361,23 @@ fn a_law_without_correlations_names_what_is_not_fixed() {
 
 #[test]
 fn a_fast_camera_makes_no_large_figure_and_none_of_noise() {
-    const TIMES: usize = 8;
     /// Largest error of a place, m.
     const NOISE_M: f64 = 4e-6;
+    let times: usize = pick(4, 8);
     let finer = |grid: FrameGrid, mut traces: Traces| {
-        let frames = (grid.frames - 1) * TIMES;
+        let frames = (grid.frames - 1) * times;
         let mut random = Xoshiro256PlusPlus::seed_from_u64(5);
         for column in columns(&mut traces) {
             let between = |i: usize| {
-                let (low, high) = (column[i / TIMES]?, column[i / TIMES + 1]?);
+                let (low, high) = (column[i / times]?, column[i / times + 1]?);
                 Some(
-                    low + (high - low) * (i % TIMES) as f64 / TIMES as f64
+                    low + (high - low) * (i % times) as f64 / times as f64
                         + NOISE_M * random.random_range(-1.0..1.0),
                 )
             };
             *column = (0..frames).map(between).collect();
         }
-        (FrameGrid { frames, frame_rate_hz: grid.frame_rate_hz * TIMES as f64, ..grid }, traces)
+        (FrameGrid { frames, frame_rate_hz: grid.frame_rate_hz * times as f64, ..grid }, traces)
     };
     let report = case(vec![traced(true, finer)]).report();
     for figure in report.all_figures() {

@@ -20,6 +20,8 @@ mod shown;
 mod sketch_file;
 #[path = "../common/small_fit.rs"]
 mod small_fit;
+#[path = "../common/thorough.rs"]
+mod thorough;
 
 mod browser;
 mod claims;
