@@ -23,7 +23,7 @@ static STOP_REQUESTED: AtomicBool = AtomicBool::new(false);
 static LATE: AtomicBool = AtomicBool::new(false);
 
 static STATE: Mutex<InterruptState> =
-    Mutex::new(InterruptState { kept: None, finishing: false, passing: Vec::new() });
+    Mutex::new(InterruptState { kept: None, finishing: false, passing: Vec::new(), renamed: false });
 
 /// State that is needed to end the program.
 struct InterruptState {
@@ -33,6 +33,8 @@ struct InterruptState {
     finishing: bool,
     /// Temporary files that have not been renamed yet, and new folders that contain no files yet.
     passing: Vec<PathBuf>,
+    /// Whether temporary files have been renamed, so that outputs of this run are on the disk.
+    renamed: bool,
 }
 
 /// Installs the handler of signals.
@@ -127,6 +129,7 @@ impl RenameLock {
     /// Call this when every temporary file has been renamed.
     pub(crate) fn forget_temporaries(mut self) {
         self.0.passing.clear();
+        self.0.renamed = true;
     }
 }
 
@@ -156,12 +159,18 @@ fn end_program() -> ! {
         // removed
         let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir(path));
     }
-    let kept = state.kept.as_ref().map_or_else(nothing_saved, |kept| kept());
+    let kept = state.kept.as_ref().map_or_else(|| name_unregistered_outputs(state.renamed), |kept| kept());
     let reached = progress::finish_in_words().map_or_else(String::new, |reached| format!("{reached}; "));
     warn_line!("{}: {reached}{kept}", why());
     std::process::exit(i32::from(STOPPED_EARLY))
 }
 
-fn nothing_saved() -> String {
-    "a file that was not complete is not written".to_owned()
+/// Describes what is on the disk when a command that cannot stop early is ended.
+fn name_unregistered_outputs(renamed: bool) -> String {
+    let said = if renamed {
+        "files that were complete are written, others are not"
+    } else {
+        "a file that was not complete is not written"
+    };
+    said.to_owned()
 }

@@ -42,10 +42,11 @@ fn interrupted(project: &Project, arguments: &[&str], name: &str, part: &str) ->
             if said.contains(part) {
                 return said;
             }
-            continue; // it was reading or checking
+            // it was reading or checking, or had written its files
+        } else {
+            assert!(matches!(ended.status.code(), Some(0) | None), "{arguments:?}: {said}");
         }
-        assert!(matches!(ended.status.code(), Some(0) | None), "{arguments:?}: {said}");
-        // it was complete before the signal: what it wrote says nothing of the next attempt
+        // what this attempt wrote says nothing of the next
         if let Some(option) = arguments.iter().position(|argument| *argument == "--out") {
             let _ = fs::remove_dir_all(project.path(arguments[option + 1]));
         }
