@@ -42,7 +42,7 @@ fn interrupted(project: &Project, arguments: &[&str], name: &str, part: &str) ->
             if said.contains(part) {
                 return said;
             }
-            // it was reading or checking, or had written its files
+            // it was still reading, or its files were already written (`import` judges them after that)
         } else {
             assert!(matches!(ended.status.code(), Some(0) | None), "{arguments:?}: {said}");
         }
