@@ -126,7 +126,7 @@ fn assign_component<'a>(
         math::powi(off, 2) + math::powi(level_below_strongest_db(inside, c) / ASSIGN_DB, 2)
     };
     let mut ranked: Vec<(f64, &Component)> = inside.iter().map(|c| (rank(c), *c)).collect();
-    ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+    math::sort_by_number(&mut ranked, |a| a.0);
     Some((ranked.first()?.1, ranked.get(1).map(|(_, second)| *second)))
 }
 

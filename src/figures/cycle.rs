@@ -76,7 +76,7 @@ pub fn draw_figure(shown: &CycleOverSpeed) -> Figure {
     let targets = shown.targets.iter().map(|t| line(&name(t), t.frequency_hz, Colour::Blue));
     let mut lines: Vec<(String, f64, Colour)> =
         natural.chain(targets).filter(|(_, hz, _)| *hz > 0.0 && *hz < top).collect();
-    lines.sort_by(|a, b| a.1.total_cmp(&b.1));
+    portable_math::sort_by_number(&mut lines, |a| a.1);
     let (x, y) = (ChartAxis::linear("tip speed, mm/s"), ChartAxis::linear("frequency, Hz"));
     let panel = Panel {
         ribbons: shown.targets.iter().filter_map(|t| deviation_ribbon(t, right)).collect(),
@@ -221,7 +221,7 @@ fn claim_sentence(shown: &CycleOverSpeed, points: &[SpeedPoint]) -> Option<Strin
 /// Mean frequency, Hz, of the faster half of the points minus that of the slower half.
 fn frequency_rise_hz(points: &[SpeedPoint]) -> f64 {
     let mut by_speed = points.to_vec();
-    by_speed.sort_by(|a, b| a.speed_m_per_s.total_cmp(&b.speed_m_per_s));
+    portable_math::sort_by_number(&mut by_speed, |a| a.speed_m_per_s);
     let (slow, fast) = by_speed.split_at(by_speed.len() / 2);
     let mean = |of: &[SpeedPoint]| of.iter().map(|p| p.frequency_hz).sum::<f64>() / of.len().max(1) as f64;
     if slow.is_empty() { 0.0 } else { mean(fast) - mean(slow) }

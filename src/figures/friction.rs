@@ -206,7 +206,7 @@ fn slip_speeds(case: &ConditionComparison) -> Vec<(f64, f64)> {
         |s: &&ModelSample| matches!(s.mode, TipMode::SlipForward | TipMode::SlipBackward) && s.normal_n > 0.0;
     let place = |s: &ModelSample| (s.tip_velocity_m_per_s.abs(), s.friction_n.abs() / s.normal_n);
     let mut slips: Vec<(f64, f64)> = case.model.motion.samples.iter().filter(slip).map(place).collect();
-    slips.sort_by(|a, b| a.0.total_cmp(&b.0));
+    portable_math::sort_by_number(&mut slips, |a| a.0);
     slips
 }
 

@@ -225,7 +225,7 @@ pub(crate) fn thin_points(points: &[Option<(f64, f64)>], (from, to): (f64, f64))
         let lowest = group.iter().copied().min_by(|a, b| a.1.total_cmp(&b.1));
         let highest = group.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1));
         let mut ends: Vec<(f64, f64)> = [lowest, highest].into_iter().flatten().collect();
-        ends.sort_by(|a, b| a.0.total_cmp(&b.0));
+        math::sort_by_number(&mut ends, |a| a.0);
         ends.dedup();
         kept.extend(ends.into_iter().map(Some));
     }

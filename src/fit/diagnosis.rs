@@ -482,7 +482,7 @@ impl FailedFit<'_> {
         most: usize,
         same_kind: usize,
     ) -> Vec<TriedHypothesis> {
-        trials.sort_by(|a, b| a.cost_per_dof().total_cmp(&b.cost_per_dof()));
+        math::sort_by_number(&mut trials, |a| a.cost_per_dof());
         let least = trials.first().map_or(f64::INFINITY, TriedHypothesis::cost_per_dof);
         let limit = if least < NEAR_NOISE { WORSE * least } else { f64::INFINITY };
         let mut kept: Vec<TriedHypothesis> = Vec::new();

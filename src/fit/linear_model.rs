@@ -269,7 +269,7 @@ impl ParameterCombination {
     /// The product as text, such as `friction.c friction.a^0.31`.
     pub(crate) fn describe(&self) -> String {
         let mut factors: Vec<(&String, f64)> = self.exponents.iter().map(|(name, e)| (name, *e)).collect();
-        factors.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
+        math::sort_by_number(&mut factors, |a| -a.1.abs());
         let factor = |(name, e): (&String, f64)| {
             if (e - 1.0).abs() < 0.005 { name.clone() } else { format!("{name}^{e:.2}") }
         };
@@ -281,7 +281,7 @@ impl ParameterCombination {
     pub(crate) fn describe_in_words(&self) -> String {
         let named: Vec<(&str, f64)> = self.exponents.iter().map(|(name, e)| (name.as_str(), *e)).collect();
         let mut named: Vec<_> = named.into_iter().filter(|(_, e)| e.abs() >= MIN_SPOKEN_EXPONENT).collect();
-        named.sort_by(|a, b| b.1.total_cmp(&a.1));
+        math::sort_by_number(&mut named, |a| -a.1);
         let is_plain = |e: f64| (e.abs() - 1.0).abs() < MIN_SPOKEN_EXPONENT;
         let words = |name| describe_parameters([name]);
         match named[..] {
@@ -304,7 +304,7 @@ impl SingularDirections {
         let rows = svd.v_t.iter().flat_map(|v_t| v_t.row_iter());
         let rows = rows.map(|row| row.iter().copied().collect::<Vec<f64>>());
         let mut all: Vec<(f64, Vec<f64>)> = svd.singular_values.iter().copied().zip(rows).collect();
-        all.sort_by(|a, b| b.0.total_cmp(&a.0));
+        math::sort_by_number(&mut all, |a| -a.0);
         let threshold =
             all.first().map_or(MIN_INFORMATIVE, |(largest, _)| MIN_INFORMATIVE.max(ROUNDING_SHARE * largest));
         let rank = all.iter().filter(|(value, _)| *value > threshold).count();

@@ -149,7 +149,7 @@ fn join_walkers(best: &Evaluation, below: &ProfileWalker, above: &ProfileWalker)
     let centre = (best.unit.get(below.axis).copied().unwrap_or(0.5), best.cost);
     let mut points: Vec<(f64, f64)> =
         below.places.iter().chain(&above.places).copied().chain([centre]).collect();
-    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    math::sort_by_number(&mut points, |a| a.0);
     let crossing = |walker: &ProfileWalker| walker.end.flatten();
     ProfileLikelihood { points, lower: crossing(below), upper: crossing(above) }
 }

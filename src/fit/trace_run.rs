@@ -338,7 +338,7 @@ impl TraceFindings<'_> {
             Some(WorstSegment { start_s: shoot.times_s[first], end_s, chi2_per_dof })
         };
         let mut worst: Vec<WorstSegment> = parts.iter().filter_map(segment).collect();
-        worst.sort_by(|a, b| b.chi2_per_dof.total_cmp(&a.chi2_per_dof));
+        portable_math::sort_by_number(&mut worst, |a| -a.chi2_per_dof);
         worst.truncate(WORST_SEGMENTS);
         let metres = squares(&|part| part.residual_m.iter().map(|r| r * r).sum());
         ChannelMisfit {

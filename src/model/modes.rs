@@ -166,7 +166,7 @@ fn damped_pairs(m: &Matrix2<f64>, c: &Matrix2<f64>, k: &Matrix2<f64>) -> Vec<(f6
     let eigenvalues = state.complex_eigenvalues();
     let upper = eigenvalues.iter().filter(|e| e.im > 0.0);
     let mut pairs: Vec<(f64, f64)> = upper.map(|e| (e.im / TAU, -e.re / math::hypot(e.re, e.im))).collect();
-    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+    math::sort_by_number(&mut pairs, |a| a.0);
     if pairs.len() == 2 { pairs } else { Vec::new() }
 }
 

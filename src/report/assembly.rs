@@ -150,7 +150,7 @@ fn shown_conditions<'a, 'b>(
         line.and_then(|line| line.rms_over_noise).unwrap_or(0.0)
     };
     let mut shown: Vec<&ConditionComparison> = cases.iter().collect();
-    shown.sort_by(|a, b| left(b).total_cmp(&left(a)));
+    portable_math::sort_by_number(&mut shown, |a| -left(a));
     shown.sort_by_key(|case| case.condition != telling);
     shown.truncate(MOST_CONDITIONS);
     shown

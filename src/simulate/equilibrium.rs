@@ -114,7 +114,7 @@ pub(crate) fn static_deflections(linkage: &Linkage) -> Vec<(f64, f64)> {
     };
     let mut all = one_way(1.0);
     all.extend(one_way(-1.0).into_iter().skip(1));
-    all.sort_by(|a, b| a.1.total_cmp(&b.1));
+    math::sort_by_number(&mut all, |a| a.1);
     all
 }
 

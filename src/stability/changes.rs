@@ -121,7 +121,7 @@ pub(super) fn rank_changes(
         changes.push(ParameterChange { parameter, value, step, onset_m_per_s, end_m_per_s, fold_m_per_s });
     }
     changes.retain(|change| change.size() > LEAST_EFFECT * highest);
-    changes.sort_by(|a, b| b.size().total_cmp(&a.size()));
+    portable_math::sort_by_number(&mut changes, |a| -a.size());
     Ok(changes)
 }
 
@@ -153,7 +153,7 @@ pub(super) fn find_remedy(
         })
         .filter(|(moved, ..)| *moved < 0.0)
         .collect();
-    guesses.sort_by(|a, b| a.0.total_cmp(&b.0));
+    portable_math::sort_by_number(&mut guesses, |a| a.0);
     let compute = |change: &ParameterChange, factor: f64| {
         let changed = physical.with_parameter(change.parameter.name, factor * change.value).ok()?;
         let intervals =

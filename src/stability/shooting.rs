@@ -334,7 +334,7 @@ impl CycleShooter {
         let map = onto * &solution.monodromy;
         let found = Schur::try_new(map, f64::EPSILON, 400).map(|schur| schur.complex_eigenvalues());
         let mut found: Vec<_> = found.iter().flat_map(|all| all.iter().map(|e| [e.re, e.im])).collect();
-        found.sort_by(|a, b| math::hypot(b[0], b[1]).total_cmp(&math::hypot(a[0], a[1])));
+        math::sort_by_number(&mut found, |a| -math::hypot(a[0], a[1]));
         found.truncate(n - 1); // the projection makes the last one zero
         found
     }

@@ -99,7 +99,7 @@ impl SlideFinder {
             slides.map(|(speed, slide)| (speed, excess(slide))).collect();
         let hidden: Vec<_> = samples.windows(3).filter_map(|three| self.find_hidden_state(three)).collect();
         samples.extend(hidden);
-        samples.sort_by(|a, b| a.0.total_cmp(&b.0));
+        portable_math::sort_by_number(&mut samples, |a| a.0);
         let mut found = Vec::new();
         let mut start = samples[0].0;
         for pair in samples.windows(2) {

@@ -81,7 +81,7 @@ pub(crate) fn spearman_correlation(x: &[f64], y: &[f64]) -> Option<f64> {
 /// Ranks, counted from 0; equal values share their mean rank.
 fn rank_values(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
-    order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
+    portable_math::sort_by_number(&mut order, |a| values[*a]);
     let mut ranks = vec![0.0; values.len()];
     let mut start = 0;
     for equal in order.chunk_by(|a, b| values[*a] == values[*b]) {

@@ -1,5 +1,5 @@
-//! Mathematical functions whose results are the same to the last bit on every machine, and random draws from
-//! the normal distribution.
+//! Mathematical functions, normal draws and quadrature whose results are the same to the last bit on every
+//! machine, and sorting by a number.
 //!
 //! The functions of `f64` call the system's library, whose rounding is not specified: glibc has one version
 //! for processors with fused multiply-add and another for those without. The functions here consist only of
@@ -15,8 +15,10 @@
 
 pub mod gauss_legendre;
 mod normal;
+mod sort;
 
 pub use normal::StandardNormal;
+pub use sort::sort_by_number;
 
 /// The sine of an angle in rad.
 #[must_use]

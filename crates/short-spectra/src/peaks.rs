@@ -95,7 +95,7 @@ impl PeakList {
         let component = |k: &usize| peak_component(spectrum, self.floor_m, &self.accepted[*k], outcomes[*k]);
         let listed = self.listed.iter().filter(|index| !absent(**index));
         let mut components: Vec<Component> = listed.map(component).collect();
-        components.sort_by(|a, b| b.amplitude_m.total_cmp(&a.amplitude_m));
+        math::sort_by_number(&mut components, |a| -a.amplitude_m);
         components
     }
 }

@@ -116,7 +116,7 @@ fn clear_trends<'a>(study: &'a Study, values: &[Option<f64>]) -> Vec<(f64, &'a S
     };
     let mut clear: Vec<_> = study.axes.iter().enumerate().filter_map(of).collect();
     clear.retain(|(r, _)| r.abs() >= CLEAR);
-    clear.sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()));
+    math::sort_by_number(&mut clear, |a| -a.0.abs());
     clear
 }
 

@@ -207,7 +207,7 @@ fn sorted_optima(names: &[String], descents: &[LocalDescent]) -> Vec<LocalOptimu
         failure: descent.end.failure.as_ref().map(ToString::to_string),
     };
     let mut optima: Vec<LocalOptimum> = descents.iter().map(optimum).collect();
-    optima.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    math::sort_by_number(&mut optima, |a| a.cost);
     optima
 }
 

@@ -36,7 +36,7 @@ pub(super) fn search_locally(
             }
         }
         let share = settings.local_evaluations / (3 * REFINED_ENDS);
-        descents.sort_by(|a, b| a.end.cost.total_cmp(&b.end.cost));
+        portable_math::sort_by_number(descents, |a| a.end.cost);
         for at in 0..descents.len().min(REFINED_ENDS) {
             let (from, seed) = (descents[at].clone(), settings.seed.wrapping_add(at as u64 + 1));
             let mut further = Vec::new();
@@ -142,7 +142,7 @@ pub(super) fn distinct_best_points<'e>(
     most: usize,
 ) -> Vec<Evaluation> {
     let mut order: Vec<&Evaluation> = known.into_iter().collect();
-    order.sort_by(|a, b| a.global_cost.total_cmp(&b.global_cost));
+    portable_math::sort_by_number(&mut order, |a| a.global_cost);
     let mut chosen: Vec<Evaluation> = Vec::new();
     for point in order {
         let far = |(a, b): (&f64, &f64)| (a - b).abs() > MIN_START_DISTANCE;

@@ -258,7 +258,7 @@ impl<'l, 'a> Solver<LedgerCosts<'l, 'a>, GenerationState> for CmaEs {
         let points: Vec<Vec<f64>> = steps.iter().map(|step| self.point_of(step)).collect();
         let costs = problem.bulk_cost(&points)?;
         let mut order: Vec<usize> = (0..points.len()).collect();
-        order.sort_by(|a, b| costs[*a].total_cmp(&costs[*b]));
+        portable_math::sort_by_number(&mut order, |a| costs[*a]);
         let ranked: Vec<_> = order.iter().map(|at| steps[*at].clone()).collect();
         self.update_distribution(&ranked);
         self.least_cost = order.first().map_or(self.least_cost, |at| self.least_cost.min(costs[*at]));
@@ -292,7 +292,7 @@ mod tests {
             let drawn = cloud.draw_steps();
             let mut steps: Vec<(f64, _)> =
                 drawn.into_iter().map(|step| (cost(&cloud.point_of(&step)), step)).collect();
-            steps.sort_by(|a, b| a.0.total_cmp(&b.0));
+            portable_math::sort_by_number(&mut steps, |a| a.0);
             cloud.update_distribution(&steps.into_iter().map(|(_, step)| step).collect::<Vec<_>>());
         }
         cloud.mean.iter().map(|u| reflect_into_unit(*u)).collect()

@@ -269,7 +269,7 @@ fn weakest_direction_states(point: &RecordingModel<'_>, segment: &SegmentState) 
     let scaled = Matrix4::from_fn(|a, b| jacobian.column(a).dot(&jacobian.column(b)) * steps[a] * steps[b]);
     let eigen = scaled.symmetric_eigen();
     let mut order = [0, 1, 2, 3];
-    order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+    portable_math::sort_by_number(&mut order, |&a| eigen.eigenvalues[a]);
     let mut states = Vec::new();
     for &i in &order[..2] {
         let sd = 1.0 / eigen.eigenvalues[i].max(1e-9).sqrt();

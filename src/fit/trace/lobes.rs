@@ -132,7 +132,7 @@ fn scan_lobes(end: &SearchEnd<'_>, direction: &LobeDirection, long: &[SegmentSta
     let is_minimum =
         |k: &usize| cost(Some(*k)) < cost(k.checked_sub(1)) && cost(Some(*k)) <= cost(k.checked_add(1));
     let mut minima: Vec<usize> = (0..points.len()).filter(is_minimum).collect();
-    minima.sort_by(|a, b| points[*a].cost.total_cmp(&points[*b].cost));
+    portable_math::sort_by_number(&mut minima, |a| points[*a].cost);
     minima.into_iter().take(MAX_LOBES).map(|k| points[k].point.iter().copied().collect()).collect()
 }
 

@@ -42,7 +42,7 @@ pub(super) fn prior_conflicts(end: &SearchEnd<'_>) -> Vec<String> {
     let mut doubts = Vec::new();
     if are_jointly_improbable(&removed, &pulls) {
         let mut furthest = known.clone();
-        furthest.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
+        math::sort_by_number(&mut furthest, |a| -a.1.abs());
         let named = furthest.iter().take(NAMED);
         let named: Vec<String> =
             named.map(|(i, pull, _)| format!("{} by {pull:+.1} standard deviations", name(*i))).collect();

@@ -193,7 +193,7 @@ impl CollectedInstance {
         let Some(column) = clock.frame.as_ref().or(clock.time.as_ref()) else { return Ok(()) };
         let key = |row: usize| column.get(row).unwrap_or(f64::INFINITY);
         let mut order: Vec<usize> = (0..clock.len()).collect();
-        order.sort_by(|a, b| key(*a).total_cmp(&key(*b)));
+        portable_math::sort_by_number(&mut order, |a| key(*a));
         if let Some(pair) =
             order.windows(2).find(|pair| key(pair[0]) == key(pair[1]) && key(pair[0]).is_finite())
         {

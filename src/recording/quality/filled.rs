@@ -181,7 +181,7 @@ fn improbable_runs(
 ) -> Vec<Range<usize>> {
     let mut ranked: Vec<(f64, Range<usize>)> =
         runs.into_iter().map(|run| (frames as f64 * chance(&run), run)).collect();
-    ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+    math::sort_by_number(&mut ranked, |a| a.0);
     let exceeds = |(rank, (expected, _)): (usize, &(f64, Range<usize>))| {
         let allowed = if *expected < NO_RUNS { 0.0 } else { BY_NOISE * (1.0 + expected) };
         (rank + 1) as f64 > allowed

@@ -34,7 +34,7 @@ fn stack_labels(labels: &[(&str, f64)], x: &CanvasAxis, title_ends: &[f64]) -> V
     let place = |at: f64| x.canvas_position(at).filter(|at| *at >= x.from && *at <= x.to);
     let mut order: Vec<(usize, f64)> =
         labels.iter().enumerate().filter_map(|(i, (_, at))| place(*at).map(|at| (i, at))).collect();
-    order.sort_by(|a, b| a.1.total_cmp(&b.1));
+    portable_math::sort_by_number(&mut order, |a| a.1);
     let mut ends = [f64::NEG_INFINITY; MAX_LABEL_ROWS];
     ends.iter_mut().zip(title_ends).for_each(|(end, title)| *end = *title);
     let mut rows = vec![None; labels.len()];

@@ -117,7 +117,7 @@ fn judge_reading(mixture: &Mixture, reading: &Reading, ms: f64) -> Outcome {
     for (k, o) in list.iter().enumerate() {
         pairs.extend(components.iter().enumerate().filter_map(|(j, c)| Some((distance(o, c)?, k, j))));
     }
-    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+    portable_math::sort_by_number(&mut pairs, |a| a.0);
     let (mut of, mut taken) = (vec![None; list.len()], vec![false; components.len()]);
     for (_, k, j) in pairs {
         if of[k].is_none() && !taken[j] {

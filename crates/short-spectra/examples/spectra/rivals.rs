@@ -137,7 +137,7 @@ pub fn lomb_scargle(samples: &[Option<f64>], rate_hz: f64) -> Vec<f64> {
             list.push((omega, weights[4 + 2 * at].hypot(weights[5 + 2 * at])));
         }
     }
-    list.sort_by(|a, b| b.1.total_cmp(&a.1));
+    portable_math::sort_by_number(&mut list, |a| -a.1);
     list.iter().map(|tone| tone.0 * rate_hz / TAU).collect()
 }
 
@@ -207,7 +207,7 @@ fn signal_space(record: &[f64]) -> Option<DMatrix<f64>> {
     }
     let eigen = SymmetricEigen::try_new(covariance, f64::EPSILON, 100 * rows)?;
     let mut order: Vec<usize> = (0..rows).collect();
-    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+    portable_math::sort_by_number(&mut order, |&a| -eigen.eigenvalues[a]);
     let floor = eigen.eigenvalues[order[0]] * 1e-14;
     let values: Vec<f64> = order.iter().map(|&at| eigen.eigenvalues[at].max(floor)).collect();
     if values[0].is_nan() || values[0] <= 0.0 {
@@ -232,7 +232,7 @@ fn rotation_poles(space: &DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
     both.columns_mut(poles, poles).copy_from(&space.rows(1, rows - 1));
     let eigen = SymmetricEigen::try_new(both.tr_mul(&both), f64::EPSILON, 200 * poles)?;
     let mut order: Vec<usize> = (0..2 * poles).collect();
-    order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+    portable_math::sort_by_number(&mut order, |&a| eigen.eigenvalues[a]);
     let least = eigen.eigenvectors.select_columns(&order[..poles]);
     let upper = least.rows(0, poles).into_owned();
     let lower = least.rows(poles, poles).into_owned();
@@ -258,7 +258,7 @@ fn by_amplitude(record: &[f64], poles: &[(f64, f64)]) -> Vec<f64> {
     let Some((weights, _)) = fit(&columns, record) else { return Vec::new() };
     let pairs = poles.iter().zip(weights.chunks_exact(2));
     let mut list: Vec<(f64, f64)> = pairs.map(|(pole, pair)| (pole.1, pair[0].hypot(pair[1]))).collect();
-    list.sort_by(|a, b| b.1.total_cmp(&a.1));
+    portable_math::sort_by_number(&mut list, |a| -a.1);
     list.iter().map(|tone| tone.0).collect()
 }
 
@@ -271,7 +271,7 @@ fn peaks(curve: &[f64], first: usize) -> Vec<(f64, f64)> {
             list.push((at as f64 + 0.5 * (left - right) / (left - 2.0 * here + right), here));
         }
     }
-    list.sort_by(|a, b| b.1.total_cmp(&a.1));
+    portable_math::sort_by_number(&mut list, |a| -a.1);
     list
 }
 

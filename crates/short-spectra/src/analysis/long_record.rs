@@ -89,7 +89,7 @@ fn merge_components(
     let (mut components, evidence): (Vec<Component>, Vec<Evidence>) = lines.into_iter().unzip();
     classify_components(&mut components, &evidence, context);
     components.extend(brief.into_iter().map(|b| b.component));
-    components.sort_by(|a, b| b.amplitude_m.total_cmp(&a.amplitude_m));
+    math::sort_by_number(&mut components, |a| -a.amplitude_m);
     components.truncate(most);
     components
 }

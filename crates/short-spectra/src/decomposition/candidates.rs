@@ -75,7 +75,7 @@ pub(crate) fn find_candidates(
     if steps {
         search.add_steps(fixed);
     }
-    search.best.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    math::sort_by_number(&mut search.best, |a| -a.gain);
     search.best
 }
 

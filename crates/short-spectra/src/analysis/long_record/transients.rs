@@ -108,7 +108,7 @@ pub(super) fn find_transients(record: &SampledRecord, settings: &SpectrumSetting
         read_piece(&SampledRecord { samples, ..*record }, settings, piece)
     };
     let mut found: Vec<Transient> = pieces.par_iter().flat_map_iter(read).collect();
-    found.sort_by(|a, b| a.component.frequency_sd_hz.total_cmp(&b.component.frequency_sd_hz));
+    math::sort_by_number(&mut found, |a| a.component.frequency_sd_hz);
     let mut once: Vec<Transient> = Vec::new();
     for brief in found {
         // two components of one piece are distinct

@@ -58,7 +58,7 @@ impl PartSearch {
             }
             first += size;
         }
-        tried.sort_by(|a, b| a.1.total_cmp(&b.1));
+        portable_math::sort_by_number(&mut tried, |a| a.1);
         for (parts, estimate, is_late) in tried {
             if estimate > current.criterion + WORTH_A_FIT {
                 self.rivals.push(Rival { atoms: parts.atoms, criterion: estimate });
