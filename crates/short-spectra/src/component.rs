@@ -15,7 +15,7 @@ pub struct Component {
     /// periodogram it is 1.6 times the Cramér-Rao bound, plus the effect of a removed trend.
     pub frequency_sd_hz: f64,
     /// Lowest and highest frequency of a component that drifts. `frequency_hz` is then the mean: the number
-    /// of cycles divided by their duration.
+    /// of cycles divided by their duration, while the component is present.
     pub range_hz: Option<FrequencyRange>,
     /// Start, s from the first frame analysed; `None` for a component present from the first frame on. If the
     /// component was found in a piece of a long record and is present when the piece starts, the start of the

@@ -5,6 +5,7 @@
 
 mod atom;
 mod candidates;
+mod cluster;
 mod column_products;
 mod course;
 mod problem;
@@ -20,10 +21,10 @@ use crate::record::SampledRecord;
 use crate::settings::{MAX_COMPONENTS, ROUNDING, SpectrumSettings};
 use crate::transform::RealTransform;
 use crate::trend::Trend;
-use atom::Atom;
+use atom::{Atom, OscillationAtom};
 pub use course::exceeds_noise;
 use portable_math as math;
-use problem::{Explanation, NoisyRecord, Parts};
+use problem::{Explanation, NoisyRecord, Parts, dot};
 pub use record_parts::Oscillation;
 pub(crate) use record_parts::RecordParts;
 use search::{PartSearch, Rival};
@@ -32,7 +33,8 @@ use search::{PartSearch, Rival};
 /// allows about three frames per parameter.
 const FRAMES_PER_OSCILLATION: usize = 16;
 
-/// The most probable explanation of a record, with the frames and the noise for which it holds.
+/// The most probable explanation of a record, with the frames and the noise for which it holds. If that has
+/// no oscillation, it may be the most probable one with an oscillation of changing amplitude instead.
 pub(crate) struct Decomposition {
     problem: NoisyRecord,
     explanation: Explanation,
@@ -121,8 +123,8 @@ impl Contest {
     const MOST_REPETITIONS: usize = 3;
 
     /// Searches from `parts` on, then again in the noise that the explanation leaves, as long as this lowers
-    /// the criterion.
-    fn search_parts(&mut self, problem: NoisyRecord, parts: Parts) {
+    /// the criterion. Returns what it finds, also if it is not the best.
+    fn search_parts(&mut self, problem: NoisyRecord, parts: Parts) -> (NoisyRecord, Explanation) {
         let DecompositionSettings { trend_grows, most_oscillations, .. } = self.settings;
         let mut search = PartSearch::new(problem, trend_grows, most_oscillations);
         search.bound = self.best.criterion;
@@ -155,8 +157,9 @@ impl Contest {
         }
         self.rivals.extend(search.rivals);
         if found.criterion < self.best.criterion {
-            (self.problem, self.best) = (search.problem, found);
+            (self.problem, self.best) = (search.problem.clone(), found.clone());
         }
+        (search.problem, found)
     }
 
     fn keep_rival(&mut self, explanation: &Explanation) {
@@ -206,6 +209,81 @@ impl Contest {
         (problem, best.parts)
     }
 
+    /// Searches once more from parts with one oscillation in place of each cluster. The search itself unites
+    /// only a few oscillations that are present from the first frame on.
+    fn unite_clusters(&mut self) {
+        if let Some(parts) = cluster::unite_clusters(&self.problem, &self.best) {
+            self.search_parts(self.problem.clone(), parts);
+        }
+    }
+
+    /// Searches once more from `parts` and one oscillation of changing amplitude and frequency, which takes
+    /// the place of coloured noise. Its fit must explain most of what `parts` leave. The search does not
+    /// find it step by step: until its shape is right, a few coefficients of the noise describe its band
+    /// better. If the best explanation has no oscillation, this one becomes the best, although noise alone
+    /// is more probable: its odds put it in doubt.
+    fn add_swelling(&mut self, parts: &Parts) {
+        /// Half width, resolutions, of the band of such an oscillation: enough for the drift of one that a
+        /// polynomial describes.
+        const HALF_WIDTH: f64 = 8.0;
+        /// Smallest fraction of the energy of the residual that the band has for a fit to be tried: otherwise
+        /// the noise is not narrow.
+        const LEAST_SHARE: f64 = 0.5;
+        /// Largest fraction of the energy of the residual that the fit may leave: it leaves more of a band of
+        /// noise that is five resolutions wide.
+        const MOST_LEFT: f64 = 0.25;
+        /// Degree of the amplitude: the lowest that follows one that rises, falls and is over.
+        const DEGREE: usize = 5;
+        /// Latest onset: a later oscillation is too short for an amplitude of that degree.
+        const LATEST: f64 = 0.8;
+        /// Iterations of the fit, which starts from a constant amplitude.
+        const ITERATIONS: usize = 40;
+        if self.problem.order == 0 {
+            return;
+        }
+        let white = self.problem.clone().with_noise(&[]);
+        let all = white.fix_parts(parts.trend, &parts.atoms);
+        let left = white.residual_of(&all);
+        let Some((cycles, share)) = find_strongest_band(&white, left, HALF_WIDTH) else { return };
+        let is_near = |o: &OscillationAtom| (o.mean_cycles() - cycles).abs() <= HALF_WIDTH;
+        let is_other = |atom: &&Atom| !atom.oscillation().is_some_and(is_near);
+        let mut atoms: Vec<Atom> = parts.atoms.iter().filter(is_other).cloned().collect();
+        let oscillations = atoms.iter().filter(|atom| atom.oscillation().is_some()).count();
+        let (envelope, phase) = (vec![0.0; DEGREE], vec![0.0]);
+        let start = OscillationAtom { envelope, phase, ..OscillationAtom::steady(cycles) };
+        let is_usable = Atom::Oscillation(start.clone()).is_usable(white.at.frames);
+        if share < LEAST_SHARE || !is_usable || oscillations >= self.settings.most_oscillations {
+            return;
+        }
+        // it begins with the record or where a step is nearly over
+        let over = |atom: &Atom| match atom {
+            Atom::Step { centre, width, .. } => Some(centre + width).filter(|at| *at > 0.0 && *at < LATEST),
+            _ => None,
+        };
+        let others = white.fix_parts(parts.trend, &atoms);
+        let fit_from = |onset: f64| {
+            let start = OscillationAtom { onset, ..start.clone() };
+            white.fit_atoms(&others, vec![Atom::Oscillation(start)], ITERATIONS)
+        };
+        let onsets = std::iter::once(0.0).chain(atoms.iter().filter_map(over));
+        let Some((fitted, squares)) = onsets.map(fit_from).min_by(|a, b| a.1.total_cmp(&b.1)) else { return };
+        if squares > MOST_LEFT * dot(left, left) {
+            return;
+        }
+        atoms.extend(fitted);
+        let parts = Parts { trend: parts.trend, atoms };
+        let (problem, found) = self.search_parts(with_noise_of(&white, &parts), parts);
+        let has_oscillation = |explanation: &Explanation| {
+            let is_one = |atom: &Atom| matches!(atom, Atom::Oscillation(_) | Atom::Course(_));
+            explanation.parts.atoms.iter().any(is_one)
+        };
+        if !has_oscillation(&self.best) && has_oscillation(&found) && found.criterion.is_finite() {
+            let noise = self.best.clone();
+            self.keep_rival(&noise);
+            (self.problem, self.best) = (problem, found);
+        }
+    }
+
     /// Looks for an oscillation along a ridge in addition to the parts of the best explanation.
     fn add_course(&mut self) {
         let (problem, best) = (self.problem.clone(), self.best.clone());
@@ -240,6 +318,7 @@ fn select_explanation(white: NoisyRecord, settings: DecompositionSettings) -> Co
     let mut contest =
         Contest { settings, problem: white.clone(), best: first.clone(), rivals: search.rivals };
     let mut slow = slow_parts(&first.parts);
+    let slow_of_white = slow.clone();
     let mut alone = with_noise_of(&white, &slow);
     let mut noise_alone = alone.fit_parts(&slow, FEW_ITERATIONS);
     if let Some((problem, course)) = contest.follow_course(&white, &first) {
@@ -267,6 +346,9 @@ fn select_explanation(white: NoisyRecord, settings: DecompositionSettings) -> Co
         contest.search_parts(white, first.parts);
     }
     contest.add_course();
+    contest.unite_clusters();
+    contest.add_swelling(&contest.best.parts.clone());
+    contest.add_swelling(&slow_of_white);
     contest
 }
 
@@ -321,6 +403,21 @@ fn with_background(problem: &NoisyRecord, parts: &Parts) -> NoisyRecord {
 /// A higher order must lower the criterion by more than this, nats: the scatter of a running median alone can
 /// cause a smaller fall.
 const MEDIAN_SCATTER: f64 = 4.0;
+
+/// Frequency of the largest peak in the spectrum of a residual, cycles per record, and the fraction of the
+/// energy within `half_width` resolutions of it. `None` if the residual is zero.
+fn find_strongest_band(problem: &NoisyRecord, residual: &[f64], half_width: f64) -> Option<(f64, f64)> {
+    let frames = problem.at.frames;
+    let mut values = vec![0.0; frames];
+    problem.used.iter().zip(residual).for_each(|(i, r)| values[*i] = *r);
+    let padded = (2 * frames).next_power_of_two();
+    let energies = RealTransform::new(padded).squared_magnitudes(values.into_iter());
+    let peak = (0..energies.len()).max_by(|a, b| energies[*a].total_cmp(&energies[*b]))?;
+    let bins = (half_width * padded as f64 / frames as f64) as usize;
+    let near = &energies[peak.saturating_sub(bins)..(peak + bins + 1).min(energies.len())];
+    let total: f64 = energies.iter().sum();
+    (total > 0.0).then(|| (peak as f64 * frames as f64 / padded as f64, near.iter().sum::<f64>() / total))
+}
 
 /// Autoregressive coefficients of the order with the lowest Bayesian information criterion for `frames`
 /// frames. `next_kappa` gives the reflection coefficient of the next order from the coefficients of the

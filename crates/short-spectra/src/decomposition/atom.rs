@@ -27,6 +27,9 @@ const MOST_GROWTH: f64 = 6.0;
 /// Largest distance of the centre of a step from the record, as a fraction of its length: the record then
 /// shows the tail of the step.
 pub(crate) const OUTSIDE: f64 = 0.25;
+/// Number of intervals, from the onset to the end, between which a polynomial amplitude is compared with its
+/// maximum.
+pub(crate) const INTERVALS: usize = 64;
 /// Smallest number of cycles of an oscillation in a record; the trend describes slower motion.
 pub(crate) const FEWEST_CYCLES: f64 = 1.5;
 /// Largest damping, nepers per radian: with more, an oscillation ends within half a cycle and cannot be
@@ -153,17 +156,32 @@ impl OscillationAtom {
         (self.phase_at(s + STEP) - self.phase_at(s - STEP)) / (2.0 * STEP)
     }
 
-    /// Position at which it is over: a twentieth of its amplitude is left, or the record ends.
-    fn end_place(&self) -> f64 {
+    /// First and last position at which it is present. It begins at its onset and ends when a twentieth of
+    /// its amplitude is left, or with the record. With a polynomial amplitude it begins and ends where the
+    /// amplitude is a tenth of its maximum: the frequency of a smaller oscillation is not known.
+    fn present_places(&self) -> (f64, f64) {
         /// Decay, nepers, that leaves a twentieth of the amplitude.
         const OVER_NEPERS: f64 = 3.0;
+        /// Smallest amplitude, as a fraction of the largest, at which it is present: where the true amplitude
+        /// is zero, that of a polynomial is smaller.
+        const LEAST_ENVELOPE: f64 = 0.1;
         let over = |nepers: &f64| *nepers > 0.0;
-        self.nepers.filter(over).map_or(1.0, |nepers| (self.onset + OVER_NEPERS / nepers).min(1.0))
+        let end = self.nepers.filter(over).map_or(1.0, |nepers| (self.onset + OVER_NEPERS / nepers).min(1.0));
+        if self.envelope.is_empty() {
+            return (self.onset, end);
+        }
+        let place = |k: usize| self.onset + (end - self.onset) * k as f64 / INTERVALS as f64;
+        let sizes: Vec<f64> = (0..=INTERVALS).map(|k| self.size_at(place(k)).abs()).collect();
+        let least = LEAST_ENVELOPE * sizes.iter().fold(0.0, |most: f64, size| most.max(*size));
+        let first = sizes.iter().position(|size| *size >= least).unwrap_or(0);
+        let last = sizes.iter().rposition(|size| *size >= least).unwrap_or(INTERVALS);
+        (place(first.min(INTERVALS - 1)), place(last.max(first + 1).min(INTERVALS)))
     }
 
-    /// Time from its onset until it is over, as a fraction of the record.
+    /// Time in which it is present, as a fraction of the record.
     pub(crate) fn duration(&self) -> f64 {
-        self.end_place() - self.onset
+        let (first, last) = self.present_places();
+        last - first
     }
 
     /// Whether it ends within a cycle. It then counts as slow motion, because a step looks the same.
@@ -174,28 +192,43 @@ impl OscillationAtom {
         self.nepers.is_some_and(|d| d > DAMPING * math::hypot(d, TAU * self.cycles))
     }
 
-    /// Mean frequency from its onset until it is over, cycles per record.
+    /// Mean frequency while it is present, cycles per record.
     pub(crate) fn mean_cycles(&self) -> f64 {
         if self.phase.is_empty() {
             return self.cycles;
         }
-        (self.phase_at(self.end_place()) - self.phase_at(self.onset)) / (self.end_place() - self.onset)
+        let (first, last) = self.present_places();
+        (self.phase_at(last) - self.phase_at(first)) / (last - first)
     }
 
-    /// Positions, from its onset until it is over, at which its frequency is lowest and highest.
+    /// Positions, while it is present, at which its frequency is lowest and highest.
     pub(crate) fn extreme_places(&self) -> (f64, f64) {
         /// Number of positions compared: several between two extremes of a phase of degree nine.
         const POINTS: usize = 33;
-        let lasts = self.duration();
-        let places = || (0..POINTS).map(|k| self.onset + lasts * k as f64 / (POINTS - 1) as f64);
+        let (first, last) = self.present_places();
+        let places = || (0..POINTS).map(|k| first + (last - first) * k as f64 / (POINTS - 1) as f64);
         let by_frequency = |a: &f64, b: &f64| self.cycles_at(*a).total_cmp(&self.cycles_at(*b));
         (places().min_by(by_frequency).unwrap_or(0.0), places().max_by(by_frequency).unwrap_or(0.0))
     }
 
-    /// Lowest and highest frequency from its onset until it is over, cycles per record.
+    /// Lowest and highest frequency while it is present, cycles per record.
     pub fn cycles_range(&self) -> (f64, f64) {
         let (low, high) = self.extreme_places();
         (self.cycles_at(low), self.cycles_at(high))
+    }
+
+    /// Frequencies of its peak in a spectrum, cycles per record, with a margin in resolutions on each side. A
+    /// decay widens the peak.
+    pub(crate) fn peak_band(&self, margin: f64) -> (f64, f64) {
+        let (low, high) = self.cycles_range();
+        let wide = margin + self.nepers.map_or(0.0, |d| d.abs() / TAU);
+        (low - wide, high + wide)
+    }
+
+    /// Whether its peak and that of another oscillation overlap, each widened by the margin.
+    pub(crate) fn overlaps(&self, other: &Self, margin: f64) -> bool {
+        let ((low, high), (other_low, other_high)) = (self.peak_band(margin), other.peak_band(margin));
+        other_low < high && low < other_high
     }
 
     /// Factor of the amplitude by decay since the onset; 0 before it.

@@ -3,7 +3,8 @@
 
 mod pieces;
 
-use super::atom::{Atom, OscillationAtom};
+use super::atom::{Atom, INTERVALS, OscillationAtom};
+use super::cluster::{CLUSTER_REACH, group_linked};
 use super::course::{self, CourseAtom};
 use super::problem::{self, Parts};
 use super::search::Rival;
@@ -35,9 +36,6 @@ const SLOW_CYCLES_PER_COLUMN: f64 = 0.75;
 /// Distance, in resolutions, below which two oscillations may be pieces of one: closer lines are not
 /// separated reliably.
 const LEAST_APART: f64 = 0.5;
-/// Distance, in resolutions, below which two oscillations belong to one cluster: their peaks in a Hann
-/// spectrum touch.
-const CLUSTER_REACH: f64 = 2.5;
 /// An oscillation that drifts across one more than this many times as large may be a piece of it: a model
 /// leaves up to a fifth of an oscillation.
 const MUCH_LARGER: f64 = 5.0;
@@ -269,7 +267,7 @@ impl Decomposition {
             }));
             read.push((component, doubts));
         }
-        read.sort_by(|a, b| b.0.amplitude_m.total_cmp(&a.0.amplitude_m));
+        math::sort_by_number(&mut read, |a| -a.0.amplitude_m);
         let (mut components, doubts): (Vec<_>, Vec<_>) = read.into_iter().unzip();
         let evidence = |doubts| Evidence { doubts, ..Evidence::default() };
         let evidence: Vec<Evidence> = doubts.into_iter().map(evidence).collect();
@@ -284,30 +282,22 @@ impl Decomposition {
     fn unite_pieces(&self, readings: Vec<OscillationReading>) -> Vec<OscillationReading> {
         /// A group is united if its strongest oscillation has more than this fraction of its energy.
         const MOST_ENERGY: f64 = 0.6;
+        let mut readings = readings;
+        math::sort_by_number(&mut readings, |reading| -reading.energy);
         let clustered: Vec<bool> = readings.iter().map(|r| self.count_cluster(&r.atom) >= CLUSTER).collect();
-        let mut left: Vec<(OscillationReading, bool)> = readings.into_iter().zip(clustered).collect();
-        left.sort_by(|a, b| b.0.energy.total_cmp(&a.0.energy));
+        let is_piece = |a: usize, b: usize| {
+            let (one, other) = (&readings[a].atom, &readings[b].atom);
+            let together = clustered[a] && clustered[b];
+            (together || may_be_one(one, other)) && median_distance(one, other) < CLUSTER_REACH
+        };
         let mut united = Vec::new();
-        while !left.is_empty() {
-            let (mut group, mut next) = (vec![left.remove(0)], 0);
-            while next < group.len() {
-                let (from, is_clustered) = group[next].clone();
-                let is_piece = |(other, other_clustered): &(OscillationReading, bool)| {
-                    let together = is_clustered && *other_clustered;
-                    (together || may_be_one(&from.atom, &other.atom))
-                        && median_distance(&from.atom, &other.atom) < CLUSTER_REACH
-                };
-                let (near, rest): (Vec<_>, Vec<_>) = left.into_iter().partition(is_piece);
-                group.extend(near);
-                left = rest;
-                next += 1;
-            }
-            let total: f64 = group.iter().map(|(reading, _)| reading.energy).sum();
-            let mut group: Vec<OscillationReading> = group.into_iter().map(|(reading, _)| reading).collect();
+        for group in group_linked(readings.len(), is_piece) {
+            let group: Vec<OscillationReading> = group.iter().map(|k| readings[*k].clone()).collect();
+            let total: f64 = group.iter().map(|reading| reading.energy).sum();
             if group.len() > 1 && group[0].energy > MOST_ENERGY * total {
                 united.push(OscillationReading::unite(&group));
             } else {
-                united.append(&mut group);
+                united.extend(group);
             }
         }
         united
@@ -390,10 +380,12 @@ impl Decomposition {
     fn list_doubts(&self, reading: &OscillationReading, resolution_hz: f64) -> Vec<String> {
         let o = &reading.atom;
         let mut doubts = Vec::new();
-        if reading.lead < CLEAR_LEAD {
+        if reading.lead < 0.0 {
+            doubts.push("the description of the window is more probable without it".to_owned());
+        } else if reading.lead < CLEAR_LEAD {
             doubts.push(format!(
                 "the description of the window is only {:.0} times as probable with it as without it",
-                math::exp(reading.lead.max(0.0))
+                math::exp(reading.lead)
             ));
         }
         let parts = &self.explanation.parts;
@@ -493,25 +485,11 @@ impl Decomposition {
 
     /// Number of oscillations in the cluster of `o`, in which each is close to another one.
     fn count_cluster(&self, o: &OscillationAtom) -> usize {
-        let mut left: Vec<&OscillationAtom> = self
-            .explanation
-            .parts
-            .atoms
-            .iter()
-            .filter_map(Atom::oscillation)
-            .filter(|other| *other != o)
-            .collect();
-        let mut cluster = vec![o];
-        let mut next = 0;
-        while next < cluster.len() {
-            let from = cluster[next];
-            let (near, rest) =
-                left.into_iter().partition::<Vec<_>, _>(|other| median_distance(from, other) < CLUSTER_REACH);
-            cluster.extend(near);
-            left = rest;
-            next += 1;
-        }
-        cluster.len()
+        let all: Vec<&OscillationAtom> =
+            self.explanation.parts.atoms.iter().filter_map(Atom::oscillation).collect();
+        let is_close = |a: usize, b: usize| median_distance(all[a], all[b]) < CLUSTER_REACH;
+        let groups = group_linked(all.len(), is_close);
+        groups.iter().find(|group| group.iter().any(|k| all[*k] == o)).map_or(1, Vec::len)
     }
 
     /// The oscillations of the explanation.
@@ -570,11 +548,11 @@ impl Decomposition {
         let gradient: Vec<f64> = (0..n).map(gradient).collect();
         let pairs = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
         let own: f64 = pairs.map(|(i, j)| gradient[i] * gradient[j] * covariance[(i, j)]).sum();
-        // where the record begins and ends is known to half a frame, which changes the mean of a drifting
-        // frequency
+        // where the oscillation begins and ends is known to half a frame, or to half an interval of a
+        // polynomial amplitude, which changes the mean of a drifting frequency
         let (low, high) = if o.phase.is_empty() { (0.0, 0.0) } else { o.cycles_range() };
-        let half_frame = 0.5 * (high - low) / self.problem.at.frames as f64;
-        let own_cycles_sd = math::hypot(own.max(0.0).sqrt(), half_frame);
+        let parts = if o.envelope.is_empty() { self.problem.at.frames } else { INTERVALS };
+        let own_cycles_sd = math::hypot(own.max(0.0).sqrt(), 0.5 * (high - low) / parts as f64);
         let range = (!o.phase.is_empty()).then(|| read_range(o, &covariance.into_owned()));
         let (spread, lead) = self.average_rivals(o, cycles);
         let scatter = self.frequency_scatter(o, amplitudes, &columns, variance);

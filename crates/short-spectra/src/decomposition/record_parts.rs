@@ -87,7 +87,7 @@ impl Decomposition {
 }
 
 impl Oscillation {
-    /// Mean frequency, Hz.
+    /// Mean frequency while it is present, Hz.
     #[must_use]
     pub fn frequency_hz(&self) -> f64 {
         let cycles = match &self.atom {

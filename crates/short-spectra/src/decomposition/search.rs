@@ -11,7 +11,6 @@ use crate::periodogram::upper_median;
 use crate::trend::Trend;
 use portable_math as math;
 use rayon::prelude::*;
-use std::f64::consts::TAU;
 
 /// Iterations of a fit of one part while the others stay.
 const LOCAL_ITERATIONS: usize = 8;
@@ -212,7 +211,7 @@ impl PartSearch {
             atoms: [atoms_without(atoms, &change.replaced), change.fitted.clone()].concat(),
             criterion: current.criterion - change.gain,
         }));
-        changes.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        math::sort_by_number(&mut changes, |a| -a.gain);
         let least = -self.problem.log_frames();
         let promising = changes.iter().take(TRIED_CHANGES).take_while(|change| change.gain > least);
         let promising: Vec<&Change> = promising.collect();
@@ -220,7 +219,7 @@ impl PartSearch {
             promising.par_iter().map(|change| self.try_change(current, &fixed, change)).collect();
         self.rivals
             .extend(tried.iter().map(|t| Rival { atoms: t.parts.atoms.clone(), criterion: t.criterion }));
-        tried.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
+        math::sort_by_number(&mut tried, |a| a.criterion);
         let best = tried.first().filter(|best| best.criterion < current.criterion + HOPELESS)?;
         // if several changes together gain more than the best one alone, it need not be fitted
         if let Some(parts) = combine_changes(current, &tried) {
@@ -333,12 +332,7 @@ fn combine_changes(current: &Explanation, changes: &[FittedChange]) -> Option<Pa
     const LEAST: f64 = 10.0;
     /// Smallest distance, resolutions, of frequencies at which changes hardly affect each other.
     const APART: f64 = 4.0;
-    let reach = |atom: &Atom| {
-        let o = atom.oscillation()?;
-        let (low, high) = o.cycles_range();
-        let wide = APART / 2.0 + o.nepers.map_or(0.0, |d| d.abs() / TAU);
-        Some((low - wide, high + wide))
-    };
+    let reach = |atom: &Atom| Some(atom.oscillation()?.peak_band(APART / 2.0));
     let mut taken: Vec<&FittedChange> = Vec::new();
     let mut ranges: Vec<(f64, f64)> = Vec::new();
     for change in changes {

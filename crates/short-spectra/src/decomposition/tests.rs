@@ -75,7 +75,7 @@ fn record(samples: &[Option<f64>]) -> SampledRecord<'_> {
 fn listed(found: &Decomposition, samples: &[Option<f64>]) -> Vec<(f64, f64)> {
     let components = found.components(&record(samples), &SpectrumSettings::default());
     let mut list: Vec<(f64, f64)> = components.iter().map(|c| (c.frequency_hz, c.frequency_sd_hz)).collect();
-    list.sort_by(|a, b| a.0.total_cmp(&b.0));
+    portable_math::sort_by_number(&mut list, |a| a.0);
     list
 }
 
@@ -268,4 +268,28 @@ fn windows_of_a_few_dozen_frames_keep_their_line_and_their_noise() {
         assert!(found >= 19, "{frames} frames: the line is found in {found} of 20 windows");
         assert!(floors[0] > 0.0, "{frames} frames: {floors:?}");
     }
+}
+
+/// An oscillation from 300 to 270 Hz that swells, fades and is over after 110 of 150 ms.
+#[test]
+fn a_fading_oscillation_has_no_frequency_where_it_is_over() {
+    const OVER_S: f64 = 0.11;
+    let value = |t: f64| {
+        let size = if t < OVER_S { (TAU / 2.0 * t / OVER_S).sin().powi(2) } else { 0.0 };
+        1e-5 * size * (TAU * (300.0 * t - 15.0 * t * t / OVER_S)).cos()
+    };
+    let (mut clear, mut ranges) = (0, 0);
+    for seed in 0..10 {
+        let (found, samples) = taken_apart(value, 3e-7, seed);
+        let components = found.components(&record(&samples), &SpectrumSettings::default());
+        let largest = &components[0];
+        assert!((largest.frequency_hz - 285.0).abs() < 4.0 * largest.frequency_sd_hz, "{seed}: {largest:?}");
+        if let Some(range) = largest.range_hz {
+            let (low, high) = (range.low_hz + 3.0 * range.low_sd_hz, range.high_hz - 3.0 * range.high_sd_hz);
+            assert!(low > 268.0 && high < 302.0, "{seed}: {range:?}");
+            ranges += 1;
+        }
+        clear += usize::from(largest.verdict == ComponentVerdict::Clear);
+    }
+    assert!(clear >= 5 && ranges >= 9, "{clear} {ranges}");
 }

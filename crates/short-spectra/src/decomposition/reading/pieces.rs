@@ -11,15 +11,17 @@ impl OscillationReading {
         math::hypot(self.amplitudes_m[0][0], self.amplitudes_m[0][1])
     }
 
-    /// The doubt that this oscillation is a piece of another one: of a much larger one nearby that is united
-    /// from several, or, if it drifts, of one whose range comes from a ridge and overlaps its own. `followed`
-    /// are the ranges that come from ridges, cycles per record.
+    /// The doubt that this oscillation is a piece of another one. First case: a much larger one nearby is
+    /// united from several, or has a polynomial amplitude, which is only an approximation. Second case: this
+    /// one drifts, and its range overlaps one that comes from a ridge. `followed` are the ranges that come
+    /// from ridges, cycles per record.
     pub(super) fn describe_larger(&self, readings: &[Self], followed: &[FrequencyRange]) -> Option<String> {
         /// Distance, resolutions, from a changing oscillation within which a piece of it may lie.
         const REACH: f64 = 8.0;
         let changes = |other: &Self| {
             let is_larger = other.amplitude_m() > MUCH_LARGER * self.amplitude_m();
-            other.pieces > 1 && is_larger && (other.cycles - self.cycles).abs() < REACH
+            let is_modulated = other.pieces > 1 || !other.atom.envelope.is_empty();
+            is_modulated && is_larger && (other.cycles - self.cycles).abs() < REACH
         };
         let crosses = |own: &FrequencyRange, other: &FrequencyRange| {
             own.low_hz < other.high_hz && other.low_hz < own.high_hz

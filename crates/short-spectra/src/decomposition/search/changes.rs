@@ -7,11 +7,13 @@ use crate::decomposition::candidates::{Candidate, find_candidates};
 use crate::decomposition::problem::{Explanation, Fixed, Parts, dot};
 use crate::trend::Trend;
 use portable_math as math;
-use std::f64::consts::TAU;
 
 /// An oscillation with a faster decay or growth than this, nepers per record, gets no harmonics: it is a free
 /// oscillation, and not a driven cycle.
 const DRIVEN_NEPERS: f64 = 3.0;
+
+/// Margin, in resolutions, on each side of two peaks that overlap if their oscillations may be united.
+const UNION_MARGIN: f64 = 2.5;
 
 impl PartSearch {
     /// Additions of one part that the residual may contain.
@@ -279,20 +281,9 @@ impl PartSearch {
     /// oscillations whose peaks overlap its own.
     fn list_unions(&mut self, current: &Explanation, k: usize, o: &OscillationAtom) -> Vec<Change> {
         let atoms = &current.parts.atoms;
-        let reach = |o: &OscillationAtom| {
-            let (low, high) = o.cycles_range();
-            let wide = 2.5 + o.nepers.map_or(0.0, |d| d.abs() / TAU);
-            (low - wide, high + wide)
-        };
-        let (low, high) = reach(o);
-        let near: Vec<usize> = (0..atoms.len())
-            .filter(|j| {
-                atoms[*j].oscillation().is_some_and(|other| {
-                    let (l, h) = reach(other);
-                    l < high && low < h
-                })
-            })
-            .collect();
+        let is_near =
+            |j: &usize| atoms[*j].oscillation().is_some_and(|other| o.overlaps(other, UNION_MARGIN));
+        let near: Vec<usize> = (0..atoms.len()).filter(is_near).collect();
         // only the first oscillation of a group unites it, so that no group is tried twice
         if near.len() < 2 || near[0] != k {
             return Vec::new();
@@ -304,7 +295,7 @@ impl PartSearch {
         let kept = atoms_without(atoms, &near);
         let fixed = self.problem.fix_parts(current.parts.trend, &kept);
         let mut changes = self.list_group_envelopes(current, &fixed, &near);
-        let ranges = near.iter().filter_map(|j| atoms[*j].oscillation()).map(reach);
+        let ranges = near.iter().filter_map(|j| atoms[*j].oscillation()).map(|o| o.peak_band(UNION_MARGIN));
         let band = ranges.fold((f64::INFINITY, 0.0_f64), |(a, b), (l, h)| (a.min(l), b.max(h)));
         let base = self.problem.criterion(
             &Parts { trend: current.parts.trend, atoms: kept },
@@ -346,7 +337,7 @@ impl PartSearch {
         if group.len() > 2 {
             let mut largest: Vec<&OscillationAtom> = group.clone();
             let size = |o: &OscillationAtom| amplitude_of(current, o);
-            largest.sort_by(|a, b| size(b).total_cmp(&size(a)));
+            math::sort_by_number(&mut largest, |a| -size(a));
             let pair = largest[..2].iter().map(|o| Atom::Oscillation(OscillationAtom::steady(o.cycles)));
             changes.push(self.fit_change(current, others, near.to_vec(), pair.collect()));
         }
