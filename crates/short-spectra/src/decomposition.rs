@@ -21,7 +21,7 @@ use crate::record::SampledRecord;
 use crate::settings::{MAX_COMPONENTS, ROUNDING, SpectrumSettings};
 use crate::transform::RealTransform;
 use crate::trend::Trend;
-use atom::{Atom, OscillationAtom};
+use atom::{Atom, MOST_ENVELOPE_DEGREE, OscillationAtom};
 pub use course::exceeds_noise;
 use portable_math as math;
 use problem::{Explanation, NoisyRecord, Parts, dot};
@@ -229,11 +229,9 @@ impl Contest {
         /// Smallest fraction of the energy of the residual that the band has for a fit to be tried: otherwise
         /// the noise is not narrow.
         const LEAST_SHARE: f64 = 0.5;
-        /// Largest fraction of the energy of the residual that the fit may leave: it leaves more of a band of
-        /// noise that is five resolutions wide.
-        const MOST_LEFT: f64 = 0.25;
-        /// Degree of the amplitude: the lowest that follows one that rises, falls and is over.
-        const DEGREE: usize = 5;
+        /// Largest fraction of the energy of the residual that the fit may leave. It leaves more of nearly
+        /// every band of noise that is five resolutions wide, and less of most bursts.
+        const MOST_LEFT: f64 = 0.5;
         /// Latest onset: a later oscillation is too short for an amplitude of that degree.
         const LATEST: f64 = 0.8;
         /// Iterations of the fit, which starts from a constant amplitude.
@@ -249,7 +247,7 @@ impl Contest {
         let is_other = |atom: &&Atom| !atom.oscillation().is_some_and(is_near);
         let mut atoms: Vec<Atom> = parts.atoms.iter().filter(is_other).cloned().collect();
         let oscillations = atoms.iter().filter(|atom| atom.oscillation().is_some()).count();
-        let (envelope, phase) = (vec![0.0; DEGREE], vec![0.0]);
+        let (envelope, phase) = (vec![0.0; MOST_ENVELOPE_DEGREE], vec![0.0]);
         let start = OscillationAtom { envelope, phase, ..OscillationAtom::steady(cycles) };
         let is_usable = Atom::Oscillation(start.clone()).is_usable(white.at.frames);
         if share < LEAST_SHARE || !is_usable || oscillations >= self.settings.most_oscillations {
