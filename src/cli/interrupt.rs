@@ -33,7 +33,7 @@ struct InterruptState {
     finishing: bool,
     /// Temporary files that have not been renamed yet, and new folders that contain no files yet.
     passing: Vec<PathBuf>,
-    /// Whether temporary files have been renamed, so that outputs of this run are on the disk.
+    /// Whether a temporary file may have been renamed, so that outputs of this run are on the disk.
     renamed: bool,
 }
 
@@ -126,10 +126,14 @@ pub(crate) fn lock_renames() -> RenameLock {
 pub(crate) struct RenameLock(MutexGuard<'static, InterruptState>);
 
 impl RenameLock {
+    /// Call this before the first temporary file is renamed.
+    pub(crate) fn expect_outputs(&mut self) {
+        self.0.renamed = true;
+    }
+
     /// Call this when every temporary file has been renamed.
     pub(crate) fn forget_temporaries(mut self) {
         self.0.passing.clear();
-        self.0.renamed = true;
     }
 }
 
@@ -159,18 +163,18 @@ fn end_program() -> ! {
         // removed
         let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir(path));
     }
-    let kept = state.kept.as_ref().map_or_else(|| name_unregistered_outputs(state.renamed), |kept| kept());
+    let kept = state.kept.as_ref().map_or_else(|| describe_outputs(state.renamed), |kept| kept());
     let reached = progress::finish_in_words().map_or_else(String::new, |reached| format!("{reached}; "));
     warn_line!("{}: {reached}{kept}", why());
     std::process::exit(i32::from(STOPPED_EARLY))
 }
 
 /// Describes what is on the disk when a command that cannot stop early is ended.
-fn name_unregistered_outputs(renamed: bool) -> String {
+fn describe_outputs(renamed: bool) -> String {
     let said = if renamed {
-        "files that were complete are written, others are not"
+        "the files that were complete are written, others are not"
     } else {
-        "a file that was not complete is not written"
+        "nothing is written"
     };
     said.to_owned()
 }

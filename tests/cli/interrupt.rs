@@ -195,7 +195,7 @@ fn a_command_without_anything_partial_ends_at_once_and_writes_nothing() {
         &["import", "export.csv", "--frame-rate-hz", "5000", "--out", "new"],
     ];
     for arguments in commands {
-        let said = interrupted(&project, arguments, "-INT", "not complete is not written");
+        let said = interrupted(&project, arguments, "-INT", "nothing is written");
         assert!(!project.path("new").exists(), "{said}");
     }
 }

@@ -108,7 +108,8 @@ impl OutputStaging {
 }
 
 fn rename_staged(files: Vec<StagedFile>) -> Outcome<()> {
-    let whole = interrupt::lock_renames();
+    let mut whole = interrupt::lock_renames();
+    whole.expect_outputs();
     for staged in files {
         staged.file.persist(&staged.path).map_err(|e| write_failure(&staged.path, &e.error))?;
     }
