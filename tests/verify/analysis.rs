@@ -408,7 +408,7 @@ fn no_polynomial_swings_through_a_whole_reversal() {
     use wiperlab::simulate::scene::Scene;
     use wiperlab::simulate::twin::{Camera, TrackingModel, add_tracking_noise, film_scene};
     let scene = Scene::parse("scene", include_str!("../../data/scenes/actual-blade.toml")).unwrap();
-    // (from 1,500 to 2,500 frames/s the ringing of the drop is taken for coloured noise)
+    // (at 2,000 frames/s the ringing of the drop is taken for coloured noise)
     let rates: &[f64] = pick(&[1000.0], &[1000.0, 5000.0]);
     for &frame_rate_hz in rates {
         let camera = Camera { frame_rate_hz, exposure_s: 5e-5 };

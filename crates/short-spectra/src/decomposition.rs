@@ -34,7 +34,7 @@ use search::{PartSearch, Rival};
 const FRAMES_PER_OSCILLATION: usize = 16;
 
 /// The most probable explanation of a record, with the frames and the noise for which it holds. If that has
-/// no oscillation, it may be the most probable one with an oscillation of changing amplitude instead.
+/// no oscillation, one that explains most of its noise by an oscillation may take its place.
 pub(crate) struct Decomposition {
     problem: NoisyRecord,
     explanation: Explanation,
@@ -218,21 +218,15 @@ impl Contest {
     }
 
     /// Searches once more from `parts` and one oscillation of changing amplitude and frequency, which takes
-    /// the place of coloured noise. Its fit must explain most of what `parts` leave. The search does not
-    /// find it step by step: until its shape is right, a few coefficients of the noise describe its band
-    /// better. If the best explanation has no oscillation, this one becomes the best, although noise alone
-    /// is more probable: its odds put it in doubt.
+    /// the place of coloured noise and of the oscillations within its band. Its fit must explain most of
+    /// what `parts` leave. The search does not find it step by step: until its shape is right, a few
+    /// coefficients of the noise describe its band better. If the best explanation has no oscillation, this
+    /// one becomes the best, although noise alone is more probable: its odds put it in doubt.
     fn add_swelling(&mut self, parts: &Parts) {
-        /// Half width, resolutions, of the band of such an oscillation: enough for the drift of one that a
-        /// polynomial describes.
-        const HALF_WIDTH: f64 = 8.0;
-        /// Smallest fraction of the energy of the residual that the band has for a fit to be tried: otherwise
-        /// the noise is not narrow.
-        const LEAST_SHARE: f64 = 0.5;
-        /// Largest fraction of the energy of the residual that the fit may leave. It leaves more of nearly
-        /// every band of noise that is five resolutions wide, and less of most bursts.
+        /// Largest fraction of the energy of the residual that the fit may leave. The fit leaves more of most
+        /// bands of noise that are five resolutions wide, and less of most bursts.
         const MOST_LEFT: f64 = 0.5;
-        /// Latest onset: a later oscillation is too short for an amplitude of that degree.
+        /// Latest onset: a later oscillation is too short for a polynomial amplitude.
         const LATEST: f64 = 0.8;
         /// Iterations of the fit, which starts from a constant amplitude.
         const ITERATIONS: usize = 40;
@@ -240,17 +234,14 @@ impl Contest {
             return;
         }
         let white = self.problem.clone().with_noise(&[]);
-        let all = white.fix_parts(parts.trend, &parts.atoms);
-        let left = white.residual_of(&all);
-        let Some((cycles, share)) = find_strongest_band(&white, left, HALF_WIDTH) else { return };
-        let is_near = |o: &OscillationAtom| (o.mean_cycles() - cycles).abs() <= HALF_WIDTH;
-        let is_other = |atom: &&Atom| !atom.oscillation().is_some_and(is_near);
+        let Some(band) = NarrowBand::find_band(&white, parts) else { return };
+        let is_other = |atom: &&Atom| !atom.oscillation().is_some_and(|o| band.contains(o));
         let mut atoms: Vec<Atom> = parts.atoms.iter().filter(is_other).cloned().collect();
         let oscillations = atoms.iter().filter(|atom| atom.oscillation().is_some()).count();
         let (envelope, phase) = (vec![0.0; MOST_ENVELOPE_DEGREE], vec![0.0]);
-        let start = OscillationAtom { envelope, phase, ..OscillationAtom::steady(cycles) };
+        let start = OscillationAtom { envelope, phase, ..OscillationAtom::steady(band.cycles) };
         let is_usable = Atom::Oscillation(start.clone()).is_usable(white.at.frames);
-        if share < LEAST_SHARE || !is_usable || oscillations >= self.settings.most_oscillations {
+        if !is_usable || oscillations >= self.settings.most_oscillations {
             return;
         }
         // it begins with the record or where a step is nearly over
@@ -265,17 +256,21 @@ impl Contest {
         };
         let onsets = std::iter::once(0.0).chain(atoms.iter().filter_map(over));
         let Some((fitted, squares)) = onsets.map(fit_from).min_by(|a, b| a.1.total_cmp(&b.1)) else { return };
+        let all = white.fix_parts(parts.trend, &parts.atoms);
+        let left = white.residual_of(&all);
         if squares > MOST_LEFT * dot(left, left) {
             return;
         }
         atoms.extend(fitted);
         let parts = Parts { trend: parts.trend, atoms };
         let (problem, found) = self.search_parts(with_noise_of(&white, &parts), parts);
-        let has_oscillation = |explanation: &Explanation| {
-            let is_one = |atom: &Atom| matches!(atom, Atom::Oscillation(_) | Atom::Course(_));
-            explanation.parts.atoms.iter().any(is_one)
-        };
-        if !has_oscillation(&self.best) && has_oscillation(&found) && found.criterion.is_finite() {
+        let has =
+            |explanation: &Explanation, is_one: fn(&Atom) -> bool| explanation.parts.atoms.iter().any(is_one);
+        let is_listed = |atom: &Atom| atom.oscillation().is_some_and(|o| !o.is_single_swing());
+        // the verdict of an oscillation along a ridge takes no account of the odds
+        let is_course = |atom: &Atom| atom.course().is_some();
+        let is_silent = !has(&self.best, is_listed) && !has(&self.best, is_course);
+        if is_silent && has(&found, is_listed) && !has(&found, is_course) && found.criterion.is_finite() {
             let noise = self.best.clone();
             self.keep_rival(&noise);
             (self.problem, self.best) = (problem, found);
@@ -345,8 +340,11 @@ fn select_explanation(white: NoisyRecord, settings: DecompositionSettings) -> Co
     }
     contest.add_course();
     contest.unite_clusters();
-    contest.add_swelling(&contest.best.parts.clone());
-    contest.add_swelling(&slow_of_white);
+    let found = contest.best.parts.clone();
+    contest.add_swelling(&found);
+    if slow_of_white != found {
+        contest.add_swelling(&slow_of_white);
+    }
     contest
 }
 
@@ -366,11 +364,8 @@ fn with_background(problem: &NoisyRecord, parts: &Parts) -> NoisyRecord {
     let white = problem.clone().with_noise(&[]);
     let left = white.fit_parts(parts, 4);
     let frames = white.at.frames;
-    let mut values = vec![0.0; frames];
-    for (i, r) in white.used.iter().zip(&left.residual) {
-        let hann = 0.5 - 0.5 * math::cos(std::f64::consts::TAU * (*i as f64 + 0.5) / frames as f64);
-        values[*i] = hann * r;
-    }
+    let hann = |s: f64| 0.5 - 0.5 * math::cos(std::f64::consts::TAU * s);
+    let values = fill_frames(&white, &left.residual, hann);
     let padded = frames.next_power_of_two();
     let density = RealTransform::new(padded).squared_magnitudes(values.into_iter());
     let bins = HALF_WIDTH * padded.div_ceil(frames);
@@ -402,19 +397,48 @@ fn with_background(problem: &NoisyRecord, parts: &Parts) -> NoisyRecord {
 /// cause a smaller fall.
 const MEDIAN_SCATTER: f64 = 4.0;
 
-/// Frequency of the largest peak in the spectrum of a residual, cycles per record, and the fraction of the
-/// energy within `half_width` resolutions of it. `None` if the residual is zero.
-fn find_strongest_band(problem: &NoisyRecord, residual: &[f64], half_width: f64) -> Option<(f64, f64)> {
-    let frames = problem.at.frames;
-    let mut values = vec![0.0; frames];
-    problem.used.iter().zip(residual).for_each(|(i, r)| values[*i] = *r);
-    let padded = (2 * frames).next_power_of_two();
-    let energies = RealTransform::new(padded).squared_magnitudes(values.into_iter());
-    let peak = (0..energies.len()).max_by(|a, b| energies[*a].total_cmp(&energies[*b]))?;
-    let bins = (half_width * padded as f64 / frames as f64) as usize;
-    let near = &energies[peak.saturating_sub(bins)..(peak + bins + 1).min(energies.len())];
-    let total: f64 = energies.iter().sum();
-    (total > 0.0).then(|| (peak as f64 * frames as f64 / padded as f64, near.iter().sum::<f64>() / total))
+/// A residual times a window, which depends on the position in the record; 0 in a frame that is not used.
+fn fill_frames(problem: &NoisyRecord, residual: &[f64], window: impl Fn(f64) -> f64) -> Vec<f64> {
+    let mut values = vec![0.0; problem.at.frames];
+    for ((i, s), r) in problem.used.iter().zip(&problem.at.places).zip(residual) {
+        values[*i] = window(*s) * r;
+    }
+    values
+}
+
+/// A band of frequencies that holds most of what parts leave of a record: narrow-band noise, or an
+/// oscillation that no part describes.
+struct NarrowBand {
+    /// Its middle, cycles per record.
+    cycles: f64,
+}
+
+impl NarrowBand {
+    /// Half width, resolutions: enough for the drift of an oscillation that a polynomial describes.
+    const HALF_WIDTH: f64 = 8.0;
+
+    /// The band around the largest peak in the spectrum of what `parts` leave of a record in white noise;
+    /// `None` if it has less than half of the energy.
+    fn find_band(white: &NoisyRecord, parts: &Parts) -> Option<Self> {
+        /// Smallest fraction of the energy.
+        const LEAST_SHARE: f64 = 0.5;
+        let all = white.fix_parts(parts.trend, &parts.atoms);
+        let frames = white.at.frames;
+        let padded = (2 * frames).next_power_of_two();
+        let values = fill_frames(white, white.residual_of(&all), |_| 1.0);
+        let energies = RealTransform::new(padded).squared_magnitudes(values.into_iter());
+        let peak = (0..energies.len()).max_by(|a, b| energies[*a].total_cmp(&energies[*b]))?;
+        let bins = (Self::HALF_WIDTH * padded as f64 / frames as f64) as usize;
+        let near = &energies[peak.saturating_sub(bins)..(peak + bins + 1).min(energies.len())];
+        let total: f64 = energies.iter().sum();
+        let is_narrow = near.iter().sum::<f64>() >= LEAST_SHARE * total && total > 0.0;
+        is_narrow.then_some(Self { cycles: peak as f64 * frames as f64 / padded as f64 })
+    }
+
+    /// Whether the mean frequency of an oscillation lies in it.
+    fn contains(&self, o: &OscillationAtom) -> bool {
+        (o.mean_cycles() - self.cycles).abs() <= Self::HALF_WIDTH
+    }
 }
 
 /// Autoregressive coefficients of the order with the lowest Bayesian information criterion for `frames`

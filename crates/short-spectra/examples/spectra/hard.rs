@@ -131,6 +131,18 @@ fn ringing(hz: f64, ratio: f64, draw: &mut Draw) -> Made {
     plain(vec![truth], 20.0, draw)
 }
 
+/// An oscillation that swells and fades within a fraction of the record, somewhere in it, at 40 dB.
+fn burst(share: f64, draw: &mut Draw) -> Made {
+    let (hz, phase) = (draw.within(300.0, 1500.0), draw.phase());
+    let first_s = draw.within(0.0, (1.0 - share) * DURATION_S);
+    let mut made = record(FRAMES, Vec::new(), noise_m(40.0), draw, |t| {
+        let within = ((t - first_s) / (share * DURATION_S)).clamp(0.0, 1.0);
+        AMPLITUDE_M * (TAU / 2.0 * within).sin().powi(2) * (TAU * hz * t + phase).cos()
+    });
+    made.truths.push(Truth::steady(hz, phase));
+    made
+}
+
 /// A ring-down of so many nepers over the record, anywhere in frequency.
 fn fast(nepers: f64, draw: &mut Draw) -> Made {
     let truth =
@@ -354,6 +366,9 @@ kinds! {
     "drifts", "a chirp over 1 resolution, 30 dB" => |d| drift(1.0, d);
     "drifts", "a chirp over 2 resolutions, 30 dB" => |d| drift(2.0, d);
     "drifts", "a chirp over 4 resolutions, 30 dB" => |d| drift(4.0, d);
+    "drifts", "a burst in two thirds of the window, 40 dB" => |d| burst(2.0 / 3.0, d);
+    "drifts", "a burst in a third of the window, 40 dB" => |d| burst(1.0 / 3.0, d);
+    "drifts", "a burst in a sixth of the window, 40 dB" => |d| burst(1.0 / 6.0, d);
     "drifts", "an amplitude that falls in a line, 30 dB" => |d| {
         let (hz, phase) = (d.within(300.0, 1500.0), d.phase());
         let mut made = record(FRAMES, Vec::new(), noise_m(30.0), d, |t| {

@@ -27,8 +27,8 @@ const MOST_GROWTH: f64 = 6.0;
 /// Largest distance of the centre of a step from the record, as a fraction of its length: the record then
 /// shows the tail of the step.
 pub(crate) const OUTSIDE: f64 = 0.25;
-/// Number of intervals, from the onset to the end, between which a polynomial amplitude is compared with its
-/// maximum.
+/// Number of intervals from the onset to the end. A polynomial amplitude is compared with its maximum at the
+/// ends of each.
 pub(crate) const INTERVALS: usize = 64;
 /// Smallest number of cycles of an oscillation in a record; the trend describes slower motion.
 pub(crate) const FEWEST_CYCLES: f64 = 1.5;
@@ -157,13 +157,14 @@ impl OscillationAtom {
     }
 
     /// First and last position at which it is present. It begins at its onset and ends when a twentieth of
-    /// its amplitude is left, or with the record. With a polynomial amplitude it begins and ends where the
-    /// amplitude is a tenth of its maximum: the frequency of a smaller oscillation is not known.
+    /// its amplitude is left, or with the record. Within this time, one with a polynomial amplitude is
+    /// present from the first to the last position at which the amplitude is a tenth of its maximum: the
+    /// frequency of a smaller oscillation is not known.
     fn present_places(&self) -> (f64, f64) {
         /// Decay, nepers, that leaves a twentieth of the amplitude.
         const OVER_NEPERS: f64 = 3.0;
-        /// Smallest amplitude, as a fraction of the largest, at which it is present: where the true amplitude
-        /// is zero, that of a polynomial is smaller.
+        /// Smallest amplitude, as a fraction of the largest, at which it is present. A polynomial stays below
+        /// this where the true amplitude is zero.
         const LEAST_ENVELOPE: f64 = 0.1;
         let over = |nepers: &f64| *nepers > 0.0;
         let end = self.nepers.filter(over).map_or(1.0, |nepers| (self.onset + OVER_NEPERS / nepers).min(1.0));

@@ -3,8 +3,8 @@
 use super::atom::{Atom, OscillationAtom};
 use super::problem::{Explanation, NoisyRecord, Parts, dot};
 
-/// Distance of their frequencies, or of the edges of their bands, in resolutions, below which two
-/// oscillations belong to one cluster: their peaks in a Hann spectrum touch.
+/// Median distance of their frequencies, in resolutions, below which two oscillations belong to one cluster:
+/// their peaks in a Hann spectrum touch.
 pub(super) const CLUSTER_REACH: f64 = 2.5;
 
 /// Groups the indices below `count`. Two indices are in one group if a chain of links joins them. The first
@@ -30,6 +30,8 @@ pub(super) fn group_linked(count: usize, is_linked: impl Fn(usize, usize) -> boo
 /// weighted by energy. Its amplitude is a polynomial, constant at first, without onset or decay. Its
 /// harmonics are those of the strongest oscillation. `None` without a cluster.
 pub(super) fn unite_clusters(problem: &NoisyRecord, found: &Explanation) -> Option<Parts> {
+    /// Margin of a peak, resolutions: the peaks of a cluster touch in a Hann spectrum.
+    const MARGIN: f64 = 1.25;
     /// Degree of the amplitude; the search raises or lowers it.
     const DEGREE: usize = 4;
     let atoms = &found.parts.atoms;
@@ -37,7 +39,7 @@ pub(super) fn unite_clusters(problem: &NoisyRecord, found: &Explanation) -> Opti
     let energy = |k: usize| dot(&courses[k], &courses[k]);
     let is_near = |a: usize, b: usize| {
         let bands = atoms[a].oscillation().zip(atoms[b].oscillation());
-        bands.is_some_and(|(a, b)| a.overlaps(b, CLUSTER_REACH / 2.0))
+        bands.is_some_and(|(a, b)| a.overlaps(b, MARGIN))
     };
     let groups = group_linked(atoms.len(), is_near);
     let unite = |group: &Vec<usize>| {

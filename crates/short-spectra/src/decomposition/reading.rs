@@ -8,7 +8,7 @@ use super::cluster::{CLUSTER_REACH, group_linked};
 use super::course::{self, CourseAtom};
 use super::problem::{self, Parts};
 use super::search::Rival;
-use super::{Decomposition, with_noise_of};
+use super::{Decomposition, NarrowBand, with_noise_of};
 use crate::classification::{Evidence, LEAST_CLEAR_DRIFT, RecordContext, classify_components};
 use crate::component::{Component, DecayingTone, Estimator, Harmonic};
 use crate::frequency_drift::{CYCLE_INSTANT_SD, RidgeMean};
@@ -246,9 +246,16 @@ impl Decomposition {
             .filter_map(|reading| reading.range)
             .chain(self.list_courses().map(|(course, _)| course.range))
             .collect();
+        let left = self.find_narrow_rest();
         for reading in &readings {
             let component = self.to_component(reading, record, resolution_hz);
             let mut doubts = self.list_doubts(reading, resolution_hz);
+            if left.as_ref().is_some_and(|band| band.contains(&reading.atom)) {
+                doubts.push(
+                    "most of what no component describes lies around it: its description is incomplete"
+                        .to_owned(),
+                );
+            }
             doubts.extend(reading.describe_larger(&readings, &followed));
             let multiples = reading.atom.multiples.iter().zip(&reading.amplitudes_m[1..]);
             read.extend(multiples.map(|(multiple, [a, b])| {
@@ -275,14 +282,20 @@ impl Decomposition {
         components
     }
 
+    /// The band around a component that holds most of what the explanation leaves as coloured noise; `None`
+    /// in white noise.
+    fn find_narrow_rest(&self) -> Option<NarrowBand> {
+        let white = (self.problem.order > 0).then(|| self.problem.clone().with_noise(&[]))?;
+        NarrowBand::find_band(&white, &self.explanation.parts)
+    }
+
     /// Unites oscillations that may be pieces of one: those for which `may_be_one` holds and those of a
     /// cluster, if they are closer than `CLUSTER_REACH`. If one of such a group has most of the energy, a
     /// single oscillation takes the place of the group. Its frequency is the mean of theirs, weighted by
     /// their energies.
-    fn unite_pieces(&self, readings: Vec<OscillationReading>) -> Vec<OscillationReading> {
+    fn unite_pieces(&self, mut readings: Vec<OscillationReading>) -> Vec<OscillationReading> {
         /// A group is united if its strongest oscillation has more than this fraction of its energy.
         const MOST_ENERGY: f64 = 0.6;
-        let mut readings = readings;
         math::sort_by_number(&mut readings, |reading| -reading.energy);
         let clustered: Vec<bool> = readings.iter().map(|r| self.count_cluster(&r.atom) >= CLUSTER).collect();
         let is_piece = |a: usize, b: usize| {
@@ -551,8 +564,12 @@ impl Decomposition {
         // where the oscillation begins and ends is known to half a frame, or to half an interval of a
         // polynomial amplitude, which changes the mean of a drifting frequency
         let (low, high) = if o.phase.is_empty() { (0.0, 0.0) } else { o.cycles_range() };
-        let parts = if o.envelope.is_empty() { self.problem.at.frames } else { INTERVALS };
-        let own_cycles_sd = math::hypot(own.max(0.0).sqrt(), 0.5 * (high - low) / parts as f64);
+        let step = if o.envelope.is_empty() {
+            1.0 / self.problem.at.frames as f64
+        } else {
+            1.0 / (INTERVALS as f64 * o.duration())
+        };
+        let own_cycles_sd = math::hypot(own.max(0.0).sqrt(), 0.5 * (high - low) * step);
         let range = (!o.phase.is_empty()).then(|| read_range(o, &covariance.into_owned()));
         let (spread, lead) = self.average_rivals(o, cycles);
         let scatter = self.frequency_scatter(o, amplitudes, &columns, variance);

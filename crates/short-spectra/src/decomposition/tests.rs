@@ -285,11 +285,40 @@ fn a_fading_oscillation_has_no_frequency_where_it_is_over() {
         let largest = &components[0];
         assert!((largest.frequency_hz - 285.0).abs() < 4.0 * largest.frequency_sd_hz, "{seed}: {largest:?}");
         if let Some(range) = largest.range_hz {
-            let (low, high) = (range.low_hz + 3.0 * range.low_sd_hz, range.high_hz - 3.0 * range.high_sd_hz);
-            assert!(low > 268.0 && high < 302.0, "{seed}: {range:?}");
+            // at a tenth of its amplitude the frequency is 294 and 276 Hz
+            assert!((range.low_hz - 273.0).abs() < 15.0, "{seed}: {range:?}");
+            assert!((range.high_hz - 297.0).abs() < 5.0, "{seed}: {range:?}");
             ranges += 1;
         }
         clear += usize::from(largest.verdict == ComponentVerdict::Clear);
     }
     assert!(clear >= 5 && ranges >= 9, "{clear} {ranges}");
+}
+
+/// A burst in two thirds of the record is listed. No polynomial follows one in a third of it, or a stronger
+/// one with the shape of a bell: what is listed is in doubt, also if noise describes the record better.
+#[test]
+fn a_burst_is_listed_or_in_doubt_and_no_piece_of_it_is_clear() {
+    let swell = |t: f64, lasts_s: f64| (TAU / 2.0 * ((t - 0.03) / lasts_s).clamp(0.0, 1.0)).sin().powi(2);
+    let sizes: [(&dyn Fn(f64) -> f64, bool); 3] = [
+        (&|t| 1e-5 * swell(t, 0.1), true),
+        (&|t| 1e-5 * swell(t, 0.05), false),
+        (&|t| 1e-4 * (-((t - 0.0625) / 0.02).powi(2)).exp(), true),
+    ];
+    let mut more_probable_without = 0;
+    for seed in 0..8 {
+        let hz = 325.0 + 60.0 * seed as f64;
+        for (k, (size, is_listed)) in sizes.iter().enumerate() {
+            let (found, samples) = taken_apart(|t| size(t) * (TAU * hz * t).cos(), 1e-7, seed);
+            let components = found.components(&record(&samples), &SpectrumSettings::default());
+            let is_it = |c: &crate::Component| (c.frequency_hz - hz).abs() < 2.0;
+            assert!(!is_listed || components.iter().any(is_it), "{k}, {hz} Hz: {components:?}");
+            let clear = components.iter().filter(|c| c.verdict == ComponentVerdict::Clear);
+            let mut wrong = clear.filter(|c| (c.frequency_hz - hz).abs() > 4.0 * c.frequency_sd_hz);
+            assert!(wrong.next().is_none(), "{k}, {hz} Hz: {components:?}");
+            let words = components.iter().flat_map(|c| &c.reasons).map(|reason| &reason.words);
+            more_probable_without += words.filter(|words| words.contains("more probable without it")).count();
+        }
+    }
+    assert!(more_probable_without > 0);
 }

@@ -12,24 +12,22 @@ impl OscillationReading {
     }
 
     /// The doubt that this oscillation is a piece of another one. First case: a much larger one nearby is
-    /// united from several, or has a polynomial amplitude, which is only an approximation. Second case: this
-    /// one drifts, and its range overlaps one that comes from a ridge. `followed` are the ranges that come
-    /// from ridges, cycles per record.
+    /// united from several, or a stronger one has a polynomial amplitude, which is only an approximation.
+    /// Second case: this one drifts, and its range overlaps one that comes from a ridge. `followed` are the
+    /// ranges that come from ridges, cycles per record.
     pub(super) fn describe_larger(&self, readings: &[Self], followed: &[FrequencyRange]) -> Option<String> {
         /// Distance, resolutions, from a changing oscillation within which a piece of it may lie.
         const REACH: f64 = 8.0;
         let changes = |other: &Self| {
-            let is_larger = other.amplitude_m() > MUCH_LARGER * self.amplitude_m();
-            let is_modulated = other.pieces > 1 || !other.atom.envelope.is_empty();
-            is_modulated && is_larger && (other.cycles - self.cycles).abs() < REACH
+            let is_united = other.pieces > 1 && other.amplitude_m() > MUCH_LARGER * self.amplitude_m();
+            let is_modulated = !other.atom.envelope.is_empty() && other.energy > self.energy;
+            (is_united || is_modulated) && (other.cycles - self.cycles).abs() < REACH
         };
         let crosses = |own: &FrequencyRange, other: &FrequencyRange| {
             own.low_hz < other.high_hz && other.low_hz < own.high_hz
         };
         if readings.iter().any(changes) {
-            return Some(
-                "a much larger oscillation nearby changes: it may be a piece of that one".to_owned(),
-            );
+            return Some("a larger oscillation nearby changes: it may be a piece of that one".to_owned());
         }
         let own = self.range.filter(|_| !self.has_ridge)?;
         followed.iter().any(|other| crosses(&own, other)).then(|| {

@@ -12,7 +12,8 @@ use portable_math as math;
 /// oscillation, and not a driven cycle.
 const DRIVEN_NEPERS: f64 = 3.0;
 
-/// Margin, in resolutions, on each side of two peaks that overlap if their oscillations may be united.
+/// Margin, in resolutions, on each side of two peaks that overlap if their oscillations may be united. Peaks
+/// in a Hann spectrum touch at half of this distance.
 const UNION_MARGIN: f64 = 2.5;
 
 impl PartSearch {
