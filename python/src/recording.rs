@@ -8,6 +8,7 @@ use pyo3::types::{PyBytes, PyDict};
 use std::path::PathBuf;
 use std::sync::Arc;
 use wiperlab::cli::read::{self, SpectrumOptions};
+use wiperlab::recording::files::RecordingFile;
 use wiperlab::recording::{self, FrameGrid, Traces};
 
 /// Tracked positions of tip and head in every frame.
@@ -18,6 +19,8 @@ pub struct PyRecording {
     /// Exposure of a frame, s, if known.
     #[pyo3(get)]
     exposure_s: Option<f64>,
+    /// The description, if the recording was read from a folder with one.
+    file: Option<Arc<RecordingFile>>,
 }
 
 /// Times of the frames: the time of each frame, s, or a constant frame rate, 1/s.
@@ -33,8 +36,9 @@ impl PyRecording {
     #[staticmethod]
     fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let loaded = workers::run_interruptible(py, None, move |_| read::read_recording(&path))?;
-        let (recording, exposure_s) = loaded.map_err(|failure| errors::failure_error(py, failure))?;
-        Ok(Self { inner: Arc::new(recording), exposure_s })
+        let (recording, file) = loaded.map_err(|failure| errors::failure_error(py, failure))?;
+        let exposure_s = file.as_ref().and_then(|file| file.camera.exposure_s);
+        Ok(Self { inner: Arc::new(recording), exposure_s, file: file.map(Arc::new) })
     }
 
     /// Makes a recording from columns with one value per frame; NaN means that a position was not tracked.
@@ -79,7 +83,7 @@ impl PyRecording {
             };
             let recording = recording.and_then(|recording| recording.with_frame_rate_sd(frame_rate_sd_hz));
             let recording = recording.map_err(|error| errors::input_error(py, format!("{name}: {error}")))?;
-            Ok(Self { inner: Arc::new(recording), exposure_s })
+            Ok(Self { inner: Arc::new(recording), exposure_s, file: None })
         })
     }
 
@@ -153,8 +157,9 @@ pub fn analyse<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let exposure_s = exposure_s.or(recording.exposure_s);
     let of = SpectrumOptions { channel, window, detrend, band_hz, max_components, exposure_s };
-    let inner = Arc::clone(&recording.inner);
-    let files = workers::run_detached(py, move || read::spectrum_files((*inner).clone(), &of))?;
+    let PyRecording { inner, file, .. } = recording.clone();
+    let files =
+        workers::run_detached(py, move || read::spectrum_files((*inner).clone(), file.as_deref(), &of))?;
     let all = PyDict::new(py);
     for (name, bytes) in files.map_err(|failure| errors::failure_error(py, failure))? {
         all.set_item(name, PyBytes::new(py, &bytes))?;

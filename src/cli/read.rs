@@ -5,6 +5,7 @@ use super::load::{load_recording, read_driven_scene};
 use super::spectrum::SpectrumArgs;
 use crate::fit::Problem;
 use crate::recording::Recording;
+use crate::recording::files::RecordingFile;
 use crate::simulate::scene::Scene;
 use std::path::{Path, PathBuf};
 
@@ -16,15 +17,14 @@ pub fn read_scene(path: &Path) -> Result<(Scene, Option<PathBuf>), Failure> {
     read_driven_scene(path)
 }
 
-/// Reads a recording, a folder with `trace.csv` or a single trace; also returns the exposure of a frame, s,
-/// if known.
+/// Reads a recording, a folder with `trace.csv` or a single trace; also returns its description, if it has
+/// one.
 ///
 /// # Errors
 /// As [`read_scene`].
-pub fn read_recording(path: &Path) -> Result<(Recording, Option<f64>), Failure> {
+pub fn read_recording(path: &Path) -> Result<(Recording, Option<RecordingFile>), Failure> {
     let loaded = load_recording(path)?;
-    let exposure_s = loaded.exposure_s();
-    Ok((loaded.recording, exposure_s))
+    Ok((loaded.recording, loaded.file))
 }
 
 /// Reads a job with its scenes and recordings.
@@ -68,16 +68,21 @@ pub struct SpectrumOptions {
     pub exposure_s: Option<f64>,
 }
 
-/// The files that `wiperlab spectrum` writes, by name.
+/// The files that `wiperlab spectrum` writes, by name. `file` is the description of the recording, if it has
+/// one.
 ///
 /// # Errors
 /// [`Failure::Input`] with file or option, what was found, what was expected and what to do.
-pub fn spectrum_files(recording: Recording, of: &SpectrumOptions) -> Result<Vec<(String, Vec<u8>)>, Failure> {
+pub fn spectrum_files(
+    recording: Recording,
+    file: Option<&RecordingFile>,
+    of: &SpectrumOptions,
+) -> Result<Vec<(String, Vec<u8>)>, Failure> {
     let mut args =
         SpectrumArgs::new(Path::new(""), &of.channel, &of.window, Path::new(""), Default::default());
     args.detrend.clone_from(&of.detrend);
     args.band = of.band_hz.map(|(low, high)| format!("{low}..{high}"));
     args.max_components = of.max_components.unwrap_or(args.max_components);
     args.exposure_s = of.exposure_s;
-    args.output_files(recording)
+    args.output_files(recording, file)
 }

@@ -11,6 +11,8 @@ use crate::figures::spectrum::{self, SpectraPlot};
 use crate::recording::Recording;
 use crate::recording::channel::{Channel, ReversalInstants, Window};
 use crate::recording::cycles::{CountedCycle, NoCycle};
+use crate::recording::files::RecordingFile;
+use crate::recording::quality::{Optics, QualityFinding, find_frequency_faults};
 use crate::simulate::twin::film::{DropoutPattern, film_like_recording};
 use plain_charts::Figure;
 use short_spectra::{Detrend, FASTEST_HZ, MAX_COMPONENTS, SpectralAnalysis, SpectrumSettings};
@@ -79,6 +81,8 @@ struct StudiedWindow {
     cycle: Result<CountedCycle, NoCycle>,
     /// The analysed frames and what was removed from them, as text.
     note: String,
+    /// Serious findings on the clock or the positions, which put every component in doubt.
+    faults: Vec<QualityFinding>,
     /// Advice on a better window, if the analysed window contains a whole flip of the blade.
     hint: Option<String>,
     /// Largest number of components in the list.
@@ -109,11 +113,15 @@ impl SpectrumArgs {
         }
     }
 
-    /// The files that the command would write, for a recording in memory.
-    pub(crate) fn output_files(&self, recording: Recording) -> Outcome<Vec<(String, Vec<u8>)>> {
+    /// The files that the command would write, for a recording in memory and its description.
+    pub(crate) fn output_files(
+        &self,
+        recording: Recording,
+        file: Option<&RecordingFile>,
+    ) -> Outcome<Vec<(String, Vec<u8>)>> {
         let request = self.parse_request()?;
         let exposure_s = self.given_exposure_s()?;
-        request.output_files(&request.study_recording(exposure_s, recording)?)
+        request.output_files(&request.study_recording(exposure_s, recording, file)?)
     }
 
     pub(crate) fn run(&self, global: &GlobalArgs) -> Outcome {
@@ -124,7 +132,10 @@ impl SpectrumArgs {
         let loaded = load_recording(&self.recording)?;
         steps.show_step("analysing the window");
         let Some(like) = &self.like else {
-            let studied = request.study_recording(self.exposure_for(&loaded)?, loaded.recording)?;
+            let studied = {
+                let exposure_s = self.exposure_for(&loaded)?;
+                request.study_recording(exposure_s, loaded.recording, loaded.file.as_ref())?
+            };
             let outputs = request.output_files(&studied)?;
             drop(steps);
             return self.write_and_print(global, &request, &outputs, &[&studied]);
@@ -135,12 +146,12 @@ impl SpectrumArgs {
         let place = format!("{} like {}", self.recording.display(), like.display());
         let filmed = film_like_recording(&loaded.recording, &model.recording, blur_s, FILM_SEED)
             .map_err(|error| Failure::at(place, error))?;
-        let mut simulated = request.study_recording(exposure_s, filmed.recording)?;
+        let mut simulated = request.study_recording(exposure_s, filmed.recording, None)?;
         let same = filmed.dropouts == DropoutPattern::SameFrames;
         let (frames, name) = (if same { "the same" } else { "as many" }, model.recording.name());
         let seen = format!("; seen as in {name}: its rate, exposure and noise, {frames} frames lost");
         simulated.note.push_str(&seen);
-        let measured = request.study_recording(exposure_s, model.recording)?;
+        let measured = request.study_recording(exposure_s, model.recording, model.file.as_ref())?;
         let mut outputs = request.output_files(&simulated)?;
         outputs.push(("components-like.json".to_owned(), tables::components_json(&measured)?));
         outputs.extend(figure_files("comparison", &request.comparison_figure(&simulated, &measured)));
@@ -199,8 +210,14 @@ impl SpectrumArgs {
 }
 
 impl SpectrumRequest {
-    fn study_recording(&self, exposure_s: Option<f64>, recording: Recording) -> Outcome<StudiedWindow> {
-        let recording = recording.move_to_grid();
+    /// Analyses the window of a recording. `file` is the description of the recording, if it has one.
+    fn study_recording(
+        &self,
+        exposure_s: Option<f64>,
+        taken: Recording,
+        file: Option<&RecordingFile>,
+    ) -> Outcome<StudiedWindow> {
+        let recording = taken.clone().move_to_grid();
         let instants = ReversalInstants::find_instants(&recording);
         let frames = self.window.resolve_frames(&recording, &instants).map_err(Failure::input)?;
         let grid = recording.grid();
@@ -210,7 +227,7 @@ impl SpectrumRequest {
         let refuse = |error| {
             Failure::Input(format!("{}, {} in `{}`: {error}", recording.name(), self.channel, self.window))
         };
-        let analysis = recording.analyse_samples(inside, exposure_s, &self.settings).map_err(refuse)?;
+        let mut analysis = recording.analyse_samples(inside, exposure_s, &self.settings).map_err(refuse)?;
         let hint = flip_hint(&instants, (grid.time_s(frames.start), grid.time_s(frames.end)));
         let frames = frames.start + analysis.skipped_frames..frames.end;
         let (from_s, to_s) = (grid.time_s(frames.start), grid.time_s(frames.end));
@@ -218,11 +235,39 @@ impl SpectrumRequest {
         let rate = grid.frame_rate_hz / stride as f64;
         let every = || format!(" (one of {stride} is tracked: {rate:.6} frames/s)");
         let kept = if stride == 1 { String::new() } else { every() };
+        let faults = self.find_faults(&taken, file, (from_s, to_s));
+        for fault in &faults {
+            let doubt = format!("a serious finding on the recording ({})", fault.check.name());
+            analysis.spectrum.components.iter_mut().for_each(|c| c.add_doubt(doubt.clone()));
+        }
         let uneven = recording.describe_resampling().map_or_else(String::new, |said| format!("; {said}"));
         let note = format!("{from_s:.4} s to {to_s:.4} s, {count} frames{kept}, {removed} removed{uneven}");
         let cycle = recording.count_cycles(frames.clone());
         let most_components = self.settings.max_components;
-        Ok(StudiedWindow { recording, exposure_s, frames, analysis, cycle, note, hint, most_components })
+        Ok(StudiedWindow {
+            recording,
+            exposure_s,
+            frames,
+            analysis,
+            cycle,
+            note,
+            faults,
+            hint,
+            most_components,
+        })
+    }
+
+    /// Serious findings on the clock of a recording, or on positions of the channel between two times, s.
+    fn find_faults(
+        &self,
+        recording: &Recording,
+        file: Option<&RecordingFile>,
+        (from_s, to_s): (f64, f64),
+    ) -> Vec<QualityFinding> {
+        let optics = file.map_or_else(Optics::default, |file| Optics::from(&file.camera));
+        let import = file.and_then(|file| file.source.as_ref()).map_or(&[][..], |source| &source.findings);
+        let frame = |time_s: f64| recording.frame_at_or_after(time_s).max(0.0) as usize;
+        find_frequency_faults(recording, &optics, import, self.channel, &(frame(from_s)..frame(to_s)))
     }
 
     fn output_files(&self, studied: &StudiedWindow) -> Outcome<Vec<(String, Vec<u8>)>> {

@@ -69,6 +69,16 @@ impl Channel {
         })
     }
 
+    /// Names of the columns of a recording from which the channel is computed.
+    pub(crate) fn columns(self) -> &'static [&'static str] {
+        match self {
+            Self::Deflection => &["tip-x", "head-x"],
+            Self::HeadDrop => &["head-y"],
+            Self::TipX => &["tip-x"],
+            Self::HeadX => &["head-x"],
+        }
+    }
+
     /// Value of the channel in every frame, m; `None` if a point that the channel needs was not tracked.
     #[must_use]
     pub fn samples(self, recording: &Recording) -> Vec<Option<f64>> {

@@ -21,7 +21,7 @@ mod tilt;
 mod untracked;
 
 use super::{FrameGrid, Recording};
-use crate::recording::channel::ReversalInstants;
+use crate::recording::channel::{Channel, ReversalInstants};
 use crate::text::{format_decimals, format_or_dash, to_ascii};
 pub(crate) use checks::check_position_steps;
 pub use finding::{Check, QualityFinding, Severity};
@@ -31,6 +31,7 @@ pub(crate) use mechanism::motion_lines;
 pub use mechanism::{MotionSummary, check_scene_height, measure_motion};
 pub use outliers::outlier_frames;
 use serde::Serialize;
+use std::ops::Range;
 pub use tilt::{CameraTilt, Curvature, TiltNotFound, measure_tilt};
 pub use untracked::{UntrackedFrames, drop_untracked, find_untracked_frames};
 
@@ -70,10 +71,31 @@ pub fn collect_findings(
     for column in &columns {
         found.extend(checks::check_track_column(column, recording.grid(), optics));
     }
-    found.extend(untracked::describe_untracked(recording.traces(), &untracked));
+    found.extend(untracked::describe_untracked(
+        recording.traces(),
+        &untracked,
+        &(0..recording.traces().tip_x_m.len()),
+    ));
     // (a stable sort keeps the order of the checks within a severity)
     found.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
     found
+}
+
+/// Serious findings that make the frequencies of a channel doubtful within `frames`: those of `import`, which
+/// concern the clock, and those on positions that nobody tracked.
+pub(crate) fn find_frequency_faults(
+    recording: &Recording,
+    optics: &Optics,
+    import: &[QualityFinding],
+    channel: Channel,
+    frames: &Range<usize>,
+) -> Vec<QualityFinding> {
+    let measured = measure_quality(recording, optics.exposure_s);
+    let mut untracked = find_untracked_frames(recording, &measured, optics);
+    untracked.retain(|found| channel.columns().iter().any(|column| column.starts_with(found.channel)));
+    let positions = untracked::describe_untracked(recording.traces(), &untracked, frames);
+    let found = import.iter().cloned().chain(positions);
+    found.filter(|finding| finding.severity == Severity::Serious).collect()
 }
 
 /// The recording and its quality without repeated and interpolated positions, whose noise is too small.

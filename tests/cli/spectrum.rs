@@ -273,6 +273,40 @@ fn a_simulated_trace_is_seen_as_the_recording_it_is_held_against() {
 }
 
 #[test]
+fn a_serious_finding_on_the_window_puts_every_component_in_doubt() {
+    let folder = recording();
+    let text = read(folder.path(), "trace.csv");
+    // the tip keeps its position for four frames out of ten in the second half
+    let mut held = String::new();
+    let mut tip = "";
+    for (row, line) in text.lines().enumerate() {
+        let cells: Vec<&str> = line.split(',').collect();
+        if row < 750 || row % 10 >= 4 {
+            tip = cells[1];
+        }
+        writeln!(held, "{},{tip},{}", cells[0], cells[2..].join(",")).unwrap();
+    }
+    std::fs::write(folder.path().join("trace.csv"), held).unwrap();
+    let verdicts = |window: &str| {
+        let said = wiperlab(folder.path(), &[".", "--window", window, "--force"]).success();
+        let said = String::from_utf8(said.get_output().stdout.clone()).unwrap();
+        let findings = json(folder.path(), "out/spectrum.json")["findings"].clone();
+        let found = components(folder.path());
+        let clear = found.iter().filter(|c| c["verdict"] == "clear").count();
+        (said, findings, clear, found)
+    };
+    let (said, findings, clear, _) = verdicts("0..0.14");
+    assert!(!said.contains("serious") && findings.as_array().unwrap().is_empty() && clear >= 1, "{said}");
+    let (said, findings, clear, found) = verdicts("0.16..0.3");
+    assert!(said.contains("serious: tip: ") && said.contains("repeat the last position exactly"), "{said}");
+    assert_eq!(findings[0]["check"], "held-points");
+    let doubt = "a serious finding on the recording (held-points)";
+    let is_doubted =
+        |c: &Value| c["reasons"].as_array().unwrap().iter().any(|reason| reason["words"] == doubt);
+    assert!(clear == 0 && !found.is_empty() && found.iter().all(is_doubted), "{found:?}");
+}
+
+#[test]
 fn bad_input_is_refused_with_code_2_and_writes_nothing() {
     let folder = recording();
     trace(&folder.path().join("fast"), 10_000.0, 3000, even);

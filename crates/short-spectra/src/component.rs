@@ -166,6 +166,16 @@ impl ComponentVerdict {
     }
 }
 
+impl Component {
+    /// Adds a reason for which the frequency is ambiguous that the record itself does not show.
+    pub fn add_doubt(&mut self, words: String) {
+        let verdict = ComponentVerdict::Ambiguous;
+        let graver = self.reasons.partition_point(|reason| reason.verdict <= verdict);
+        self.reasons.insert(graver, ComponentReason { verdict, words });
+        self.verdict = self.reasons[0].verdict;
+    }
+}
+
 /// A verdict with the numbers behind it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ComponentReason {

@@ -5,6 +5,7 @@ use crate::cli::failure::{Failure, Outcome};
 use crate::figures::analysis::CoursePoint;
 use crate::recording::channel::{Channel, ReversalInstants, phase_windows};
 use crate::recording::cycles::{CountedCycle, NoCycle};
+use crate::recording::quality::QualityFinding;
 use crate::text::{format_digits, format_milliseconds, format_percent, format_with_sd, pluralise, to_ascii};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -56,6 +57,8 @@ struct SpectrumDescription<'a> {
     /// Frequency range of the ridge, whether or not the ridge is listed as a drifting component.
     ridge_hz: Option<FrequencyRange>,
     note: &'a str,
+    /// Serious findings on the recording, which put every component in doubt.
+    findings: &'a [QualityFinding],
     hint: Option<&'a str>,
 }
 
@@ -97,6 +100,7 @@ pub(crate) fn description_json(request: &SpectrumRequest, studied: &StudiedWindo
             .and_then(|ridge| ridge.range_hz())
             .map(|range| recording.widen_range(range)),
         note: &studied.note,
+        findings: &studied.faults,
         hint: studied.hint.as_deref(),
     })
 }
@@ -168,6 +172,7 @@ pub(crate) fn print_summary(channel: Channel, studied: &StudiedWindow) {
         let frames = pluralise("frame", left_out);
         print_line!("{left_out} {frames} left out: mis-tracked, or within a jump");
     }
+    studied.faults.iter().for_each(|fault| print_line!("{}", fault.to_line()));
     studied.hint.iter().for_each(|hint| print_line!("{hint}"));
     print_components(from_s, spectrum);
     if spectrum.components.len() >= studied.most_components {

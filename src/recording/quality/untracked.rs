@@ -158,14 +158,22 @@ pub fn find_untracked_frames(
     found
 }
 
-/// Findings on frames in which a position was written but not tracked.
-pub(super) fn describe_untracked(traces: &Traces, found: &[UntrackedFrames]) -> Vec<QualityFinding> {
+/// Findings on frames, within the range `frames`, in which a position was written but not tracked.
+pub(super) fn describe_untracked(
+    traces: &Traces,
+    found: &[UntrackedFrames],
+    frames: &Range<usize>,
+) -> Vec<QualityFinding> {
     let Traces { tip_x_m, head_x_m, .. } = traces;
     let of = |untracked: &UntrackedFrames| {
+        let clip = |run: &Range<usize>| run.start.max(frames.start)..run.end.min(frames.end);
+        let runs = untracked.runs.iter().map(clip).filter(|run| !run.is_empty()).collect();
+        let within = UntrackedFrames { runs, ..*untracked };
         let x = if untracked.concerns("tip") { tip_x_m } else { head_x_m };
-        untracked.to_finding(x.iter().flatten().count())
+        let tracked = x.get(frames.clone()).into_iter().flatten().flatten().count();
+        (!within.runs.is_empty()).then(|| within.to_finding(tracked))
     };
-    found.iter().map(of).collect()
+    found.iter().filter_map(of).collect()
 }
 
 /// The traces without the positions that nobody tracked: both coordinates of the point are missing there.
