@@ -23,7 +23,7 @@ pub(crate) mod track_file;
 
 use super::error::ImportResult;
 use super::source::{ImportSource, base_name};
-pub(crate) use column::{ColumnMeaning, ColumnUnit, CoordinateUnit, TimeUnit};
+pub(crate) use column::{ColumnMeaning, ColumnUnit, CoordinateUnit, TimeUnit, squeeze_name};
 use encoding::DecodedText;
 pub(crate) use findings::new_finding;
 pub(crate) use instances::{InstanceFields, PointFields, RowOrder, RowPosition, RowStamp, TrackCollector};

@@ -48,6 +48,10 @@ pub(crate) fn is_playback_rate(rate_hz: f64) -> bool {
 const PHASE_GAIN: f64 = 0.1;
 /// Maximum number of digits to which a fitted frame rate is rounded.
 const RATE_DIGITS: usize = 16;
+/// Longest gaps, in frames, of the runs of rows that refine a guess of the time per frame one after another.
+const RUN_GAPS: [usize; 4] = [1, 8, 64, 512];
+/// Largest relative change of the guess by this.
+const MOST_REFINED: f64 = 0.3;
 /// Maximum number of times that the rows are numbered again after a line was fitted; once suffices unless the
 /// slope of the first line is far off.
 const ROUNDS: usize = 4;
@@ -96,7 +100,7 @@ pub(crate) fn number_frames(times_s: &[f64], seed_s: f64) -> Option<FrameFit> {
     if times_s.len() < 2 || seed_s <= 0.0 || too_long {
         return None;
     }
-    let mut frames = follow_grid(times_s, first, seed_s);
+    let mut frames = follow_grid(times_s, first, refine_step(times_s, first, seed_s));
     let mut line = fit_line(&frames, times_s);
     for _ in 0..ROUNDS {
         if !renumber_frames(&mut frames, times_s, line) {
@@ -105,6 +109,44 @@ pub(crate) fn number_frames(times_s: &[f64], seed_s: f64) -> Option<FrameFit> {
         line = fit_line(&frames, times_s);
     }
     Some(assess_fit(frames, times_s, line))
+}
+
+/// Time per frame from runs of rows without long gaps. A guess that comes from rounded times is too coarse to
+/// count the frames of a long gap. The slope within the runs is finer, and finer still with the gaps that it
+/// counts.
+fn refine_step(times_s: &[f64], first: f64, seed_s: f64) -> f64 {
+    let mut step_s = seed_s;
+    for longest in RUN_GAPS {
+        let frames = follow_grid(times_s, first, step_s);
+        let slope = slope_within_runs(&frames, times_s, longest);
+        step_s = slope.filter(|slope| (slope / seed_s - 1.0).abs() <= MOST_REFINED).unwrap_or(step_s);
+        if frames.windows(2).all(|pair| pair[1].abs_diff(pair[0]) <= longest) {
+            break;
+        }
+    }
+    step_s
+}
+
+/// Slope of time against frame number that all runs of rows share; a run ends where the next row is more than
+/// `longest` frames away. `None` if no run has two frames.
+fn slope_within_runs(frames: &[usize], times_s: &[f64], longest: usize) -> Option<f64> {
+    let (mut cross, mut square, mut start) = (0.0, 0.0, 0);
+    for end in 1..=frames.len() {
+        if end < frames.len() && frames[end].abs_diff(frames[end - 1]) <= longest {
+            continue;
+        }
+        let (of_frames, of_times) = (&frames[start..end], &times_s[start..end]);
+        let count = of_frames.len() as f64;
+        let mean_frame = of_frames.iter().map(|frame| *frame as f64).sum::<f64>() / count;
+        let mean_s = of_times.iter().sum::<f64>() / count;
+        for (frame, time_s) in of_frames.iter().zip(of_times) {
+            let from_mean = *frame as f64 - mean_frame;
+            cross += from_mean * (time_s - mean_s);
+            square += from_mean * from_mean;
+        }
+        start = end;
+    }
+    (square > 0.0).then(|| cross / square)
 }
 
 /// Nearest frame of every row on a grid whose phase follows the rows with [`PHASE_GAIN`].
@@ -138,13 +180,7 @@ fn fit_line(frames: &[usize], times_s: &[f64]) -> (f64, f64) {
     let count = frames.len() as f64;
     let mean_frame = frames.iter().map(|&n| n as f64).sum::<f64>() / count;
     let mean_time = times_s.iter().sum::<f64>() / count;
-    let (mut cross, mut square) = (0.0, 0.0);
-    for (&frame, time) in frames.iter().zip(times_s) {
-        let from_mean = frame as f64 - mean_frame;
-        cross += from_mean * (time - mean_time);
-        square += from_mean * from_mean;
-    }
-    let slope = cross / square;
+    let slope = slope_within_runs(frames, times_s, usize::MAX).unwrap_or(f64::NAN);
     (mean_time - slope * mean_frame, slope)
 }
 
@@ -188,6 +224,17 @@ mod tests {
         assert_eq!(fit.frames, (0..600).collect::<Vec<_>>());
         assert!((1.0 / fit.frame_s - 120.0).abs() < 0.01, "{}", 1.0 / fit.frame_s);
         assert!(fit.is_on_grid());
+    }
+
+    #[test]
+    fn the_frames_of_a_long_gap_are_counted_also_with_rounded_times() {
+        for (rate_hz, gap) in [(1500.0, 300), (700.0, 300), (7000.0, 3000), (124.37, 900)] {
+            let frames: Vec<usize> = (0..40).chain(40 + gap..80 + gap).collect();
+            let rounded = |frame: &usize| (*frame as f64 / rate_hz * 1e5).round() / 1e5;
+            let times: Vec<f64> = frames.iter().map(rounded).collect();
+            let fit = number_frames(&times, median_step_s(&times).unwrap()).unwrap();
+            assert_eq!(fit.frames, frames, "{rate_hz}");
+        }
     }
 
     #[test]

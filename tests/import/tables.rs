@@ -285,8 +285,8 @@ fn tables_of_mtrackj_without_times_are_refused() {
     let project =
         says("a.mdf", "MTrackJ 1.5.1 Data File\nAssembly 1 FF0000\nPoint 1 101.5 200.25 1.0 1.0 1.0\n");
     assert!(project.contains("a project of MTrackJ (.mdf)"), "{project}");
-    let hours = says("a.txt", &replaced(MTRACKJ, "t [sec]", "t [hour]"));
-    assert!(hours.contains("--time UNIT"), "{hours}");
+    let unknown = says("a.txt", &replaced(MTRACKJ, "t [sec]", "t [fortnight]"));
+    assert!(unknown.contains("--time UNIT"), "{unknown}");
 }
 
 #[test]

@@ -151,7 +151,7 @@ fn a_quantity_that_is_no_position_is_no_position() {
     }
     let names = "time (mm),tip x (mm),tip y (mm),head x (mm),head y (mm)";
     let says = refused(&table(names, 20, seconds, [1e-3; 2], 2000.0), &at_rate(2000.0, Some(BY_NUMBER)));
-    assert!(says.contains("--columns time=1: found another unit"), "{says}");
+    assert!(says.contains("column 1 is called `time (mm)`; expected times in s, ms"), "{says}");
 }
 
 #[test]
@@ -395,4 +395,204 @@ fn the_uncertainty_of_the_rate_is_part_of_the_recording() {
     assert!((sd(at_rate(2000.0, None)).unwrap() - 0.1 / 3_f64.sqrt()).abs() < 1e-12);
     let real = ImportOptions { time: Some(TimeColumn::Real), ..options(None) };
     assert!((sd(real).unwrap() - 0.1 / 3_f64.sqrt()).abs() < 1e-9);
+}
+
+#[test]
+fn units_of_times_in_every_spelling_are_read_or_refused_by_every_route() {
+    let real = |columns| ImportOptions { time: Some(TimeColumn::Real), ..options(columns) };
+    let text = |name: &str, unit_s: f64| {
+        let names = format!("{name},tip x [mm],tip y [mm],head x [mm],head y [mm]");
+        let time = |row: usize| format!("{:.12}", row as f64 / 2000.0 / unit_s);
+        table(&names, 300, time, [1e-3; 2], 2000.0)
+    };
+    for (name, unit_s) in [
+        ("t/ms", 1e-3),
+        ("Zeit/ms", 1e-3),
+        ("time_min", 60.0),
+        ("t/min", 60.0),
+        ("time (hours)", 3600.0),
+        ("time_h", 3600.0),
+        ("time/us", 1e-6),
+        ("time_millis", 1e-3),
+        ("time [0.1 ms]", 1e-4),
+    ] {
+        for columns in [None, Some(BY_NUMBER)] {
+            let found = read(&text(name, unit_s), &real(columns));
+            let rate_hz = found.recording.grid().frame_rate_hz;
+            assert!((rate_hz / 2000.0 - 1.0).abs() < 1e-4, "{name}: {rate_hz}");
+        }
+    }
+    for name in ["time (1/100 s)", "time x1000 (s)", "time_s_x1000", "sec/100", "ticks", "time (fortnights)"]
+    {
+        for columns in [None, Some(BY_NUMBER)] {
+            let says = refused(&text(name, 1.0), &real(columns));
+            assert!(says.starts_with("run.csv:1:1: ") && says.contains(name), "{name}: {says}");
+        }
+    }
+    // a time whose unit is not known is left out beside frame numbers
+    let names = "frame,ticks,tip x [mm],tip y [mm],head x [mm],head y [mm]";
+    let both = |row: usize| format!("{row},{}", 7 * row);
+    assert_positions(&read(&table(names, 60, both, [1e-3; 2], 2000.0), &at_rate(2000.0, None)), 2000.0);
+}
+
+#[test]
+fn units_of_lengths_in_every_spelling_are_read_and_contradictions_are_refused() {
+    let seconds = |row: usize| format!("{:.4}", row as f64 / 2000.0);
+    let text = |unit: &str, unit_m: f64| {
+        let names: Vec<String> =
+            ["tip x", "tip y", "head x", "head y"].map(|name| unit.replace("NAME", name)).into();
+        table(&format!("time_s,{}", names.join(",")), 200, seconds, [unit_m; 2], 2000.0)
+    };
+    for (unit, unit_m) in [
+        ("NAME/mm", 1e-3),
+        ("NAME (0.1 mm)", 1e-4),
+        ("NAME (nm)", 1e-9),
+        ("NAME (dm)", 0.1),
+        ("NAME (ft)", 0.3048),
+    ] {
+        for columns in [None, Some(BY_NUMBER)] {
+            let found = read(&text(unit, unit_m), &at_rate(2000.0, columns));
+            let [x, ..] = position_m(100.0 / 2000.0);
+            assert!(
+                (found.recording.traces().tip_x_m[100].unwrap() - x).abs() < 1e-6 * unit_m.max(0.1),
+                "{unit}"
+            );
+            let says = refused(
+                &text(unit, unit_m),
+                &ImportOptions { scale: Some(CoordinateScale::Unit(0.01)), ..at_rate(2000.0, columns) },
+            );
+            assert!(says.starts_with("--scale: "), "{unit}: {says}");
+        }
+    }
+    let names = "time_s,tip x (cm),tip y (cm),head x (cm),head y (cm)\ns,mm,mm,mm,mm";
+    for columns in [None, Some(BY_NUMBER)] {
+        let says = refused(&table(names, 20, seconds, [1e-3; 2], 2000.0), &at_rate(2000.0, columns));
+        assert!(says.contains("column 2 is called `tip x (cm)`, but line 2 gives `mm` for it"), "{says}");
+    }
+    // a setting above the table names the unit of all columns
+    let names = "Length Units,mm,,,\nt,tip_x,tip_y,head_x,head_y";
+    let with_setting = table(names, 200, seconds, [1e-3; 2], 2000.0);
+    for columns in [None, Some(BY_NUMBER)] {
+        assert_positions(&read(&with_setting, &at_rate(2000.0, columns)), 2000.0);
+        let scale = Some(CoordinateScale::Unit(0.01));
+        let says = refused(&with_setting, &ImportOptions { scale, ..at_rate(2000.0, columns) });
+        assert!(says.contains("line 1: `Length Units` is `mm`"), "{says}");
+    }
+}
+
+#[test]
+fn frame_numbers_and_times_that_part_are_refused_at_their_row() {
+    let names = "frame,time_s,tip_x,tip_y,head_x,head_y";
+    let text = |clocks: &dyn Fn(usize) -> (usize, f64)| {
+        let both = |row: usize| {
+            let (frame, time_s) = clocks(row);
+            format!("{frame},{time_s:.6}")
+        };
+        table(names, 200, both, [1e-3; 2], 1000.0)
+    };
+    let real = || in_mm(ImportOptions { time: Some(TimeColumn::Real), ..options(None) });
+    // a pause that only the times show, and lost frames that only the numbers show
+    let pause = |row: usize| (row, row as f64 / 1000.0 + if row < 50 { 0.0 } else { 0.0204 });
+    let lost = |row: usize| (row + if row < 50 { 0 } else { 20 }, row as f64 / 1000.0);
+    for clocks in [&pause as &dyn Fn(usize) -> (usize, f64), &lost] {
+        for options in [real(), in_mm(at_rate(1000.0, None))] {
+            let says = refused(&text(clocks), &options);
+            assert!(says.starts_with("run.csv:52:1: found a step of "), "{says}");
+            assert!(says.contains("expected frame numbers and times that agree"), "{says}");
+        }
+    }
+    // lost frames in both, and times that are rounded to whole frames
+    let both = |row: usize| {
+        let frame = row + if row < 50 { 0 } else { 20 };
+        (frame, frame as f64 / 1000.0)
+    };
+    assert_eq!(read(&text(&both), &real()).recording.grid().frames, 220);
+    let coarse = |row: usize| (row, (row as f64 / 1300.0 * 1e3).round() / 1e3);
+    assert!((read(&text(&coarse), &real()).recording.grid().frame_rate_hz / 1300.0 - 1.0).abs() < 0.01);
+}
+
+#[test]
+fn a_long_gap_in_rounded_times_keeps_its_frames() {
+    for rate_hz in [700.0, 1500.0, 7000.0] {
+        let mut text = String::from("time_s,tip_x,head_x\n");
+        for frame in (0..40).chain(340..380) {
+            let time_s = f64::from(frame) / rate_hz;
+            writeln!(
+                text,
+                "{time_s:.5},{:.6},{:.6}",
+                1e3 * position_m(time_s)[0],
+                1e3 * position_m(time_s)[2]
+            )
+            .unwrap();
+        }
+        for options in
+            [ImportOptions { time: Some(TimeColumn::Real), ..options(None) }, at_rate(rate_hz, None)]
+        {
+            let grid = read(&text, &in_mm(options)).recording.grid();
+            assert_eq!(grid.frames, 380, "{rate_hz}");
+            assert!((grid.frame_rate_hz / rate_hz - 1.0).abs() < 1e-9, "{}", grid.frame_rate_hz);
+        }
+    }
+}
+
+#[test]
+fn separators_of_thousands_are_refused_in_every_delimiter() {
+    let numbers = [900, 940, 980, 1020, 1060, 1100, 1140, 1180];
+    let text = |delimiter: &str, separate: &dyn Fn(i32) -> String| {
+        let row =
+            |(frame, x): (usize, &i32)| [frame.to_string(), separate(*x), separate(x + 7000)].join(delimiter);
+        let rows: Vec<String> = numbers.iter().enumerate().map(row).collect();
+        format!("{}\n{}\n", ["frame", "tip_x_um", "head_x_um"].join(delimiter), rows.join("\n"))
+    };
+    let grouped = |mark: &'static str| {
+        move |x: i32| if x < 1000 { x.to_string() } else { format!("{}{mark}{:03}", x / 1000, x % 1000) }
+    };
+    for (delimiter, mark) in [(";", ","), ("\t", ","), (";", "."), ("\t", "."), ("\t", " "), (";", "\u{a0}")]
+    {
+        let says = refused(&text(delimiter, &grouped(mark)), &at_rate(1000.0, None));
+        assert!(says.starts_with("run.csv:"), "{delimiter:?} {mark:?}: {says}");
+    }
+    // decimals of three digits next to whole numbers
+    let decimals = |x: i32| {
+        if x % 100 == 0 { (x / 100).to_string() } else { format!("{},{:03}", x / 100, x % 100 * 10) }
+    };
+    let found = read(&text(";", &decimals), &at_rate(1000.0, None));
+    assert_eq!(found.recording.traces().tip_x_m[1], Some(9.4e-6));
+    // exponents as Fortran writes them
+    let fortran = |x: i32| format!("{x}.0D-03");
+    let found = read(&text(",", &fortran), &at_rate(1000.0, None));
+    assert!((found.recording.traces().tip_x_m[1].unwrap() - 9.4e-7).abs() < 1e-20);
+}
+
+#[test]
+fn a_column_that_names_objects_is_not_left_out_in_silence() {
+    let mut text = String::from("frame,x,y,shot\n");
+    for (object, at) in [(0, 0.0), (1, 49.0)] {
+        for row in 0..30 {
+            writeln!(text, "{},{:.3},{:.3},{object}", 30 * object + row, at + 0.01 * f64::from(row), 5.0)
+                .unwrap();
+        }
+    }
+    let plain = in_mm(ImportOptions { tip: Some("run".to_owned()), ..at_rate(1000.0, None) });
+    let says = refused(&text, &plain);
+    assert!(says.starts_with("run.csv:32:1: column 4 (`shot`) is not read, but the point jumps"), "{says}");
+    let chosen = ImportOptions {
+        tip: Some("1".to_owned()),
+        ..in_mm(at_rate(1000.0, Some("frame=1,x=2,y=3,track=4")))
+    };
+    assert_eq!(read(&text, &chosen).recording.grid().frames, 30);
+    let left_out =
+        ImportOptions { tip: Some("run".to_owned()), ..in_mm(at_rate(1000.0, Some("frame=1,x=2,y=3"))) };
+    let found = read(&text, &left_out);
+    assert!(found.report.findings.iter().any(|finding| finding.found.contains("`shot`")));
+    // a column of another kind does not jump with the point
+    let phases: String = text
+        .lines()
+        .enumerate()
+        .map(|(row, line)| match row {
+            0 => format!("{line}\n"),
+            _ => format!("{},{},5.0,{}\n", row - 1, 0.01 * row as f64, row / 20),
+        })
+        .collect();
+    assert_eq!(read(&phases, &plain).recording.grid().frames, 60);
 }

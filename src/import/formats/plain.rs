@@ -34,12 +34,14 @@ impl FileFormat for PlainFormat {
 
     fn read<'a>(&self, document: &'a Document<'a>, options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
         let table = document.table()?;
-        let columns = match &options.columns {
+        let mut columns = match &options.columns {
             Some(map) => find_mapped_columns(table, map)?,
             None if self.name == PLAIN.name => find_header_columns(table)?,
             None => return Err(unnamed_columns_error(table)),
         };
+        columns.refuse_unreadable_times(table)?;
         columns.refuse_other_clocks(table)?;
+        let objects = columns.check_unread_objects(table)?;
         let (layout, start) = (columns.table_layout(table, document.stem), columns.start);
         if layout.key == [0] {
             let advice = "rename it; if the line is a comment, move it above the header";
@@ -47,9 +49,10 @@ impl FileFormat for PlainFormat {
             table.refuse_comment_names(line, "the name of an object", advice)?;
         }
         let time = columns.time.map_or(TimeUnit::AssumedSeconds, |time| time.1);
-        let mut export = layout.read_tracks(document, table, Facts { time, ..Facts::default() })?;
+        let unit = columns.unit_above(table);
+        let mut export = layout.read_tracks(document, table, Facts { time, unit, ..Facts::default() })?;
         export.notes.push(columns.describe(table));
-        export.findings.extend(columns.unused_clock_finding(table)?);
+        export.findings.extend(columns.unused_clock_finding(table)?.into_iter().chain(objects));
         Ok(export)
     }
 }
@@ -95,6 +98,104 @@ impl TableColumns {
         let names = self.header.and_then(|row| table.head.get(row)).map_or(&[][..], |row| &row.cells);
         let meanings = names.iter().enumerate().filter(|(column, _)| !used.contains(column));
         meanings.filter_map(|(column, name)| Some((column, ColumnMeaning::parse_clock(name)?))).collect()
+    }
+
+    /// Leaves out times whose unit is not known if the rows have frame numbers, and refuses them otherwise.
+    fn refuse_unreadable_times(&mut self, table: &DelimitedTable) -> ImportResult<()> {
+        let Some((column, _)) = self.time.filter(|(_, unit)| *unit == TimeUnit::Unreadable) else {
+            return Ok(());
+        };
+        if self.frame.is_some() {
+            self.time = None;
+            return Ok(());
+        }
+        let line = self.header.and_then(|row| table.head.get(row)).map_or(1, |row| row.line);
+        let problem = format!(
+            "column {} is called `{}`; expected times in s, ms, us, ns, min, h or d",
+            column + 1,
+            self.name(table, column)
+        );
+        let advice = "correct the name in a copy of the file, with times in one of these units, or name a column \
+                      that counts frames (--columns frame=...)";
+        Err(ImportError::columns(table.file, line, problem, advice))
+    }
+
+    /// The unit of length that a setting above the table states, with its source.
+    fn unit_above(&self, table: &DelimitedTable) -> Fact<CoordinateUnit> {
+        /// Names of the setting, in lower case and without separators.
+        const NAMES: [&str; 6] = [
+            "lengthunit",
+            "lengthunits",
+            "unitoflength",
+            "coordinateunit",
+            "coordinateunits",
+            "positionunits",
+        ];
+        let settings = table.head.iter().take(self.header.unwrap_or(self.start));
+        settings.flat_map(|row| row.cells.windows(2).map(move |pair| (row.line, pair))).find_map(
+            |(line, pair)| {
+                NAMES.contains(&squeeze_name(&pair[0]).as_str()).then_some(())?;
+                Some((
+                    CoordinateUnit::parse(&pair[1])?,
+                    format!("line {line}: `{}` is `{}`", pair[0], pair[1]),
+                ))
+            },
+        )
+    }
+
+    /// The column that seems to name the objects of a table whose rows become one track. It is not read,
+    /// keeps each of its few values for several rows, and the point jumps where the value changes.
+    fn find_unread_objects(&self, table: &DelimitedTable) -> ImportResult<Option<ObjectColumn>> {
+        let [point] = &self.points[..] else { return Ok(None) };
+        let used = self.used_columns();
+        let width = self.header.and_then(|row| table.head.get(row)).map_or(0, TextRow::used_width);
+        let mut candidates: Vec<ObjectColumn> =
+            (0..width).filter(|column| !used.contains(column)).map(ObjectColumn::new).collect();
+        if candidates.is_empty() || self.track.is_some() {
+            return Ok(None);
+        }
+        let coordinates: Vec<usize> = point.x.iter().chain(&point.y).copied().collect();
+        let (mut last, mut steps) = (None, vec![]);
+        table.find_in_rows(self.start, |record| {
+            let numbers = coordinates.iter().map(|cell| table.parse_cell(record.cell(*cell)).value());
+            let Some(now) = numbers.collect::<Option<Vec<f64>>>() else { return Ok(None::<()>) };
+            let step = last.as_ref().map_or(0.0, |last: &Vec<f64>| {
+                last.iter().zip(&now).map(|(last, now)| (now - last).abs()).fold(0.0, f64::max)
+            });
+            last = Some(now);
+            steps.push(step);
+            let rows = steps.len();
+            candidates.retain_mut(|column| column.add_row(record.cell(column.at), step, record.line, rows));
+            Ok(candidates.is_empty().then_some(()))
+        })?;
+        let place = (ObjectColumn::USUAL * steps.len().saturating_sub(1) as f64) as usize;
+        if candidates.is_empty() || steps.is_empty() {
+            return Ok(None);
+        }
+        let usual = *steps.select_nth_unstable_by(place, f64::total_cmp).1;
+        Ok(candidates.into_iter().find(|column| column.names_objects(usual)))
+    }
+
+    /// Refuses a table of several objects that would become one track. If `--columns` names the columns, this
+    /// is a finding.
+    fn check_unread_objects(&self, table: &DelimitedTable) -> ImportResult<Option<QualityFinding>> {
+        let Some(found) = self.find_unread_objects(table)? else { return Ok(None) };
+        let (number, name) = (found.at + 1, self.name(table, found.at));
+        let problem = format!(
+            "column {number} (`{name}`) is not read, but the point jumps where its value changes from `{}` to `{}`, \
+             as if it named the object of a row",
+            found.texts[0], found.texts[1]
+        );
+        if !self.by_header {
+            let value = (found.changes as f64, "changes");
+            let advice = format!("if it does, add track={number} to --columns");
+            return Ok(Some(new_finding(Check::Points, Severity::Caution, value, problem, &advice)));
+        }
+        let advice = format!(
+            "if it does, add --columns frame=A,x=B,y=C,track={number} with the numbers of the other columns; if not, \
+             leave track={number} out"
+        );
+        Err(ImportError::columns(table.file, found.line, problem, advice))
     }
 
     /// Refuses a table with another clock that differs from the one that is read.
@@ -196,6 +297,57 @@ impl TableColumns {
         let advice = "name that column: --columns time=...; frequencies and times are wrong without it";
         let value = (fit.worst_frames, "frames");
         Ok(Some(new_finding(Check::UnevenClock, Severity::Serious, value, found, advice)))
+    }
+}
+
+/// A column that is not read, and whose values may name the objects of the rows.
+struct ObjectColumn {
+    at: usize,
+    /// The first two values.
+    texts: [String; 2],
+    last: String,
+    /// Number of changes from a row to the next.
+    changes: usize,
+    /// Smallest step of the point where the value changes.
+    least_step: f64,
+    /// Line of the first change.
+    line: usize,
+}
+
+impl ObjectColumn {
+    /// Quantile of the steps from row to row with which the steps at the changes are compared.
+    const USUAL: f64 = 0.9;
+    /// Ratio of the two steps from which the point jumps.
+    const JUMP: f64 = 10.0;
+    /// Smallest number of rows of an object on average.
+    const LEAST_ROWS: usize = 3;
+    /// Number of rows after which this average is taken.
+    const ROWS_TRIED: usize = 100;
+
+    fn new(at: usize) -> Self {
+        let texts = [String::new(), String::new()];
+        Self { at, texts, last: String::new(), changes: 0, least_step: f64::INFINITY, line: 0 }
+    }
+
+    /// Adds a row, where the point has moved by `step` since the row before. Returns whether the column may
+    /// still name objects.
+    fn add_row(&mut self, text: &str, step: f64, line: usize, rows: usize) -> bool {
+        if rows == 1 {
+            text.clone_into(&mut self.last);
+        } else if text != self.last {
+            if self.changes == 0 {
+                (self.texts, self.line) = ([self.last.clone(), text.to_owned()], line);
+            }
+            text.clone_into(&mut self.last);
+            self.changes += 1;
+            self.least_step = self.least_step.min(step);
+        }
+        rows < Self::ROWS_TRIED || Self::LEAST_ROWS * self.changes <= rows
+    }
+
+    /// Whether the values name objects, if `usual` is a usual step of the point.
+    fn names_objects(&self, usual: f64) -> bool {
+        self.changes > 0 && self.least_step > Self::JUMP * usual && usual > 0.0
     }
 }
 

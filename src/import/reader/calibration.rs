@@ -147,7 +147,7 @@ fn convert_times(export: &mut TrackFile, options: &ImportOptions) -> ImportResul
         (Some(TimeColumn::Milliseconds), _) => MILLISECOND_S,
         (_, TimeUnit::Seconds(seconds)) => seconds,
         (Some(TimeColumn::Real | TimeColumn::Playback), _) | (None, TimeUnit::AssumedSeconds) => 1.0,
-        (None, TimeUnit::Unknown) => {
+        (None, TimeUnit::Unknown | TimeUnit::Unreadable) => {
             for clock in export.clocks.iter_mut().filter(|clock| clock.frame.is_some()) {
                 clock.time = None;
             }

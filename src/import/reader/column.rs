@@ -9,16 +9,21 @@ const FRAMES: &str = "frame frames frameno framenr framenumber framenum frameidx
     bildnr bildnummer \u{30d5}\u{30ec}\u{30fc}\u{30e0} \u{30d5}\u{30ec}\u{30fc}\u{30e0}\u{756a}\u{53f7} \u{30b3}\u{30de}";
 /// Names of columns of times, in lower case and without separators, with the unit that a name implies (`None`
 /// if it implies none).
-const TIMES: [(&str, Option<TimeUnit>); 4] = [
+const TIMES: [(&str, Option<TimeUnit>); 5] = [
     // (the last name is the Japanese word jikan, time)
     ("t time zeit temps tempo tiempo \u{6642}\u{9593}", None),
     // (a timestamp may be in seconds or milliseconds, and may count from 1970)
     ("timestamp", Some(TimeUnit::Unknown)),
     ("seconds second sec timesec", Some(TimeUnit::Seconds(1.0))),
     ("milliseconds millisecond msec ms timems timemsec", Some(TimeUnit::Seconds(1e-3))),
+    ("tick ticks", Some(TimeUnit::Unreadable)),
 ];
+/// Units of time that are also words or names, so a column name that ends in one of them names a unit only if
+/// a name of times comes before it.
+const TIME_UNITS_THAT_ARE_WORDS: &str = "min h hr d cs ds ks day";
 /// Names of columns that name the object to which a row belongs, in lower case and without separators.
-const KEYS: &str = "id track trackid objectid object particle marker point label name";
+const KEYS: &str = "id track trackid trackno tracknr trackindex trajectory trajectoryid objectid objectno objectnr object \
+    particle marker point pointid label name spot target ball cell";
 const CONFIDENCES: &str = "confidence likelihood score conf";
 /// Parts of column names that mark speeds, forces and other quantities that are not positions.
 const NOT_POSITIONS: &str =
@@ -106,8 +111,8 @@ impl ColumnMeaning {
     }
 }
 
-/// Splits a column name such as `x (mm)`, `x [mm]` or `tip_x_px` into name and unit; the unit is `None` if
-/// there is none.
+/// Splits a column name such as `x (mm)`, `x [mm]`, `x/mm` or `tip_x_px` into name and unit; the unit is
+/// `None` if there is none.
 fn split_unit(name: &str) -> (&str, Option<&str>) {
     let name = name.trim();
     for (open, close) in [('(', ')'), ('[', ']')] {
@@ -115,12 +120,24 @@ fn split_unit(name: &str) -> (&str, Option<&str>) {
             return (base.trim_end_matches([' ', '_']), Some(unit.trim()));
         }
     }
+    // (`tip/x` is the x of a point, not a unit)
+    let is_unit = |unit: &str| unit.split('/').all(|part| is_simple_unit(part) || starts_with_digit(part));
+    // (nor has `m/s` a name before its unit, nor `rate 1/s`)
+    let is_named = |(base, unit): &(&str, &str)| {
+        let last = base.rsplit(' ').next().unwrap_or(base);
+        let is_name = !last.is_empty() && !starts_with_digit(last);
+        is_name && is_unit(unit) && (starts_with_digit(unit) || !is_simple_unit(base))
+    };
+    if let Some((base, unit)) = name.split_once('/').filter(is_named) {
+        return (base.trim_end(), Some(unit.trim()));
+    }
     match name.rsplit_once(['_', ' ']) {
-        // (`in` and `min` are also words, so inches and minutes need brackets)
+        // (`in` is also a word, so inches need brackets)
         Some((base, unit))
             if !base.is_empty()
-                && !["in", "min"].contains(&unit)
-                && (CoordinateUnit::parse(unit).is_some() || TimeUnit::parse(unit).is_some()) =>
+                && unit != "in"
+                && is_simple_unit(unit)
+                && (!is_listed(TIME_UNITS_THAT_ARE_WORDS, unit) || is_name_of_times(base)) =>
         {
             (base, Some(unit))
         }
@@ -128,15 +145,42 @@ fn split_unit(name: &str) -> (&str, Option<&str>) {
     }
 }
 
+/// Whether a text is a unit of length or of time, without a factor.
+fn is_simple_unit(text: &str) -> bool {
+    !starts_with_digit(text) && (CoordinateUnit::parse(text).is_some() || TimeUnit::parse(text).is_some())
+}
+
+fn starts_with_digit(text: &str) -> bool {
+    text.trim_start().starts_with(|c: char| c.is_ascii_digit() || c == '.')
+}
+
+fn is_name_of_times(base: &str) -> bool {
+    TIMES.iter().any(|(names, _)| is_listed(names, &squeeze_name(base)))
+}
+
+/// Whether a name contains a factor, such as `x1000` or `1e3`, behind a name of times.
+fn scales_times(base: &str) -> bool {
+    let mut parts = base.split(SEPARATORS);
+    let is_factor = |part: &str| {
+        let number = part.trim_start_matches(['x', 'X', '*', '\u{d7}']);
+        starts_with_digit(number)
+            && (number.len() < part.len() || number.parse::<f64>().is_ok_and(|n| n >= 100.0))
+    };
+    parts.next().is_some_and(is_name_of_times) && parts.any(is_factor)
+}
+
 fn parse_clock(base: &str, unit: Option<&str>) -> Option<ColumnMeaning> {
     let plain = squeeze_name(base);
     if is_listed(FRAMES, &plain) {
         return unit.is_none().then_some(ColumnMeaning::Frame);
     }
+    if scales_times(base) {
+        return Some(ColumnMeaning::Time(TimeUnit::Unreadable));
+    }
     let (_, own) = TIMES.iter().find(|(names, _)| is_listed(names, &plain))?;
     Some(match (unit, own) {
         (Some(unit), _) if squeeze_name(unit).starts_with("frame") => ColumnMeaning::Frame,
-        (Some(unit), _) => ColumnMeaning::Time(TimeUnit::parse(unit).unwrap_or(TimeUnit::Unknown)),
+        (Some(unit), _) => ColumnMeaning::Time(TimeUnit::parse(unit).unwrap_or(TimeUnit::Unreadable)),
         (None, own) => ColumnMeaning::Time(own.unwrap_or(TimeUnit::AssumedSeconds)),
     })
 }
@@ -181,7 +225,7 @@ fn is_listed(list: &str, name: &str) -> bool {
 }
 
 /// The name in lower case, without separators.
-fn squeeze_name(name: &str) -> String {
+pub(crate) fn squeeze_name(name: &str) -> String {
     name.chars().filter(|c| !SEPARATORS.contains(c)).flat_map(char::to_lowercase).collect()
 }
 
@@ -197,6 +241,8 @@ pub(crate) enum TimeUnit {
     AssumedSeconds,
     /// Unknown: the format allows several units, and the file does not name its unit.
     Unknown,
+    /// The file names a unit that is not known.
+    Unreadable,
 }
 
 impl TimeUnit {
@@ -205,17 +251,25 @@ impl TimeUnit {
         if let Self::Seconds(seconds) = self { seconds } else { 1.0 }
     }
 
-    /// Reads `s`, `sec`, `ms`, ...; `None` for any other name.
+    /// Reads `s`, `sec`, `ms`, `0.1 ms`, ...; `None` for any other name.
     pub(crate) fn parse(name: &str) -> Option<Self> {
-        let seconds = match trim_brackets(name).to_lowercase().as_str() {
+        let name = trim_brackets(name).to_lowercase();
+        let (factor, symbol) = split_factor(&name)?;
+        let seconds = match symbol {
             "s" | "sec" | "secs" | "second" | "seconds" => 1.0,
-            "ms" | "msec" | "millisecond" | "milliseconds" => 1e-3,
-            "min" | "minute" | "minutes" => 60.0,
-            "us" | "usec" | "\u{b5}s" | "\u{3bc}s" | "microsecond" | "microseconds" => 1e-6,
-            "ns" | "nsec" | "nanosecond" | "nanoseconds" => 1e-9,
+            "ms" | "msec" | "millis" | "millisec" | "millisecond" | "milliseconds" => 1e-3,
+            "h" | "hr" | "hrs" | "hour" | "hours" => 3600.0,
+            "d" | "day" | "days" => 86_400.0,
+            "min" | "mins" | "minute" | "minutes" => 60.0,
+            "us" | "usec" | "\u{b5}s" | "\u{3bc}s" | "micros" | "microsec" | "microsecond"
+            | "microseconds" => 1e-6,
+            "ns" | "nsec" | "nanos" | "nanosec" | "nanosecond" | "nanoseconds" => 1e-9,
+            "cs" => 1e-2,
+            "ds" => 0.1,
+            "ks" => 1000.0,
             _ => return None,
         };
-        Some(Self::Seconds(seconds))
+        Some(Self::Seconds(factor * seconds))
     }
 }
 
@@ -229,15 +283,22 @@ pub(crate) enum CoordinateUnit {
 }
 
 impl CoordinateUnit {
-    /// Reads `px`, `pixel`, `mm`, `micron`, ...; `None` for any other name.
+    /// Reads `px`, `pixel`, `mm`, `0.1 mm`, `micron`, ...; `None` for any other name.
     pub(crate) fn parse(name: &str) -> Option<Self> {
         let name = trim_brackets(name).to_lowercase();
-        match name.as_str() {
-            "px" | "pixel" | "pixels" => Some(Self::Pixel),
-            "micron" | "microns" | "micrometer" | "micrometre" => Some(Self::Metres(1e-6)),
-            "inch" | "in" => Some(Self::Metres(0.0254)),
-            name => CoordinateScale::parse(name).ok().map(|scale| Self::Metres(scale.metres())),
-        }
+        let (factor, symbol) = split_factor(&name)?;
+        let metres = match symbol {
+            "px" | "pixel" | "pixels" => return (factor == 1.0).then_some(Self::Pixel),
+            "micron" | "microns" | "micrometer" | "micrometre" => 1e-6,
+            "nm" => 1e-9,
+            "dm" => 0.1,
+            "inch" | "in" => 0.0254,
+            "ft" | "foot" | "feet" => 0.3048,
+            // (a length per pixel is no unit of a column)
+            symbol if symbol.contains('/') => return None,
+            symbol => CoordinateScale::parse(symbol).ok()?.metres(),
+        };
+        Some(Self::Metres(factor * metres))
     }
 
     pub(crate) fn describe(self) -> String {
@@ -267,7 +328,7 @@ impl ColumnUnit {
     /// Reads a unit; `None` for a text that is no unit.
     pub(crate) fn parse(text: &str) -> Option<Self> {
         let symbol = trim_brackets(text).to_lowercase();
-        let derived = symbol.contains(['/', '^', '\u{b2}', '\u{b3}']);
+        let derived = symbol.contains(['/', '^', '\u{b2}', '\u{b3}']) || is_scaled_word(&symbol);
         if let Some(unit) = CoordinateUnit::parse(text) {
             return Some(Self::Coordinate(unit));
         }
@@ -277,10 +338,37 @@ impl ColumnUnit {
         (derived || is_listed(OTHER_UNITS, &symbol)).then_some(Self::Other)
     }
 
+    /// The unit that the name of a column of times names, in any of its spellings: `Clock_min`, `minutes`.
+    pub(crate) fn of_times(name: &str) -> Option<Self> {
+        let last = split_last_part(name).map_or(name, |(_, last)| last);
+        match ColumnMeaning::parse(name) {
+            ColumnMeaning::Time(unit @ (TimeUnit::Seconds(_) | TimeUnit::Unreadable)) => {
+                Some(Self::Time(unit))
+            }
+            _ => Self::in_name(name).or_else(|| TimeUnit::parse(last).map(Self::Time)),
+        }
+    }
+
     /// The unit in the name of a column.
     pub(crate) fn in_name(name: &str) -> Option<Self> {
         split_unit(name).1.and_then(Self::parse)
     }
+}
+
+/// Splits a unit such as `0.1 mm` into factor and symbol; the factor is 1 if there is none. `None` for a number
+/// that is no factor.
+fn split_factor(unit: &str) -> Option<(f64, &str)> {
+    if !starts_with_digit(unit) {
+        return Some((1.0, unit));
+    }
+    let (number, symbol) = unit.split_once(' ')?;
+    let factor = number.parse::<f64>().ok().filter(|factor| factor.is_finite() && *factor > 0.0)?;
+    Some((factor, symbol.trim()))
+}
+
+/// Whether a text is a number with a word behind it, such as `0.1 cubits`.
+fn is_scaled_word(text: &str) -> bool {
+    starts_with_digit(text) && text.ends_with(char::is_alphabetic)
 }
 
 /// A unit without the brackets around it.
@@ -316,7 +404,18 @@ mod tests {
             ("t", TimeUnit::AssumedSeconds),
             ("Time", TimeUnit::AssumedSeconds),
             ("timestamp", TimeUnit::Unknown),
-            ("time (h)", TimeUnit::Unknown),
+            ("time (fortnights)", TimeUnit::Unreadable),
+            ("time (1/100 s)", TimeUnit::Unreadable),
+            ("time x1000 (s)", TimeUnit::Unreadable),
+            ("time_s_x1000", TimeUnit::Unreadable),
+            ("sec/100", TimeUnit::Unreadable),
+            ("ticks", TimeUnit::Unreadable),
+            ("time (h)", TimeUnit::Seconds(3600.0)),
+            ("time_h", TimeUnit::Seconds(3600.0)),
+            ("time_min", TimeUnit::Seconds(60.0)),
+            ("t/min", TimeUnit::Seconds(60.0)),
+            ("time_cs", TimeUnit::Seconds(1e-2)),
+            ("time [0.1 ms]", TimeUnit::Seconds(1e-4)),
         ];
         let seconds = [
             "time_s",
@@ -329,8 +428,9 @@ mod tests {
             "\u{6642}\u{9593}(s)",
         ]
         .map(|name| (name, TimeUnit::Seconds(1.0)));
-        let milliseconds = ["time_ms", "Time [ms]", "t (ms)", "Time_ms", "timestamp_ms"]
-            .map(|name| (name, TimeUnit::Seconds(1e-3)));
+        let milliseconds =
+            ["time_ms", "Time [ms]", "t (ms)", "Time_ms", "timestamp_ms", "t/ms", "Zeit/ms", "time_millis"]
+                .map(|name| (name, TimeUnit::Seconds(1e-3)));
         for (name, unit) in times.into_iter().chain(seconds).chain(milliseconds) {
             assert_eq!(ColumnMeaning::parse(name), ColumnMeaning::Time(unit), "{name}");
         }
@@ -346,6 +446,13 @@ mod tests {
         }
         assert_eq!(ColumnMeaning::parse("tip_x_m"), at("tip", 0, Some(CoordinateUnit::Metres(1.0))));
         assert_eq!(ColumnMeaning::parse("X (mm)"), at("", 0, Some(CoordinateUnit::Metres(1e-3))));
+        assert_eq!(ColumnMeaning::parse("tip_x/mm"), at("tip", 0, Some(CoordinateUnit::Metres(1e-3))));
+        assert_eq!(ColumnMeaning::parse("x (0.1 mm)"), at("", 0, Some(CoordinateUnit::Metres(1e-4))));
+        assert_eq!(ColumnMeaning::parse("x (dm)"), at("", 0, Some(CoordinateUnit::Metres(0.1))));
+        for name in ["x_h", "x_min", "x_d"] {
+            let point = name.split_once('_').unwrap().1;
+            assert_eq!(ColumnMeaning::parse(name), at(point, 0, None), "{name}");
+        }
         assert_eq!(ColumnMeaning::parse("m_x"), at("m", 0, None));
         assert_eq!(ColumnMeaning::parse("x_min"), at("min", 0, None));
         assert_eq!(ColumnMeaning::parse("left_blade_tip_y"), at("left_blade_tip", 1, None));

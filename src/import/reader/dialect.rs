@@ -66,7 +66,9 @@ impl Dialect {
         if delimiter == Delimiter::Comma {
             refuse_double_comma(file, &rows)?;
         }
-        Ok(Self { delimiter, decimal: decimal_mark(&rows, delimiter) })
+        let decimal = decimal_mark(&rows, delimiter);
+        refuse_thousands(file, &rows, decimal)?;
+        Ok(Self { delimiter, decimal })
     }
 }
 
@@ -139,10 +141,73 @@ fn delimiter_score(rows: &[TextRow], delimiter: Delimiter, (least, cells): (f64,
     numeric.iter().filter(|(count, _)| *count == usual).map(|(_, share)| share).sum()
 }
 
-/// Fraction of the cells of a row that are numbers; missing values are not counted.
+/// Refuses a column in which the decimal mark separates thousands: `1,020` below `980`. Each mark stands before
+/// groups of three digits, and the numbers go on more evenly without it.
+fn refuse_thousands(file: &str, rows: &[TextRow], decimal: char) -> ImportResult<()> {
+    /// Fewest numbers with such a mark.
+    const FEWEST_MARKED: usize = 2;
+    let width = rows.iter().map(|row| row.cells.len()).max().unwrap_or(0);
+    for column in 0..width {
+        let cells =
+            rows.iter().map(|row| (row.line, row.cell(column))).filter(|(_, cell)| is_value(cell, decimal));
+        let cells: Vec<(usize, &str)> = cells.collect();
+        let marked = || cells.iter().filter(|(_, cell)| cell.contains(decimal));
+        if marked().count() < FEWEST_MARKED || !marked().all(|(_, cell)| is_grouped(cell, decimal)) {
+            continue;
+        }
+        let as_decimals = |cell: &str| parse_number(cell, decimal).value();
+        let as_thousands = |cell: &str| parse_number(&cell.replace(decimal, ""), '.').value();
+        let apart = |read: &dyn Fn(&str) -> Option<f64>, pair: &[(usize, &str)]| {
+            Some((read(pair[1].1)? - read(pair[0].1)?).abs())
+        };
+        // (only where a number with the mark and one without it meet do the two ways of reading differ)
+        let borders =
+            cells.windows(2).filter(|pair| pair[0].1.contains(decimal) != pair[1].1.contains(decimal));
+        let (mut even, mut odd) = (0, 0);
+        for pair in borders {
+            let (Some(decimals), Some(thousands)) = (apart(&as_decimals, pair), apart(&as_thousands, pair))
+            else {
+                continue;
+            };
+            if thousands < decimals { even += 1 } else { odd += 1 }
+        }
+        if even > odd {
+            let (line, cell) = *marked().next().unwrap_or(&cells[0]);
+            let found = format!("`{cell}` in column {}, next to numbers without `{decimal}`", column + 1);
+            let expected = format!("one meaning of `{decimal}`, which seems to separate thousands here");
+            let advice = "export again without separators of thousands";
+            return Err(ImportError::format(format!("{file}:{line}:1"), found, expected, advice));
+        }
+    }
+    Ok(())
+}
+
+/// Whether a number consists of groups of three digits with `mark` between them, such as `-12,345,678`.
+fn is_grouped(text: &str, mark: char) -> bool {
+    let digits = |group: &str| group.chars().all(|c| c.is_ascii_digit());
+    let mut groups = text.trim_start_matches(['+', '-', '\u{2212}']).split(mark);
+    let first = groups
+        .next()
+        .is_some_and(|group| (1..=3).contains(&group.len()) && digits(group) && !group.starts_with('0'));
+    let rest: Vec<&str> = groups.collect();
+    first && !rest.is_empty() && rest.iter().all(|group| group.len() == 3 && digits(group))
+}
+
+/// Whether a cell is a number whose thousands are separated by blanks: `12 345.6`.
+fn has_blank_thousands(cell: &str) -> bool {
+    let whole = cell.split(['.', ',']).next().unwrap_or_default();
+    [' ', '\u{a0}', '\u{202f}'].into_iter().any(|blank| is_grouped(whole, blank))
+        && cell.chars().all(|c| c.is_ascii_digit() || " \u{a0}\u{202f}.,+-".contains(c))
+}
+
+/// Fraction of the cells of a row that are numbers; missing values are not counted. A number with blanks
+/// between its thousands counts too: it is refused later, with its place.
 fn numeric_share(cells: &[String], delimiter: Delimiter) -> f64 {
-    let is_number =
-        |text: &str| is_value(text, '.') || (delimiter != Delimiter::Comma && is_value(text, ','));
+    let is_number = |text: &str| {
+        is_value(text, '.')
+            || (delimiter != Delimiter::Comma && is_value(text, ','))
+            || has_blank_thousands(text)
+    };
     let present: Vec<&String> =
         cells.iter().filter(|cell| parse_number(cell, '.') != CellNumber::Missing).collect();
     if present.is_empty() {

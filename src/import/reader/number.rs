@@ -57,6 +57,8 @@ fn parse_spelled(text: &str, decimal: char) -> CellNumber {
             c if is_minus(Some(c)) => b'-',
             c if c == decimal => b'.',
             '0'..='9' | '+' | 'e' | 'E' => c as u8,
+            // (Fortran writes the exponent of a double with D)
+            'd' | 'D' if plain.contains(&b'.') => b'e',
             _ => return CellNumber::Text,
         };
         let Some(place) = plain.get_mut(length) else { return CellNumber::Text };
@@ -78,6 +80,7 @@ mod tests {
     #[test]
     fn numbers_in_every_spelling() {
         assert_eq!(parse_number("\u{2212}1,25E\u{2212}1", ','), CellNumber::Value(-0.125));
+        assert_eq!(parse_number("-1.25D-01", '.'), CellNumber::Value(-0.125));
         for (text, value) in [
             ("1.234E0", 1.234),
             ("5", 5.0),
@@ -101,6 +104,7 @@ mod tests {
             "x",
             "1.2.3",
             "0x10",
+            "2D4",
             "1'000.0",
             "1\u{a0}000",
             "+",

@@ -148,7 +148,7 @@ fn is_round(hz: f64) -> bool {
 
 /// Step to which times are rounded, s: the largest power of ten of which all times are multiples, and at
 /// least `digit_s`, the value of their last digit.
-fn rounding_s(times: &[f64], digit_s: f64) -> f64 {
+pub(crate) fn rounding_s(times: &[f64], digit_s: f64) -> f64 {
     find_quantum_s(times).unwrap_or(digit_s).max(digit_s)
 }
 

@@ -2,7 +2,7 @@
 //! equally spaced frames that fits the times.
 
 use crate::import::error::{ImportError, ImportResult};
-use crate::import::reader::rate::{RATE_AGREEMENT, UNEVEN_RATE, find_quantum_s, is_uneven};
+use crate::import::reader::rate::{RATE_AGREEMENT, UNEVEN_RATE, find_quantum_s, is_uneven, rounding_s};
 use crate::import::reader::track_file::{Clock, Column, Track, TrackFile};
 use crate::recording::clock::{self, FrameFit, MAX_FRAMES, OFF_GRID_LIMIT_FRAMES};
 
@@ -151,6 +151,9 @@ fn place_by_number(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<Ro
         refuse_disorder(rows, row, frames.last().map(|&last| last as f64), number)?;
         frames.push(number as i64);
     }
+    if !declared.playback {
+        refuse_parting_clocks(rows, &frames)?;
+    }
     apply_frame_step(&mut frames, declared.step)?;
     let (Some(first), Some(last)) = (frames.first().copied(), frames.last().copied()) else {
         return Err(ImportError::header_only(rows.export.file, 1));
@@ -170,6 +173,42 @@ fn place_by_number(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<Ro
     let counted_s = first as f64 / declared.rate_hz;
     let start_s = if declared.playback { counted_s } else { time_s(0).unwrap_or(counted_s) };
     Ok(RowFrames { frames, numbered: true, start_s, times: None, implied_hz })
+}
+
+/// Refuses frame numbers and times of which one has a pause or a jump that the other does not have. Times with
+/// uneven steps throughout are another matter: they are those of a camera with a variable rate.
+fn refuse_parting_clocks(rows: ClockRows, frames: &[i64]) -> ImportResult<()> {
+    /// Largest allowed difference between the two clocks from a row to the next, frames.
+    const MOST_APART: f64 = 0.5;
+    /// Largest fraction of the rows at which two clocks part that belong together otherwise.
+    const FEW_ROWS: f64 = 0.02;
+    let Some(times) = &rows.clock.time else { return Ok(()) };
+    let timed: Vec<(usize, f64)> =
+        times.iter().take(frames.len()).enumerate().filter_map(|(row, time)| Some((row, time?))).collect();
+    let steps: Vec<(usize, f64, f64)> = timed
+        .windows(2)
+        .map(|pair| (pair[1].0, (frames[pair[1].0] - frames[pair[0].0]) as f64, pair[1].1 - pair[0].1))
+        .collect();
+    let mut per_frame: Vec<f64> = steps.iter().map(|(_, counted, step_s)| step_s / counted).collect();
+    let Some(middle) = per_frame.len().checked_sub(1).map(|last| last / 2) else { return Ok(()) };
+    let frame_s = *per_frame.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let limit = MOST_APART + 2.0 * rounding_s(&rows.clock.times(), rows.clock.digit) / frame_s;
+    let part = |(_, counted, step_s): &&(usize, f64, f64)| (step_s / frame_s - counted).abs() > limit;
+    let apart: Vec<_> = steps.iter().filter(part).collect();
+    match apart.first() {
+        Some((row, counted, step_s)) if (apart.len() as f64) < 1.0 + FEW_ROWS * steps.len() as f64 => {
+            let place = format!("{}:{}:1", rows.export.file, rows.clock.line_number(*row));
+            let found = format!(
+                "a step of {counted} in the frame numbers and of {:.2} frames in the times",
+                step_s / frame_s
+            );
+            let expected = "frame numbers and times that agree";
+            let advice = "find out which of the two is right, and read only that one (--columns frame=... or \
+                          --columns time=..., with the positions)";
+            Err(ImportError::format(place, found, expected, advice))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Multiplies frame numbers by `--frame-step`. They must increase by 1 from row to row, which shows that they

@@ -40,6 +40,7 @@ pub(super) fn find_header(table: &DelimitedTable) -> Option<usize> {
 pub(super) fn find_header_columns(table: &DelimitedTable) -> ImportResult<TableColumns> {
     let header = find_header(table).ok_or_else(|| no_header_error(table))?;
     let names = NamedColumns::read(table, header);
+    refuse_two_units(table, names.row, names.units, 0..names.row.cells.len())?;
     let frame = names.only(|meaning| *meaning == ColumnMeaning::Frame, "numbers of the frames")?;
     let time = names.time_column()?;
     let points = names.point_cells()?;
@@ -82,7 +83,7 @@ impl<'t> NamedColumns<'t> {
         let mut units = None;
         if let Some(below) = table.head.get(header + 1).filter(|row| is_row_of_words(table, row)) {
             for (meaning, cell) in meanings.iter_mut().zip(&below.cells) {
-                if meaning.take_unit(cell) {
+                if meaning.take_unit(cell) || ColumnUnit::parse(cell).is_some() {
                     units = Some(header + 1);
                 }
             }
@@ -169,6 +170,29 @@ impl<'t> NamedColumns<'t> {
         let problem = format!("found {found}, expected {expected}");
         ImportError::columns(self.table.file, self.row.line, problem, ADVICE)
     }
+}
+
+/// Refuses a column whose name and whose cell in the row of units give different units.
+fn refuse_two_units(
+    table: &DelimitedTable,
+    header: &TextRow,
+    units: Option<usize>,
+    columns: impl IntoIterator<Item = usize>,
+) -> ImportResult<()> {
+    let Some(row) = units.and_then(|row| table.head.get(row)) else { return Ok(()) };
+    let differs = |column: &usize| {
+        let below = ColumnUnit::parse(row.cell(*column));
+        below.is_some_and(|below| ColumnUnit::in_name(header.cell(*column)).is_some_and(|unit| unit != below))
+    };
+    let Some(column) = columns.into_iter().find(differs) else { return Ok(()) };
+    let problem = format!(
+        "column {} is called `{}`, but line {} gives `{}` for it; expected one unit",
+        column + 1,
+        header.cell(column),
+        row.line,
+        row.cell(column)
+    );
+    Err(ImportError::columns(table.file, row.line, problem, "correct the wrong one in a copy of the file"))
 }
 
 /// Text on where the unit of a column was found.
@@ -346,21 +370,25 @@ impl MappedColumns<'_> {
         })
     }
 
-    /// Unit of a column, from its name or from the row of units, with its source.
-    fn unit(&self, rows: [Option<usize>; 2], at: usize) -> Option<(ColumnUnit, String)> {
+    /// Unit of a column, from its name or from the row of units, with its source. `in_name` reads the name.
+    fn unit(
+        &self,
+        rows: [Option<usize>; 2],
+        at: usize,
+        in_name: fn(&str) -> Option<ColumnUnit>,
+    ) -> Option<(ColumnUnit, String)> {
         let [header, units] = rows.map(|row| row.and_then(|row| self.table.head.get(row)));
         let (header, name) = (header?, header?.cell(at));
-        let of_clock = match ColumnMeaning::parse(name) {
-            ColumnMeaning::Time(unit @ TimeUnit::Seconds(_)) => Some(ColumnUnit::Time(unit)),
-            _ => ColumnUnit::in_name(name),
-        };
-        let unit = of_clock.or_else(|| ColumnUnit::parse(units?.cell(at)))?;
+        let unit = in_name(name).or_else(|| ColumnUnit::parse(units?.cell(at)))?;
         Some((unit, unit_source(self.table, header, rows[1], at)))
     }
 
     /// Checks that the units in the header fit the keys of `--columns`, and collects the columns to read.
     fn read(&self, header: Option<usize>, units: Option<usize>, start: usize) -> ImportResult<TableColumns> {
-        let unit = |at: usize| self.unit([header, units], at);
+        if let Some(names) = header.and_then(|row| self.table.head.get(row)) {
+            refuse_two_units(self.table, names, units, self.positions.iter().map(|(_, at)| *at))?;
+        }
+        let unit = |at: usize| self.unit([header, units], at, ColumnUnit::in_name);
         let name = |at: usize| header.map_or("", |row| self.table.head[row].cell(at));
         let refuse = |key: &str, at: usize, found: &str, expected: &str| {
             let problem = format!("--columns {key}={}: found {found}, expected {expected}", at + 1);
@@ -370,7 +398,7 @@ impl MappedColumns<'_> {
         let mut time = None;
         for key in ["time", "time-ms"] {
             let Some(at) = self.column(key) else { continue };
-            let stated = unit(at);
+            let stated = self.unit([header, units], at, ColumnUnit::of_times);
             let known = if key == "time-ms" { TimeUnit::Seconds(1e-3) } else { TimeUnit::AssumedSeconds };
             let seconds = match &stated {
                 None => known,
