@@ -123,10 +123,18 @@ pub(crate) fn measure_noise(recording: &Recording) -> RecordingNoise {
     let (cuts, traces) = (RecordingCuts::new(recording), recording.traces());
     let head = measure_head_noise(&traces.head_x_m, &cuts);
     let glass = measure_channel_noise(&traces.tip_y_m, &cuts.cut_glass());
-    let (head_x, tip_y) = (head.clone().or_else(|| glass.clone()), glass.or(head));
     let own = |other: &Option<ChannelNoise>, values: &[Option<f64>]| {
         other.clone().map(|other| measure_own_size(values, &cuts, &other).unwrap_or(other))
     };
+    // (a marker beside the edge of the lip moves up and down as the lip turns)
+    let is_motion = |glass: &ChannelNoise| {
+        head.as_ref().is_some_and(|head| glass.noise.sd() > MOST_UNLIKE * head.noise.sd())
+    };
+    let glass = match glass {
+        Some(glass) if is_motion(&glass) => own(&head, &traces.tip_y_m),
+        glass => glass,
+    };
+    let (head_x, tip_y) = (head.clone().or_else(|| glass.clone()), glass.or(head));
     RecordingNoise {
         tip_x: own(&head_x, &traces.tip_x_m),
         head_y: own(&tip_y, &traces.head_y_m),

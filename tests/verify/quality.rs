@@ -180,6 +180,28 @@ fn outliers_are_counted_exactly() {
     assert_eq!((told(&one, "outliers"), value(&one, "outliers")), (vec![("tip-x", Severity::Note)], 1.0));
 }
 
+/// Jumps in frames whose neighbours are partly lost are found wherever the neighbours lie within nine frames.
+#[test]
+fn outliers_are_found_between_lost_frames() {
+    for (seed, lost, least) in [(1, 0.05, 59), (2, 0.15, 57), (3, 0.3, 50)] {
+        let places: Vec<usize> = (0..60).map(|k| 40 + 65 * k).collect();
+        let mut traces =
+            with_tip(
+                stroke(4_000, seed, NOISE_M),
+                |i, x| {
+                    if places.contains(&i) { x + 100.0 * NOISE_M } else { x }
+                },
+            );
+        let mut drop = Noise::new(seed);
+        for (i, x) in traces.tip_x_m.iter_mut().enumerate() {
+            *x = x.filter(|_| drop.0.random::<f64>() >= lost || places.contains(&i));
+        }
+        let found = tip_outliers(&traces);
+        assert!(found.iter().all(|frame| places.contains(frame)), "{lost}: {found:?}");
+        assert!(found.len() >= least, "{lost}: {} of 60", found.len());
+    }
+}
+
 #[test]
 fn a_million_frames_of_noise_hold_no_outlier() {
     let noise: Vec<Option<f64>> = Noise::new(5).column(1_000_000, NOISE_M).into_iter().map(Some).collect();

@@ -139,6 +139,25 @@ fn noise_that_lasts_for_many_frames_is_found_in_longer_blocks() {
     }
 }
 
+/// A marker beside the edge of the lip moves up and down by ten times the noise as the blade rings and leans.
+#[test]
+fn the_motion_of_a_marker_beside_the_edge_is_no_noise_of_heights() {
+    let white = AutoregressiveNoise::white(SD_M).unwrap();
+    for (rate_hz, seed) in [(5000.0, 0), (10_000.0, 1)] {
+        let sweep = Sweep { rate_hz, noise: white.clone(), shared: 0.0, lost: 0.03, seed };
+        let recording = sweep.recording();
+        let mut traces = recording.traces().clone();
+        for (i, y) in traces.tip_y_m.iter_mut().enumerate() {
+            let [tip, _, head, _] = sweep.motion(i);
+            *y = y.map(|y| y + 0.1 * (tip - head));
+        }
+        let found = measure_noise(&recording.with_traces(traces).unwrap());
+        for channel in [found.tip_y.unwrap(), found.head_y.unwrap()] {
+            assert!((channel.noise.sd() / SD_M - 1.0).abs() < 0.3, "{rate_hz}: {channel:?}");
+        }
+    }
+}
+
 /// Additional noise doubles the variance of the tip. Without it, tip and head have noise of the same size. At
 /// the lower frame rate, the blade rings at a fifth of the rate, which hides the difference.
 #[test]

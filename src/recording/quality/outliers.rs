@@ -8,21 +8,16 @@
 //!   it (at a kink it lies on one of them), and both lines agree on its place (at a jump they do not);
 //! - the points around it are much closer to their own cubics (in chatter or strong noise they are not).
 //!
-//! A single point is not judged if a frame within two frames of it is missing. Several points in a row are
-//! outliers between two jumps of about the same size in opposite directions, if no other jump of more than a
+//! The neighbours of a single point are the two tracked points before it and the two after it. It is not judged
+//! if they span more than [`LONGEST_SPAN`] frames. Several points in a row are outliers between two jumps of about the same size in opposite directions, if no other jump of more than a
 //! quarter of this size is near and the point afterwards continues its earlier path.
 
 use super::measurement::ChannelQuality;
 use crate::recording::noise::differences::difference_at;
 
-/// Weight of the two nearer neighbours in the cubic through four points; the two further ones have the weight
-/// -1.
-const NEARER: f64 = 4.0;
-/// Sum of the four weights of the neighbours in the cubic.
-const WEIGHTS: f64 = 6.0;
-/// Standard deviation of the miss (the distance from the cubic) in white noise of standard deviation 1:
-/// `sqrt(1 + (16 + 16 + 1 + 1)/36)`.
-const MISS_SD: f64 = 1.394_433_377_556_792_8;
+/// Largest number of frames from the first to the last of the four neighbours of a point: without a gap there
+/// are four. Over a longer time the motion is no cubic.
+const LONGEST_SPAN: usize = 9;
 /// Smallest distance of an outlier from the cubic through its neighbours, in standard deviations of this
 /// distance in white noise. White noise exceeds it at 2 of 1e9 points.
 const BEYOND_NOISE: f64 = 6.0;
@@ -38,14 +33,14 @@ const LEAST_MISS_PX: f64 = 0.1;
 /// fraction of its distance from the cubic. The values of the two lines differ by at most this fraction, plus
 /// noise.
 const BOTH_SIDES: f64 = 0.5;
-/// Three standard deviations of the difference between the values of the two lines in white noise of standard
-/// deviation 1: `3 sqrt(2 (4 + 1))`.
-const LINES_SD: f64 = 9.5;
+/// Largest difference between the values of the two lines that noise explains, in standard deviations of this
+/// difference in white noise.
+const LINES_AGREE: f64 = 3.0;
 /// Smallest ratio of an outlier's distance from its cubic to the largest such distance of the points around
 /// it. In white noise, the largest of six such distances reaches 3 standard deviations once in 60 cases.
 const MORE_THAN_AROUND: f64 = 4.0;
-/// Distances, in frames, from an outlier to the points around it: the nearest points whose own cubic does not
-/// use the outlier.
+/// Distances, in tracked points, from an outlier to the points around it: the nearest points whose own cubic
+/// does not use the outlier.
 const AROUND: std::ops::RangeInclusive<usize> = 3..=5;
 /// Standard deviation of a third difference of white noise of standard deviation 1: `sqrt(1 + 9 + 9 + 1)`.
 const THIRD_DIFFERENCE_SD: f64 = 4.472_135_954_999_58;
@@ -67,16 +62,19 @@ pub fn outlier_frames(
     let Some(noise_m) = channel.noise_m else { return vec![] };
     let by_step = BEYOND_STEPS * channel.step_m.or_else(|| smallest_movement(samples)).unwrap_or(0.0);
     let by_pixel = LEAST_MISS_PX * metres_per_pixel.unwrap_or(0.0);
-    let least_m = (BEYOND_NOISE * MISS_SD * noise_m).max(by_step).max(by_pixel).max(LEAST_MISS_M);
-    let candidates =
-        samples.windows(5).enumerate().filter_map(|(before, w)| Some((before + 2, distance_from_cubic(w)?)));
-    let far = candidates.filter(|(_, miss)| miss.abs() > least_m);
-    let isolated = far.filter(|&(frame, miss)| {
-        lies_off_both_lines(samples, frame, miss, noise_m).unwrap_or(false)
-            && is_calm_around(samples, frame, miss)
+    let at_least_m = |noise_m: f64| (BEYOND_NOISE * noise_m).max(by_step).max(by_pixel).max(LEAST_MISS_M);
+    let points = TrackedPoints::new(samples);
+    let far = (0..points.values.len()).filter_map(|point| {
+        let (miss, sd) = points.distance_from_cubic(point)?;
+        (miss.abs() > at_least_m(sd * noise_m)).then_some((point, miss))
     });
-    let mut frames: Vec<usize> = isolated.map(|(frame, _)| frame).collect();
-    let least_third_m = (BEYOND_NOISE * THIRD_DIFFERENCE_SD * noise_m).max(2.0 * least_m);
+    let isolated = far.filter(|&(point, miss)| {
+        points.lies_off_both_lines(point, miss, noise_m).unwrap_or(false)
+            && points.is_calm_around(point, miss)
+    });
+    let mut frames: Vec<usize> = isolated.map(|(point, _)| points.frames[point]).collect();
+    let least_third_m =
+        (BEYOND_NOISE * THIRD_DIFFERENCE_SD * noise_m).max(2.0 * at_least_m(UNBROKEN_SD * noise_m));
     frames.extend(find_absences(samples, least_third_m).into_iter().flatten());
     frames.sort_unstable();
     frames.dedup();
@@ -123,29 +121,76 @@ fn find_absences(samples: &[Option<f64>], least_m: f64) -> Vec<std::ops::RangeIn
     absences
 }
 
-/// Distance of the middle one of five frames from the cubic through the others.
-fn distance_from_cubic(five: &[Option<f64>]) -> Option<f64> {
-    match *five {
-        [Some(a), Some(b), Some(c), Some(d), Some(e)] => Some(c - (NEARER * (b + d) - (a + e)) / WEIGHTS),
-        _ => None,
+/// Standard deviation of the distance of a point from the cubic through its neighbours, without a gap, in white
+/// noise of standard deviation 1: `sqrt(1 + (16 + 16 + 1 + 1)/36)`.
+const UNBROKEN_SD: f64 = 1.394_433_377_556_792_8;
+
+/// The tracked positions of a column, with their frames.
+struct TrackedPoints {
+    frames: Vec<usize>,
+    values: Vec<f64>,
+}
+
+impl TrackedPoints {
+    fn new(samples: &[Option<f64>]) -> Self {
+        let tracked = samples.iter().enumerate().filter_map(|(frame, x)| Some((frame, (*x)?)));
+        let (frames, values) = tracked.unzip();
+        Self { frames, values }
     }
-}
 
-fn lies_off_both_lines(samples: &[Option<f64>], frame: usize, miss_m: f64, noise_m: f64) -> Option<bool> {
-    let at = |index: Option<usize>| *samples.get(index?)?;
-    let x = at(Some(frame))?;
-    let before = 2.0 * at(frame.checked_sub(1))? - at(frame.checked_sub(2))?;
-    let after = 2.0 * at(frame.checked_add(1))? - at(frame.checked_add(2))?;
-    let off = |line: f64| (x - line) * miss_m.signum() >= BOTH_SIDES * miss_m.abs();
-    let agree = (before - after).abs() <= BOTH_SIDES * miss_m.abs() + LINES_SD * noise_m;
-    Some(off(before) && off(after) && agree)
-}
+    /// Distances in frames from a point to its two neighbours on either side; `None` if they span too much.
+    fn neighbours(&self, point: usize) -> Option<[f64; 4]> {
+        let (first, last) = (point.checked_sub(2)?, point + 2);
+        let span = self.frames.get(last)? - self.frames[first];
+        let apart = |other: usize| self.frames[other] as f64 - self.frames[point] as f64;
+        (span <= LONGEST_SPAN).then(|| [apart(first), apart(point - 1), apart(point + 1), apart(last)])
+    }
 
-/// Whether all points around a frame are much closer to their own cubics than the distance `miss_m` of the
-/// frame's point from its cubic; false if no point around it has a cubic.
-fn is_calm_around(samples: &[Option<f64>], frame: usize, miss_m: f64) -> bool {
-    let miss = |at: Option<usize>| distance_from_cubic(samples.get(at?.checked_sub(2)?..at? + 3)?);
-    let around = AROUND.flat_map(|apart| [frame.checked_sub(apart), frame.checked_add(apart)]);
-    let largest = around.filter_map(miss).map(f64::abs).reduce(f64::max);
-    largest.is_some_and(|largest| miss_m.abs() > MORE_THAN_AROUND * largest)
+    /// Distance of a point from the cubic through its neighbours, and the standard deviation of this distance
+    /// in white noise of standard deviation 1.
+    fn distance_from_cubic(&self, point: usize) -> Option<(f64, f64)> {
+        let at = self.neighbours(point)?;
+        let weight = |i: usize| {
+            let others = (0..4).filter(|other| *other != i);
+            others.map(|other| at[other] / (at[other] - at[i])).product::<f64>()
+        };
+        let values = [point - 2, point - 1, point + 1, point + 2].map(|neighbour| self.values[neighbour]);
+        let (mut cubic, mut variance) = (0.0, 1.0);
+        for (i, value) in values.into_iter().enumerate() {
+            let weight = weight(i);
+            cubic += weight * value;
+            variance += weight * weight;
+        }
+        Some((self.values[point] - cubic, variance.sqrt()))
+    }
+
+    fn lies_off_both_lines(&self, point: usize, miss_m: f64, noise_m: f64) -> Option<bool> {
+        let [far_before, before, after, far_after] = self.neighbours(point)?;
+        // value of the line through two neighbours, and its variance in white noise of variance 1
+        let line = |(far, far_value): (f64, f64), (near, near_value): (f64, f64)| {
+            let share = far / (far - near);
+            (share * near_value + (1.0 - share) * far_value, share * share + (1.0 - share) * (1.0 - share))
+        };
+        let values = &self.values;
+        let earlier = line((far_before, values[point - 2]), (before, values[point - 1]));
+        let later = line((far_after, values[point + 2]), (after, values[point + 1]));
+        let off = |line: f64| (values[point] - line) * miss_m.signum() >= BOTH_SIDES * miss_m.abs();
+        let by_noise = LINES_AGREE * (earlier.1 + later.1).sqrt() * noise_m;
+        let agree = (earlier.0 - later.0).abs() <= BOTH_SIDES * miss_m.abs() + by_noise;
+        Some(off(earlier.0) && off(later.0) && agree)
+    }
+
+    /// Whether all points around a point are much closer to their own cubics than this point is to its cubic,
+    /// from which it has the distance `miss_m`; false if no point around it has a cubic. Motion misses the cubic
+    /// in proportion to the product of the distances of the neighbours, so a miss with nearer neighbours counts
+    /// for more.
+    fn is_calm_around(&self, point: usize, miss_m: f64) -> bool {
+        let reach = |point: usize| Some(self.neighbours(point)?.iter().product::<f64>().abs());
+        let Some(own) = reach(point) else { return false };
+        let around = AROUND.flat_map(|apart| [point.checked_sub(apart), point.checked_add(apart)]);
+        let misses = around.filter_map(|other| {
+            Some(self.distance_from_cubic(other?)?.0.abs() * (own / reach(other?)?).max(1.0))
+        });
+        misses.reduce(f64::max).is_some_and(|largest| miss_m.abs() > MORE_THAN_AROUND * largest)
+    }
 }
