@@ -12,7 +12,9 @@ use super::trace_data::{TraceData, TraceError, prepare_traces};
 use super::{FitError, job};
 use crate::checkpoint::{CheckpointSink, NullSink, fingerprint};
 use crate::model::parameters::name_in_scene;
-use crate::recording::quality::measure_quality;
+use crate::recording::quality::{
+    Check, Optics, UntrackedFrames, drop_untracked, find_untracked_frames, measure_quality,
+};
 use crate::recording::{FrameGrid, Recording, Traces};
 use crate::simulate::drive::HeadMotionError;
 use crate::simulate::scene::error::SceneError;
@@ -85,6 +87,21 @@ pub struct Problem {
     pub(super) segment_s: Vec<f64>,
     pub(super) constants: Vec<FreedConstant>,
     fingerprint: String,
+    /// Positions that are left out of recordings because the tracker jumped away: condition, and description.
+    left_out: Vec<(usize, String)>,
+}
+
+/// A recording without the positions to which the tracker jumped for a few frames. A single one of them makes
+/// its segment fit worse than noise ever does.
+fn leave_out_outliers(recording: Recording) -> (Recording, Vec<UntrackedFrames>) {
+    let optics = Optics::default();
+    let mut found = find_untracked_frames(&recording, &measure_quality(&recording, None), &optics);
+    found.retain(|found| found.check == Check::Outliers);
+    if found.is_empty() {
+        return (recording, found);
+    }
+    let traces = drop_untracked(recording.traces().clone(), &found);
+    (recording.clone().with_traces(traces).unwrap_or(recording), found)
 }
 
 impl Problem {
@@ -109,8 +126,15 @@ impl Problem {
             .into_iter()
             .map(|measured| MeasuredRecording { recording: measured.recording.move_to_grid(), ..measured });
         let paths = job.conditions.iter().map(|condition| condition.recording.as_ref());
-        let measured: Vec<Option<MeasuredRecording>> =
+        let mut measured: Vec<Option<MeasuredRecording>> =
             paths.map(|path| path.and_then(|_| measured.next())).collect();
+        let mut left_out = Vec::new();
+        for trace in &job.traces {
+            let Some(measured) = measured.get_mut(trace.condition).and_then(Option::as_mut) else { continue };
+            let (recording, outliers) = leave_out_outliers(measured.recording.clone());
+            measured.recording = recording;
+            left_out.extend(outliers.iter().map(|found| (trace.condition, found.describe())));
+        }
         let check = |at: usize| check_scene(&job, at, &scenes[at], measured[at].as_ref());
         let scenes: Vec<Scene> = (0..scenes.len()).map(check).collect::<Result<_, _>>()?;
         for ((scene, measured), condition) in scenes.iter().zip(&measured).zip(&job.conditions) {
@@ -140,7 +164,7 @@ impl Problem {
         let (spread, largest_tilt_rad) = (job.ensemble.spread, job.largest_tilt_rad);
         let plausible = PlausibilityLimits { spread, largest_tilt_rad };
         let model = SceneModel::new(conditions.collect(), job.parameter_names(), plausible);
-        Ok(Self { job, model, recordings, traces, segment_s, constants, fingerprint })
+        Ok(Self { job, model, recordings, traces, segment_s, constants, fingerprint, left_out })
     }
 
     /// The job.
@@ -173,6 +197,14 @@ impl Problem {
     /// Constants of the scenes that are freed within priors.
     pub(crate) fn constants(&self) -> &[FreedConstant] {
         &self.constants
+    }
+
+    /// One sentence for each point whose positions are left out in some frames.
+    pub(crate) fn describe_left_out(&self) -> impl Iterator<Item = String> {
+        self.left_out.iter().map(|(condition, frames)| {
+            let name = &self.job.conditions[*condition].name;
+            format!("{name}: {frames} are left out, because the tracker jumped away and came back")
+        })
     }
 
     /// The model of the fitted traces; `None` in a job on features.

@@ -436,6 +436,7 @@ impl TraceFindings<'_> {
                     .to_owned(),
             );
         }
+        notes.extend(self.problem.describe_left_out());
         let recordings = || self.problem.recordings().iter().flatten();
         notes.extend(recordings().filter_map(Recording::describe_resampling));
         if recordings().any(Recording::is_synthetic) {
