@@ -56,7 +56,7 @@ pub fn search_trace(
     for start in 0..MAX_STARTS {
         let first_costs = found.descents.iter().filter_map(|descent| Some(descent.stages.first()?.cost));
         let limit = GIVE_UP_FACTOR * first_costs.fold(f64::INFINITY, f64::min);
-        let first = || first_iterate(model, settings, &start_point(model, seed, start));
+        let first = || first_of_start(model, settings, seed, start);
         let (descent, stopped) = descend(model, settings, start, first, limit, journal);
         found.descents.push(descent);
         if stopped {
@@ -115,6 +115,24 @@ pub fn search_trace(
     found
 }
 
+/// First iterate of a start. Every second start from the third on is the best of several points: where two starts
+/// do not agree, the cost has several minima, and the right one may lie far from most points.
+fn first_of_start(
+    model: &TraceModel,
+    settings: &TraceSearchSettings,
+    seed: u64,
+    start: usize,
+) -> Option<Iterate> {
+    /// Number of points of which the best is taken.
+    const SCREENED: usize = 24;
+    let first = |point: usize| first_iterate(model, settings, &start_point(model, seed, point));
+    if start < MIN_STARTS || start % 2 == 1 {
+        return first(start);
+    }
+    let tried = (0..SCREENED).filter_map(|point| first(start + MAX_STARTS * point));
+    tried.min_by(|a, b| a.cost.total_cmp(&b.cost))
+}
+
 /// Point at which a start begins, in the coordinates of the unknowns. Start 0 is in the middle of every
 /// range, the others are at random points given by `seed`. Camera errors and unknowns with a prior always
 /// begin at their own `start`. The first two starts of a slider begin at the values that the equation of
@@ -123,8 +141,8 @@ pub fn search_trace(
 pub fn start_point(model: &TraceModel, seed: u64, start: usize) -> Vec<f64> {
     /// Fraction of each range, at either end, in which no search starts; one entry per start. Later starts
     /// are nearer to the middle, because searches that start near the ends of a wide range often fail.
-    const EDGES: [f64; MAX_STARTS] = [0.1, 0.1, 0.1, 0.3, 0.3, 0.3];
-    let edge = EDGES[start.min(MAX_STARTS - 1)];
+    const EDGES: [f64; MAX_STARTS] = [0.1, 0.1, 0.1, 0.3, 0.1, 0.3];
+    let edge = EDGES[start % MAX_STARTS];
     let mut generator = Xoshiro256PlusPlus::seed_from_u64(seed ^ ((start as u64) << 32));
     let place = |unknown: &TraceUnknown| {
         let share = edge + (1.0 - 2.0 * edge) * generator.random::<f64>();
