@@ -144,9 +144,10 @@ pub(crate) struct TraceCovariance {
     pub curvature: DMatrix<f64>,
     /// Part of `curvature` that comes from the errors of the priors: C P C with the inverse C of the
     /// information matrix and the information P of the priors.
-    priors: DMatrix<f64>,
-    /// Mean square of the cost gradients of the segments, relative to the mean square that noise of the
-    /// measured size gives. It is 1 on average if the model is right and the residuals are white.
+    pub priors: DMatrix<f64>,
+    /// Sum of the squared cost gradients of the segments, relative to the sum that noise of the measured size
+    /// and the errors of the recorded heads give on average. It is 1 on average if the model is right and the
+    /// residuals are white.
     pub gradient_scatter: f64,
     /// Covariance due to errors of the recorded head positions.
     pub heads: DMatrix<f64>,
@@ -161,15 +162,10 @@ pub(crate) fn trace_covariance(model: &TraceModel, at: &Iterate) -> Option<Trace
         residual.map_or(0.0, |[_, slope]| slope * slope)
     });
     let prior = DVector::from_iterator(at.point.len(), prior);
-    // number of unknowns that the recordings determine, rather than the priors
-    let determined = prior.len() as f64 - inverse.diagonal().dot(&prior);
-    let parts = || found.parts.iter().flatten();
-    let square: f64 = parts().map(|part| part.slope.dot(&(&inverse * &part.slope))).sum();
-    // at the minimum, the gradients of the segments have one degree of freedom less per determined unknown
-    let left = (parts().count() as f64 - determined).max(1.0);
-    let gradient_scatter = square / determined.max(1.0) * parts().count() as f64 / left;
+    let heads = head_curve_covariance(model, at)?;
+    let gradient_scatter = compare_gradients(&found, &inverse, &heads);
     let priors = &inverse * DMatrix::from_diagonal(&prior) * &inverse;
-    let heads = &inverse * head_curve_covariance(model, at)? * &inverse;
+    let heads = &inverse * heads.total * &inverse;
     let curvature = inverse + &heads;
     Some(TraceCovariance { information: found.matrix, curvature, priors, gradient_scatter, heads })
 }
@@ -184,31 +180,66 @@ impl TraceCovariance {
     }
 }
 
-/// Covariance of the cost gradient due to errors of the recorded head positions. The curve fitted to these
-/// positions is smooth, so its error extends over many segments and does not average out like noise.
-fn head_curve_covariance(model: &TraceModel, at: &Iterate) -> Option<DMatrix<f64>> {
+/// Sum of the squared cost gradients of the segments at the minimum, relative to its mean for a right model; see
+/// [`TraceCovariance::gradient_scatter`]. The squares are weighted by the inverse `C` of the information matrix.
+///
+/// At the minimum, the gradient of a segment with the matrix `M` is `g - M C G`, where `g` is its gradient at
+/// the true values, and `G` is the sum of all gradients and prior pulls.
+fn compare_gradients(found: &NormalEquations, inverse: &DMatrix<f64>, heads: &HeadCovariance) -> f64 {
+    let covariance_of_sum = &found.matrix + &heads.total;
+    let (mut square, mut expected) = (0.0, 0.0);
+    for (part, head) in found.parts.iter().zip(&heads.by_segment) {
+        let Some(part) = part else { continue };
+        let own = head.as_ref().map_or_else(|| part.matrix.clone(), |head| &part.matrix + head);
+        let (own, moved) = (inverse * own, inverse * &part.matrix);
+        square += part.slope.dot(&(inverse * &part.slope));
+        let of_sum = &moved * inverse * &covariance_of_sum * &moved;
+        expected += own.trace() - 2.0 * (&moved * &own).trace() + of_sum.trace();
+    }
+    if expected > 0.0 { square / expected } else { 1.0 }
+}
+
+/// Covariances of cost gradients due to errors of the recorded head positions.
+struct HeadCovariance {
+    /// That of the sum over all segments. The curve through the positions is smooth, so its error extends over
+    /// many segments and does not average out like noise.
+    total: DMatrix<f64>,
+    /// That of each segment.
+    by_segment: Vec<Option<DMatrix<f64>>>,
+}
+
+fn head_curve_covariance(model: &TraceModel, at: &Iterate) -> Option<HeadCovariance> {
     let points = recording_models(model, &at.point)?;
     let n = at.point.len();
-    let mut total = DMatrix::zeros(n, n);
+    let mut heads = HeadCovariance { total: DMatrix::zeros(n, n), by_segment: vec![None; at.segments.len()] };
     for (film, shoot) in model.recordings.iter().enumerate() {
         let Some(curve) = &shoot.observation.own_curve else { continue };
-        let mine = at.segments.par_iter().filter(|s| s.recording == film && s.chi2.is_finite());
-        let parts: Vec<Option<(usize, DMatrix<f64>)>> =
-            mine.map(|segment| head_curve_slopes(&points[film], segment)).collect();
-        let mut slopes = DMatrix::zeros(n, curve.coefficient_count());
-        for (from, part) in parts.into_iter().flatten() {
-            let mut place = slopes.columns_mut(from, part.ncols());
-            place += part;
-        }
-        for i in 0..n {
-            let mut row: Vec<f64> = slopes.row(i).iter().copied().collect();
-            curve.multiply_covariance(&mut row);
-            for j in 0..n {
-                total[(i, j)] += slopes.row(j).iter().zip(&row).map(|(a, b)| a * b).sum::<f64>();
+        let covariance = |slopes: &DMatrix<f64>| {
+            let mut weighted = DMatrix::zeros(n, slopes.ncols());
+            for i in 0..n {
+                let mut row: Vec<f64> = slopes.row(i).iter().copied().collect();
+                curve.multiply_covariance(&mut row);
+                row.iter().enumerate().for_each(|(k, value)| weighted[(i, k)] = *value);
             }
+            slopes * weighted.transpose()
+        };
+        let slopes = |segment: &SegmentState| {
+            let mine = segment.recording == film && segment.chi2.is_finite();
+            let (from, part) = mine.then(|| head_curve_slopes(&points[film], segment))??;
+            let mut slopes = DMatrix::zeros(n, curve.coefficient_count());
+            slopes.columns_mut(from, part.ncols()).copy_from(&part);
+            Some((covariance(&slopes), slopes))
+        };
+        let parts: Vec<Option<(DMatrix<f64>, DMatrix<f64>)>> = at.segments.par_iter().map(slopes).collect();
+        let mut all = DMatrix::zeros(n, curve.coefficient_count());
+        for (own, part) in heads.by_segment.iter_mut().zip(parts) {
+            let Some((covariance, slopes)) = part else { continue };
+            all += slopes;
+            *own = Some(covariance);
         }
+        heads.total += covariance(&all);
     }
-    Some(total)
+    Some(heads)
 }
 
 /// Derivatives of the gradient of a segment's cost with respect to the coefficients of the curve through the

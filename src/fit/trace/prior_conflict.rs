@@ -1,7 +1,7 @@
 //! Tests whether the estimates of the constants contradict their priors.
 //!
 //! With a right model and right priors, the distance of the estimates from the prior means has the covariance
-//! `P - C` (prior less posterior). Constants that are jointly too far from their priors, and parameters that
+//! `P - C` (prior less posterior), and the excess of the noise and the errors of the recorded head add to it. Constants that are jointly too far from their priors, and parameters that
 //! move when the priors are made wider, show that a prior or the model is wrong.
 
 use super::uncertainty_run::SearchEnd;
@@ -35,8 +35,12 @@ pub(super) fn prior_conflicts(end: &SearchEnd<'_>) -> Vec<String> {
     let Some(posterior) = end.covariance.information.clone().cholesky().map(|c| c.inverse()) else {
         return Vec::new();
     };
-    let reduced = |a: usize, b: usize| posterior[(known[a].0, known[b].0)] * known[a].2 * known[b].2;
-    let removed = DMatrix::from_fn(known.len(), known.len(), |a, b| f64::from(a == b) - reduced(a, b));
+    let excess = end.excess_covariance();
+    let left = |a: usize, b: usize| {
+        let at = (known[a].0, known[b].0);
+        (posterior[at] - excess[at]) * known[a].2 * known[b].2
+    };
+    let removed = DMatrix::from_fn(known.len(), known.len(), |a, b| f64::from(a == b) - left(a, b));
     let pulls: Vec<f64> = known.iter().map(|(_, pull, _)| *pull).collect();
     let name = |i: usize| describe_parameters(end.model.unknowns.parameter_name(i));
     let mut doubts = Vec::new();

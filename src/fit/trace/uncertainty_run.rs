@@ -11,6 +11,7 @@ use super::normal_equations::{TraceCovariance, trace_covariance};
 use super::segment_simulation::{SegmentResiduals, segment_residuals};
 use crate::fit::journal::Journal;
 use crate::recording::noise::AutoregressiveNoise;
+use nalgebra::DMatrix;
 use portable_math as math;
 use portable_math::StandardNormal;
 use rand::{Rng, SeedableRng};
@@ -111,6 +112,13 @@ impl<'a> SearchEnd<'a> {
         let widening = chi2_per_dof(model, at).0.max(covariance.gradient_scatter).max(1.0);
         let sd = (0..at.point.len()).map(|i| covariance.variance(i, widening).sqrt()).collect();
         Some(Self { model, settings, seed, at, covariance, widening, sd })
+    }
+
+    /// Part of the covariance of the estimates by which they scatter more than their information says: the noise
+    /// beyond the measured one, and the errors of the recorded heads.
+    pub(super) fn excess_covariance(&self) -> DMatrix<f64> {
+        let TraceCovariance { curvature, priors, heads, .. } = &self.covariance;
+        (curvature - heads - priors) * (self.widening - 1.0) + heads
     }
 
     /// The end of a descent; `None` if it has no iterate, or if the information matrix is singular.
