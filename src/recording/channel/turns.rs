@@ -13,6 +13,9 @@ const RETURN_NOISES: f64 = 12.0;
 /// Smallest distance that the head must move towards a turn and away from it, as a fraction of the head's
 /// whole travel; vibration of the drive is smaller.
 const RETURN_TRAVEL: f64 = 0.005;
+/// Smallest distance that the head must move towards a turn and away from it, in steps of its positions: at
+/// rest, a position flickers between two or three neighbouring values.
+const RETURN_STEPS: f64 = 2.5;
 /// The time of a turn comes from a parabola. It is fitted to the frames in which the head is near the
 /// extremum: within this multiple of the smallest movement that counts as a turn.
 const FIT_RETURNS: f64 = 4.0;
@@ -29,7 +32,8 @@ pub(super) struct HeadTurn {
 pub(super) fn find_turns(head: &TrackPoints) -> Vec<HeadTurn> {
     let smooth = median_filter(&head.points);
     let (low, high) = value_range(&smooth);
-    let least = LEAST_RETURN_M.max(RETURN_NOISES * head.noise_m).max(RETURN_TRAVEL * (high - low));
+    let of_errors = (RETURN_NOISES * head.noise_m).max(RETURN_STEPS * head.step_m);
+    let least = LEAST_RETURN_M.max(of_errors).max(RETURN_TRAVEL * (high - low));
     let extrema = alternating_extrema(&smooth, least).into_iter();
     extrema.map(|index| time_extremum(head, &smooth, index, FIT_RETURNS * least)).collect()
 }
