@@ -9,6 +9,7 @@ mod checks;
 mod columns;
 mod filled;
 mod finding;
+mod jumps;
 mod lag;
 mod measurement;
 mod mechanism;
@@ -20,7 +21,7 @@ mod smoothing;
 mod tilt;
 mod untracked;
 
-use super::{FrameGrid, Recording};
+use super::{FrameGrid, Recording, Traces};
 use crate::recording::channel::{Channel, ReversalInstants};
 use crate::text::{format_decimals, format_or_dash, to_ascii};
 pub(crate) use checks::check_position_steps;
@@ -48,6 +49,13 @@ pub fn collect_findings(
     instants: &ReversalInstants,
     import: &[QualityFinding],
 ) -> Vec<QualityFinding> {
+    let exchanges = jumps::find_exchanges(recording, measured);
+    let put_back = change_traces(recording, !exchanges.is_empty(), |traces| {
+        jumps::put_back_exchanged(traces, &exchanges)
+    });
+    let own_instants = put_back.as_ref().map(ReversalInstants::find_instants);
+    let (recording, instants) =
+        (put_back.as_ref().unwrap_or(recording), own_instants.as_ref().unwrap_or(instants));
     // (this check needs the original frames: resampling to a grid changes repeated positions and exact lines)
     let untracked = find_untracked_frames(recording, measured, optics);
     let recording = &*recording.resample_to_grid();
@@ -57,12 +65,22 @@ pub fn collect_findings(
     let rest = leave_out_filled(recording, measured, &untracked);
     let (tracked, quality) = rest.as_ref().map_or((recording, measured), |(rest, quality)| (rest, quality));
     let motion = measure_motion(tracked, quality, instants);
-    found.extend(columns::check_columns(tracked.traces(), quality, instants));
+    let jumped = jumps::find_head_jumps(tracked, quality, &untracked);
+    let stretch =
+        change_traces(tracked, !jumped.is_empty(), |traces| jumps::keep_longest_stretch(traces, &jumped));
+    // (after a jump of both points, the halves of the recording are not alike, so no lag can be seen to grow)
+    let may_grow = !jumped.iter().any(jumps::HeadJump::is_of_both);
+    let told_lag = motion.lag_frames.filter(|lag| {
+        (may_grow || !lag::is_growing(*lag)) && !untracked::are_many(&untracked, measured.frames)
+    });
+    found.extend(jumps::check_exchanges(&exchanges));
+    found.extend(jumps::check_head_jumps(&jumped));
+    found.extend(columns::check_columns(stretch.as_ref().unwrap_or(tracked).traces(), quality, instants));
     found.extend(mechanism::check_mechanism(&motion, measured));
     found.extend(
         columns.iter().filter_map(|column| prefilter::check_prefilter(column, measured.frame_rate_hz)),
     );
-    found.extend(lag::check_lag(motion.lag_frames));
+    found.extend(lag::check_lag(told_lag));
     found.extend(checks::check_grid(measured));
     found.push(checks::check_exposure(measured));
     found.extend(motion::check_motion(recording));
@@ -96,6 +114,15 @@ pub(crate) fn find_frequency_faults(
     let positions = untracked::describe_untracked(recording.traces(), &untracked, frames);
     let found = import.iter().cloned().chain(positions);
     found.filter(|finding| finding.severity == Severity::Serious).collect()
+}
+
+/// The recording with changed traces, if they are `wanted`.
+fn change_traces(
+    recording: &Recording,
+    wanted: bool,
+    change: impl FnOnce(Traces) -> Traces,
+) -> Option<Recording> {
+    wanted.then(|| recording.clone().with_traces(change(recording.traces().clone())).ok()).flatten()
 }
 
 /// The recording and its quality without repeated and interpolated positions, whose noise is too small.

@@ -179,7 +179,7 @@ fn own_rate(film: &Film) -> f64 {
     film.recording.grid().frame_rate_hz
 }
 
-const FAULTS: [Fault; 10] = [
+const FAULTS: [Fault; 14] = [
     ("tenfold frame rate", "frame-rate", |film| alter_film(film, 10.0 * own_rate(film), |columns| columns)),
     ("5 frames/s", "frame-rate", |film| alter_film(film, 5.0, |columns| columns)),
     ("mean of 11 frames", "pre-filtered", |film| {
@@ -211,7 +211,48 @@ const FAULTS: [Fault; 10] = [
     ("x and y exchanged", "mixed-columns", |film| {
         alter_film(film, own_rate(film), |[tip_x, tip_y, head_x, head_y]| [tip_y, tip_x, head_y, head_x])
     }),
+    ("points exchanged in the middle fifth", "swapped-points", |film| {
+        alter_film(film, own_rate(film), |columns| exchange_fifths(columns, [2, 3]))
+    }),
+    ("points exchanged in the last two fifths", "swapped-points", |film| {
+        alter_film(film, own_rate(film), |columns| exchange_fifths(columns, [3, 5]))
+    }),
+    ("a stretch of both tracks lost and closed up", "lost-frames", |film| {
+        alter_film(film, own_rate(film), |columns| {
+            let lost = columns[0].len() / 40;
+            lose_stretch(columns, lost)
+        })
+    }),
+    ("a stretch of the head lost and closed up", "lost-frames", |film| {
+        alter_film(film, own_rate(film), |[mut tip_x, mut tip_y, head_x, head_y]| {
+            let lost = tip_x.len() / 40;
+            let [head_x, head_y] = lose_stretch([head_x, head_y], lost);
+            tip_x.truncate(head_x.len());
+            tip_y.truncate(head_x.len());
+            [tip_x, tip_y, head_x, head_y]
+        })
+    }),
 ];
+
+/// The columns without some frames from three quarters of the recording on, where the head moves.
+fn lose_stretch<const N: usize>(columns: [Vec<Option<f64>>; N], lost: usize) -> [Vec<Option<f64>>; N] {
+    columns.map(|mut column| {
+        let from = 3 * column.len() / 4;
+        column.drain(from..from + lost);
+        column
+    })
+}
+
+/// The columns with tip and head exchanged in a part of the frames, given in fifths of the recording.
+fn exchange_fifths(
+    [mut tip_x, mut tip_y, mut head_x, mut head_y]: Columns,
+    [from, to]: [usize; 2],
+) -> Columns {
+    let part = from * tip_x.len() / 5..to * tip_x.len() / 5;
+    tip_x[part.clone()].swap_with_slice(&mut head_x[part.clone()]);
+    tip_y[part.clone()].swap_with_slice(&mut head_y[part]);
+    [tip_x, tip_y, head_x, head_y]
+}
 
 /// The first `count` films of usual blades, each at a frame rate that resolves the vibration of the neck.
 fn usual_films(count: usize) -> Vec<Film> {
@@ -247,7 +288,68 @@ fn a_mean_and_tracks_that_are_apart_are_named_first() {
 
 #[test]
 fn exchanged_columns_are_named_first() {
-    count_named_first(&FAULTS[5..]);
+    count_named_first(&FAULTS[5..10]);
+}
+
+#[test]
+fn points_exchanged_in_a_part_are_named_first() {
+    count_named_first(&FAULTS[10..12]);
+}
+
+#[test]
+fn a_stretch_that_was_closed_up_is_named_first() {
+    count_named_first(&FAULTS[12..]);
+}
+
+/// A rig whose head makes strokes with rests between them; the tip follows as far as the blade leans.
+/// Positions are rounded to `step_m`, if it is not zero.
+fn film_resting_rig(
+    seed: u64,
+    [stroke_s, travel_m, rest_s]: [f64; 3],
+    frame_rate_hz: f64,
+    step_m: f64,
+) -> Recording {
+    let rng = &mut Xoshiro256PlusPlus::seed_from_u64(seed);
+    let (height_m, lean_m, noise_m): (f64, f64, f64) = (6e-3, 1.5e-3, 2e-6);
+    let frames = (3.0 * stroke_s.max(rest_s) * frame_rate_hz) as usize;
+    let head = |i: usize| {
+        let phase = (i as f64 / frame_rate_hz) % (2.0 * (stroke_s + rest_s)) / (stroke_s + rest_s);
+        let part = (phase % 1.0 * (stroke_s + rest_s) / stroke_s).min(1.0);
+        let place = travel_m * 0.5 * (1.0 - (0.5 * TAU * part).cos());
+        if phase < 1.0 { place } else { travel_m - place }
+    };
+    let lean = |lean_so_far: &mut f64, i: usize| {
+        *lean_so_far = (*lean_so_far + head(i) - head(i.saturating_sub(1))).clamp(-lean_m, lean_m);
+        Some(*lean_so_far)
+    };
+    let leans: Vec<f64> = (0..frames).scan(0.0, lean).collect();
+    let mut column = |place: &dyn Fn(usize) -> f64| {
+        let mut sample = |i: usize| {
+            let x = place(i) + noise_m * rng.sample::<f64, _>(StandardNormal);
+            if step_m > 0.0 { (x / step_m).round() * step_m } else { x }
+        };
+        (0..frames).map(|i| Some(sample(i))).collect::<Vec<_>>()
+    };
+    let traces = Traces {
+        tip_x_m: column(&|i| head(i) - leans[i]),
+        tip_y_m: column(&|_| 0.0),
+        head_x_m: column(&head),
+        head_y_m: column(&|i| (height_m * height_m - leans[i] * leans[i]).sqrt()),
+        ..Traces::default()
+    };
+    let grid = FrameGrid { start_s: 0.0, frame_rate_hz, frames };
+    Recording::new("rig", grid, traces, true).unwrap()
+}
+
+#[test]
+fn a_rig_at_rest_shows_neither_a_lag_nor_turns() {
+    for seed in 0..thorough::pick(3, 20) as u64 {
+        let rested = film_resting_rig(seed, [1.0, 0.06, [8.0, 5.0, 3.0][seed as usize % 3]], 1_000.0, 0.0);
+        assert!(doubts(&rested, None).is_empty(), "{seed}: {:?}", doubts(&rested, None));
+        let coarse = film_resting_rig(seed, [20.0, 0.015, 10.0], 250.0, 1e-4);
+        let found = doubts(&coarse, None);
+        assert!(found.iter().all(|f| f.check == Check::PositionStep), "{seed}: {found:?}");
+    }
 }
 
 #[test]
@@ -282,4 +384,39 @@ fn films_without_a_fault_are_not_cautioned() {
         .collect();
     println!("cautioned: {} of {count}", cautioned.len());
     assert!(cautioned.len() <= count / 100, "{cautioned:#?}");
+}
+
+/// A short recording of a blade that oscillates by a fifth of a millimetre, so that its head sinks by no more
+/// than the noise. Every 21 frames, the tip is held for `held` frames.
+fn film_short_oscillation(seed: u64, held: usize) -> Recording {
+    let rng = &mut Xoshiro256PlusPlus::seed_from_u64(seed);
+    let (frames, frame_rate_hz) = (300, 1_000.0);
+    let lean = |i: usize| 2e-4 * (TAU * 78.4 * i as f64 / frame_rate_hz).sin() + 1e-4;
+    let head = |i: usize| 1e-3 + 2e-2 * i as f64 / frames as f64;
+    let mut column = |place: &dyn Fn(usize) -> f64| {
+        let mut sample = |i: usize| place(i) + 2e-6 * rng.sample::<f64, _>(StandardNormal);
+        (0..frames).map(|i| Some(sample(i))).collect::<Vec<_>>()
+    };
+    let hold = |column: Vec<Option<f64>>| -> Vec<Option<f64>> {
+        (0..frames).map(|i| column[if i % 21 <= held { i - i % 21 } else { i }]).collect()
+    };
+    let traces = Traces {
+        tip_x_m: hold(column(&|i| head(i) + lean(i))),
+        tip_y_m: hold(column(&|_| 0.0)),
+        head_x_m: column(&head),
+        head_y_m: column(&|i| (144e-6 - lean(i) * lean(i)).sqrt()),
+        ..Traces::default()
+    };
+    let grid = FrameGrid { start_s: 0.0, frame_rate_hz, frames };
+    Recording::new("short", grid, traces, true).unwrap()
+}
+
+#[test]
+fn a_short_recording_and_a_tip_that_was_not_tracked_show_no_lag() {
+    for seed in 0..thorough::pick(25, 200) as u64 {
+        for held in [0, 6] {
+            let found = doubts(&film_short_oscillation(seed, held), None);
+            assert!(found.iter().all(|f| f.check != Check::Lag), "{seed}, {held}: {found:?}");
+        }
+    }
 }

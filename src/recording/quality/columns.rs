@@ -4,6 +4,7 @@
 use super::finding::{Check, QualityFinding, Severity};
 use super::measurement::{ChannelQuality, Quality};
 use super::motion::{head_height_m, trimmed_range_m};
+use super::outliers::smallest_movement;
 use super::regression::{fit_rows, polynomial_row};
 use crate::recording::Traces;
 use crate::recording::channel::ReversalInstants;
@@ -59,7 +60,12 @@ fn roughness(samples: &[Option<f64>], noise_m: f64, strokes: usize) -> Option<f6
 /// Range of a height, in units of the range of noise, after tilt and curvature of the glass are removed (a
 /// parabola along the sweep).
 fn height_range(x: &[Option<f64>], y: &[Option<f64>], quality: &ChannelQuality) -> Option<f64> {
-    let noise_m = quality.noise_m.filter(|noise| *noise > 0.0)?.max(quality.step_m.unwrap_or(0.0) / 3.0);
+    let step_m = quality.step_m.or_else(|| smallest_movement(y));
+    if step_m.is_none() {
+        // (a height that never changes)
+        return y.iter().flatten().next().map(|_| 0.0);
+    }
+    let noise_m = quality.noise_m?.max(step_m.unwrap_or(0.0) / 3.0);
     let centre = x.iter().flatten().next()?;
     let reach = trimmed_range_m(x)?.max(f64::MIN_POSITIVE);
     let some = x.iter().zip(y).step_by(x.len() / MOST_ROWS + 1);

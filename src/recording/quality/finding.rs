@@ -88,6 +88,8 @@ checks! {
     FrameRate = "frame-rate",
     /// Tracks of tip and head that belong to different frames.
     Lag = "lag",
+    /// A jump of the head, where frames are missing although the frame numbers go on.
+    LostFrames = "lost-frames",
     /// Tip and head exchanged.
     SwappedPoints = "swapped-points",
     /// Columns of tip and head, or of x and y, exchanged.

@@ -28,11 +28,17 @@ const CLEARLY_BETTER: f64 = 0.9;
 /// Replaces [`CLEARLY_BETTER`] if the residuals at the best lag are only noise: then nothing but a lag can
 /// change the fraction.
 const BETTER_IN_NOISE: f64 = 0.96;
+/// Smallest decrease of the sum of squares at the best lag, in units of the mean square: the largest of the
+/// decreases at 80 wrong lags, each of a fit with five coefficients to white noise, is about half as large.
+const BEYOND_CHANCE: f64 = 40.0;
 /// Residuals count as only noise if their mean square is below this multiple of the squared noise.
 const NOISE_ALONE: f64 = 1.25;
 /// A growing lag is accepted if the mean square of its residuals is below this fraction of the mean square
 /// with a constant lag and a drift.
 const GROWTH_EXPLAINS: f64 = 0.5;
+/// Smallest speed of the head in the fit of a growing lag, as a fraction of the highest: a head at rest has
+/// the same place in every frame, whatever the lag.
+const MOVES: f64 = 0.05;
 /// Maximum number of frames of a fit.
 const MOST_ROWS: usize = 4_000;
 
@@ -82,16 +88,17 @@ fn best_lag(traces: &Traces, range: Range<usize>, noise_m: f64) -> Option<BestLa
             Some((polynomial_row::<5>((deflection_m - centre_m) / reach_m), head_y[i]? - level_m))
         };
         let rows: Vec<_> = (first..last).step_by((last - first) / MOST_ROWS + 1).filter_map(row).collect();
-        Some((lag, fit_rows(&rows)?.mean_square))
+        Some((lag, fit_rows(&rows)?.mean_square, rows.len() as f64))
     };
-    let unshifted = mean_square(0)?.1;
+    let (_, unshifted, rows) = mean_square(0)?;
     let least_of = |lags: &mut dyn Iterator<Item = isize>| {
         lags.filter_map(mean_square).min_by(|a, b| a.1.total_cmp(&b.1))
     };
-    let (near, _) = least_of(&mut (-MOST_LAG..=MOST_LAG).step_by(2))?;
-    let (frames, least) = least_of(&mut ((near - 1).max(-MOST_LAG)..=(near + 1).min(MOST_LAG)))?;
+    let (near, ..) = least_of(&mut (-MOST_LAG..=MOST_LAG).step_by(2))?;
+    let (frames, least, _) = least_of(&mut ((near - 1).max(-MOST_LAG)..=(near + 1).min(MOST_LAG)))?;
     let limit = if least < NOISE_ALONE * noise_m * noise_m { BETTER_IN_NOISE } else { CLEARLY_BETTER };
-    Some(BestLag { frames, clear: frames.abs() >= LEAST_LAG && least < limit * unshifted })
+    let better = least < limit * unshifted && rows * (unshifted - least) > BEYOND_CHANCE * least;
+    Some(BestLag { frames, clear: frames.abs() >= LEAST_LAG && better })
 }
 
 /// Lag at the start and the end of the recording, in frames, if it grows evenly, from a fit of the deflection
@@ -106,14 +113,21 @@ fn growing_lag_frames(traces: &Traces) -> Option<[f64; 2]> {
         Some(([1.0, speed * 1e3, place, speed * 1e3 * place], traces.tip_x_m[i]? - head_x[i]?))
     };
     let every = frames / MOST_ROWS + 1;
-    let growing: Vec<_> = (half..frames.saturating_sub(half)).step_by(every).filter_map(row).collect();
+    let mut growing: Vec<_> = (half..frames.saturating_sub(half)).step_by(every).filter_map(row).collect();
+    let highest = growing.iter().map(|([_, speed, ..], _)| speed.abs()).fold(0.0, f64::max);
+    growing.retain(|([_, speed, ..], _)| speed.abs() >= MOVES * highest);
     let constant: Vec<_> =
         growing.iter().map(|([one, speed, place, _], d)| ([*one, *speed, *place], *d)).collect();
     let (growing, constant) = (fit_rows(&growing)?, fit_rows(&constant)?);
     let [_, mean, _, growth] = growing.coefficients.map(|c| 1e3 * c);
     let explains = growing.mean_square < GROWTH_EXPLAINS * constant.mean_square;
-    let possible = LEAST_GROWTH..=MOST_GROWTH * frames as f64;
+    let possible = LEAST_GROWTH..=(MOST_GROWTH * frames as f64).min(MOST_LAG as f64);
     (explains && possible.contains(&growth.abs())).then_some([mean - growth / 2.0, mean + growth / 2.0])
+}
+
+/// Whether a lag, given at the start and at the end of a recording, grows.
+pub(super) fn is_growing([start, end]: [f64; 2]) -> bool {
+    (end - start).abs() >= 1.0
 }
 
 /// Finding on a lag between the tracks of tip and head.
@@ -122,7 +136,7 @@ pub(super) fn check_lag(lag_frames: Option<[f64; 2]>) -> Option<QualityFinding> 
     let behind = |lag: f64| {
         format!("{:.0} frames {} the head", lag.abs(), if lag < 0.0 { "ahead of" } else { "behind" })
     };
-    let (value, found, advice) = if (end - start).abs() < 1.0 {
+    let (value, found, advice) = if !is_growing([start, end]) {
         let found = format!(
             "the track of the tip is {}: the height of the head follows the deflection of other frames",
             behind(start)

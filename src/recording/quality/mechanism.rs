@@ -89,6 +89,7 @@ pub fn measure_motion(
     let speeds = head_speeds_m_per_s(&traces.head_x_m, rate_hz, strokes);
     let turns: Vec<f64> = instants.reversals.iter().map(|turn| turn.reversal_s).collect();
     let between = median_in_place(&mut turns.windows(2).map(|turns| turns[1] - turns[0]).collect::<Vec<_>>());
+    let between = between.filter(|stroke_s| *stroke_s > 0.0);
     MotionSummary {
         blade_height_m: head_height_m(traces),
         travel_m: largest_travel_m(traces),

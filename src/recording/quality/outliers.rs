@@ -83,7 +83,7 @@ pub fn outlier_frames(
 
 /// Smallest movement between neighbouring frames that is not zero. It is used as the step of a column that
 /// moves too rarely for a common divisor.
-fn smallest_movement(samples: &[Option<f64>]) -> Option<f64> {
+pub(super) fn smallest_movement(samples: &[Option<f64>]) -> Option<f64> {
     let moves = samples.windows(2).filter_map(|w| Some((w[1]? - w[0]?).abs()));
     moves.filter(|&size| size > 0.0).reduce(f64::min)
 }

@@ -25,6 +25,9 @@ const MOST_FRAMES: f64 = 0.05;
 /// Fraction of repeated frames above which the finding is serious: repeated frames also shift the times of
 /// all later frames.
 const MOST_REPEATED: f64 = 0.01;
+/// Fraction of untracked frames of a point above which no lag is reported: filled positions are themselves a
+/// few frames off, and not all of them are found.
+const NO_LAG: f64 = 0.2;
 /// Maximum number of runs whose frames are listed in a finding.
 const NAMED_RUNS: usize = 4;
 
@@ -62,7 +65,7 @@ impl UntrackedFrames {
     }
 
     /// Whether a position of the point `name` is concerned.
-    fn concerns(&self, name: &str) -> bool {
+    pub(super) fn concerns(&self, name: &str) -> bool {
         self.channel.is_empty() || self.channel.starts_with(name)
     }
 
@@ -156,6 +159,13 @@ pub fn find_untracked_frames(
     }
     found.retain(|untracked| !untracked.runs.is_empty());
     found
+}
+
+/// Whether a point was not tracked in so many of its frames that a lag of its track cannot be told.
+pub(super) fn are_many(found: &[UntrackedFrames], frames: usize) -> bool {
+    let of_point =
+        |point| found.iter().filter(|f| f.concerns(point)).map(UntrackedFrames::count).sum::<usize>();
+    ["tip", "head"].into_iter().any(|point| of_point(point) as f64 > NO_LAG * frames as f64)
 }
 
 /// Findings on frames, within the range `frames`, in which a position was written but not tracked.
