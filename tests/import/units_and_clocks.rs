@@ -260,17 +260,17 @@ fn equal_steps_of_few_digits_know_their_rate_coarsely() {
         "{said}"
     );
     // steps of 4 ms may be those of 250 or of 240 frames/s, steps of 20 ms only those of 50
-    let steps_of = |step_s: f64| {
-        table(
-            "t,tip_x,tip_y,head_x,head_y",
-            300,
-            |row| format!("{:.3}", row as f64 * step_s),
-            [1e-3; 2],
-            30.0,
-        )
+    let steps_of = |step_s: f64, digits: usize| {
+        let time = |row| format!("{:.digits$}", row as f64 * step_s);
+        read(&table("t,tip_x,tip_y,head_x,head_y", 300, time, [1e-3; 2], 30.0), &real)
+            .report
+            .lines()
+            .join("\n")
     };
-    assert!(read(&steps_of(0.004), &real).report.lines().join("\n").contains("known to 4.1 % only"));
-    assert!(!read(&steps_of(0.02), &real).report.lines().join("\n").contains("% only"));
+    assert!(steps_of(0.004, 3).contains("known to 4.1 % only"));
+    assert!(!steps_of(0.02, 3).contains("% only"));
+    // with four digits, a step of 240 frames/s is 0.0042
+    assert!(!steps_of(0.004, 4).contains("% only"));
     // 25 frames/s differs from the rate of the steps by more than half of the last digit
     assert!(refused(&text, &in_mm(at_rate(25.0, None))).contains("--frame-rate-hz says 25"));
 }

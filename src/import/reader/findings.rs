@@ -16,10 +16,13 @@ const ZERO_RUN: usize = 3;
 /// Value of both coordinates of a lost point, as scripts that use OpenCV often write it. In pixels, (-1, -1)
 /// is outside the picture, so a single frame is enough for a finding.
 const OUTSIDE_PICTURE: f64 = -1.0;
-/// Coordinates above this number look like pixels if their declared unit is a millimetre or larger. A view
-/// that resolves the lip of a wiper is rarely wider than 100 mm, and a picture is hardly ever narrower than
-/// 100 pixels.
+/// Coordinates above this number may be pixels if their declared unit is a millimetre or larger. A view that
+/// resolves the lip of a wiper is rarely wider than 100 mm, and a picture is hardly ever narrower than 100
+/// pixels.
 const PIXEL_LIKE_LIMIT: f64 = 100.0;
+/// Largest coordinate of a wiper, m: the longest blades travel about 1.5 m along their arc. Smaller ones are
+/// only worth a note, because the unit is declared.
+const LARGEST_COORDINATE_M: f64 = 1.5;
 /// Smallest declared unit for which [`PIXEL_LIKE_LIMIT`] is used, m. In micrometres, the coordinates of every
 /// view exceed the limit.
 const MILLIMETRE_M: f64 = 1e-3;
@@ -173,7 +176,9 @@ pub(crate) fn position_findings(
         };
         let found = format!("{name}: the coordinates {sign} (largest {largest:.6e})");
         let advice = "they look like pixels; if so, give --scale as a length a pixel";
-        findings.push(new_finding(Check::UnitSuspicion, Severity::Caution, (largest, ""), found, advice));
+        let possible = !whole && largest * scale.metres() <= LARGEST_COORDINATE_M;
+        let severity = if possible { Severity::Note } else { Severity::Caution };
+        findings.push(new_finding(Check::UnitSuspicion, severity, (largest, ""), found, advice));
     }
     findings
 }
@@ -234,19 +239,21 @@ mod tests {
 
     #[test]
     fn pixels_declared_as_millimetres_are_suspected_whole_or_not() {
-        let suspected = |from: f64, step: f64, scale| {
+        let cautions = |from: f64, step: f64, scale| {
             let x: Vec<Option<f64>> = (0..20).map(|i| Some(from + f64::from(i) * step)).collect();
             position_findings("tip", &x, &[None; 20], scale)
                 .iter()
-                .filter(|finding| finding.check == Check::UnitSuspicion)
+                .filter(|found| found.check == Check::UnitSuspicion && found.severity > Severity::Note)
                 .count()
         };
         let millimetres = CoordinateScale::Unit(1e-3);
-        assert_eq!(suspected(511.37, 0.75, millimetres), 1);
-        assert_eq!(suspected(3.0, 1.0, millimetres), 1);
-        assert_eq!(suspected(20.37, 0.75, millimetres), 0);
-        assert_eq!(suspected(5113.7, 7.5, CoordinateScale::Unit(1e-6)), 0);
-        assert_eq!(suspected(511.37, 0.75, CoordinateScale::MetresPerPixel(2e-5)), 0);
+        assert_eq!(cautions(1511.37, 0.75, millimetres), 1);
+        assert_eq!(cautions(3.0, 1.0, millimetres), 1);
+        // a stroke of half a metre
+        assert_eq!(cautions(451.37, 0.75, millimetres), 0);
+        assert_eq!(cautions(20.37, 0.75, millimetres), 0);
+        assert_eq!(cautions(5113.7, 7.5, CoordinateScale::Unit(1e-6)), 0);
+        assert_eq!(cautions(511.37, 0.75, CoordinateScale::MetresPerPixel(2e-5)), 0);
     }
 
     fn is_picked(frames: &[f64]) -> bool {

@@ -93,7 +93,9 @@ pub(crate) fn implied_rate(export: &TrackFile) -> Option<FrameRate> {
     let quantum_s = find_quantum_s(&times);
     let hz = clock::simplest_rate(hz, |rate| times_fit_rate(&times, &frames, rate, quantum_s));
     let source = format!("the times of {}", export.file);
-    Some(FrameRate { hz, error: times_error(&times, &frames, rounding_s(&times, longest.digit)), source })
+    let rounding_s = rounding_s(&times, longest.digit);
+    let written_s = if longest.digit > 0.0 { longest.digit } else { rounding_s };
+    Some(FrameRate { hz, error: times_error(&times, &frames, rounding_s, written_s), source })
 }
 
 /// Frame numbers and times of the rows of a clock, and the frame rate, 1/s. If the file has frame numbers,
@@ -112,12 +114,12 @@ fn number_rows(clock: &Clock) -> Option<(Vec<f64>, Vec<f64>, f64)> {
     Some((frames, times, 1.0 / fit.frame_s))
 }
 
-/// Largest relative error of the frame rate that times imply; `digit_s` is the value of their last digit, s.
-/// If each time was rounded separately, the error is the last digit divided by the time from the first to the
-/// last row. If all steps are equal, the step itself may have been rounded, with an error of half its last
-/// digit. A rate of at most two significant digits counts as exact, unless another common rate has the same
-/// rounded step.
-fn times_error(times: &[f64], frames: &[f64], digit_s: f64) -> f64 {
+/// Largest relative error of the frame rate that times imply. `digit_s` is the value of their last digit that
+/// is not always zero, and `written_s` that of the last written digit, s. If each time was rounded separately,
+/// the error is the last digit divided by the time from the first to the last row. If all steps are equal, the
+/// step itself may have been rounded, with an error of half its last digit. A rate of at most two significant
+/// digits counts as exact, unless another common rate would have been written with the same step.
+fn times_error(times: &[f64], frames: &[f64], digit_s: f64, written_s: f64) -> f64 {
     let span = |values: &[f64]| values.last().zip(values.first()).map_or(0.0, |(last, first)| last - first);
     let frame_s = span(times) / span(frames);
     let mut steps = times.windows(2).zip(frames.windows(2));
@@ -133,7 +135,7 @@ fn times_error(times: &[f64], frames: &[f64], digit_s: f64) -> f64 {
         (true, false) if !few => return 0.5 / digits,
         _ => return of_ends,
     }
-    let same_step = |hz: &&f64| (1.0 / (**hz * digit_s)).round() == digits;
+    let same_step = |hz: &&f64| (1.0 / (**hz * written_s)).round() == (frame_s / written_s).round();
     clock::COMMON_RATES_HZ
         .iter()
         .filter(same_step)
