@@ -79,13 +79,16 @@ fn best_lag(traces: &Traces, range: Range<usize>, noise_m: f64) -> Option<BestLa
     let apart = || range.clone().filter_map(|i| Some(tip_x[i]? - head_x[i]?));
     let centre_m = median_in_place(&mut apart().collect::<Vec<_>>())?;
     let reach_m = apart().map(|d| (d - centre_m).abs()).fold(0.0, f64::max);
+    let place_m = middle(&head_x[range.clone()])?;
     if last < first + 2 * MOST_LAG as usize || reach_m <= 0.0 {
         return None;
     }
     let mean_square = |lag: isize| {
         let row = |i: usize| {
             let deflection_m = tip_x[i.checked_add_signed(lag)?]? - head_x[i]?;
-            Some((polynomial_row::<5>((deflection_m - centre_m) / reach_m), head_y[i]? - level_m))
+            let [one, a, b, c, d] = polynomial_row((deflection_m - centre_m) / reach_m);
+            // (in a tilted picture the head climbs along the sweep)
+            Some(([one, a, b, c, d, (head_x[i]? - place_m) / reach_m], head_y[i]? - level_m))
         };
         let rows: Vec<_> = (first..last).step_by((last - first) / MOST_ROWS + 1).filter_map(row).collect();
         Some((lag, fit_rows(&rows)?.mean_square, rows.len() as f64))
