@@ -180,8 +180,9 @@ impl TraceCovariance {
     }
 }
 
-/// Sum of the squared cost gradients of the segments at the minimum, relative to its mean for a right model; see
-/// [`TraceCovariance::gradient_scatter`]. The squares are weighted by the inverse `C` of the information matrix.
+/// Sum of the squared cost gradients of the segments at the minimum, relative to its mean for a right model;
+/// see [`TraceCovariance::gradient_scatter`]. The squares are weighted by the inverse `C` of the information
+/// matrix.
 ///
 /// At the minimum, the gradient of a segment with the matrix `M` is `g - M C G`, where `g` is its gradient at
 /// the true values, and `G` is the sum of all gradients and prior pulls.
@@ -201,8 +202,8 @@ fn compare_gradients(found: &NormalEquations, inverse: &DMatrix<f64>, heads: &He
 
 /// Covariances of cost gradients due to errors of the recorded head positions.
 struct HeadCovariance {
-    /// That of the sum over all segments. The curve through the positions is smooth, so its error extends over
-    /// many segments and does not average out like noise.
+    /// That of the sum over all segments. The curve through the positions is smooth, so its error extends
+    /// over many segments and does not average out like noise.
     total: DMatrix<f64>,
     /// That of each segment.
     by_segment: Vec<Option<DMatrix<f64>>>,

@@ -1,8 +1,9 @@
 //! Tests whether the estimates of the constants contradict their priors.
 //!
 //! With a right model and right priors, the distance of the estimates from the prior means has the covariance
-//! `P - C` (prior less posterior), and the excess of the noise and the errors of the recorded head add to it. Constants that are jointly too far from their priors, and parameters that
-//! move when the priors are made wider, show that a prior or the model is wrong.
+//! `P - C` (prior less posterior), and the excess of the noise and the errors of the recorded head add to it.
+//! Constants that are jointly too far from their priors, and parameters that move when the priors are made
+//! wider, show that a prior or the model is wrong.
 
 use super::uncertainty_run::SearchEnd;
 use crate::model::parameters::describe_parameters;

@@ -115,8 +115,8 @@ pub fn search_trace(
     found
 }
 
-/// First iterate of a start. Every second start from the third on is the best of several points: where two starts
-/// do not agree, the cost has several minima, and the right one may lie far from most points.
+/// First iterate of a start. Every second start from the third on is the best of several points: where two
+/// starts do not agree, the cost has several minima, and the right one may lie far from most points.
 fn first_of_start(
     model: &TraceModel,
     settings: &TraceSearchSettings,

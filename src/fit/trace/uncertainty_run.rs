@@ -114,8 +114,8 @@ impl<'a> SearchEnd<'a> {
         Some(Self { model, settings, seed, at, covariance, widening, sd })
     }
 
-    /// Part of the covariance of the estimates by which they scatter more than their information says: the noise
-    /// beyond the measured one, and the errors of the recorded heads.
+    /// Part of the covariance of the estimates by which they scatter more than their information says: the
+    /// noise beyond the measured one, and the errors of the recorded heads.
     pub(super) fn excess_covariance(&self) -> DMatrix<f64> {
         let TraceCovariance { curvature, priors, heads, .. } = &self.covariance;
         (curvature - heads - priors) * (self.widening - 1.0) + heads

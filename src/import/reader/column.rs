@@ -355,8 +355,8 @@ impl ColumnUnit {
     }
 }
 
-/// Splits a unit such as `0.1 mm` into factor and symbol; the factor is 1 if there is none. `None` for a number
-/// that is no factor.
+/// Splits a unit such as `0.1 mm` into factor and symbol; the factor is 1 if there is none. `None` for a
+/// number that is no factor.
 fn split_factor(unit: &str) -> Option<(f64, &str)> {
     if !starts_with_digit(unit) {
         return Some((1.0, unit));

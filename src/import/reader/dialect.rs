@@ -141,8 +141,8 @@ fn delimiter_score(rows: &[TextRow], delimiter: Delimiter, (least, cells): (f64,
     numeric.iter().filter(|(count, _)| *count == usual).map(|(_, share)| share).sum()
 }
 
-/// Refuses a column in which the decimal mark separates thousands: `1,020` below `980`. Each mark stands before
-/// groups of three digits, and the numbers go on more evenly without it.
+/// Refuses a column in which the decimal mark separates thousands: `1,020` below `980`. Each mark stands
+/// before groups of three digits, and the numbers go on more evenly without it.
 fn refuse_thousands(file: &str, rows: &[TextRow], decimal: char) -> ImportResult<()> {
     /// Fewest numbers with such a mark.
     const FEWEST_MARKED: usize = 2;

@@ -115,10 +115,11 @@ fn number_rows(clock: &Clock) -> Option<(Vec<f64>, Vec<f64>, f64)> {
 }
 
 /// Largest relative error of the frame rate that times imply. `digit_s` is the value of their last digit that
-/// is not always zero, and `written_s` that of the last written digit, s. If each time was rounded separately,
-/// the error is the last digit divided by the time from the first to the last row. If all steps are equal, the
-/// step itself may have been rounded, with an error of half its last digit. A rate of at most two significant
-/// digits counts as exact, unless another common rate would have been written with the same step.
+/// is not always zero, and `written_s` that of the last written digit, s. If each time was rounded
+/// separately, the error is the last digit divided by the time from the first to the last row. If all steps
+/// are equal, the step itself may have been rounded, with an error of half its last digit. A rate of at most
+/// two significant digits counts as exact, unless another common rate would have been written with the same
+/// step.
 fn times_error(times: &[f64], frames: &[f64], digit_s: f64, written_s: f64) -> f64 {
     let span = |values: &[f64]| values.last().zip(values.first()).map_or(0.0, |(last, first)| last - first);
     let frame_s = span(times) / span(frames);

@@ -175,8 +175,8 @@ fn place_by_number(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<Ro
     Ok(RowFrames { frames, numbered: true, start_s, times: None, implied_hz })
 }
 
-/// Refuses frame numbers and times of which one has a pause or a jump that the other does not have. Times with
-/// uneven steps throughout are another matter: they are those of a camera with a variable rate.
+/// Refuses frame numbers and times of which one has a pause or a jump that the other does not have. Times
+/// with uneven steps throughout are another matter: they are those of a camera with a variable rate.
 fn refuse_parting_clocks(rows: ClockRows, frames: &[i64]) -> ImportResult<()> {
     /// Largest allowed difference between the two clocks from a row to the next, frames.
     const MOST_APART: f64 = 0.5;

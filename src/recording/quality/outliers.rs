@@ -1,16 +1,17 @@
 //! Points far from the prediction by their neighbours: the tracker jumps away for one frame or for several
 //! and comes back.
 //!
-//! A single point is an outlier if all three conditions hold. The conditions exclude fast chatter, and
-//! kinks, jumps and flips of the blade:
+//! A single point is an outlier if all three conditions hold. The conditions exclude fast chatter, and kinks,
+//! jumps and flips of the blade:
 //! - its distance from the cubic through its four neighbours exceeds what noise and step explain;
 //! - it lies on the same side of two straight lines, through the two points before and the two points after
 //!   it (at a kink it lies on one of them), and both lines agree on its place (at a jump they do not);
 //! - the points around it are much closer to their own cubics (in chatter or strong noise they are not).
 //!
-//! The neighbours of a single point are the two tracked points before it and the two after it. It is not judged
-//! if they span more than [`LONGEST_SPAN`] frames. Several points in a row are outliers between two jumps of about the same size in opposite directions, if no other jump of more than a
-//! quarter of this size is near and the point afterwards continues its earlier path.
+//! The neighbours of a single point are the two tracked points before it and the two after it. It is not
+//! judged if they span more than [`LONGEST_SPAN`] frames. Several points in a row are outliers between two
+//! jumps of about the same size in opposite directions, if no other jump of more than a quarter of this size
+//! is near and the point afterwards continues its earlier path.
 
 use super::measurement::ChannelQuality;
 use crate::recording::noise::differences::difference_at;
@@ -121,8 +122,8 @@ fn find_absences(samples: &[Option<f64>], least_m: f64) -> Vec<std::ops::RangeIn
     absences
 }
 
-/// Standard deviation of the distance of a point from the cubic through its neighbours, without a gap, in white
-/// noise of standard deviation 1: `sqrt(1 + (16 + 16 + 1 + 1)/36)`.
+/// Standard deviation of the distance of a point from the cubic through its neighbours, without a gap, in
+/// white noise of standard deviation 1: `sqrt(1 + (16 + 16 + 1 + 1)/36)`.
 const UNBROKEN_SD: f64 = 1.394_433_377_556_792_8;
 
 /// The tracked positions of a column, with their frames.
@@ -181,9 +182,9 @@ impl TrackedPoints {
     }
 
     /// Whether all points around a point are much closer to their own cubics than this point is to its cubic,
-    /// from which it has the distance `miss_m`; false if no point around it has a cubic. Motion misses the cubic
-    /// in proportion to the product of the distances of the neighbours, so a miss with nearer neighbours counts
-    /// for more.
+    /// from which it has the distance `miss_m`; false if no point around it has a cubic. Motion misses the
+    /// cubic in proportion to the product of the distances of the neighbours, so a miss with nearer
+    /// neighbours counts for more.
     fn is_calm_around(&self, point: usize, miss_m: f64) -> bool {
         let reach = |point: usize| Some(self.neighbours(point)?.iter().product::<f64>().abs());
         let Some(own) = reach(point) else { return false };
