@@ -16,6 +16,7 @@ use crate::recording::quality::{Optics, QualityFinding, find_frequency_faults};
 use crate::simulate::twin::film::{DropoutPattern, film_like_recording};
 use plain_charts::Figure;
 use short_spectra::{Detrend, FASTEST_HZ, MAX_COMPONENTS, SpectralAnalysis, SpectrumSettings};
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 /// File names of the tables.
@@ -214,10 +215,10 @@ impl SpectrumRequest {
     fn study_recording(
         &self,
         exposure_s: Option<f64>,
-        taken: Recording,
+        original: Recording,
         file: Option<&RecordingFile>,
     ) -> Outcome<StudiedWindow> {
-        let recording = taken.clone().move_to_grid();
+        let recording = original.clone().move_to_grid();
         let instants = ReversalInstants::find_instants(&recording);
         let frames = self.window.resolve_frames(&recording, &instants).map_err(Failure::input)?;
         let grid = recording.grid();
@@ -235,9 +236,10 @@ impl SpectrumRequest {
         let rate = grid.frame_rate_hz / stride as f64;
         let every = || format!(" (one of {stride} is tracked: {rate:.6} frames/s)");
         let kept = if stride == 1 { String::new() } else { every() };
-        let faults = self.find_faults(&taken, file, (from_s, to_s));
-        for fault in &faults {
-            let doubt = format!("a serious finding on the recording ({})", fault.check.name());
+        let faults = self.find_faults(&original, file, (from_s, to_s));
+        let checks: BTreeSet<&str> = faults.iter().map(|fault| fault.check.name()).collect();
+        for check in checks {
+            let doubt = format!("the recording has the serious finding `{check}` in this window");
             analysis.spectrum.components.iter_mut().for_each(|c| c.add_doubt(doubt.clone()));
         }
         let uneven = recording.describe_resampling().map_or_else(String::new, |said| format!("; {said}"));

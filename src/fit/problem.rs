@@ -93,15 +93,15 @@ pub struct Problem {
 
 /// A recording without the positions to which the tracker jumped for a few frames. A single one of them makes
 /// its segment fit worse than noise ever does.
-fn leave_out_outliers(recording: Recording) -> (Recording, Vec<UntrackedFrames>) {
-    let optics = Optics::default();
-    let mut found = find_untracked_frames(&recording, &measure_quality(&recording, None), &optics);
+fn leave_out_outliers(recording: Recording, exposure_s: Option<f64>) -> (Recording, Vec<UntrackedFrames>) {
+    let measured = measure_quality(&recording, exposure_s);
+    let mut found = find_untracked_frames(&recording, &measured, &Optics::default());
     found.retain(|found| found.check == Check::Outliers);
-    if found.is_empty() {
-        return (recording, found);
-    }
     let traces = drop_untracked(recording.traces().clone(), &found);
-    (recording.clone().with_traces(traces).unwrap_or(recording), found)
+    match recording.clone().with_traces(traces) {
+        Ok(rest) if !found.is_empty() => (rest, found),
+        _ => (recording, vec![]),
+    }
 }
 
 impl Problem {
@@ -122,18 +122,18 @@ impl Problem {
         if found != expected {
             return Err(ProblemError::Recordings { found, expected });
         }
-        let mut measured = measured
-            .into_iter()
-            .map(|measured| MeasuredRecording { recording: measured.recording.move_to_grid(), ..measured });
+        let mut measured = measured.into_iter();
         let paths = job.conditions.iter().map(|condition| condition.recording.as_ref());
         let mut measured: Vec<Option<MeasuredRecording>> =
             paths.map(|path| path.and_then(|_| measured.next())).collect();
         let mut left_out = Vec::new();
-        for trace in &job.traces {
-            let Some(measured) = measured.get_mut(trace.condition).and_then(Option::as_mut) else { continue };
-            let (recording, outliers) = leave_out_outliers(measured.recording.clone());
-            measured.recording = recording;
-            left_out.extend(outliers.iter().map(|found| (trace.condition, found.describe())));
+        for (number, one) in measured.iter_mut().enumerate() {
+            let Some(MeasuredRecording { recording, exposure_s }) = one.take() else { continue };
+            let is_traced = job.traces.iter().any(|trace| trace.condition == number);
+            let (recording, outliers) =
+                if is_traced { leave_out_outliers(recording, exposure_s) } else { (recording, vec![]) };
+            left_out.extend(outliers.iter().map(|found| (number, found.describe())));
+            *one = Some(MeasuredRecording { recording: recording.move_to_grid(), exposure_s });
         }
         let check = |at: usize| check_scene(&job, at, &scenes[at], measured[at].as_ref());
         let scenes: Vec<Scene> = (0..scenes.len()).map(check).collect::<Result<_, _>>()?;
@@ -199,7 +199,7 @@ impl Problem {
         &self.constants
     }
 
-    /// One sentence for each point whose positions are left out in some frames.
+    /// One sentence for each column whose positions are left out in some frames.
     pub(crate) fn describe_left_out(&self) -> impl Iterator<Item = String> {
         self.left_out.iter().map(|(condition, frames)| {
             let name = &self.job.conditions[*condition].name;

@@ -357,10 +357,10 @@ fn interval_verdict(unit: f64, lower: Option<f64>, upper: Option<f64>, determine
     }
 }
 
-/// Ratio of the 97.5 % quantile of Student's t with `twins` degrees of freedom to that of the normal
-/// distribution, to first order in 1 / `twins` (Abramowitz and Stegun, 26.7.5).
-fn student_factor(twins: usize) -> f64 {
-    1.0 + (Z_95 * Z_95 + 1.0) / (4.0 * twins.max(1) as f64)
+/// Ratio of the 97.5 % quantile of Student's t with `freedoms` degrees of freedom to that of the normal
+/// distribution, to first order in 1 / `freedoms` (Abramowitz and Stegun, 26.7.5).
+fn student_factor(freedoms: usize) -> f64 {
+    1.0 + (Z_95 * Z_95 + 1.0) / (4.0 * freedoms.max(1) as f64)
 }
 
 fn log_sensitivities(

@@ -48,9 +48,12 @@ pub(crate) fn is_playback_rate(rate_hz: f64) -> bool {
 const PHASE_GAIN: f64 = 0.1;
 /// Maximum number of digits to which a fitted frame rate is rounded.
 const RATE_DIGITS: usize = 16;
-/// Longest gaps, in frames, of the runs of rows that refine a guess of the time per frame one after another.
+/// Longest gap, in frames, that the runs of rows contain in each round in which the time per frame is
+/// refined. Runs of ten frames and more make it eight times as accurate, so the next round counts longer
+/// gaps.
 const RUN_GAPS: [usize; 4] = [1, 8, 64, 512];
-/// Largest relative change of the guess by this.
+/// Largest relative difference between the refined time per frame and the first guess, a median of rounded
+/// steps: times rounded to half a frame have medians that are off by up to a quarter.
 const MOST_REFINED: f64 = 0.3;
 /// Maximum number of times that the rows are numbered again after a line was fitted; once suffices unless the
 /// slope of the first line is far off.
@@ -95,12 +98,19 @@ impl FrameFit {
 /// [`MAX_FRAMES`].
 pub(crate) fn number_frames(times_s: &[f64], seed_s: f64) -> Option<FrameFit> {
     let first = *times_s.first()?;
-    let span_frames = (times_s.last()? - first) / seed_s;
-    let too_long = span_frames.is_nan() || span_frames + times_s.len() as f64 > MAX_FRAMES;
-    if times_s.len() < 2 || seed_s <= 0.0 || too_long {
+    let span_s = times_s.last()? - first;
+    let is_too_long = |step_s: f64| {
+        let frames = span_s / step_s;
+        frames.is_nan() || frames + times_s.len() as f64 > MAX_FRAMES
+    };
+    if times_s.len() < 2 || seed_s <= 0.0 || is_too_long(seed_s) {
         return None;
     }
-    let mut frames = follow_grid(times_s, first, refine_step(times_s, first, seed_s));
+    let step_s = refine_step(times_s, first, seed_s);
+    if is_too_long(step_s) {
+        return None;
+    }
+    let mut frames = follow_grid(times_s, first, step_s);
     let mut line = fit_line(&frames, times_s);
     for _ in 0..ROUNDS {
         if !renumber_frames(&mut frames, times_s, line) {
@@ -112,8 +122,8 @@ pub(crate) fn number_frames(times_s: &[f64], seed_s: f64) -> Option<FrameFit> {
 }
 
 /// Time per frame from runs of rows without long gaps. A guess that comes from rounded times is too coarse to
-/// count the frames of a long gap. The slope within the runs is finer, and finer still with the gaps that it
-/// counts.
+/// count the frames of a long gap. The slope within the runs is more accurate, and each gap that is counted
+/// makes it more accurate.
 fn refine_step(times_s: &[f64], first: f64, seed_s: f64) -> f64 {
     let mut step_s = seed_s;
     for longest in RUN_GAPS {

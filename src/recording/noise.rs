@@ -117,8 +117,8 @@ impl RecordingCuts<'_> {
 }
 
 /// Measures the noise of a recording. The position of the head along the sweep and the height of the tip are
-/// measured first; if one measurement fails, the result of the other is used for both. The other two channels
-/// take their correlations from these.
+/// measured first; if one measurement fails, or if the height of the tip scatters by its motion, the result
+/// of the other is used for both. The other two channels take their correlations from these.
 pub(crate) fn measure_noise(recording: &Recording) -> RecordingNoise {
     let (cuts, traces) = (RecordingCuts::new(recording), recording.traces());
     let head = measure_head_noise(&traces.head_x_m, &cuts);
@@ -126,9 +126,13 @@ pub(crate) fn measure_noise(recording: &Recording) -> RecordingNoise {
     let own = |other: &Option<ChannelNoise>, values: &[Option<f64>]| {
         other.clone().map(|other| measure_own_size(values, &cuts, &other).unwrap_or(other))
     };
-    // (a marker beside the edge of the lip moves up and down as the lip turns)
+    // (a marker beside the edge of the lip moves up and down as the lip turns, unlike the head)
     let is_motion = |glass: &ChannelNoise| {
-        head.as_ref().is_some_and(|head| glass.noise.sd() > MOST_UNLIKE * head.noise.sd())
+        head.as_ref().is_some_and(|head| {
+            let least_m = glass.noise.sd() / MOST_UNLIKE;
+            let of_head = measure_scatter(&traces.head_y_m, &cuts, head);
+            head.noise.sd() < least_m && of_head.is_none_or(|[sd_m, _]| sd_m < least_m)
+        })
     };
     let glass = match glass {
         Some(glass) if is_motion(&glass) => own(&head, &traces.tip_y_m),
@@ -202,13 +206,13 @@ fn measure_channel_noise(values: &[Option<f64>], cut: &BlockCut<'_>) -> Option<C
     (found.frames >= FEWEST_FRAMES && found.noise.sd() >= LEAST_SD_M).then_some(found)
 }
 
-/// Noise of a channel in which the blade moves, with the correlations of the other point. `None` if its size
-/// does not clearly differ from that of the other point, or if its motion is too fast.
-fn measure_own_size(
+/// Standard deviation, with its own standard deviation, of the scatter of a channel in which the blade moves,
+/// m, with the correlations of another point. `None` if its motion is too fast.
+fn measure_scatter(
     values: &[Option<f64>],
     cuts: &RecordingCuts<'_>,
     other: &ChannelNoise,
-) -> Option<ChannelNoise> {
+) -> Option<[f64; 2]> {
     let with_degree = |degree: usize| {
         let cut = BlockCut { length: LEAST_BLOCK, degree, ..cuts.cut_head(SHORTEST) };
         likelihood::estimate_sd_like(&cut_blocks(values, &cut), &other.noise)
@@ -221,8 +225,17 @@ fn measure_own_size(
         let apart_sd_m = (highest[1] * highest[1] - sd_of_sd_m * sd_of_sd_m).max(0.0).sqrt();
         sd_m - highest[0] <= ALIKE_DEVIATIONS * apart_sd_m
     };
-    let [sd_m, sd_of_sd_m] =
-        found.iter().find(|found| is_alike(found)).copied().filter(|_| is_alike(&second))?;
+    found.iter().find(|found| is_alike(found)).copied().filter(|_| is_alike(&second))
+}
+
+/// Noise of a channel in which the blade moves, with the correlations of the other point. `None` if its size
+/// does not clearly differ from that of the other point, or if its motion is too fast.
+fn measure_own_size(
+    values: &[Option<f64>],
+    cuts: &RecordingCuts<'_>,
+    other: &ChannelNoise,
+) -> Option<ChannelNoise> {
+    let [sd_m, sd_of_sd_m] = measure_scatter(values, cuts, other)?;
     let other_m = other.noise.sd();
     let is_noise = (other_m / MOST_UNLIKE..=other_m * MOST_UNLIKE).contains(&sd_m);
     let is_clear = (sd_m - other_m).abs() > CLEAR_DEVIATIONS * math::hypot(sd_of_sd_m, other.sd_of_sd_m);

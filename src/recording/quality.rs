@@ -50,14 +50,15 @@ pub fn collect_findings(
     import: &[QualityFinding],
 ) -> Vec<QualityFinding> {
     let exchanges = jumps::find_exchanges(recording, measured);
-    let put_back = change_traces(recording, !exchanges.is_empty(), |traces| {
-        jumps::put_back_exchanged(traces, &exchanges)
-    });
+    let put_back = (!exchanges.is_empty())
+        .then(|| change_traces(recording, |traces| jumps::put_back_exchanged(traces, &exchanges)))
+        .flatten();
     let own_instants = put_back.as_ref().map(ReversalInstants::find_instants);
     let (recording, instants) =
         (put_back.as_ref().unwrap_or(recording), own_instants.as_ref().unwrap_or(instants));
     // (this check needs the original frames: resampling to a grid changes repeated positions and exact lines)
     let untracked = find_untracked_frames(recording, measured, optics);
+    let all_frames = 0..recording.traces().tip_x_m.len();
     let recording = &*recording.resample_to_grid();
     let columns = measurement::measured_columns(recording.traces(), measured);
     let mut found = import.to_vec();
@@ -66,11 +67,12 @@ pub fn collect_findings(
     let (tracked, quality) = rest.as_ref().map_or((recording, measured), |(rest, quality)| (rest, quality));
     let motion = measure_motion(tracked, quality, instants);
     let jumped = jumps::find_head_jumps(tracked, quality, &untracked);
-    let stretch =
-        change_traces(tracked, !jumped.is_empty(), |traces| jumps::keep_longest_stretch(traces, &jumped));
+    let stretch = (!jumped.is_empty())
+        .then(|| change_traces(tracked, |traces| jumps::keep_longest_stretch(traces, &jumped)))
+        .flatten();
     // (after a jump of both points, the halves of the recording are not alike, so no lag can be seen to grow)
     let may_grow = !jumped.iter().any(jumps::HeadJump::is_of_both);
-    let told_lag = motion.lag_frames.filter(|lag| {
+    let reported_lag = motion.lag_frames.filter(|lag| {
         (may_grow || !lag::is_growing(*lag)) && !untracked::are_many(&untracked, measured.frames)
     });
     found.extend(jumps::check_exchanges(&exchanges));
@@ -80,7 +82,7 @@ pub fn collect_findings(
     found.extend(
         columns.iter().filter_map(|column| prefilter::check_prefilter(column, measured.frame_rate_hz)),
     );
-    found.extend(lag::check_lag(told_lag));
+    found.extend(lag::check_lag(reported_lag));
     found.extend(checks::check_grid(measured));
     found.push(checks::check_exposure(measured));
     found.extend(motion::check_motion(recording));
@@ -89,18 +91,14 @@ pub fn collect_findings(
     for column in &columns {
         found.extend(checks::check_track_column(column, recording.grid(), optics));
     }
-    found.extend(untracked::describe_untracked(
-        recording.traces(),
-        &untracked,
-        &(0..recording.traces().tip_x_m.len()),
-    ));
+    found.extend(untracked::describe_untracked(recording.traces(), &untracked, &all_frames));
     // (a stable sort keeps the order of the checks within a severity)
     found.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
     found
 }
 
-/// Serious findings that make the frequencies of a channel doubtful within `frames`: those of `import`, which
-/// concern the clock, and those on positions that nobody tracked.
+/// Serious findings that make the frequencies of a channel doubtful within `frames`: those of `import` on the
+/// clock, and those on positions that nobody tracked.
 pub(crate) fn find_frequency_faults(
     recording: &Recording,
     optics: &Optics,
@@ -112,17 +110,16 @@ pub(crate) fn find_frequency_faults(
     let mut untracked = find_untracked_frames(recording, &measured, optics);
     untracked.retain(|found| channel.columns().iter().any(|column| column.starts_with(found.channel)));
     let positions = untracked::describe_untracked(recording.traces(), &untracked, frames);
-    let found = import.iter().cloned().chain(positions);
+    let of_clock = |finding: &&QualityFinding| {
+        matches!(finding.check, Check::UnevenClock | Check::ImpliedRate | Check::PickedFrames)
+    };
+    let found = import.iter().filter(of_clock).cloned().chain(positions);
     found.filter(|finding| finding.severity == Severity::Serious).collect()
 }
 
-/// The recording with changed traces, if they are `wanted`.
-fn change_traces(
-    recording: &Recording,
-    wanted: bool,
-    change: impl FnOnce(Traces) -> Traces,
-) -> Option<Recording> {
-    wanted.then(|| recording.clone().with_traces(change(recording.traces().clone())).ok()).flatten()
+/// The recording with changed traces.
+fn change_traces(recording: &Recording, change: impl FnOnce(Traces) -> Traces) -> Option<Recording> {
+    recording.clone().with_traces(change(recording.traces().clone())).ok()
 }
 
 /// The recording and its quality without repeated and interpolated positions, whose noise is too small.

@@ -275,7 +275,7 @@ fn a_simulated_trace_is_seen_as_the_recording_it_is_held_against() {
 #[test]
 fn a_serious_finding_on_the_window_puts_every_component_in_doubt() {
     let folder = recording();
-    let text = read(folder.path(), "trace.csv");
+    let text = std::fs::read_to_string(folder.path().join("trace.csv")).unwrap();
     // the tip keeps its position for four frames out of ten in the second half
     let mut held = String::new();
     let mut tip = "";
@@ -290,7 +290,7 @@ fn a_serious_finding_on_the_window_puts_every_component_in_doubt() {
     let verdicts = |window: &str| {
         let said = wiperlab(folder.path(), &[".", "--window", window, "--force"]).success();
         let said = String::from_utf8(said.get_output().stdout.clone()).unwrap();
-        let findings = json(folder.path(), "out/spectrum.json")["findings"].clone();
+        let findings = json(folder.path(), "spectrum.json")["findings"].clone();
         let found = components(folder.path());
         let clear = found.iter().filter(|c| c["verdict"] == "clear").count();
         (said, findings, clear, found)
@@ -300,7 +300,7 @@ fn a_serious_finding_on_the_window_puts_every_component_in_doubt() {
     let (said, findings, clear, found) = verdicts("0.16..0.3");
     assert!(said.contains("serious: tip: ") && said.contains("repeat the last position exactly"), "{said}");
     assert_eq!(findings[0]["check"], "held-points");
-    let doubt = "a serious finding on the recording (held-points)";
+    let doubt = "the recording has the serious finding `held-points` in this window";
     let is_doubted =
         |c: &Value| c["reasons"].as_array().unwrap().iter().any(|reason| reason["words"] == doubt);
     assert!(clear == 0 && !found.is_empty() && found.iter().all(is_doubted), "{found:?}");

@@ -151,7 +151,7 @@ fn a_quantity_that_is_no_position_is_no_position() {
     }
     let names = "time (mm),tip x (mm),tip y (mm),head x (mm),head y (mm)";
     let says = refused(&table(names, 20, seconds, [1e-3; 2], 2000.0), &at_rate(2000.0, Some(BY_NUMBER)));
-    assert!(says.contains("column 1 is called `time (mm)`; expected times in s, ms"), "{says}");
+    assert!(says.contains("(column 1: `time (mm)`), expected s, ms"), "{says}");
 }
 
 #[test]
@@ -415,6 +415,7 @@ fn units_of_times_in_every_spelling_are_read_or_refused_by_every_route() {
         ("time/us", 1e-6),
         ("time_millis", 1e-3),
         ("time [0.1 ms]", 1e-4),
+        ("time [0.7 s]", 0.7),
     ] {
         for columns in [None, Some(BY_NUMBER)] {
             let found = read(&text(name, unit_s), &real(columns));
@@ -429,10 +430,17 @@ fn units_of_times_in_every_spelling_are_read_or_refused_by_every_route() {
             assert!(says.starts_with("run.csv:1:1: ") && says.contains(name), "{name}: {says}");
         }
     }
-    // a time whose unit is not known is left out beside frame numbers
-    let names = "frame,ticks,tip x [mm],tip y [mm],head x [mm],head y [mm]";
-    let both = |row: usize| format!("{row},{}", 7 * row);
-    assert_positions(&read(&table(names, 60, both, [1e-3; 2], 2000.0), &at_rate(2000.0, None)), 2000.0);
+    // a time whose unit is not known is left out beside frame numbers and beside other times
+    for (names, second) in [("frame,ticks", 1.0), ("time_s,ticks", 1.0 / 2000.0), ("time_s,speed mm/s", 5e-4)]
+    {
+        let names = format!("{names},tip x [mm],tip y [mm],head x [mm],head y [mm]");
+        let both = |row: usize| format!("{:.4},{}", row as f64 * second, 7 * row);
+        assert_positions(&read(&table(&names, 60, both, [1e-3; 2], 2000.0), &at_rate(2000.0, None)), 2000.0);
+    }
+    let names = "t,tip_x,tip_y,head_x,head_y\nticks,mm,mm,mm,mm";
+    let ticks = table(names, 60, |row| row.to_string(), [1e-3; 2], 2000.0);
+    let says = refused(&ticks, &real(None));
+    assert!(says.contains("(column 1: `t`, `ticks`)"), "{says}");
 }
 
 #[test]
@@ -507,6 +515,13 @@ fn frame_numbers_and_times_that_part_are_refused_at_their_row() {
         (frame, frame as f64 / 1000.0)
     };
     assert_eq!(read(&text(&both), &real()).recording.grid().frames, 220);
+    for (rate_hz, digit) in [(1500.0, 1e-4), (1300.0, 1e-3)] {
+        let lost = |row: usize| {
+            let frame = row + if row < 50 { 0 } else { 120 };
+            (frame, (frame as f64 / rate_hz / digit).round() * digit)
+        };
+        assert_eq!(read(&text(&lost), &in_mm(at_rate(rate_hz, None))).recording.grid().frames, 320);
+    }
     let coarse = |row: usize| (row, (row as f64 / 1300.0 * 1e3).round() / 1e3);
     assert!((read(&text(&coarse), &real()).recording.grid().frame_rate_hz / 1300.0 - 1.0).abs() < 0.01);
 }

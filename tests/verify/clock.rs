@@ -65,7 +65,7 @@ fn spectrum(recording: Recording, window: &str) -> [Value; 2] {
         max_components: None,
         exposure_s: None,
     };
-    let files = spectrum_files(recording, &options).unwrap();
+    let files = spectrum_files(recording, None, &options).unwrap();
     let [mut components, description] = ["components.json", "spectrum.json"].map(|name| {
         let (_, bytes) = files.iter().find(|(found, _)| found == name).unwrap();
         serde_json::from_slice::<Value>(bytes).unwrap()

@@ -197,7 +197,7 @@ const LENGTHS_AGREE_SD: f64 = 3.0;
 /// the standard deviations of the coordinates at `end`.
 ///
 /// Returns the bias of every unknown, in its coordinate: the difference of the two estimates, from which
-/// twice the standard deviation of this difference is subtracted in quadrature. The longer the segments, the
+/// the standard deviation of this difference is subtracted in quadrature. The longer the segments, the
 /// smaller the bias, so the result is an upper limit of the bias at `end`. Also returns a reason for doubt
 /// that names the parameter with the largest difference, if this difference is implausible: one wrong
 /// parameter casts doubt on all.
@@ -211,7 +211,7 @@ fn compare_segment_lengths(
     let widening = earlier.gradient_scatter.max(1.0);
     let variance = |i: usize| earlier.variance(i, widening).max(sd[i] * sd[i]);
     let moved = |i: usize| shorter.point[i] - end.point[i];
-    let left = |i: usize| moved(i) * moved(i) - 4.0 * (variance(i) - sd[i] * sd[i]);
+    let left = |i: usize| moved(i) * moved(i) - (variance(i) - sd[i] * sd[i]);
     let bias = (0..sd.len()).map(|i| left(i).max(0.0).sqrt()).collect();
     let apart = |i: usize| moved(i).abs() / variance(i).sqrt();
     let furthest = model.unknowns.parameters().max_by(|a, b| apart(*a).total_cmp(&apart(*b)));

@@ -1,6 +1,6 @@
 //! Normal equations of all segments, and a step of the outer search.
 
-use super::iterate::{Iterate, SegmentState};
+use super::iterate::{Iterate, SegmentState, is_slider};
 use super::model::{TraceModel, TraceRecording};
 use super::segment_simulation::{LinkState, RecordingModel};
 use super::variable_projection::{ProjectedSegment, project_out_state};
@@ -149,9 +149,16 @@ pub(crate) struct TraceCovariance {
     /// and the errors of the recorded heads give on average. It is 1 on average if the model is right and the
     /// residuals are white.
     pub gradient_scatter: f64,
+    /// Ratio of the scatter of estimates around the truth to that of the linear model.
+    beyond_linear: f64,
     /// Covariance due to errors of the recorded head positions.
     pub heads: DMatrix<f64>,
 }
+
+/// Ratio of the scatter of estimates around the truth to that of the linear model for a blade. The linear
+/// model knows neither the curvature of the cost nor errors that all segments share. The motion of a slider
+/// is nearly linear in its parameters.
+const BEYOND_LINEAR: f64 = 1.3;
 
 /// Covariance of the unknowns at an iterate; `None` if the information matrix is singular.
 pub(crate) fn trace_covariance(model: &TraceModel, at: &Iterate) -> Option<TraceCovariance> {
@@ -167,7 +174,9 @@ pub(crate) fn trace_covariance(model: &TraceModel, at: &Iterate) -> Option<Trace
     let priors = &inverse * DMatrix::from_diagonal(&prior) * &inverse;
     let heads = &inverse * heads.total * &inverse;
     let curvature = inverse + &heads;
-    Some(TraceCovariance { information: found.matrix, curvature, priors, gradient_scatter, heads })
+    let beyond_linear = if is_slider(model) { 1.0 } else { BEYOND_LINEAR };
+    let information = found.matrix;
+    Some(TraceCovariance { information, curvature, priors, gradient_scatter, beyond_linear, heads })
 }
 
 impl TraceCovariance {
@@ -176,7 +185,7 @@ impl TraceCovariance {
     pub(super) fn variance(&self, i: usize, widening: f64) -> f64 {
         let at = (i, i);
         let by_noise = self.curvature[at] - self.heads[at] - self.priors[at];
-        widening * by_noise + self.priors[at] + self.heads[at]
+        math::powi(self.beyond_linear, 2) * widening * by_noise + self.priors[at] + self.heads[at]
     }
 }
 
@@ -185,28 +194,32 @@ impl TraceCovariance {
 /// matrix.
 ///
 /// At the minimum, the gradient of a segment with the matrix `M` is `g - M C G`, where `g` is its gradient at
-/// the true values, and `G` is the sum of all gradients and prior pulls.
+/// the true values, and `G` is the sum of all gradients and prior pulls. So its mean square is the trace of
+/// `C (V - 2 M C W + M C S C M)`, where `V`, `W` and `S` are the covariances of `g`, of `G` with `g`, and of
+/// `G`.
 fn compare_gradients(found: &NormalEquations, inverse: &DMatrix<f64>, heads: &HeadCovariance) -> f64 {
-    let covariance_of_sum = &found.matrix + &heads.total;
+    let of_sum = inverse * (&found.matrix + &heads.total);
     let (mut square, mut expected) = (0.0, 0.0);
     for (part, head) in found.parts.iter().zip(&heads.by_segment) {
         let Some(part) = part else { continue };
-        let own = head.as_ref().map_or_else(|| part.matrix.clone(), |head| &part.matrix + head);
-        let (own, moved) = (inverse * own, inverse * &part.matrix);
+        let information = inverse * &part.matrix;
+        let [own, with_sum] = head.as_ref().map_or([0.0; 2], |[own, with_sum]| {
+            [(inverse * own).trace(), (&information * inverse * with_sum).trace()]
+        });
         square += part.slope.dot(&(inverse * &part.slope));
-        let of_sum = &moved * inverse * &covariance_of_sum * &moved;
-        expected += own.trace() - 2.0 * (&moved * &own).trace() + of_sum.trace();
+        expected += information.trace() + own - 2.0 * ((&information * &information).trace() + with_sum)
+            + (&information * &of_sum * &information).trace();
     }
     if expected > 0.0 { square / expected } else { 1.0 }
 }
 
-/// Covariances of cost gradients due to errors of the recorded head positions.
+/// Covariances of cost gradients due to errors of the recorded head positions. The curve through the
+/// positions is smooth, so its error extends over many segments and does not average out like noise.
 struct HeadCovariance {
-    /// That of the sum over all segments. The curve through the positions is smooth, so its error extends
-    /// over many segments and does not average out like noise.
+    /// Covariance of the sum over all segments.
     total: DMatrix<f64>,
-    /// That of each segment.
-    by_segment: Vec<Option<DMatrix<f64>>>,
+    /// Covariances of the gradient of each segment with itself, and of the sum with it.
+    by_segment: Vec<Option<[DMatrix<f64>; 2]>>,
 }
 
 fn head_curve_covariance(model: &TraceModel, at: &Iterate) -> Option<HeadCovariance> {
@@ -215,30 +228,37 @@ fn head_curve_covariance(model: &TraceModel, at: &Iterate) -> Option<HeadCovaria
     let mut heads = HeadCovariance { total: DMatrix::zeros(n, n), by_segment: vec![None; at.segments.len()] };
     for (film, shoot) in model.recordings.iter().enumerate() {
         let Some(curve) = &shoot.observation.own_curve else { continue };
-        let covariance = |slopes: &DMatrix<f64>| {
-            let mut weighted = DMatrix::zeros(n, slopes.ncols());
+        let mine = |segment: &SegmentState| segment.recording == film && segment.chi2.is_finite();
+        let slopes = |segment: &SegmentState| head_curve_slopes(&points[film], segment);
+        let parts: Vec<Option<(usize, DMatrix<f64>)>> =
+            at.segments.par_iter().map(|segment| mine(segment).then(|| slopes(segment))?).collect();
+        // covariance of the coefficients times slopes by them, given by the first coefficient and its columns
+        let weighted = |from: usize, slopes: &DMatrix<f64>| {
+            let mut weighted = DMatrix::zeros(curve.coefficient_count(), n);
             for i in 0..n {
-                let mut row: Vec<f64> = slopes.row(i).iter().copied().collect();
+                let mut row = vec![0.0; curve.coefficient_count()];
+                row[from..].iter_mut().zip(&slopes.row(i)).for_each(|(place, slope)| *place = *slope);
                 curve.multiply_covariance(&mut row);
-                row.iter().enumerate().for_each(|(k, value)| weighted[(i, k)] = *value);
+                weighted.column_mut(i).copy_from_slice(&row);
             }
-            slopes * weighted.transpose()
+            weighted
         };
-        let slopes = |segment: &SegmentState| {
-            let mine = segment.recording == film && segment.chi2.is_finite();
-            let (from, part) = mine.then(|| head_curve_slopes(&points[film], segment))??;
-            let mut slopes = DMatrix::zeros(n, curve.coefficient_count());
-            slopes.columns_mut(from, part.ncols()).copy_from(&part);
-            Some((covariance(&slopes), slopes))
-        };
-        let parts: Vec<Option<(DMatrix<f64>, DMatrix<f64>)>> = at.segments.par_iter().map(slopes).collect();
         let mut all = DMatrix::zeros(n, curve.coefficient_count());
-        for (own, part) in heads.by_segment.iter_mut().zip(parts) {
-            let Some((covariance, slopes)) = part else { continue };
-            all += slopes;
-            *own = Some(covariance);
+        for (from, part) in parts.iter().flatten() {
+            let mut place = all.columns_mut(*from, part.ncols());
+            place += part;
         }
-        heads.total += covariance(&all);
+        let of_all = weighted(0, &all);
+        heads.total += &all * &of_all;
+        let covariances = |(from, part): &(usize, DMatrix<f64>)| {
+            let columns = |weighted: &DMatrix<f64>| part * weighted.rows(*from, part.ncols());
+            [columns(&weighted(*from, part)), columns(&of_all).transpose()]
+        };
+        let found: Vec<Option<[DMatrix<f64>; 2]>> =
+            parts.par_iter().map(|part| part.as_ref().map(covariances)).collect();
+        for (own, found) in heads.by_segment.iter_mut().zip(found) {
+            *own = found.or_else(|| own.take());
+        }
     }
     Some(heads)
 }

@@ -33,19 +33,17 @@ pub(super) fn prior_conflicts(end: &SearchEnd<'_>) -> Vec<String> {
     if known.is_empty() {
         return Vec::new();
     }
-    let Some(posterior) = end.covariance.information.clone().cholesky().map(|c| c.inverse()) else {
-        return Vec::new();
-    };
     let excess = end.excess_covariance();
-    let left = |a: usize, b: usize| {
-        let at = (known[a].0, known[b].0);
-        (posterior[at] - excess[at]) * known[a].2 * known[b].2
+    let of_pulls = |covariance: &DMatrix<f64>| {
+        let entry = |a: usize, b: usize| covariance[(known[a].0, known[b].0)] * known[a].2 * known[b].2;
+        DMatrix::from_fn(known.len(), known.len(), entry)
     };
-    let removed = DMatrix::from_fn(known.len(), known.len(), |a, b| f64::from(a == b) - left(a, b));
+    let posterior = &end.covariance.curvature - &end.covariance.heads;
+    let removed = DMatrix::identity(known.len(), known.len()) - of_pulls(&posterior);
     let pulls: Vec<f64> = known.iter().map(|(_, pull, _)| *pull).collect();
     let name = |i: usize| describe_parameters(end.model.unknowns.parameter_name(i));
     let mut doubts = Vec::new();
-    if are_jointly_improbable(&removed, &pulls) {
+    if are_jointly_improbable(&removed, &of_pulls(&excess), &pulls) {
         let mut furthest = known.clone();
         math::sort_by_number(&mut furthest, |a| -a.1.abs());
         let named = furthest.iter().take(NAMED);
@@ -70,16 +68,16 @@ pub(super) fn prior_conflicts(end: &SearchEnd<'_>) -> Vec<String> {
 }
 
 /// Whether the pulls are jointly so large that only one right fit in a hundred exceeds them. A pull is the
-/// distance of an estimate from its prior mean, in standard deviations of the prior; `removed` is the
-/// covariance of the pulls.
-fn are_jointly_improbable(removed: &DMatrix<f64>, pulls: &[f64]) -> bool {
+/// distance of an estimate from its prior mean, in standard deviations of the prior. `removed` is the
+/// covariance of the pulls for noise of the measured size, `excess` is added to it.
+fn are_jointly_improbable(removed: &DMatrix<f64>, excess: &DMatrix<f64>, pulls: &[f64]) -> bool {
     let eigen = removed.clone().symmetric_eigen();
-    let pulls = DVector::from_column_slice(pulls);
-    let directions = (0..pulls.len()).filter(|&k| eigen.eigenvalues[k] > LEAST_REMOVED);
-    let squares: Vec<f64> = directions
-        .map(|k| math::powi(eigen.eigenvectors.column(k).dot(&pulls), 2) / eigen.eigenvalues[k])
-        .collect();
-    squares.iter().sum::<f64>() > chi_squared_99(squares.len())
+    let directions: Vec<usize> = (0..pulls.len()).filter(|&k| eigen.eigenvalues[k] > LEAST_REMOVED).collect();
+    let axes = eigen.eigenvectors.select_columns(&directions);
+    let along = axes.transpose() * DVector::from_column_slice(pulls);
+    let covariance = axes.transpose() * (removed + excess) * &axes;
+    let square = covariance.cholesky().map_or(0.0, |covariance| along.dot(&covariance.solve(&along)));
+    square > chi_squared_99(directions.len())
 }
 
 /// The 99 % quantile of chi2 with `freedoms` degrees of freedom (Wilson and Hilferty 1931).
@@ -119,14 +117,18 @@ mod tests {
 
     #[test]
     fn pulls_count_only_where_the_recordings_say_something() {
+        let none = DMatrix::zeros(2, 2);
         let removed = DMatrix::from_diagonal(&DVector::from_vec(vec![1.0, 0.0]));
-        assert!(!are_jointly_improbable(&removed, &[2.0, 0.0]));
-        assert!(are_jointly_improbable(&removed, &[3.0, 0.0]));
-        assert!(!are_jointly_improbable(&DMatrix::zeros(2, 2), &[0.0, 0.0]));
+        assert!(!are_jointly_improbable(&removed, &none, &[2.0, 0.0]));
+        assert!(are_jointly_improbable(&removed, &none, &[3.0, 0.0]));
+        assert!(!are_jointly_improbable(&DMatrix::zeros(2, 2), &none, &[0.0, 0.0]));
         // the recordings remove a quarter of the prior variance of the second constant, so its pull of 1.6 is
         // as improbable as a pull of 3.2 of the first
         let half = DMatrix::from_diagonal(&DVector::from_vec(vec![1.0, 0.25]));
-        assert!(are_jointly_improbable(&half, &[0.0, 1.6]));
+        assert!(are_jointly_improbable(&half, &none, &[0.0, 1.6]));
+        // with three times the variance by more noise than was measured, this pull is not improbable
+        let noise = DMatrix::from_diagonal(&DVector::from_vec(vec![0.0, 0.5]));
+        assert!(!are_jointly_improbable(&half, &noise, &[0.0, 1.6]));
     }
 
     /// An unknown has the prior 0 with standard deviation 1, and is measured as 1 with standard deviation

@@ -43,7 +43,7 @@ pub struct TraceSearchOutcome {
     pub assessment: Option<TraceAssessment>,
 }
 
-/// Searches from the middle of the ranges, then from random points given by `seed`, until two searches end in
+/// Searches from the middle of the ranges, then from points given by `seed`, until two searches end in
 /// the same minimum. If a segment is much longer than its stage, searches on with whole segments from each
 /// lobe. Then assesses the best end point.
 pub fn search_trace(
@@ -139,8 +139,9 @@ fn first_of_start(
 /// motion gives in the two halves of the recordings.
 #[must_use]
 pub fn start_point(model: &TraceModel, seed: u64, start: usize) -> Vec<f64> {
-    /// Fraction of each range, at either end, in which no search starts; one entry per start. Later starts
-    /// are nearer to the middle, because searches that start near the ends of a wide range often fail.
+    /// Fraction of each range, at either end, in which no search starts; one entry per start. Later random
+    /// starts are nearer to the middle, because searches that start near the ends of a wide range often fail;
+    /// those that are the best of several points need not be.
     const EDGES: [f64; MAX_STARTS] = [0.1, 0.1, 0.1, 0.3, 0.1, 0.3];
     let edge = EDGES[start % MAX_STARTS];
     let mut generator = Xoshiro256PlusPlus::seed_from_u64(seed ^ ((start as u64) << 32));

@@ -39,7 +39,7 @@ impl FileFormat for PlainFormat {
             None if self.name == PLAIN.name => find_header_columns(table)?,
             None => return Err(unnamed_columns_error(table)),
         };
-        columns.refuse_unreadable_times(table)?;
+        columns.drop_or_refuse_unreadable_times(table)?;
         columns.refuse_other_clocks(table)?;
         let objects = columns.check_unread_objects(table)?;
         let (layout, start) = (columns.table_layout(table, document.stem), columns.start);
@@ -101,7 +101,7 @@ impl TableColumns {
     }
 
     /// Leaves out times whose unit is not known if the rows have frame numbers, and refuses them otherwise.
-    fn refuse_unreadable_times(&mut self, table: &DelimitedTable) -> ImportResult<()> {
+    fn drop_or_refuse_unreadable_times(&mut self, table: &DelimitedTable) -> ImportResult<()> {
         let Some((column, _)) = self.time.filter(|(_, unit)| *unit == TimeUnit::Unreadable) else {
             return Ok(());
         };
@@ -110,13 +110,15 @@ impl TableColumns {
             return Ok(());
         }
         let line = self.header.and_then(|row| table.head.get(row)).map_or(1, |row| row.line);
+        let below = self.units.and_then(|row| table.head.get(row)).map_or("", |row| row.cell(column));
+        let below = if below.is_empty() { String::new() } else { format!(", `{below}`") };
         let problem = format!(
-            "column {} is called `{}`; expected times in s, ms, us, ns, min, h or d",
+            "found times in a unit that is not known (column {}: `{}`{below}), expected s, ms, us, ns, min, h or d",
             column + 1,
             self.name(table, column)
         );
-        let advice = "correct the name in a copy of the file, with times in one of these units, or name a column \
-                      that counts frames (--columns frame=...)";
+        let advice = "correct the unit in a copy of the file, with the times converted, or name a column that counts \
+                      frames (--columns frame=...)";
         Err(ImportError::columns(table.file, line, problem, advice))
     }
 
@@ -144,7 +146,7 @@ impl TableColumns {
     }
 
     /// The column that seems to name the objects of a table whose rows become one track. It is not read,
-    /// keeps each of its few values for several rows, and the point jumps where the value changes.
+    /// has few values, each in rows that follow one another, and the point jumps where the value changes.
     fn find_unread_objects(&self, table: &DelimitedTable) -> ImportResult<Option<ObjectColumn>> {
         let [point] = &self.points[..] else { return Ok(None) };
         let used = self.used_columns();
@@ -164,16 +166,15 @@ impl TableColumns {
             });
             last = Some(now);
             steps.push(step);
-            let rows = steps.len();
-            candidates.retain_mut(|column| column.add_row(record.cell(column.at), step, record.line, rows));
+            candidates.retain_mut(|column| column.add_row(record.cell(column.at), step, record.line));
             Ok(candidates.is_empty().then_some(()))
         })?;
-        let place = (ObjectColumn::USUAL * steps.len().saturating_sub(1) as f64) as usize;
+        let place = (ObjectColumn::QUANTILE * steps.len().saturating_sub(1) as f64) as usize;
         if candidates.is_empty() || steps.is_empty() {
             return Ok(None);
         }
-        let usual = *steps.select_nth_unstable_by(place, f64::total_cmp).1;
-        Ok(candidates.into_iter().find(|column| column.names_objects(usual)))
+        let step = *steps.select_nth_unstable_by(place, f64::total_cmp).1;
+        Ok(candidates.into_iter().find(|column| column.names_objects(step, steps.len())))
     }
 
     /// Refuses a table of several objects that would become one track. If `--columns` names the columns, this
@@ -184,16 +185,16 @@ impl TableColumns {
         let problem = format!(
             "column {number} (`{name}`) is not read, but the point jumps where its value changes from `{}` to `{}`, \
              as if it named the object of a row",
-            found.texts[0], found.texts[1]
+            found.values[0], found.values[1]
         );
         if !self.by_header {
-            let value = (found.changes as f64, "changes");
+            let value = (found.values.len() as f64, "objects");
             let advice = format!("if it does, add track={number} to --columns");
             return Ok(Some(new_finding(Check::Points, Severity::Caution, value, problem, &advice)));
         }
         let advice = format!(
-            "if it does, add --columns frame=A,x=B,y=C,track={number} with the numbers of the other columns; if not, \
-             leave track={number} out"
+            "if it does, add --columns frame=A,x=B,y=C,track={number} with the numbers of the other columns; to read \
+             all rows as one track, give --columns without track="
         );
         Err(ImportError::columns(table.file, found.line, problem, advice))
     }
@@ -204,7 +205,7 @@ impl TableColumns {
         for (column, meaning) in self.unused_clocks(table) {
             let pair = match meaning {
                 ColumnMeaning::Frame => self.frame.map(|cell| (ClockCell { cell, unit: 1.0 }, 1.0)),
-                ColumnMeaning::Time(unit) => self.time.map(|(cell, used)| {
+                ColumnMeaning::Time(unit) if unit != TimeUnit::Unreadable => self.time.map(|(cell, used)| {
                     (ClockCell { cell, unit: used.seconds_or_one() }, unit.seconds_or_one())
                 }),
                 _ => None,
@@ -303,51 +304,51 @@ impl TableColumns {
 /// A column that is not read, and whose values may name the objects of the rows.
 struct ObjectColumn {
     at: usize,
-    /// The first two values.
-    texts: [String; 2],
-    last: String,
-    /// Number of changes from a row to the next.
-    changes: usize,
+    /// The different values, in order.
+    values: Vec<String>,
     /// Smallest step of the point where the value changes.
-    least_step: f64,
+    smallest_jump: f64,
     /// Line of the first change.
     line: usize,
 }
 
 impl ObjectColumn {
     /// Quantile of the steps from row to row with which the steps at the changes are compared.
-    const USUAL: f64 = 0.9;
+    const QUANTILE: f64 = 0.9;
     /// Ratio of the two steps from which the point jumps.
     const JUMP: f64 = 10.0;
     /// Smallest number of rows of an object on average.
     const LEAST_ROWS: usize = 3;
-    /// Number of rows after which this average is taken.
-    const ROWS_TRIED: usize = 100;
+    /// Largest number of objects: there are not more tracked points.
+    const MOST_VALUES: usize = 20;
 
     fn new(at: usize) -> Self {
-        let texts = [String::new(), String::new()];
-        Self { at, texts, last: String::new(), changes: 0, least_step: f64::INFINITY, line: 0 }
+        Self { at, values: vec![], smallest_jump: f64::INFINITY, line: 0 }
     }
 
     /// Adds a row, where the point has moved by `step` since the row before. Returns whether the column may
-    /// still name objects.
-    fn add_row(&mut self, text: &str, step: f64, line: usize, rows: usize) -> bool {
-        if rows == 1 {
-            text.clone_into(&mut self.last);
-        } else if text != self.last {
-            if self.changes == 0 {
-                (self.texts, self.line) = ([self.last.clone(), text.to_owned()], line);
-            }
-            text.clone_into(&mut self.last);
-            self.changes += 1;
-            self.least_step = self.least_step.min(step);
+    /// still name objects: the value of a flag comes back, and that of a measurement changes in every row.
+    fn add_row(&mut self, text: &str, step: f64, line: usize) -> bool {
+        if self.values.last().is_some_and(|last| last == text) {
+            return true;
         }
-        rows < Self::ROWS_TRIED || Self::LEAST_ROWS * self.changes <= rows
+        if self.values.iter().any(|value| value == text) || self.values.len() == Self::MOST_VALUES {
+            return false;
+        }
+        if !self.values.is_empty() {
+            self.smallest_jump = self.smallest_jump.min(step);
+        }
+        if self.values.len() == 1 {
+            self.line = line;
+        }
+        self.values.push(text.to_owned());
+        true
     }
 
-    /// Whether the values name objects, if `usual` is a usual step of the point.
-    fn names_objects(&self, usual: f64) -> bool {
-        self.changes > 0 && self.least_step > Self::JUMP * usual && usual > 0.0
+    /// Whether the values name objects, if the point usually moves by `step` from row to row.
+    fn names_objects(&self, step: f64, rows: usize) -> bool {
+        let several = self.values.len() > 1 && rows >= Self::LEAST_ROWS * self.values.len();
+        several && step > 0.0 && self.smallest_jump > Self::JUMP * step
     }
 }
 

@@ -155,11 +155,11 @@ fn convert_times(export: &mut TrackFile, options: &ImportOptions) -> ImportResul
         }
     };
     // (1e-3 is not exact in binary: multiplying by it rounds twice, dividing by 1000 rounds only once)
-    let divide = if factor < 1.0 { (1.0 / factor).round() } else { 1.0 };
+    let parts = (1.0 / factor).round();
     for clock in &mut export.clocks {
         clock.digit *= factor;
         if let Some(time) = &mut clock.time {
-            if factor < 1.0 { time.divide(divide) } else { time.scale(factor) }
+            if factor < 1.0 && factor == 1.0 / parts { time.divide(parts) } else { time.scale(factor) }
         }
     }
     Ok(true)

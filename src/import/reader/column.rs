@@ -18,9 +18,10 @@ const TIMES: [(&str, Option<TimeUnit>); 5] = [
     ("milliseconds millisecond msec ms timems timemsec", Some(TimeUnit::Seconds(1e-3))),
     ("tick ticks", Some(TimeUnit::Unreadable)),
 ];
-/// Units of time that are also words or names, so a column name that ends in one of them names a unit only if
-/// a name of times comes before it.
-const TIME_UNITS_THAT_ARE_WORDS: &str = "min h hr d cs ds ks day";
+/// Units that are also words or names of points, in lower case. A column name that ends in one of the times
+/// names a unit only if a name of times comes before it; lengths need brackets or a slash.
+const TIMES_THAT_ARE_WORDS: &str = "min h hr d cs ds ks day";
+const LENGTHS_THAT_ARE_WORDS: &str = "in ft foot feet";
 /// Names of columns that name the object to which a row belongs, in lower case and without separators.
 const KEYS: &str = "id track trackid trackno tracknr trackindex trajectory trajectoryid objectid objectno objectnr object \
     particle marker point pointid label name spot target ball cell";
@@ -120,24 +121,20 @@ fn split_unit(name: &str) -> (&str, Option<&str>) {
             return (base.trim_end_matches([' ', '_']), Some(unit.trim()));
         }
     }
-    // (`tip/x` is the x of a point, not a unit)
+    // (a name before the slash, so that `m/s` and `rate 1/s` are no times)
     let is_unit = |unit: &str| unit.split('/').all(|part| is_simple_unit(part) || starts_with_digit(part));
-    // (nor has `m/s` a name before its unit, nor `rate 1/s`)
     let is_named = |(base, unit): &(&str, &str)| {
-        let last = base.rsplit(' ').next().unwrap_or(base);
-        let is_name = !last.is_empty() && !starts_with_digit(last);
-        is_name && is_unit(unit) && (starts_with_digit(unit) || !is_simple_unit(base))
+        is_unit(unit) && (is_name_of_times(base) || parse_coordinate(base.trim_end()).is_some())
     };
     if let Some((base, unit)) = name.split_once('/').filter(is_named) {
         return (base.trim_end(), Some(unit.trim()));
     }
     match name.rsplit_once(['_', ' ']) {
-        // (`in` is also a word, so inches need brackets)
         Some((base, unit))
             if !base.is_empty()
-                && unit != "in"
                 && is_simple_unit(unit)
-                && (!is_listed(TIME_UNITS_THAT_ARE_WORDS, unit) || is_name_of_times(base)) =>
+                && !is_listed(LENGTHS_THAT_ARE_WORDS, &unit.to_lowercase())
+                && (!is_listed(TIMES_THAT_ARE_WORDS, &unit.to_lowercase()) || is_name_of_times(base)) =>
         {
             (base, Some(unit))
         }
@@ -158,15 +155,15 @@ fn is_name_of_times(base: &str) -> bool {
     TIMES.iter().any(|(names, _)| is_listed(names, &squeeze_name(base)))
 }
 
-/// Whether a name contains a factor, such as `x1000` or `1e3`, behind a name of times.
-fn scales_times(base: &str) -> bool {
+/// Whether a name of times has a factor behind it, such as `x1000` or `1e3`. (`t_1` is the name of a point.)
+fn has_time_factor(base: &str) -> bool {
     let mut parts = base.split(SEPARATORS);
     let is_factor = |part: &str| {
         let number = part.trim_start_matches(['x', 'X', '*', '\u{d7}']);
         starts_with_digit(number)
             && (number.len() < part.len() || number.parse::<f64>().is_ok_and(|n| n >= 100.0))
     };
-    parts.next().is_some_and(is_name_of_times) && parts.any(is_factor)
+    parts.next().is_some_and(|first| first.len() > 1 && is_name_of_times(first)) && parts.any(is_factor)
 }
 
 fn parse_clock(base: &str, unit: Option<&str>) -> Option<ColumnMeaning> {
@@ -174,7 +171,7 @@ fn parse_clock(base: &str, unit: Option<&str>) -> Option<ColumnMeaning> {
     if is_listed(FRAMES, &plain) {
         return unit.is_none().then_some(ColumnMeaning::Frame);
     }
-    if scales_times(base) {
+    if has_time_factor(base) {
         return Some(ColumnMeaning::Time(TimeUnit::Unreadable));
     }
     let (_, own) = TIMES.iter().find(|(names, _)| is_listed(names, &plain))?;
@@ -328,7 +325,7 @@ impl ColumnUnit {
     /// Reads a unit; `None` for a text that is no unit.
     pub(crate) fn parse(text: &str) -> Option<Self> {
         let symbol = trim_brackets(text).to_lowercase();
-        let derived = symbol.contains(['/', '^', '\u{b2}', '\u{b3}']) || is_scaled_word(&symbol);
+        let derived = symbol.contains(['/', '^', '\u{b2}', '\u{b3}']) || is_number_with_word(&symbol);
         if let Some(unit) = CoordinateUnit::parse(text) {
             return Some(Self::Coordinate(unit));
         }
@@ -338,14 +335,20 @@ impl ColumnUnit {
         (derived || is_listed(OTHER_UNITS, &symbol)).then_some(Self::Other)
     }
 
-    /// The unit that the name of a column of times names, in any of its spellings: `Clock_min`, `minutes`.
+    /// The unit in the name of a column that contains times: `Clock_min`, `minutes`.
     pub(crate) fn of_times(name: &str) -> Option<Self> {
+        /// Units that end other names too, such as `time_of_day`.
+        const ENDS_OF_NAMES: &str = "d day";
         let last = split_last_part(name).map_or(name, |(_, last)| last);
         match ColumnMeaning::parse(name) {
             ColumnMeaning::Time(unit @ (TimeUnit::Seconds(_) | TimeUnit::Unreadable)) => {
                 Some(Self::Time(unit))
             }
-            _ => Self::in_name(name).or_else(|| TimeUnit::parse(last).map(Self::Time)),
+            _ => Self::in_name(name).or_else(|| {
+                TimeUnit::parse(last)
+                    .filter(|_| !is_listed(ENDS_OF_NAMES, &last.to_lowercase()))
+                    .map(Self::Time)
+            }),
         }
     }
 
@@ -367,7 +370,7 @@ fn split_factor(unit: &str) -> Option<(f64, &str)> {
 }
 
 /// Whether a text is a number with a word behind it, such as `0.1 cubits`.
-fn is_scaled_word(text: &str) -> bool {
+fn is_number_with_word(text: &str) -> bool {
     starts_with_digit(text) && text.ends_with(char::is_alphabetic)
 }
 
@@ -449,7 +452,10 @@ mod tests {
         assert_eq!(ColumnMeaning::parse("tip_x/mm"), at("tip", 0, Some(CoordinateUnit::Metres(1e-3))));
         assert_eq!(ColumnMeaning::parse("x (0.1 mm)"), at("", 0, Some(CoordinateUnit::Metres(1e-4))));
         assert_eq!(ColumnMeaning::parse("x (dm)"), at("", 0, Some(CoordinateUnit::Metres(0.1))));
-        for name in ["x_h", "x_min", "x_d"] {
+        for name in ["vx mm/s", "v_mm/s", "rad/s", "frames/s", "m/s", "rate 1/s", "foot", "time_of_day"] {
+            assert_eq!(ColumnMeaning::parse_clock(name), None, "{name}");
+        }
+        for name in ["x_h", "x_min", "X_H", "x_Min", "x_foot"] {
             let point = name.split_once('_').unwrap().1;
             assert_eq!(ColumnMeaning::parse(name), at(point, 0, None), "{name}");
         }

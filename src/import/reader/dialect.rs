@@ -44,8 +44,8 @@ impl Dialect {
     /// decimal mark.
     ///
     /// # Errors
-    /// [`ImportError`] if no delimiter splits the rows into columns, if there are no numbers, or if the comma
-    /// is both delimiter and decimal mark.
+    /// [`ImportError`] if no delimiter splits the rows into columns, if there are no numbers, if the comma is
+    /// both delimiter and decimal mark, or if the decimal mark separates thousands.
     pub(crate) fn find(file: &str, text: &str) -> ImportResult<Self> {
         let declared = declared_delimiter(text);
         let of_the_table = |line: &NumberedLine| !(is_comment(line.1) || (declared.is_some() && line.0 == 1));
@@ -163,15 +163,15 @@ fn refuse_thousands(file: &str, rows: &[TextRow], decimal: char) -> ImportResult
         // (only where a number with the mark and one without it meet do the two ways of reading differ)
         let borders =
             cells.windows(2).filter(|pair| pair[0].1.contains(decimal) != pair[1].1.contains(decimal));
-        let (mut even, mut odd) = (0, 0);
+        let (mut fits_thousands, mut fits_decimals) = (0, 0);
         for pair in borders {
             let (Some(decimals), Some(thousands)) = (apart(&as_decimals, pair), apart(&as_thousands, pair))
             else {
                 continue;
             };
-            if thousands < decimals { even += 1 } else { odd += 1 }
+            if thousands < decimals { fits_thousands += 1 } else { fits_decimals += 1 }
         }
-        if even > odd {
+        if fits_thousands > fits_decimals {
             let (line, cell) = *marked().next().unwrap_or(&cells[0]);
             let found = format!("`{cell}` in column {}, next to numbers without `{decimal}`", column + 1);
             let expected = format!("one meaning of `{decimal}`, which seems to separate thousands here");

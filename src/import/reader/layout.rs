@@ -390,7 +390,7 @@ fn read_clock(
 
 /// Number of decimals of a written number: 3 for `0.017`, 2 for `1.7e-1`, and -2 for `1e2`.
 fn count_decimals(text: &str, decimal: char) -> i32 {
-    let (mantissa, exponent) = match text.bytes().position(|byte| matches!(byte, b'e' | b'E')) {
+    let (mantissa, exponent) = match text.bytes().position(|byte| matches!(byte, b'e' | b'E' | b'd' | b'D')) {
         Some(at) => (&text[..at], text[at + 1..].replace('\u{2212}', "-").parse().unwrap_or(0)),
         None => (text, 0),
     };

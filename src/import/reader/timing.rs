@@ -152,7 +152,7 @@ fn place_by_number(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<Ro
         frames.push(number as i64);
     }
     if !declared.playback {
-        refuse_parting_clocks(rows, &frames)?;
+        refuse_disagreeing_clocks(rows, &frames)?;
     }
     apply_frame_step(&mut frames, declared.step)?;
     let (Some(first), Some(last)) = (frames.first().copied(), frames.last().copied()) else {
@@ -175,28 +175,38 @@ fn place_by_number(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<Ro
     Ok(RowFrames { frames, numbered: true, start_s, times: None, implied_hz })
 }
 
-/// Refuses frame numbers and times of which one has a pause or a jump that the other does not have. Times
-/// with uneven steps throughout are another matter: they are those of a camera with a variable rate.
-fn refuse_parting_clocks(rows: ClockRows, frames: &[i64]) -> ImportResult<()> {
+/// Refuses frame numbers and times that disagree: one has a pause or a jump that the other does not have.
+/// Times with uneven steps throughout are another matter: they are those of a camera with a variable rate.
+fn refuse_disagreeing_clocks(rows: ClockRows, frames: &[i64]) -> ImportResult<()> {
     /// Largest allowed difference between the two clocks from a row to the next, frames.
     const MOST_APART: f64 = 0.5;
-    /// Largest fraction of the rows at which two clocks part that belong together otherwise.
+    /// Largest fraction of the rows at which uneven times count as those of single pauses.
     const FEW_ROWS: f64 = 0.02;
+    /// Longest step, frames, from which the time per frame is taken.
+    const LONGEST_STEP: f64 = 8.0;
     let Some(times) = &rows.clock.time else { return Ok(()) };
     let timed: Vec<(usize, f64)> =
         times.iter().take(frames.len()).enumerate().filter_map(|(row, time)| Some((row, time?))).collect();
+    // row, and its step in frame numbers and in times
     let steps: Vec<(usize, f64, f64)> = timed
         .windows(2)
         .map(|pair| (pair[1].0, (frames[pair[1].0] - frames[pair[0].0]) as f64, pair[1].1 - pair[0].1))
         .collect();
     let mut per_frame: Vec<f64> = steps.iter().map(|(_, counted, step_s)| step_s / counted).collect();
     let Some(middle) = per_frame.len().checked_sub(1).map(|last| last / 2) else { return Ok(()) };
-    let frame_s = *per_frame.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let limit = MOST_APART + 2.0 * rounding_s(&rows.clock.times(), rows.clock.digit) / frame_s;
-    let part = |(_, counted, step_s): &&(usize, f64, f64)| (step_s / frame_s - counted).abs() > limit;
-    let apart: Vec<_> = steps.iter().filter(part).collect();
-    match apart.first() {
-        Some((row, counted, step_s)) if (apart.len() as f64) < 1.0 + FEW_ROWS * steps.len() as f64 => {
+    let median_s = *per_frame.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let rounding_s = 2.0 * rounding_s(&rows.clock.times(), rows.clock.digit);
+    let differs = |frame_s: f64, (_, counted, step_s): &(usize, f64, f64)| {
+        (step_s - counted * frame_s).abs() > MOST_APART * frame_s + rounding_s
+    };
+    // (the median of rounded steps is coarse; the mean of those that agree with it is not)
+    let agreeing = steps.iter().filter(|step| step.1 <= LONGEST_STEP && !differs(median_s, step));
+    let (counted, span_s) = agreeing.fold((0.0, 0.0), |sum, step| (sum.0 + step.1, sum.1 + step.2));
+    let frame_s = if counted > 0.0 { span_s / counted } else { median_s };
+    let disagreeing: Vec<_> = steps.iter().filter(|step| differs(frame_s, step)).collect();
+    let are_few = (disagreeing.len() as f64) < 1.0 + FEW_ROWS * steps.len() as f64;
+    match disagreeing.first() {
+        Some((row, counted, step_s)) if are_few || !is_uneven(rows.clock) => {
             let place = format!("{}:{}:1", rows.export.file, rows.clock.line_number(*row));
             let found = format!(
                 "a step of {counted} in the frame numbers and of {:.2} frames in the times",

@@ -19,15 +19,15 @@ use std::ops::Range;
 const BEYOND_NOISE: f64 = 14.0;
 /// Smallest jump, in steps of the positions: a slow point moves by one step at a time.
 const BEYOND_STEPS: f64 = 4.0;
-/// Smallest ratio of a jump to the same measure of the frames around it. A vibration or a slip that shakes
-/// the head lasts for several frames.
+/// Smallest ratio of the third difference at a jump to those of the frames around it. A vibration or a slip
+/// that shakes the head lasts for several frames.
 const MORE_THAN_AROUND: f64 = 4.0;
 /// Smallest ratio of a jump to the longest movement between two frames around it: a camera that loses one or
 /// two frames is not reported.
 const MORE_THAN_STEPS: f64 = 3.0;
 /// Number of frames before and after a jump with which it is compared.
 const AROUND: usize = 30;
-/// Minimum number of frames around a jump, on either side, that have a measure.
+/// Minimum number of frames around a jump, on either side, that have a third difference.
 const FEWEST_AROUND: usize = 8;
 /// Allowed size of the third differences next to a jump, as fractions of that at the jump. Without noise, the
 /// fraction is 0.5 for a jump of the position, and 1 for a jump of the speed.
@@ -51,13 +51,14 @@ pub(super) fn find_exchanges(recording: &Recording, measured: &Quality) -> Vec<u
     }
     let sizes = [&measured.tip_x, &measured.head_x, &measured.tip_y, &measured.head_y];
     let least_m = sizes.into_iter().map(least_jump_m).fold(0.0, f64::max);
+    let has_heights = [&traces.tip_y_m, &traces.head_y_m].iter().all(|y| y.iter().any(Option::is_some));
     let mut exchanges = vec![];
-    // the last two frames with both points, after exchanged points are put back, and what they miss their
-    // paths by
+    // the last two frames with both points, after exchanged points are put back, and the distances of the
+    // points from their continued paths
     let mut last: VecDeque<(usize, [[f64; 2]; 2])> = VecDeque::new();
     let mut misses: VecDeque<f64> = VecDeque::new();
     for frame in 0..traces.tip_x_m.len() {
-        let Some(mut points) = both_points(traces, frame) else { continue };
+        let Some(mut points) = both_points(traces, frame, has_heights) else { continue };
         if exchanges.len() % 2 == 1 {
             points.swap(0, 1);
         }
@@ -92,10 +93,10 @@ pub(super) fn find_exchanges(recording: &Recording, measured: &Quality) -> Vec<u
     exchanges
 }
 
-/// Positions of tip and head in a frame, x and y. Without both heights, the heights count as equal.
-fn both_points(traces: &Traces, frame: usize) -> Option<[[f64; 2]; 2]> {
-    let [tip_y, head_y] =
-        traces.tip_y_m[frame].zip(traces.head_y_m[frame]).map_or([0.0; 2], |(tip, head)| [tip, head]);
+/// Positions of tip and head in a frame, x and y. In a recording without heights, they count as equal.
+fn both_points(traces: &Traces, frame: usize, has_heights: bool) -> Option<[[f64; 2]; 2]> {
+    let height = |column: &[Option<f64>]| if has_heights { column[frame] } else { Some(0.0) };
+    let [tip_y, head_y] = [height(&traces.tip_y_m)?, height(&traces.head_y_m)?];
     Some([[traces.tip_x_m[frame]?, tip_y], [traces.head_x_m[frame]?, head_y]])
 }
 
@@ -144,8 +145,8 @@ impl HeadJump {
     }
 }
 
-/// Jumps of the head between neighbouring frames, apart from the frames in which nobody tracked it; none in a
-/// recording whose frames lie on no grid.
+/// Jumps of the head between neighbouring frames, apart from the frames in which it was not tracked; none in
+/// a recording whose frames lie on no grid.
 pub(super) fn find_head_jumps(
     recording: &Recording,
     measured: &Quality,

@@ -29,7 +29,7 @@ const CLEARLY_BETTER: f64 = 0.9;
 /// change the fraction.
 const BETTER_IN_NOISE: f64 = 0.96;
 /// Smallest decrease of the sum of squares at the best lag, in units of the mean square: the largest of the
-/// decreases at 80 wrong lags, each of a fit with five coefficients to white noise, is about half as large.
+/// decreases at 80 wrong lags, each of a fit with six coefficients to white noise, is about half as large.
 const BEYOND_CHANCE: f64 = 40.0;
 /// Residuals count as only noise if their mean square is below this multiple of the squared noise.
 const NOISE_ALONE: f64 = 1.25;
@@ -80,15 +80,19 @@ fn best_lag(traces: &Traces, range: Range<usize>, noise_m: f64) -> Option<BestLa
     let centre_m = median_in_place(&mut apart().collect::<Vec<_>>())?;
     let reach_m = apart().map(|d| (d - centre_m).abs()).fold(0.0, f64::max);
     let place_m = middle(&head_x[range.clone()])?;
+    let moves = head_x[range.clone()].iter().flatten().any(|x| *x != place_m);
     if last < first + 2 * MOST_LAG as usize || reach_m <= 0.0 {
         return None;
     }
     let mean_square = |lag: isize| {
         let row = |i: usize| {
             let deflection_m = tip_x[i.checked_add_signed(lag)?]? - head_x[i]?;
-            let [one, a, b, c, d] = polynomial_row((deflection_m - centre_m) / reach_m);
+            let mut row = polynomial_row::<6>((deflection_m - centre_m) / reach_m);
             // (in a tilted picture the head climbs along the sweep)
-            Some(([one, a, b, c, d, (head_x[i]? - place_m) / reach_m], head_y[i]? - level_m))
+            if moves {
+                row[5] = (head_x[i]? - place_m) / reach_m;
+            }
+            Some((row, head_y[i]? - level_m))
         };
         let rows: Vec<_> = (first..last).step_by((last - first) / MOST_ROWS + 1).filter_map(row).collect();
         Some((lag, fit_rows(&rows)?.mean_square, rows.len() as f64))

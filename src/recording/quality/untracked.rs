@@ -161,10 +161,13 @@ pub fn find_untracked_frames(
     found
 }
 
-/// Whether a point was not tracked in so many of its frames that a lag of its track cannot be told.
+/// Whether a point was not tracked in so many of its frames that a lag of its track is not reliable.
 pub(super) fn are_many(found: &[UntrackedFrames], frames: usize) -> bool {
-    let of_point =
-        |point| found.iter().filter(|f| f.concerns(point)).map(UntrackedFrames::count).sum::<usize>();
+    // (outliers of x and y may be the same frames)
+    let of_point = |point| {
+        let filled = found.iter().filter(|f| f.concerns(point) && f.check != Check::Outliers);
+        filled.map(UntrackedFrames::count).sum::<usize>()
+    };
     ["tip", "head"].into_iter().any(|point| of_point(point) as f64 > NO_LAG * frames as f64)
 }
 

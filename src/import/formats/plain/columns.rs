@@ -82,8 +82,13 @@ impl<'t> NamedColumns<'t> {
         let mut meanings: Vec<_> = row.cells.iter().map(|cell| ColumnMeaning::parse(cell)).collect();
         let mut units = None;
         if let Some(below) = table.head.get(header + 1).filter(|row| is_row_of_words(table, row)) {
+            let are_units = below.cells.iter().any(|cell| ColumnUnit::parse(cell).is_some());
             for (meaning, cell) in meanings.iter_mut().zip(&below.cells) {
-                if meaning.take_unit(cell) || ColumnUnit::parse(cell).is_some() {
+                let is_taken = meaning.take_unit(cell);
+                if is_taken && are_units && *meaning == ColumnMeaning::Time(TimeUnit::Unknown) {
+                    *meaning = ColumnMeaning::Time(TimeUnit::Unreadable);
+                }
+                if is_taken || ColumnUnit::parse(cell).is_some() {
                     units = Some(header + 1);
                 }
             }
@@ -110,7 +115,11 @@ impl<'t> NamedColumns<'t> {
             Some(ColumnMeaning::Time(unit)) => *unit,
             _ => TimeUnit::AssumedSeconds,
         };
-        let times = self.columns_where(|meaning| matches!(meaning, ColumnMeaning::Time(_)));
+        // (times in an unknown unit count only where there are no others)
+        let mut times = self.columns_where(|meaning| matches!(meaning, ColumnMeaning::Time(_)));
+        if times.iter().any(|at| unit(*at) != TimeUnit::Unreadable) {
+            times.retain(|at| unit(*at) != TimeUnit::Unreadable);
+        }
         let doubtful = |at: &usize| {
             times.iter().any(|other| {
                 other != at && (unit(*other) == unit(*at) || !matches!(unit(*other), TimeUnit::Seconds(_)))
