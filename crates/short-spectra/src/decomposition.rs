@@ -411,6 +411,8 @@ fn fill_frames(problem: &NoisyRecord, residual: &[f64], window: impl Fn(f64) -> 
 struct NarrowBand {
     /// Its middle, cycles per record.
     cycles: f64,
+    /// Sum of the squares of what is left in it.
+    energy: f64,
 }
 
 impl NarrowBand {
@@ -425,14 +427,16 @@ impl NarrowBand {
         let all = white.fix_parts(parts.trend, &parts.atoms);
         let frames = white.at.frames;
         let padded = (2 * frames).next_power_of_two();
-        let values = fill_frames(white, white.residual_of(&all), |_| 1.0);
+        let left = white.residual_of(&all);
+        let values = fill_frames(white, left, |_| 1.0);
         let energies = RealTransform::new(padded).squared_magnitudes(values.into_iter());
         let peak = (0..energies.len()).max_by(|a, b| energies[*a].total_cmp(&energies[*b]))?;
         let bins = (Self::HALF_WIDTH * padded as f64 / frames as f64) as usize;
         let near = &energies[peak.saturating_sub(bins)..(peak + bins + 1).min(energies.len())];
         let total: f64 = energies.iter().sum();
-        let is_narrow = near.iter().sum::<f64>() >= LEAST_SHARE * total && total > 0.0;
-        is_narrow.then_some(Self { cycles: peak as f64 * frames as f64 / padded as f64 })
+        let share = near.iter().sum::<f64>() / total;
+        let cycles = peak as f64 * frames as f64 / padded as f64;
+        (share >= LEAST_SHARE).then(|| Self { cycles, energy: share * dot(left, left) })
     }
 
     /// Whether the mean frequency of an oscillation lies in it.

@@ -250,7 +250,7 @@ impl Decomposition {
         for reading in &readings {
             let component = self.to_component(reading, record, resolution_hz);
             let mut doubts = self.list_doubts(reading, resolution_hz);
-            if left.as_ref().is_some_and(|band| band.contains(&reading.atom)) {
+            if left.as_ref().is_some_and(|band| self.is_incomplete(reading, band)) {
                 doubts.push(
                     "most of what no component describes lies around it: its description is incomplete"
                         .to_owned(),
@@ -287,6 +287,15 @@ impl Decomposition {
     fn find_narrow_rest(&self) -> Option<NarrowBand> {
         let white = (self.problem.order > 0).then(|| self.problem.clone().with_noise(&[]))?;
         NarrowBand::find_band(&white, &self.explanation.parts)
+    }
+
+    /// Whether a component lies in a band of which the explanation leaves more than a small part of the energy
+    /// of this component.
+    fn is_incomplete(&self, reading: &OscillationReading, band: &NarrowBand) -> bool {
+        /// Fraction of the energy of a component that nothing needs to describe.
+        const LEAST_LEFT: f64 = 1e-3;
+        let energy_m2 = reading.energy * reading.noise_m * reading.noise_m;
+        band.contains(&reading.atom) && band.energy * self.scale_m * self.scale_m > LEAST_LEFT * energy_m2
     }
 
     /// Unites oscillations that may be pieces of one: those for which `may_be_one` holds and those of a
