@@ -68,7 +68,7 @@ fn a_fit_gives_intervals_to_the_numbers_of_its_scene() {
         let [value, half] = ["value", "half_95"].map(|key| numbers[name][key].as_f64().unwrap());
         assert!((value - truth).abs() < half && half < 0.02 * truth, "{name}: {value} +- {half}, {truth}");
     }
-    assert!(out.contains("goes on up to 0.277 m/s (0.275 to 0.279)"), "{out}");
+    assert!(out.contains("goes on up to 0.277 m/s (0.276 to 0.278)"), "{out}");
     for (scene, fit, said) in [
         (SCENE, fit.as_str(), "= 0.0018867391723858846, the estimate in"),
         (SCENE, "fits/nothing", "no such fit"),

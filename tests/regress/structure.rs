@@ -39,7 +39,7 @@ const DOMAIN_WORDS: [&str; 14] = [
 ];
 /// Commands that need no fit, and the most files that each may reach.
 const COMMANDS_WITHOUT_FIT: [(&str, usize); 5] =
-    [("modes", 65), ("twin", 70), ("inspect", 82), ("simulate", 95), ("spectrum", 85)];
+    [("modes", 65), ("twin", 70), ("inspect", 82), ("simulate", 95), ("spectrum", 92)];
 /// Layers that these commands reach nothing of.
 const FIT_LAYERS: [&str; 2] = ["fit", "compare"];
 

@@ -4,6 +4,7 @@
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::reader::rate::{RATE_AGREEMENT, UNEVEN_RATE, find_quantum_s, is_uneven, rounding_s};
 use crate::import::reader::track_file::{Clock, Column, Track, TrackFile};
+use crate::recording::channel::median_in_place;
 use crate::recording::clock::{self, FrameFit, MAX_FRAMES, OFF_GRID_LIMIT_FRAMES};
 
 /// Largest `--frame-step` that an error message suggests. A message suggests this option if the declared rate
@@ -171,7 +172,12 @@ fn place_by_number(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<Ro
         }
     }
     let counted_s = first as f64 / declared.rate_hz;
-    let start_s = if declared.playback { counted_s } else { time_s(0).unwrap_or(counted_s) };
+    // (a damaged or absent first time must not shift the recording)
+    let offset = |(row, frame): (usize, &i64)| Some(time_s(row)? - (frame - first) as f64 / declared.rate_hz);
+    let mut offsets: Vec<f64> = frames.iter().enumerate().filter_map(offset).collect();
+    let middle_s = median_in_place(&mut offsets).unwrap_or(counted_s);
+    let is_near = |start_s: &f64| (start_s - middle_s).abs() <= 0.5 / declared.rate_hz;
+    let start_s = if declared.playback { counted_s } else { time_s(0).filter(is_near).unwrap_or(middle_s) };
     Ok(RowFrames { frames, numbered: true, start_s, times: None, implied_hz })
 }
 

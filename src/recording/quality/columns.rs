@@ -60,10 +60,11 @@ fn roughness(samples: &[Option<f64>], noise_m: f64, strokes: usize) -> Option<f6
 /// Range of a height, in units of the range of noise, after tilt and curvature of the glass are removed (a
 /// parabola along the sweep).
 fn height_range(x: &[Option<f64>], y: &[Option<f64>], quality: &ChannelQuality) -> Option<f64> {
+    /// Range, m, of a height that never changes, but was interpolated.
+    const ROUNDING_M: f64 = 1e-12;
     let step_m = quality.step_m.or_else(|| smallest_movement(y));
-    if step_m.is_none() {
-        // (a height that never changes)
-        return y.iter().flatten().next().map(|_| 0.0);
+    if trimmed_range_m(y)? <= ROUNDING_M {
+        return Some(0.0);
     }
     let noise_m = quality.noise_m?.max(step_m.unwrap_or(0.0) / 3.0);
     let centre = x.iter().flatten().next()?;

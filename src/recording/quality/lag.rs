@@ -29,7 +29,7 @@ const CLEARLY_BETTER: f64 = 0.9;
 /// change the fraction.
 const BETTER_IN_NOISE: f64 = 0.96;
 /// Smallest decrease of the sum of squares at the best lag, in units of the mean square: the largest of the
-/// decreases at 80 wrong lags, each of a fit with six coefficients to white noise, is about half as large.
+/// decreases at 80 wrong lags, each of a fit with five coefficients to white noise, is about half as large.
 const BEYOND_CHANCE: f64 = 40.0;
 /// Residuals count as only noise if their mean square is below this multiple of the squared noise.
 const NOISE_ALONE: f64 = 1.25;
@@ -51,10 +51,10 @@ struct BestLag {
 }
 
 /// Lag of the tip's track behind the head's track, in frames, at the start and the end of the recording. Both
-/// are equal unless the lag grows. `None` if no lag is visible.
-pub(super) fn measure_lag_frames(traces: &Traces, measured: &Quality) -> Option<[f64; 2]> {
+/// are equal unless the lag grows. `None` if no lag is visible. `slope` is that of the glass in the picture.
+pub(super) fn measure_lag_frames(traces: &Traces, measured: &Quality, slope: f64) -> Option<[f64; 2]> {
     let frames = traces.tip_x_m.len();
-    let best = |range: Range<usize>| best_lag(traces, range, measured.head_y.noise_m?);
+    let best = |range: Range<usize>| best_lag(traces, range, measured.head_y.noise_m?, slope);
     let halves = [0..frames / 2, frames / 2..frames].map(best);
     if let [Some(first), Some(last)] = halves
         && first.clear
@@ -70,29 +70,23 @@ pub(super) fn measure_lag_frames(traces: &Traces, measured: &Quality) -> Option<
     whole.or_else(|| growing_lag_frames(traces))
 }
 
-fn best_lag(traces: &Traces, range: Range<usize>, noise_m: f64) -> Option<BestLag> {
+fn best_lag(traces: &Traces, range: Range<usize>, noise_m: f64, slope: f64) -> Option<BestLag> {
     let (first, last) = (range.start + MOST_LAG as usize, range.end.checked_sub(MOST_LAG as usize)?);
     let middle =
         |samples: &[Option<f64>]| median_in_place(&mut samples.iter().flatten().copied().collect::<Vec<_>>());
     let (tip_x, head_x, head_y) = (&traces.tip_x_m, &traces.head_x_m, &traces.head_y_m);
-    let level_m = middle(&head_y[range.clone()])?;
+    let level_m = middle(&head_y[range.clone()])? - slope * middle(&head_x[range.clone()])?;
     let apart = || range.clone().filter_map(|i| Some(tip_x[i]? - head_x[i]?));
     let centre_m = median_in_place(&mut apart().collect::<Vec<_>>())?;
     let reach_m = apart().map(|d| (d - centre_m).abs()).fold(0.0, f64::max);
-    let place_m = middle(&head_x[range.clone()])?;
-    let moves = head_x[range.clone()].iter().flatten().any(|x| *x != place_m);
     if last < first + 2 * MOST_LAG as usize || reach_m <= 0.0 {
         return None;
     }
     let mean_square = |lag: isize| {
         let row = |i: usize| {
             let deflection_m = tip_x[i.checked_add_signed(lag)?]? - head_x[i]?;
-            let mut row = polynomial_row::<6>((deflection_m - centre_m) / reach_m);
-            // (in a tilted picture the head climbs along the sweep)
-            if moves {
-                row[5] = (head_x[i]? - place_m) / reach_m;
-            }
-            Some((row, head_y[i]? - level_m))
+            let height_m = head_y[i]? - slope * head_x[i]? - level_m;
+            Some((polynomial_row::<5>((deflection_m - centre_m) / reach_m), height_m))
         };
         let rows: Vec<_> = (first..last).step_by((last - first) / MOST_ROWS + 1).filter_map(row).collect();
         Some((lag, fit_rows(&rows)?.mean_square, rows.len() as f64))

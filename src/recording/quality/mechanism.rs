@@ -6,6 +6,7 @@ use super::lag::measure_lag_frames;
 use super::measurement::Quality;
 use super::motion::{LARGEST_VIEW_M, head_height_m, largest_travel_m};
 use super::regression::fit_rows;
+use super::tilt::measure_tilt;
 use crate::recording::Recording;
 use crate::recording::channel::{Channel, ReversalInstants, median_in_place};
 use crate::recording::clock::is_playback_rate;
@@ -85,6 +86,7 @@ pub fn measure_motion(
 ) -> MotionSummary {
     let recording = &*recording.resample_to_grid();
     let (traces, rate_hz) = (recording.traces(), measured.frame_rate_hz);
+    let slope = measure_tilt(recording, instants, measured).map_or(0.0, |tilt| math::tan(tilt.angle_rad));
     let strokes = instants.reversals.len() + 1;
     let speeds = head_speeds_m_per_s(&traces.head_x_m, rate_hz, strokes);
     let turns: Vec<f64> = instants.reversals.iter().map(|turn| turn.reversal_s).collect();
@@ -97,7 +99,7 @@ pub fn measure_motion(
         median_speed_m_per_s: median_in_place(&mut speeds.clone()),
         stroke_s: between.or_else(|| stroke_of_cosine_s(&traces.head_x_m, rate_hz)),
         fastest_oscillation_hz: fastest_oscillation_hz(&Channel::Deflection.samples(recording), measured),
-        lag_frames: measure_lag_frames(traces, measured),
+        lag_frames: measure_lag_frames(traces, measured, slope),
     }
 }
 

@@ -289,8 +289,8 @@ impl Decomposition {
         NarrowBand::find_band(&white, &self.explanation.parts)
     }
 
-    /// Whether a component lies in a band of which the explanation leaves more than a small part of the energy
-    /// of this component.
+    /// Whether a component lies in a band of which the explanation leaves more than a small part of the
+    /// energy of this component.
     fn is_incomplete(&self, reading: &OscillationReading, band: &NarrowBand) -> bool {
         /// Fraction of the energy of a component that nothing needs to describe.
         const LEAST_LEFT: f64 = 1e-3;
