@@ -276,3 +276,55 @@ fn head_curve_slopes(point: &RecordingModel<'_>, segment: &SegmentState) -> Opti
     let part = project_out_state(&linear)?;
     Some((from, part.matrix.view((0, n), (n, columns.ncols())).into_owned()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use portable_math::StandardNormal;
+    use rand::{Rng, SeedableRng};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    /// Ten segments tell five unknowns, one of which hardly any other segment than the first tells. Their
+    /// gradients scatter as noise says, times `size` squared. Mean of the ratio over many draws.
+    fn mean_scatter(size: f64) -> f64 {
+        const UNKNOWNS: usize = 5;
+        const SEGMENTS: usize = 10;
+        const DRAWS: usize = 400;
+        let mut generator = Xoshiro256PlusPlus::seed_from_u64(1);
+        let mut normal = || generator.sample::<f64, _>(StandardNormal);
+        let roots: Vec<DMatrix<f64>> = (0..SEGMENTS)
+            .map(|k| {
+                let weight = |i: usize| if i == 0 && k > 0 { 0.01 } else { 1.0 };
+                DMatrix::from_fn(UNKNOWNS, 8, |i, _| weight(i) * normal())
+            })
+            .collect();
+        let matrices: Vec<DMatrix<f64>> = roots.iter().map(|root| root * root.transpose()).collect();
+        let matrix = matrices.iter().fold(DMatrix::zeros(UNKNOWNS, UNKNOWNS), |sum, one| sum + one);
+        let inverse = matrix.clone().cholesky().unwrap().inverse();
+        let total = DMatrix::zeros(UNKNOWNS, UNKNOWNS);
+        let heads = HeadCovariance { total, by_segment: vec![None; SEGMENTS] };
+        let ratios = (0..DRAWS).map(|_| {
+            let gradients: Vec<DVector<f64>> =
+                roots.iter().map(|root| root * DVector::from_fn(8, |_, _| size * normal())).collect();
+            let sum = gradients.iter().fold(DVector::zeros(UNKNOWNS), |sum, one| sum + one);
+            let part = |(own, gradient): (&DMatrix<f64>, &DVector<f64>)| {
+                Some(ProjectedSegment {
+                    matrix: own.clone(),
+                    slope: gradient - own * &inverse * &sum,
+                    move_held: LinkState::zeros(),
+                    move_by_unknown: DMatrix::zeros(4, UNKNOWNS),
+                })
+            };
+            let parts = matrices.iter().zip(&gradients).map(part).collect();
+            let found = NormalEquations { matrix: matrix.clone(), slope: DVector::zeros(UNKNOWNS), parts };
+            compare_gradients(&found, &inverse, &heads)
+        });
+        ratios.sum::<f64>() / DRAWS as f64
+    }
+
+    #[test]
+    fn gradients_scatter_as_noise_of_the_measured_size_says() {
+        assert!((mean_scatter(1.0) - 1.0).abs() < 0.05, "{}", mean_scatter(1.0));
+        assert!((mean_scatter(1.5) / 2.25 - 1.0).abs() < 0.05, "{}", mean_scatter(1.5));
+    }
+}
