@@ -49,8 +49,8 @@ const PHASE_GAIN: f64 = 0.1;
 /// Maximum number of digits to which a fitted frame rate is rounded.
 const RATE_DIGITS: usize = 16;
 /// Longest gap, in frames, that the runs of rows contain in each round in which the time per frame is
-/// refined. Runs of ten frames and more make it eight times as accurate, so the next round counts longer
-/// gaps.
+/// refined. If the runs have ten frames or more, they make it eight times as accurate, so the next round
+/// counts longer gaps.
 const RUN_GAPS: [usize; 4] = [1, 8, 64, 512];
 /// Largest relative difference between the refined time per frame and the first guess, a median of rounded
 /// steps: times rounded to half a frame have medians that are off by up to a quarter.

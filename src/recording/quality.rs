@@ -58,7 +58,7 @@ pub fn collect_findings(
         (put_back.as_ref().unwrap_or(recording), own_instants.as_ref().unwrap_or(instants));
     // (this check needs the original frames: resampling to a grid changes repeated positions and exact lines)
     let untracked = find_untracked_frames(recording, measured, optics);
-    let all_frames = 0..recording.traces().tip_x_m.len();
+    let original = recording.traces();
     let recording = &*recording.resample_to_grid();
     let columns = measurement::measured_columns(recording.traces(), measured);
     let mut found = import.to_vec();
@@ -91,7 +91,7 @@ pub fn collect_findings(
     for column in &columns {
         found.extend(checks::check_track_column(column, recording.grid(), optics));
     }
-    found.extend(untracked::describe_untracked(recording.traces(), &untracked, &all_frames));
+    found.extend(untracked::describe_untracked(original, &untracked, &(0..original.tip_x_m.len())));
     // (a stable sort keeps the order of the checks within a severity)
     found.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
     found

@@ -181,7 +181,7 @@ pub(crate) fn trace_covariance(model: &TraceModel, at: &Iterate) -> Option<Trace
 
 impl TraceCovariance {
     /// Variance of the coordinate of unknown `i` if the variance of the noise is `widening` times the
-    /// measured one.
+    /// measured one; the part by noise also grows by the square of `beyond_linear`.
     pub(super) fn variance(&self, i: usize, widening: f64) -> f64 {
         let at = (i, i);
         let by_noise = self.curvature[at] - self.heads[at] - self.priors[at];

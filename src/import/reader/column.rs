@@ -121,7 +121,7 @@ fn split_unit(name: &str) -> (&str, Option<&str>) {
             return (base.trim_end_matches([' ', '_']), Some(unit.trim()));
         }
     }
-    // (a name before the slash, so that `m/s` and `rate 1/s` are no times)
+    // (only a name of times or of a coordinate may stand before the slash: `m/s` and `rate 1/s` are no times)
     let is_unit = |unit: &str| unit.split('/').all(|part| is_simple_unit(part) || starts_with_digit(part));
     let is_named = |(base, unit): &(&str, &str)| {
         is_unit(unit) && (is_name_of_times(base) || parse_coordinate(base.trim_end()).is_some())

@@ -140,6 +140,8 @@ pub(crate) fn frame_offset(
 /// Takes the frame numbers from the file. The times are only used to check the rate and to give the time of
 /// the first row.
 fn place_by_number(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<RowFrames> {
+    /// Number of rows from which the time of the first row is checked.
+    const FIRST_ROWS: usize = 15;
     let clock = rows.clock;
     let mut frames: Vec<i64> = Vec::with_capacity(clock.len());
     let numbers = clock.frame.iter().flat_map(|column| column.iter());
@@ -172,9 +174,10 @@ fn place_by_number(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<Ro
         }
     }
     let counted_s = first as f64 / declared.rate_hz;
-    // (a damaged or absent first time must not shift the recording)
+    // (a damaged or absent first time must not shift the recording; over many rows, the offsets drift with
+    // the error of the rate)
     let offset = |(row, frame): (usize, &i64)| Some(time_s(row)? - (frame - first) as f64 / declared.rate_hz);
-    let mut offsets: Vec<f64> = frames.iter().enumerate().filter_map(offset).collect();
+    let mut offsets: Vec<f64> = frames.iter().enumerate().take(FIRST_ROWS).filter_map(offset).collect();
     let middle_s = median_in_place(&mut offsets).unwrap_or(counted_s);
     let is_near = |start_s: &f64| (start_s - middle_s).abs() <= 0.5 / declared.rate_hz;
     let start_s = if declared.playback { counted_s } else { time_s(0).filter(is_near).unwrap_or(middle_s) };
