@@ -1,4 +1,4 @@
-//! Reads job.toml and checks it completely before anything runs. `docs/fits.md` describes every key.
+//! Reads job.toml and checks it completely before anything runs. `docs/keys.md` lists every key.
 
 /// Returns early from a check with an error about `$key`; the problem is formatted as by [`format!`].
 macro_rules! refuse {
