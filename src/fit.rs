@@ -22,6 +22,7 @@ mod fitted_model;
 pub mod identifiability;
 pub mod job;
 pub mod journal;
+pub mod law;
 pub mod ledger;
 pub mod linear_model;
 pub mod misfit;

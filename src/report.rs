@@ -13,6 +13,7 @@ use crate::compare::{ComparisonSummary, ComparisonTable, ParameterLine, RunSumma
 use crate::figures::FigureBlock;
 use crate::figures::friction::FrictionLine;
 use crate::fit::findings::FitFinding;
+use crate::fit::law::LawComparison;
 use crate::fit::misfit::TraceMisfit;
 use crate::fit::result::NuisanceResult;
 use crate::stability::chatter::ChatterSummary;
@@ -47,6 +48,8 @@ pub struct Report {
     pub parameters: Vec<ParameterLine>,
     /// Friction of the best model at rest and at the largest speed of the tip.
     pub friction: Vec<FrictionLine>,
+    /// Which law of friction the traces support.
+    pub law: Option<LawComparison>,
     /// Where and why the fitted blade or slider chatters.
     pub chatter: Option<ChatterSummary>,
     /// Products of powers of the parameters. Each line says whether the features determine the product.

@@ -26,6 +26,7 @@ use std::time::Instant;
 use table::{Line, write_table};
 use truth::{Blade, Fault, SOUGHT, draw_blade, write_job};
 use wiperlab::fit::job::Job;
+use wiperlab::fit::law::LawVerdict;
 use wiperlab::fit::result::FitResult;
 use wiperlab::fit::trace::{Iterate, TraceModel, chi2_per_dof};
 use wiperlab::fit::{MeasuredRecording, Problem};
@@ -104,6 +105,18 @@ fn make_problem(blade: &Blade, believed: &Scene, number: u64) -> Problem {
     Problem::new(job, vec![believed.clone()], vec![measured]).expect("a job that goes with the scene")
 }
 
+/// Verdict of a fit on the law of its scene, which is the true law.
+fn describe_law(result: &FitResult) -> &'static str {
+    let Some(law) = &result.law else { return "none" };
+    let own = law.candidates.first().map(|own| &own.law);
+    match law.verdict {
+        LawVerdict::NoneExplains => "none",
+        LawVerdict::Undecided => "undecided",
+        LawVerdict::Preferred if law.chosen.as_ref() == own => "preferred",
+        LawVerdict::Preferred => "lost",
+    }
+}
+
 /// Fits the film of a blade. Returns one line for each parameter.
 fn fit_blade(blade: &Blade, number: u64, fault: Option<Fault>) -> Vec<Line> {
     let problem = make_problem(blade, &blade.believed, number);
@@ -153,6 +166,7 @@ fn fit_blade(blade: &Blade, number: u64, fault: Option<Fault>) -> Vec<Line> {
                 line.verdict = found.verdict.name().to_owned();
                 line.explained = result.misfit.as_ref().is_some_and(|misfit| misfit.explained);
                 line.above_truth = above_truth(result);
+                line.law = describe_law(result).to_owned();
                 reasons.extend(result.misfit.iter().flat_map(|misfit| &misfit.reasons).chain(&found.reasons));
                 line.reasons = reasons.iter().map(|r| r.replace(',', ";")).collect::<Vec<_>>().join(" | ");
             }

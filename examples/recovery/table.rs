@@ -25,6 +25,9 @@ pub struct Line {
     /// Fall of the cost if the mean of the prior of the wrong constant is its true value; `None` for other
     /// faults, or if a descent fails.
     pub visible: Option<f64>,
+    /// Verdict on the true law of friction: `preferred`, `undecided`, `lost` if another law is preferred, or
+    /// `none` without a comparison or if no law explains the film.
+    pub law: String,
     pub reasons: String,
 }
 
@@ -34,17 +37,17 @@ const VISIBLE: f64 = 10.8;
 
 impl Line {
     pub const HEAD: &str = "case,blade,maker,fault,parameter,truth,estimate,lower_95,upper_95,verdict,explained,\
-                            seconds,cramer_rao,cost_above_truth,cost_of_fault,reasons\n";
+                            seconds,cramer_rao,cost_above_truth,cost_of_fault,law,reasons\n";
 
     pub fn csv(&self) -> String {
         let Self { case, blade, maker, fault, parameter, truth, estimate, verdict, explained, .. } = self;
-        let Self { seconds, reasons, .. } = self;
+        let Self { seconds, law, reasons, .. } = self;
         let written = |number: Option<f64>| number.map_or_else(String::new, |number| number.to_string());
         let [lower, upper] = self.ends.map(written);
         let [bound, above, visible] = [self.bound, self.above_truth, self.visible].map(written);
         format!(
             "{case},{blade},{maker},{fault},{parameter},{truth},{estimate},{lower},{upper},{verdict},{explained},\
-             {seconds:.1},{bound},{above},{visible},{reasons}\n"
+             {seconds:.1},{bound},{above},{visible},{law},{reasons}\n"
         )
     }
 
@@ -54,7 +57,7 @@ impl Line {
     }
 
     fn parse(line: &str) -> Option<Self> {
-        let cells: [&str; 16] = line.split(',').collect::<Vec<_>>().try_into().ok()?;
+        let cells: [&str; 17] = line.split(',').collect::<Vec<_>>().try_into().ok()?;
         let word = |at: usize| cells[at].to_owned();
         let number = |at: usize| cells[at].parse::<f64>().ok();
         Some(Self {
@@ -72,7 +75,8 @@ impl Line {
             bound: number(12),
             above_truth: number(13),
             visible: number(14),
-            reasons: word(15),
+            law: word(15),
+            reasons: word(16),
         })
     }
 
@@ -95,6 +99,11 @@ impl Line {
     fn is_wrong(&self) -> bool {
         let off = (self.estimate / self.truth).ln().abs();
         self.is_identified() && self.half_width().is_none_or(|half| off > 4.0 * half / 1.96)
+    }
+
+    /// Distance of the estimate from the true value, in standard deviations of its interval.
+    fn deviations_off(&self) -> Option<f64> {
+        Some((self.estimate / self.truth).ln() / (self.half_width()? / 1.96))
     }
 
     /// Half width of the interval over 1.96 Cramér-Rao standard deviations.
@@ -142,6 +151,14 @@ fn right_rows(lines: &[&Line]) -> Rows {
     ratios.sort_by(f64::total_cmp);
     let narrow = ratios.iter().filter(|ratio| **ratio <= 1.5).count();
     let identified: Vec<&Line> = lines.iter().copied().filter(|line| line.is_identified()).collect();
+    let off = lines.iter().filter(|line| line.explained).filter_map(|line| line.deviations_off());
+    let mut squares: Vec<f64> = off.map(|off| off * off).collect();
+    squares.sort_by(f64::total_cmp);
+    let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+    // (the median of the square of a normal variable is 0.455)
+    let scatter = format!("{:.2}, {:.2}", mean.sqrt(), (middle(&squares) / 0.455).sqrt());
+    let of_law = |law: &str| fits.iter().filter(|fit| fit[0].law == law).count();
+    let laws = format!("{}, {}, {}", of_law("preferred"), of_law("undecided"), of_law("lost"));
     let unexplained = fits.iter().filter(|fit| !fit[0].explained).count();
     let mut rows = vec![
         ("blades", fits.len().to_string()),
@@ -158,6 +175,8 @@ fn right_rows(lines: &[&Line]) -> Rows {
         ),
         ("half width against 1.96 such deviations: median", format!("{:.2}", middle(&ratios))),
         ("at most 1.5", count_of(narrow, ratios.len())),
+        ("errors in stated standard deviations: root mean square, and from the median", scatter),
+        ("true law of friction preferred, undecided, lost", laws),
         ("called unexplained", count_of(unexplained, fits.len())),
     ];
     rows.extend(time_rows(&fits));

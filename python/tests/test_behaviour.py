@@ -198,6 +198,7 @@ def test_a_notebook_shows_the_verdict_of_the_page() -> None:
     explained = wl.FitResult.load(fit / "actual-blade-twin")
     assert explained.explained and explained.verdict[0].startswith("The model explains the recording")
     assert explained.chatter is not None and explained.chatter["part"] == "neck on the shoulder"
+    assert explained.law is not None and explained.law["verdict"] == "preferred"
     assert explained.verdict[0] in explained._repr_html_().replace("&#x27;", "'")
     published = wl.FitResult.load(fit / "published-simulation")
     assert published.verdict == ["The model meets all 3 targets"] and isinstance(published.findings, list)

@@ -30,7 +30,7 @@ pub(crate) struct InspectArgs {
     /// Scene of the blade (scene.toml): compares its height, and lists which of its modes the recording shows
     #[arg(long, value_name = "SCENE.toml")]
     pub scene: Option<PathBuf>,
-    /// Print one JSON object to standard output: measurements, motion, findings, reversals
+    /// Print one JSON object to standard output: measurements, motion, findings, reversals, tilt
     #[arg(long)]
     pub json: bool,
     #[command(flatten)]

@@ -26,9 +26,9 @@ macro_rules! with_reading_keys {
             #[doc = "Speed of the head, m/s."] speed_m_per_s: f64,
             #[doc = "Speeds of the head, m/s."] speeds_m_per_s: Vec<f64>,
             #[doc = "Relative half width of the speeds that count as one; 0.15 if left out."] width_relative: f64,
-            #[doc = "Which part of the blade."] part: String,
+            #[doc = "Which part of the stroke, \"before\" or \"after\" the flip."] part: String,
             #[doc = "Number of lines."] lines: usize,
-            #[doc = "Amplitude below which no line counts, m."] floor_m: f64
+            #[doc = "Added to the rms of each line in quadrature, m."] floor_m: f64
         }
     };
 }

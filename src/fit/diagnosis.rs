@@ -9,11 +9,12 @@ mod lost_frames;
 
 use super::findings::{FindingSource, FitFinding};
 use super::journal::Journal;
+use super::law::follow_stages;
 use super::misfit::{StageMisfit, TraceMisfit};
 use super::problem::Problem;
 use super::trace::{
     Iterate, SegmentState, TraceDescent, TraceModel, TraceSearchSettings, UnknownKind, chi2_per_dof,
-    next_iterate, outer_step, start_point, start_stage, trace_covariance,
+    outer_step, start_point, start_stage, trace_covariance,
 };
 use super::trace_run::judge_descent;
 use crate::recording::Recording;
@@ -45,8 +46,6 @@ const NEAR_NOISE: f64 = 2.0;
 const WORSE: f64 = 3.0;
 /// A hypothesis that explains nothing is reported if it divides chi2 per degree of freedom by this factor.
 const MARKEDLY: f64 = 2.0;
-/// Maximum number of iterates of a fit to all segments.
-const MAX_ITERATES: usize = 60;
 
 /// A problem with the end of a stage of its search, which does not explain the recordings.
 struct FailedFit<'a> {
@@ -159,7 +158,10 @@ impl TriedHypothesis {
             let mut starts: Vec<(Vec<f64>, &[SegmentState])> = Vec::new();
             if !failed.end.is_junk(failed.model) {
                 let before = if same_frames && failed.stage > 0 { &failed.end.segments[..] } else { &[] };
-                starts.push((carry_point(&model, &middle, failed.model, &failed.end.point), before));
+                starts.push((
+                    model.unknowns.carry_point(&middle, &failed.model.unknowns, &failed.end.point),
+                    before,
+                ));
             }
             if failed.stage == 0 || failed.end.is_junk(failed.model) {
                 starts.push((middle, &[]));
@@ -184,7 +186,7 @@ impl TriedHypothesis {
                 [&model, &from.model].map(|model| model.recordings[0].observation.rate_hz);
             let length_s = from.length_s * from_hz / own_hz;
             let middle = start_point(&model, problem.job().search.seed, 0);
-            let point = carry_point(&model, &middle, &from.model, &from.at.point);
+            let point = model.unknowns.carry_point(&middle, &from.model.unknowns, &from.at.point);
             let at = start_stage(&model, &tried_settings(length_s), (0, false), &point, &from.at.segments)?;
             (!at.segments.is_empty()).then_some(TriedProblem { problem, model, at, length_s })
         };
@@ -317,19 +319,10 @@ impl TriedHypothesis {
         for part in &self.parts {
             let segment_s = part.problem.segment_s().to_vec();
             let settings = TraceSearchSettings { segment_s, twins: 0, max_segments: None };
-            let mut at = start_stage(&part.model, &settings, (0, false), &part.at.point, &part.at.segments)?;
-            let mut descent = TraceDescent { start: 0, stages: vec![at.clone()], iterates: 1 };
-            while let Some(next) = next_iterate(&part.model, &settings, &at) {
-                descent.stages.pop_if(|before| before.stage == next.stage);
-                descent.stages.push(next.clone());
-                descent.iterates += 1;
-                at = next;
-                if descent.iterates >= MAX_ITERATES {
-                    break;
-                }
-            }
+            let first = start_stage(&part.model, &settings, (0, false), &part.at.point, &part.at.segments)?;
+            let descent = follow_stages(&part.model, &settings, first, &mut || Ok::<_, ()>(())).ok()?;
             misfits.push(judge_descent(&part.problem, &part.model, &descent)?);
-            ends.push(at);
+            ends.push(descent.last_iterate()?.clone());
         }
         Some(FittedHypothesis { trial: self, misfits, ends })
     }
@@ -413,16 +406,6 @@ impl FittedHypothesis {
             ..FitFinding::new(FindingSource::Hypothesis, sentence)
         }
     }
-}
-
-/// A point of a search in the coordinates of another model: its parameters, and the unknowns of its cameras.
-/// Unknowns that only `model` has are taken from `start`.
-fn carry_point(model: &TraceModel, start: &[f64], from: &TraceModel, point: &[f64]) -> Vec<f64> {
-    let carry = |(unknown, start): (&super::trace::TraceUnknown, &f64)| {
-        let found = from.unknowns.0.iter().zip(point).find(|(old, _)| old.kind == unknown.kind);
-        found.map_or(*start, |(_, z)| z.clamp(unknown.range[0], unknown.range[1]))
-    };
-    model.unknowns.0.iter().zip(start).map(carry).collect()
 }
 
 impl FailedFit<'_> {

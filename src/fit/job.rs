@@ -18,6 +18,7 @@ mod traces;
 use super::search::SearchSettings;
 use super::target_value::TargetCalibration;
 use crate::feature::Feature;
+use crate::model::friction::FrictionShape;
 use crate::simulate::twin::Camera;
 use crate::toml_file::{self, KeyRefusal, TomlError, check_above_zero, check_format, parse_toml};
 pub(crate) use conditions::{FeatureCamera, HeadSource, JobCondition, is_same_quantity};
@@ -64,6 +65,9 @@ pub struct Job {
     pub parameters: Vec<FreeParameter>,
     /// Constants that are free within priors.
     pub constants: Constants,
+    /// Laws of friction that are compared with that of the scene; `None` if the job names none, and empty for
+    /// no comparison.
+    pub laws: Option<Vec<FrictionShape>>,
     /// Fitted traces in the order of the file; empty in a job on features.
     pub traces: Vec<TraceTarget>,
     /// Components first, then features, in the order of the file.
@@ -181,6 +185,7 @@ impl Job {
             camera,
             parameters,
             constants,
+            laws: settings::check_laws(written)?,
             traces,
             targets,
             search: settings::check_search(written)?,

@@ -7,6 +7,7 @@ use super::evaluation::FailureReason;
 use super::findings::FitFinding;
 use super::identifiability::Identifiability;
 use super::job::{FreeParameter, Job};
+use super::law::LawComparison;
 use super::linear_model::ParameterCombination;
 use super::misfit::{TraceMisfit, far_from_priors, unexplained_headline};
 use super::uncertainty::ParameterVerdict;
@@ -326,6 +327,10 @@ pub struct FitResult {
     pub findings: Vec<FitFinding>,
     /// Results of the parameters, by key in the scene file preceded by its table.
     pub parameters: BTreeMap<String, ParameterResult>,
+    /// Which law of friction the traces support; `None` in a fit of features, and if no parameter of the law is
+    /// free.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub law: Option<LawComparison>,
     /// Where and why the fitted blade or slider of the first condition chatters; `None` if the model does not
     /// explain the recordings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -576,6 +581,7 @@ mod tests {
             status: FitStatus::BudgetExhausted,
             misfit: None,
             findings: vec![],
+            law: None,
             chatter: Some(ChatterSummary {
                 numbers: BTreeMap::from([(
                     ChatterNumber::End,

@@ -7,6 +7,7 @@ use super::diagnosis::diagnose_misfit;
 use super::identifiability::Identifiability;
 use super::job::{FreeParameter, TraceChannel};
 use super::journal::{Journal, OnProgress, StopReason};
+use super::law::LawComparison;
 use super::linear_model::CHI_SQUARED_95;
 use super::misfit::{ChannelMisfit, StageMisfit, TraceMisfit, WorstSegment};
 use super::problem::Problem;
@@ -66,12 +67,24 @@ impl Problem {
             evaluations: journal.count_evaluations(),
         };
         let mut result = found.into_result().ok_or_else(|| cannot_be_fitted(NO_SEGMENT_STARTED))?;
+        let best = &searched.descents[searched.best];
+        if let (Some(end), true) = (best.last_iterate(), result.status.has_ended()) {
+            match self.compare_laws(&model, end, result.explains_recordings(), &mut journal) {
+                Ok(law) => result.law = law,
+                Err(_) => result.status = FitStatus::Interrupted,
+            }
+            if let Some(law) = &result.law {
+                law.limit_verdicts(self.job(), &mut result.parameters);
+            }
+        }
         if let Some(misfit) = result.misfit.as_ref().filter(|misfit| !misfit.explained)
             && result.status.has_ended()
         {
-            let best = &searched.descents[searched.best];
             match diagnose_misfit(self, &model, best, misfit, &mut journal) {
-                Some(findings) => result.findings = findings,
+                Some(findings) => {
+                    result.findings = findings;
+                    result.findings.extend(result.law.as_ref().and_then(LawComparison::find_explanation));
+                }
                 None => result.status = FitStatus::Interrupted,
             }
         }
@@ -150,6 +163,7 @@ impl TraceFindings<'_> {
             segments: self.fitted_segments(end),
             misfit: Some(misfit),
             findings: Vec::new(),
+            law: None,
             chatter: None,
             components: Vec::new(),
             features: Vec::new(),
@@ -245,8 +259,13 @@ impl TraceFindings<'_> {
     }
 
     fn nuisance_results(&self, end: &Iterate) -> Vec<NuisanceResult> {
-        let first = self.problem.job().parameters.len();
-        let all = self.model.unknowns.0.iter().zip(&end.point).enumerate().skip(first);
+        let free = &self.problem.job().parameters;
+        let is_free = |unknown: &TraceUnknown| match &unknown.kind {
+            UnknownKind::Parameter { name, .. } => free.iter().any(|own| own.name == *name),
+            UnknownKind::Camera { .. } => false,
+        };
+        let all = self.model.unknowns.0.iter().zip(&end.point).enumerate();
+        let all = all.filter(|(_, (unknown, _))| !is_free(unknown));
         let nuisance = |(at, (unknown, z)): (usize, (&TraceUnknown, &f64))| {
             let ends = self.searched.assessment.as_ref().map(|known| known.estimates[at].widest_95());
             let (recording, name) = match &unknown.kind {

@@ -61,6 +61,16 @@ impl FrictionShape {
         }
     }
 
+    /// The law with this name; `None` for a table, which needs its points, and for an unknown name.
+    pub(crate) fn from_name(name: &str) -> Option<Self> {
+        [Self::Exponential, Self::Stribeck, Self::Rational].into_iter().find(|law| law.name() == name)
+    }
+
+    /// Names of the parameters that not every law has.
+    pub(crate) fn own_parameters(&self) -> &'static [&'static str] {
+        LAW_KEYS.iter().find(|(law, _)| *law == self.name()).map_or(&[], |(_, keys)| keys)
+    }
+
     /// Whether a parameter belongs to this law or to every law.
     pub(crate) fn has_parameter(&self, name: &str) -> bool {
         let mut laws = LAW_KEYS.iter().filter(|(_, keys)| keys.contains(&name)).peekable();
@@ -256,6 +266,26 @@ impl FrictionLaw {
     #[inline]
     pub(crate) fn is_plain(&self) -> bool {
         is_exponential(&self.shape) && self.viscous_s_per_m == 0.0
+    }
+
+    /// Value of a parameter of any law, in its SI unit, with which that law comes near this one; `None` for
+    /// a name that no law has.
+    pub(crate) fn nearest_value(&self, name: &str) -> Option<f64> {
+        let limit = self.a * self.varying_part_at_zero() + self.c;
+        Some(match name {
+            "friction.a" => self.a,
+            "friction.b_s_per_m" => self.b_s_per_m,
+            "friction.c" | "friction.coulomb_level" => self.c,
+            "friction.limit_at_zero" => limit,
+            "friction.stribeck_speed_m_per_s" => 1.0 / self.b_s_per_m,
+            "friction.stribeck_exponent" => self.exponent,
+            // the slope at zero speed is equal
+            "friction.rational_s_per_m" => self.a * self.b_s_per_m / limit,
+            "friction.static_ratio" => self.static_ratio,
+            "friction.viscous_s_per_m" => self.viscous_s_per_m,
+            "friction.backward_ratio" => self.backward_ratio,
+            _ => return None,
+        })
     }
 
     /// The law for speeds in units of `unit`, m/s.

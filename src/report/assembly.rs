@@ -99,6 +99,7 @@ fn fill_report_sections(
         held_out: tables::feature_lines(job, measured, &result.held_out),
         parameters: tables::parameter_lines(job, measured, result),
         friction: cases.first().map_or_else(Vec::new, friction::friction_lines),
+        law: result.law.clone(),
         chatter: result.chatter.clone(),
         combinations: result.combinations.iter().map(combination_line).collect(),
         advice: result.gate.advice.clone(),

@@ -100,10 +100,13 @@ fn subject_figures_html(report: &Report, subject: FigureSubject) -> String {
 
 pub(super) fn summary_html(report: &Report) -> String {
     let answer = ReportSummary::from_report(report);
-    let chatter = sentence_html(&answer.chatter);
-    let chatter = if chatter.is_empty() { chatter } else { format!("<p>{chatter}</p>\n") };
+    let paragraph = |sentence| {
+        let html = sentence_html(sentence);
+        if html.is_empty() { html } else { format!("<p>{html}</p>\n") }
+    };
+    let (law, chatter) = (paragraph(&answer.law), paragraph(&answer.chatter));
     format!(
-        "{}{}<p>{}</p>\n{chatter}<p><strong>Next:</strong> {}</p>\n",
+        "{}{}<p>{}</p>\n{law}{chatter}<p><strong>Next:</strong> {}</p>\n",
         headline_html(&answer.headline),
         quantities_html(&answer.quantities),
         sentence_html(&answer.certainty),

@@ -33,6 +33,8 @@ pub(crate) struct ReportSummary {
     pub quantities: Vec<SummaryQuantity>,
     /// Certainty of these numbers.
     pub certainty: Sentence,
+    /// Which law of friction the traces support; empty if it is not known.
+    pub law: Sentence,
     /// Where and why the blade chatters; empty if it is not known.
     pub chatter: Sentence,
     /// Recommended next step.
@@ -66,6 +68,7 @@ impl ReportSummary {
             headline: report_headline(report),
             quantities: blade_quantities(report),
             certainty: certainty_sentence(report),
+            law: law_sentence(report),
             chatter: chatter_sentences(report),
             next: next_step_sentence(report),
         }
@@ -268,6 +271,11 @@ pub(in crate::report) fn certainty_sentence(report: &Report) -> Sentence {
         " Masses, dampings and every other constant are taken as exact."
     };
     Sentence::new(known_words + constants)
+}
+
+/// Which law of friction the traces support; empty if it is not known.
+pub(in crate::report) fn law_sentence(report: &Report) -> Sentence {
+    Sentence::new(report.law.as_ref().map_or_else(String::new, |law| make_printable(&law.sentence)))
 }
 
 /// Where and why the blade chatters; empty if it is not known.

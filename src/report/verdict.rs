@@ -89,6 +89,7 @@ fn verdict_statements(report: &Report) -> Vec<Statement> {
         (!report.parameters.is_empty()).then_some(all_known),
     ));
     found.extend(truth_statement(&report.parameters));
+    found.extend(report.law.as_ref().map(|_| Statement::new(summary::law_sentence(report))));
     found.extend(report.chatter.as_ref().map(|_| Statement::new(summary::chatter_sentences(report))));
     found.extend(ending_statements(report));
     // bad news comes first, after the headline

@@ -11,6 +11,7 @@ mod run;
 pub use super::drive::Drive;
 use super::drive::{HeadSpline, UNCERTAIN_END_S, even_motion_start_s, smooth_head_motion};
 use crate::model::Linkage;
+use crate::model::friction::FrictionShape;
 use crate::model::modes::time_scales_rad_per_s;
 use crate::model::parameters::{self, ModelParameter, PARAMETERS, ParameterQuantity};
 use crate::model::plausibility::{self, PlausibilityFinding};
@@ -196,6 +197,20 @@ impl Scene {
         let scene = Self { has_shoulder: true, ..self.clone() };
         let scene = scene.with_parameter("shoulder.contact_angle_rad", angle_rad)?;
         scene.with_parameter("shoulder.stiffness_ratio", stiffness_ratio)
+    }
+
+    /// The same scene with another law of friction, whose own parameters come near the present law.
+    ///
+    /// # Errors
+    /// [`SceneError::Key`] if the law does not accept one of these values.
+    pub(crate) fn with_friction_shape(&self, shape: FrictionShape) -> Result<Self, SceneError> {
+        let mut scene = self.clone();
+        let old = &self.linkage.friction;
+        scene.values.retain(|name, _| !old.shape.own_parameters().contains(name));
+        let own = shape.own_parameters().iter();
+        scene.values.extend(own.filter_map(|name| Some((*name, old.nearest_value(name)?))));
+        scene.linkage = build_linkage(&self.file, &scene.values, self.has_shoulder, shape)?;
+        Ok(scene)
     }
 
     /// The same scene, driven by the head of a recording. The run covers the tracked time except for its

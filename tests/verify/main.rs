@@ -43,6 +43,7 @@ mod equations;
 mod features;
 mod film;
 mod flight;
+mod friction_law;
 mod hard_cases;
 mod hard_records;
 mod identities;

@@ -168,6 +168,15 @@ class FitResult(Mapping[str, Any]):
         return list(self.get("findings", []))
 
     @property
+    def law(self) -> dict[str, Any] | None:
+        """Which law of friction the recordings support: ``verdict``, ``chosen``, ``sentence``, ``candidates``.
+
+        None in a fit of features, and if no parameter of the law is free.
+        """
+        law: dict[str, Any] | None = self.get("law")
+        return law
+
+    @property
     def chatter(self) -> dict[str, Any] | None:
         """Where and why the fitted blade chatters: ``sentences``, and their numbers with intervals.
 

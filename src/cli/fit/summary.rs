@@ -31,6 +31,10 @@ pub(crate) fn print_summary(solved: &CompletedFit) {
         print_parameters(result);
         print_nuisances(&result.nuisances);
     }
+    if let Some(law) = &result.law {
+        print_line!("");
+        print_line!("{}", to_ascii(&law.sentence));
+    }
     if let Some(chatter) = &result.chatter {
         print_line!("");
         chatter.sentences.iter().for_each(|sentence| print_line!("{}", to_ascii(sentence)));

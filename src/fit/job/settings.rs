@@ -1,9 +1,13 @@
 //! Tables of a job that set how the fit is computed: ensemble, camera, plausibility, search and intervals.
 
+use super::checks::find_repeated;
 use super::{KeyRefusal, as_written, check_above_zero};
 use crate::fit::search::{STAGNANT_GENERATIONS, SearchSettings};
 use crate::fit::trace::MAX_TWINS as MOST_REPLICATES;
+use crate::model::friction::FrictionShape;
 use crate::simulate::twin::Camera;
+use crate::text::join_with_and;
+use crate::toml_file::suggest_key;
 use serde::Serialize;
 
 /// Default number of points in a cloud: a few points for each of up to six parameters, and a multiple of
@@ -62,6 +66,33 @@ pub(super) fn check_counts(written: &as_written::JobFile) -> Result<(), KeyRefus
         ("trace", written.trace.len()),
     ];
     counts.into_iter().try_for_each(|(key, found)| check_count(key, found, 0, MOST_ENTRIES, "leave some out"))
+}
+
+/// The laws of friction that are compared with that of the scene.
+pub(super) fn check_laws(written: &as_written::JobFile) -> Result<Option<Vec<FrictionShape>>, KeyRefusal> {
+    const FORMS: [&str; 3] = ["exponential", "stribeck", "rational"];
+    let Some(names) = &written.laws else { return Ok(None) };
+    if written.trace.is_empty() {
+        refuse!(
+            "laws",
+            "found without a [[trace]], expected one: features do not tell laws apart; remove it"
+        );
+    }
+    if let Some(name) = find_repeated(names.iter().map(String::as_str)) {
+        refuse!("laws", "found \"{name}\" twice; remove one of them");
+    }
+    let law = |name: &String| match FrictionShape::from_name(name) {
+        Some(law) => Ok(law),
+        None if name == "table" => {
+            refuse!(
+                "laws",
+                "found \"table\", whose points are no parameters; expected {}",
+                join_with_and(&FORMS.map(|form| format!("\"{form}\"")))
+            )
+        }
+        None => refuse!("laws", "found \"{name}\"; {}", suggest_key(name, &FORMS)),
+    };
+    names.iter().map(law).collect::<Result<_, _>>().map(Some)
 }
 
 pub(super) fn check_camera_table(written: &as_written::JobFile) -> Result<Option<Camera>, KeyRefusal> {

@@ -48,6 +48,7 @@ impl FitFindings<'_> {
             status: self.status,
             misfit: None,
             findings: Vec::new(),
+            law: None,
             chatter: None,
             nuisances: camera_nuisance_results(self.job, &found.cameras),
             segments: Vec::new(),

@@ -46,6 +46,14 @@ pub(super) fn refit(
     Some(at)
 }
 
+/// The first iterate of a search with plain chi2 that starts at `point`, on the segments of `end`; `None` if
+/// a scene refuses the point.
+pub(crate) fn restart_search(model: &TraceModel, end: &Iterate, point: Vec<f64>) -> Option<Iterate> {
+    let first =
+        Iterate { point, plain: true, settled: false, number: 0, damping: FIRST_DAMPING, ..end.clone() };
+    refit(model, first, MAX_STATE_STEPS, RescuePolicy::Beyond(3.0))
+}
+
 /// The iterate with plain chi2 as cost and with its starting states fitted as well as possible; `None` if a
 /// scene refuses the iterate's point.
 pub(super) fn refit_plain(model: &TraceModel, mut at: Iterate) -> Option<Iterate> {

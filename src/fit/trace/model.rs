@@ -13,6 +13,7 @@ pub struct TraceRecording {
     pub condition: usize,
     /// The scene, whose drive moves the head of the model.
     pub scene: Scene,
+    /// What the camera shows in the fitted frames.
     pub observation: CameraObservation,
     /// Noise that was measured on the recording.
     pub(crate) noise: Arc<RecordingNoise>,

@@ -74,6 +74,13 @@ pub(super) fn normal_equations(
     Some(NormalEquations { matrix: total, slope, parts })
 }
 
+/// Changes normal equations so that the step of unknown `i` is zero.
+fn hold_unknown(matrix: &mut DMatrix<f64>, slope: &mut DVector<f64>, i: usize) {
+    matrix.row_mut(i).fill(0.0);
+    matrix.column_mut(i).fill(0.0);
+    (matrix[(i, i)], slope[i]) = (1.0, 0.0);
+}
+
 /// The point after a damped step of the unknowns, within their ranges; with `held`, the constants keep their
 /// values.
 pub(super) fn damped_step(
@@ -90,12 +97,18 @@ pub(super) fn damped_step(
     for i in 0..z.len() {
         damped[(i, i)] += damping * at.matrix[(i, i)] + 1e-9;
         if held && model.unknowns.is_constant(i) {
-            damped.row_mut(i).fill(0.0);
-            damped.column_mut(i).fill(0.0);
-            (damped[(i, i)], slope[i]) = (1.0, 0.0);
+            hold_unknown(&mut damped, &mut slope, i);
         }
     }
-    let mut step = -damped.cholesky()?.solve(&slope);
+    let mut step = -damped.clone().cholesky()?.solve(&slope);
+    // an unknown whose step would leave its range stays at the end of the range
+    while let Some(i) = (0..z.len()).find(|&i| {
+        let [low, high] = model.unknowns.0[i].range;
+        (z[i] <= low && step[i] < 0.0) || (z[i] >= high && step[i] > 0.0)
+    }) {
+        hold_unknown(&mut damped, &mut slope, i);
+        step = -damped.clone().cholesky()?.solve(&slope);
+    }
     let longest = model.unknowns.parameters().map(|i| step[i].abs()).fold(0.0, f64::max);
     if longest > LONGEST {
         step *= LONGEST / longest;
@@ -150,7 +163,7 @@ pub(crate) struct TraceCovariance {
     /// residuals are white.
     pub gradient_scatter: f64,
     /// Ratio of the scatter of estimates around the truth to that of the linear model.
-    beyond_linear: f64,
+    pub beyond_linear: f64,
     /// Covariance due to errors of the recorded head positions.
     pub heads: DMatrix<f64>,
 }

@@ -20,7 +20,7 @@ use std::borrow::Cow;
 use std::sync::OnceLock;
 
 /// Half width of a two-sided 95 % interval, in standard deviations of a normal variable.
-pub(super) const Z_95: f64 = 1.959_963_984_540_054;
+pub(crate) const Z_95: f64 = 1.959_963_984_540_054;
 
 /// Maximum number of starts. A search ends sooner if two starts end in the same minimum.
 pub(crate) const MAX_STARTS: usize = 6;
@@ -112,6 +112,12 @@ impl<'a> SearchEnd<'a> {
         let widening = chi2_per_dof(model, at).0.max(covariance.gradient_scatter).max(1.0);
         let sd = (0..at.point.len()).map(|i| covariance.variance(i, widening).sqrt()).collect();
         Some(Self { model, settings, seed, at, covariance, widening, sd })
+    }
+
+    /// Rise of the cost that counts as one of chi2: noise beyond the measured one and the curvature of the cost
+    /// make differences of the cost larger than noise of the measured size does.
+    pub(crate) fn cost_unit(&self) -> f64 {
+        self.widening * math::powi(self.covariance.beyond_linear, 2)
     }
 
     /// Part of the covariance of the estimates by which they scatter more than their information says: the

@@ -181,12 +181,17 @@ impl TraceUnknowns {
     }
 
     /// Indices of the parameters of the scene.
-    pub(super) fn parameters(&self) -> impl Iterator<Item = usize> + '_ {
+    pub(crate) fn parameters(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.0.len()).filter(|&i| self.is_parameter(i))
     }
 
+    /// Index of the parameter of the scene with this name.
+    pub(crate) fn position(&self, name: &str) -> Option<usize> {
+        (0..self.0.len()).find(|&i| self.parameter_name(i) == Some(name))
+    }
+
     /// Whether unknown `i` is a constant: a parameter of the scene that starts at the mean of its prior.
-    pub(super) fn is_constant(&self, i: usize) -> bool {
+    pub(crate) fn is_constant(&self, i: usize) -> bool {
         let unknown = &self.0[i];
         self.is_parameter(i) && unknown.prior.is_some_and(|[mean, _]| mean == unknown.start)
     }
@@ -233,6 +238,15 @@ impl TraceUnknowns {
             scene.drive = scene.drive.scale_lengths(1.0 / (1.0 + self.camera_at(film, point).scale));
         }
         Some(scene)
+    }
+
+    /// A point of the unknowns `from` in these unknowns. Unknowns that only `self` has are taken from `start`.
+    pub(crate) fn carry_point(&self, start: &[f64], from: &Self, point: &[f64]) -> Vec<f64> {
+        let carry = |(unknown, start): (&TraceUnknown, &f64)| {
+            let found = from.0.iter().zip(point).find(|(old, _)| old.kind == unknown.kind);
+            found.map_or(*start, |(_, z)| z.clamp(unknown.range[0], unknown.range[1]))
+        };
+        self.0.iter().zip(start).map(carry).collect()
     }
 
     /// Cost of the priors at a point: the sum of their squared residuals.

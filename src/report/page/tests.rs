@@ -1,6 +1,7 @@
 use super::*;
 use crate::compare::{ParameterLine, TargetComparison, TrueValue};
 use crate::figures::{Drawing, FigureBlock};
+use crate::fit::law::{LawComparison, LawVerdict};
 use crate::fit::misfit::{ChannelMisfit, TraceMisfit, WorstSegment};
 use crate::fit::result::{FitStatus, NuisanceResult};
 use crate::recording::quality::{Check, Grade, QualityFinding, Severity};
@@ -102,6 +103,12 @@ fn everywhere(t: &str) -> Report {
             upper_95: None,
         }],
         friction: Vec::new(),
+        law: Some(LawComparison {
+            verdict: LawVerdict::Undecided,
+            chosen: Some(own()),
+            sentence: own(),
+            candidates: Vec::new(),
+        }),
         chatter: Some(ChatterSummary { sentences: vec![own()], ..ChatterSummary::default() }),
         combinations: vec![CombinationLine { words: own(), determined: false, sd_relative: 0.1 }],
         advice: vec![own()],
@@ -131,18 +138,28 @@ fn everywhere(t: &str) -> Report {
     }
 }
 
-/// Where and why the blade chatters is in the answer of the page, and among the lines of the terminal.
+/// The law of friction, and where and why the blade chatters, are in the answer of the page and among the lines
+/// of the terminal.
 #[test]
-fn the_page_and_the_terminal_say_why_the_blade_chatters() {
+fn the_page_and_the_terminal_name_the_law_and_say_why_the_blade_chatters() {
     let sentences = vec!["It chatters.".to_owned(), "At 1 m/s, on the neck.".to_owned()];
+    let law = "Law of friction: undecided.".to_owned();
     let report = Report {
+        law: Some(LawComparison {
+            verdict: LawVerdict::Undecided,
+            chosen: None,
+            sentence: law.clone(),
+            candidates: Vec::new(),
+        }),
         chatter: Some(ChatterSummary { sentences, ..ChatterSummary::default() }),
         ..Report::default()
     };
     // (a slash is written as an entity)
     let html = summary_html(&report);
     assert!(html.contains("<p>It chatters. At 1 m") && html.contains("s, on the neck.</p>"), "{html}");
+    assert!(html.contains("<p>Law of friction: undecided.</p>"), "{html}");
     let lines = crate::report::verdict::ReportVerdict::from_report(&report).summary();
+    assert!(lines.iter().any(|line| line.starts_with(&law)), "{lines:?}");
     assert!(lines.iter().any(|line| line.starts_with("It chatters. At 1 m/s, on the neck")), "{lines:?}");
     assert!(!summary_html(&Report::default()).contains("<p></p>"));
 }

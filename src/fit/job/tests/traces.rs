@@ -138,3 +138,22 @@ fn a_job_without_a_trace_has_its_budgets_and_something_to_fit() {
             .starts_with("job.toml: search.local_evaluations: missing;")
     );
 }
+
+#[test]
+fn laws_are_checked() {
+    let with = |laws: &str| TRACED.replace("seed = 1\n", &format!("seed = 1\nlaws = {laws}\n"));
+    assert_eq!(of(TRACED).laws, None);
+    assert_eq!(of(&with("[]")).laws, Some(Vec::new()));
+    let both = Some(vec![FrictionShape::Stribeck, FrictionShape::Rational]);
+    assert_eq!(of(&with("[\"stribeck\", \"rational\"]")).laws, both);
+    let refused = |laws: &str| job(&with(laws)).unwrap_err().to_string();
+    assert!(
+        refused("[\"stribek\"]").contains("laws: found \"stribek\"; did you mean `stribeck`?"),
+        "{}",
+        refused("[\"stribek\"]")
+    );
+    assert!(refused("[\"table\"]").contains("whose points are no parameters"));
+    assert!(refused("[\"rational\", \"rational\"]").contains("found \"rational\" twice"));
+    let features = MEASURED.replace("seed = 7\n", "seed = 7\nlaws = [\"stribeck\"]\n");
+    assert!(job(&features).unwrap_err().to_string().contains("found without a [[trace]]"));
+}

@@ -1,0 +1,699 @@
+//! Comparison of friction laws: which of them the recordings support.
+//!
+//! The law of the scene is compared with itself with a limit at rest above the friction of slip, and with a
+//! rise of friction with speed, and with the other laws that the job names. Each law is fitted to the same
+//! frames, from the best end of the search. Laws are compared by the criterion of Schwarz (Ann. Stat. 6
+//! (1978) 461), which prefers the law with fewer parameters among laws that fit equally well.
+
+use super::findings::{FindingSource, FitFinding};
+use super::job::{Job, is_same_quantity};
+use super::journal::{Journal, StopReason};
+use super::problem::Problem;
+use super::result::ParameterResult;
+use super::trace::{
+    Iterate, SearchEnd, TraceDescent, TraceModel, TraceRecording, TraceSearchSettings, TraceUnknown,
+    UnknownKind, Z_95, chi2_per_dof, next_iterate, outer_step, restart_search, start_stage,
+};
+use super::trace_run::{judge_descent, trace_verdict};
+use crate::model::friction::{FrictionLaw, FrictionShape};
+use crate::model::parameters::{find_parameter, name_if_in_recording, name_in_scene, symbol_with_recording};
+use crate::text::{format_trimmed, join_with_and};
+use portable_math as math;
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Rise of the criterion from which a law has lost: odds of 20 to 1. Kass and Raftery (J. Am. Stat. Assoc. 90
+/// (1995) 773) call this strong evidence.
+const LOST: f64 = 6.0;
+/// Maximum number of iterates of the search for the parameters of a law.
+const MAX_ITERATES: usize = 60;
+/// Lowest and highest limit at rest, divided by the friction of slip. The search starts at the lowest. It is
+/// above 1, because a release at a ratio of 1 is tangential, and its time has no derivative by the ratio.
+const STATIC_RATIOS: [f64; 2] = [1.0001, 2.0];
+/// Ratios at which further searches start, because the cost has a minimum of its own near a ratio of 1.
+const FURTHER_RATIOS: [f64; 3] = [1.03, 1.1, 1.3];
+/// Decrease of the cost below which a search ends. A law has lost only if its cost is higher by much more.
+const LEAST_GAIN: f64 = 0.1;
+/// Highest rise of friction over the mean speed of the head, divided by the friction at zero speed.
+const MOST_RISE: f64 = 2.0;
+/// Range of a parameter of another law: the value that comes near the law of the scene, divided and
+/// multiplied by this factor.
+const RANGE_FACTOR: f64 = 30.0;
+/// Range of the exponent of a Stribeck law.
+const EXPONENTS: [f64; 2] = [0.25, 4.0];
+/// Word between the name of a law and its further terms.
+const WITH: &str = " with ";
+/// Smallest friction at zero speed that is a unit for other values.
+const MIN_LIMIT: f64 = 0.01;
+
+/// Which law of friction the recordings support.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LawVerdict {
+    /// One law, by odds of more than 20 to 1.
+    Preferred,
+    /// The recordings do not decide between several laws.
+    Undecided,
+    /// No law that was tried explains the recordings.
+    NoneExplains,
+}
+
+/// Estimate of a parameter with a law.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LawEstimate {
+    /// Value in the SI unit of the parameter.
+    pub estimate: f64,
+    /// Lower end of the 95 % interval of the linear model; `None` if it is not known.
+    pub lower_95: Option<f64>,
+    /// Upper end of the 95 % interval of the linear model; `None` if it is not known.
+    pub upper_95: Option<f64>,
+}
+
+/// A law of friction that was fitted to the recordings.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LawCandidate {
+    /// Name of the law, followed by the keys of the further terms that are free.
+    pub law: String,
+    /// Whether the law explains the recordings.
+    pub explains: bool,
+    /// Chi2 per degree of freedom.
+    pub chi2_per_dof: f64,
+    /// Criterion of Schwarz, minus that of the chosen law; `None` if the law explains nothing.
+    pub criterion: Option<f64>,
+    /// Estimates with this law: those of its free parameters, and for each free parameter of the job that
+    /// this law lacks the nearest value.
+    pub parameters: BTreeMap<String, LawEstimate>,
+}
+
+impl LawCandidate {
+    /// Whether the recordings do not decide against the law.
+    #[must_use]
+    pub fn is_possible(&self) -> bool {
+        self.criterion.is_some_and(|rise| rise < LOST)
+    }
+}
+
+/// Comparison of friction laws.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LawComparison {
+    /// The verdict.
+    pub verdict: LawVerdict,
+    /// Name of the law with the lowest criterion; `None` if no law explains the recordings.
+    pub chosen: Option<String>,
+    /// The verdict in words.
+    pub sentence: String,
+    /// All laws that were tried; the law of the scene is the first.
+    pub candidates: Vec<LawCandidate>,
+}
+
+/// A law with its fit.
+struct LawTrial {
+    law: String,
+    model: TraceModel,
+    at: Iterate,
+    explains: bool,
+}
+
+/// A law that is to be fitted: its name, its model, and whether its formula differs from that of the scene.
+struct OtherLaw {
+    law: String,
+    model: TraceModel,
+    is_other_shape: bool,
+}
+
+impl Problem {
+    /// Compares the law of the scenes with other laws. `end` is the best end of the search, and `explained`
+    /// says whether it explains the recordings. `None` if no parameter of the law is free, or if the job
+    /// excludes the comparison.
+    ///
+    /// # Errors
+    /// [`StopReason`] if the fit is to end.
+    pub(super) fn compare_laws(
+        &self,
+        model: &TraceModel,
+        end: &Iterate,
+        explained: bool,
+        journal: &mut Journal<'_>,
+    ) -> Result<Option<LawComparison>, StopReason> {
+        let named = self.job().laws.as_deref();
+        let shape = model.recordings.first().map(|shoot| shoot.scene.linkage.friction.shape);
+        let frees_law = self.job().parameters.iter().any(|free| free.name.starts_with("friction."));
+        let Some(shape) = shape.filter(|_| frees_law && named != Some(&[])) else { return Ok(None) };
+        let mut others: Vec<OtherLaw> = free_terms(model, self.job(), shape).into_iter().collect();
+        let named = named.unwrap_or_default().iter().filter(|other| **other != shape);
+        others.extend(named.filter_map(|other| change_shape(model, end, shape, *other)));
+        let mut trials = vec![LawTrial {
+            law: shape.name().to_owned(),
+            model: model.clone(),
+            at: end.clone(),
+            explains: explained,
+        }];
+        for other in others {
+            let mut go_on = || journal.announce(format!("fitting friction with the law {}", other.law));
+            go_on()?;
+            trials.extend(self.fit_law(&other, model, end, explained, &mut go_on)?);
+        }
+        if !explained {
+            compare_on_same_segments(&mut trials, &mut || {
+                journal.announce("comparing laws of friction".to_owned())
+            })?;
+        }
+        Ok(Some(self.judge_laws(&trials)))
+    }
+
+    /// Fits a law; `None` if no scene accepts it.
+    fn fit_law(
+        &self,
+        OtherLaw { law, model, is_other_shape }: &OtherLaw,
+        from: &TraceModel,
+        end: &Iterate,
+        explained: bool,
+        go_on: &mut dyn FnMut() -> Result<(), StopReason>,
+    ) -> Result<Option<LawTrial>, StopReason> {
+        let segment_s = self.segment_s().to_vec();
+        let settings = TraceSearchSettings { segment_s, twins: 0, max_segments: None };
+        let starts: Vec<f64> = model.unknowns.0.iter().map(|unknown| unknown.start).collect();
+        let near = model.unknowns.carry_point(&starts, &from.unknowns, &end.point);
+        let (mut points, mut stages) = (vec![near], Vec::new());
+        if !explained || *is_other_shape {
+            let start = if explained { &points[0] } else { &starts };
+            let first = start_stage(model, &settings, (0, false), start, &[]);
+            let descent = first.map(|first| follow_stages(model, &settings, first, go_on)).transpose()?;
+            points.extend(descent.iter().filter_map(|descent| Some(descent.last_iterate()?.point.clone())));
+            stages = descent.filter(|_| !explained).map_or_else(Vec::new, |descent| descent.stages);
+        }
+        let at_rest = model.unknowns.position("friction.static_ratio").filter(|_| !is_other_shape);
+        for point in points.clone() {
+            points.extend(at_rest.iter().flat_map(|&at_rest| {
+                FURTHER_RATIOS.map(|ratio| {
+                    let mut point = point.clone();
+                    point[at_rest] = model.unknowns.0[at_rest].coordinate(ratio);
+                    point
+                })
+            }));
+        }
+        let of_frames = stages.last().unwrap_or(end).clone();
+        let Some(at) = search_on_segments(model, &of_frames, &points, go_on)? else { return Ok(None) };
+        let is_last = at.stage + 1 == settings.segment_s.len();
+        let rest = if is_last { vec![at] } else { follow_stages(model, &settings, at, go_on)?.stages };
+        stages.retain(|before| rest.iter().all(|after| after.stage != before.stage));
+        stages.extend(rest);
+        let Some(at) = stages.last().cloned() else { return Ok(None) };
+        let misfit = judge_descent(self, model, &TraceDescent { start: 0, stages, iterates: 1 });
+        let explains = (explained && at.cost <= end.cost) || misfit.is_some_and(|misfit| misfit.explained);
+        Ok(Some(LawTrial { law: law.clone(), model: model.clone(), at, explains }))
+    }
+}
+
+/// Fits the laws that explain the recordings to the segments of the one with the lowest chi2, so that their
+/// costs can be compared.
+fn compare_on_same_segments(
+    trials: &mut [LawTrial],
+    go_on: &mut dyn FnMut() -> Result<(), StopReason>,
+) -> Result<(), StopReason> {
+    let chi2 = |trial: &&LawTrial| chi2_per_dof(&trial.model, &trial.at).0;
+    let explaining = trials.iter().filter(|trial| trial.explains);
+    let Some(anchor) = explaining.min_by(|a, b| chi2(a).total_cmp(&chi2(b))).map(|trial| trial.at.clone())
+    else {
+        return Ok(());
+    };
+    for trial in trials.iter_mut().filter(|trial| trial.explains && trial.at != anchor) {
+        if let Some(at) =
+            search_on_segments(&trial.model, &anchor, std::slice::from_ref(&trial.at.point), go_on)?
+        {
+            trial.at = at;
+        }
+    }
+    Ok(())
+}
+
+/// The end of a search with plain chi2 on the segments of `end`, from the point of `points` with the lowest
+/// cost. `None` if a scene refuses all points.
+fn search_on_segments(
+    model: &TraceModel,
+    end: &Iterate,
+    points: &[Vec<f64>],
+    go_on: &mut dyn FnMut() -> Result<(), StopReason>,
+) -> Result<Option<Iterate>, StopReason> {
+    let begun = points.iter().filter_map(|point| restart_search(model, end, point.clone()));
+    let Some(mut at) = begun.min_by(|a, b| a.cost.total_cmp(&b.cost)) else { return Ok(None) };
+    while !at.settled {
+        go_on()?;
+        let next = outer_step(model, &at, false);
+        let gain = at.cost - next.cost;
+        at = next;
+        if gain < LEAST_GAIN {
+            break;
+        }
+    }
+    Ok(Some(at))
+}
+
+/// The search through all stages that begins with the iterate `first`.
+///
+/// # Errors
+/// The error of `go_on`, which is called before each step.
+pub(super) fn follow_stages<E>(
+    model: &TraceModel,
+    settings: &TraceSearchSettings,
+    first: Iterate,
+    go_on: &mut dyn FnMut() -> Result<(), E>,
+) -> Result<TraceDescent, E> {
+    let mut descent = TraceDescent { start: 0, stages: vec![first.clone()], iterates: 1 };
+    let mut at = first;
+    while descent.iterates < MAX_ITERATES {
+        go_on()?;
+        let Some(next) = next_iterate(model, settings, &at) else { break };
+        descent.stages.pop_if(|before| before.stage == next.stage);
+        descent.stages.push(next.clone());
+        descent.iterates += 1;
+        at = next;
+    }
+    Ok(descent)
+}
+
+// Models with other laws.
+
+/// The model with a limit at rest above the friction of slip, and with a rise of friction with speed, both
+/// free; `None` if the job frees both.
+fn free_terms(model: &TraceModel, job: &Job, shape: FrictionShape) -> Option<OtherLaw> {
+    let scene = &model.recordings.first()?.scene;
+    let limit = scene.linkage.friction.nearest_value("friction.limit_at_zero")?;
+    let highest_s_per_m = MOST_RISE * limit.max(MIN_LIMIT) / mean_speed_m_per_s(model);
+    let terms =
+        [("friction.static_ratio", STATIC_RATIOS), ("friction.viscous_s_per_m", [0.0, highest_s_per_m])];
+    let is_free = |name: &str| job.parameters.iter().any(|free| is_same_quantity(&free.name, name));
+    let mut changed = model.clone();
+    let mut names = Vec::new();
+    for (name, [lowest, highest]) in terms.into_iter().filter(|(name, _)| !is_free(name)) {
+        let start = scene.value(name).map_or(lowest, |value| value.max(lowest));
+        let highest = highest.max(2.0 * start);
+        let unit = highest - lowest;
+        let kind = UnknownKind::Parameter { name: name.to_owned(), unit: Some(unit) };
+        let range = [lowest / unit, highest / unit];
+        let unknown = TraceUnknown { kind, range, prior: None, start: start / unit };
+        changed.unknowns.0.insert(job.parameters.len(), unknown);
+        names.push(name.trim_start_matches("friction.").to_owned());
+    }
+    let law = format!("{}{WITH}{}", shape.name(), join_with_and(&names));
+    (!names.is_empty()).then_some(OtherLaw { law, model: changed, is_other_shape: false })
+}
+
+/// The model with another law of friction, whose parameters are all free. The search starts near the law
+/// at `end`.
+fn change_shape(
+    model: &TraceModel,
+    end: &Iterate,
+    old: FrictionShape,
+    shape: FrictionShape,
+) -> Option<OtherLaw> {
+    let mut changed = model.clone();
+    let is_own = |unknown: &TraceUnknown| match &unknown.kind {
+        UnknownKind::Parameter { name, .. } => old.own_parameters().contains(&name_in_scene(name)),
+        UnknownKind::Camera { .. } => false,
+    };
+    let mut suffixes = BTreeSet::new();
+    for (unknown, z) in model.unknowns.0.iter().zip(&end.point).filter(|(unknown, _)| is_own(unknown)) {
+        let UnknownKind::Parameter { name, .. } = &unknown.kind else { continue };
+        suffixes.insert(&name[name_in_scene(name).len()..]);
+        for shoot in &mut changed.recordings {
+            if let Some(key) = name_if_in_recording(name, shoot.condition) {
+                shoot.scene = shoot.scene.with_parameter(key, unknown.value(*z)).ok()?;
+            }
+        }
+    }
+    if suffixes.len() > 1 {
+        suffixes.remove("");
+    }
+    changed.unknowns.0.retain(|unknown| !is_own(unknown));
+    let mut found = Vec::new();
+    for suffix in suffixes {
+        for key in shape.own_parameters() {
+            let name = format!("{key}{suffix}");
+            let shoot = changed
+                .recordings
+                .iter()
+                .find(|shoot| name_if_in_recording(&name, shoot.condition).is_some())?;
+            found.push(law_unknown(name, &shoot.scene.linkage.friction, mean_speed_m_per_s(model)));
+        }
+    }
+    for shoot in &mut changed.recordings {
+        shoot.scene = shoot.scene.with_friction_shape(shape).ok()?;
+    }
+    changed.unknowns.0.splice(0..0, found);
+    Some(OtherLaw { law: shape.name().to_owned(), model: changed, is_other_shape: true })
+}
+
+/// An unknown of a law, near the value in `law`.
+fn law_unknown(name: String, law: &FrictionLaw, speed_m_per_s: f64) -> TraceUnknown {
+    let key = name_in_scene(&name);
+    let is_exponent = key == "friction.stribeck_exponent";
+    let near = law.nearest_value(key).filter(|value| value.is_finite() && *value > 0.0);
+    if is_exponent {
+        let unit = EXPONENTS[1] - EXPONENTS[0];
+        let start = near.unwrap_or(1.0).clamp(EXPONENTS[0], EXPONENTS[1]) / unit;
+        let kind = UnknownKind::Parameter { name, unit: Some(unit) };
+        return TraceUnknown { kind, range: EXPONENTS.map(|end| end / unit), prior: None, start };
+    }
+    let usual = match find_parameter(key).map_or("", |row| row.unit) {
+        "m/s" => speed_m_per_s,
+        "s/m" => 1.0 / speed_m_per_s,
+        _ => MIN_LIMIT,
+    };
+    let start = math::ln(near.unwrap_or(usual));
+    let far = math::ln(RANGE_FACTOR);
+    let kind = UnknownKind::Parameter { name, unit: None };
+    TraceUnknown { kind, range: [start - far, start + far], prior: None, start }
+}
+
+/// Mean speed of the heads, m/s.
+fn mean_speed_m_per_s(model: &TraceModel) -> f64 {
+    /// Lower limit, m/s: a slow rig.
+    const SLOWEST: f64 = 1e-4;
+    let speed = |shoot: &TraceRecording| {
+        let [first, last] = shoot.observation.settings.frames;
+        shoot.observation.head_travel_m * shoot.observation.rate_hz / (last - first).max(1) as f64
+    };
+    model.recordings.iter().map(speed).fold(SLOWEST, f64::max)
+}
+
+// Verdict.
+
+impl Problem {
+    /// Judges laws that were fitted; the first is that of the scene.
+    fn judge_laws(&self, trials: &[LawTrial]) -> LawComparison {
+        let segment_s = self.segment_s().to_vec();
+        let settings = TraceSearchSettings { segment_s, twins: 0, max_segments: None };
+        let seed = self.job().search.seed;
+        let ends: Vec<Option<SearchEnd<'_>>> =
+            trials.iter().map(|trial| SearchEnd::new(&trial.model, &settings, seed, &trial.at)).collect();
+        // the unit of the cost is that of the law that fits best
+        let explaining = || trials.iter().zip(&ends).filter(|(trial, _)| trial.explains);
+        let least = explaining().min_by(|a, b| a.0.at.cost.total_cmp(&b.0.at.cost));
+        let unit = least.and_then(|(_, end)| end.as_ref()).map_or(1.0, SearchEnd::cost_unit);
+        let criterion = |trial: &LawTrial| {
+            let parameters = trial.model.unknowns.parameters().count() as f64;
+            let dof = chi2_per_dof(&trial.model, &trial.at).1;
+            trial.at.cost / unit + parameters * math::ln(dof as f64)
+        };
+        let lowest = explaining().map(|(trial, _)| criterion(trial)).fold(f64::INFINITY, f64::min);
+        let candidate = |(trial, end): (&LawTrial, &Option<SearchEnd<'_>>)| LawCandidate {
+            law: trial.law.clone(),
+            explains: trial.explains,
+            chi2_per_dof: chi2_per_dof(&trial.model, &trial.at).0,
+            criterion: trial.explains.then(|| criterion(trial) - lowest),
+            parameters: self.list_estimates(trial, end.as_ref()),
+        };
+        LawComparison::judge(trials.iter().zip(&ends).map(candidate).collect())
+    }
+
+    /// Estimates of the free parameters of a law, and the nearest values of the parameters of the job that it
+    /// lacks.
+    fn list_estimates(&self, trial: &LawTrial, end: Option<&SearchEnd<'_>>) -> BTreeMap<String, LawEstimate> {
+        let model = &trial.model;
+        let mut found = BTreeMap::new();
+        for i in model.unknowns.parameters().filter(|&i| !model.unknowns.is_constant(i)) {
+            let (unknown, z) = (&model.unknowns.0[i], trial.at.point[i]);
+            let UnknownKind::Parameter { name, .. } = &unknown.kind else { continue };
+            let [lower, upper] = unknown.range;
+            let at = |side: f64| {
+                let end = (z + side * Z_95 * end?.sd[i]).clamp(lower, upper);
+                Some(unknown.value(end)).filter(|end| end.is_finite())
+            };
+            let estimate = unknown.value(z);
+            found.insert(name.clone(), LawEstimate { estimate, lower_95: at(-1.0), upper_95: at(1.0) });
+        }
+        for free in &self.job().parameters {
+            let of_recording = |film: usize| {
+                let shoot = &model.recordings[film];
+                let key = name_if_in_recording(&free.name, shoot.condition)?;
+                model.unknowns.scene_at(shoot, film, &trial.at.point)?.linkage.friction.nearest_value(key)
+            };
+            let Some(estimate) = (0..model.recordings.len()).find_map(of_recording) else { continue };
+            let nearest = LawEstimate { estimate, lower_95: None, upper_95: None };
+            found.entry(free.name.clone()).or_insert(nearest);
+        }
+        found
+    }
+}
+
+impl LawComparison {
+    /// The comparison of `candidates`, whose criterion is known; the first is the law of the scene.
+    fn judge(candidates: Vec<LawCandidate>) -> Self {
+        let possible: Vec<&LawCandidate> = candidates.iter().filter(|one| one.is_possible()).collect();
+        let chosen = candidates.iter().find(|one| one.criterion == Some(0.0)).map(|one| one.law.clone());
+        let list = |list: &[&LawCandidate]| {
+            join_with_and(&list.iter().map(|one| one.describe()).collect::<Vec<_>>())
+        };
+        let all: Vec<&LawCandidate> = candidates.iter().collect();
+        let (verdict, sentence) = match (&possible[..], &all[..]) {
+            ([one], [own, others @ ..]) if one.law == own.law => {
+                let assumed: String = others.iter().map(|other| own.describe_assumption(other)).collect();
+                let words = format!("{} is preferred to {}", own.describe(), list(others));
+                (LawVerdict::Preferred, words + &assumed)
+            }
+            ([one], [own, ..]) => {
+                let worse = if own.explains {
+                    "fits clearly worse than"
+                } else {
+                    "does not explain the recording, unlike"
+                };
+                let terms = one.describe_terms(own);
+                (LawVerdict::Preferred, format!("{} {worse} {}{terms}", own.describe(), one.describe()))
+            }
+            ([], _) | (_, []) => {
+                let words = format!("none of {} explains the recording", list(&all));
+                (LawVerdict::NoneExplains, words + "; `laws` of the job names others")
+            }
+            (several, _) => {
+                (LawVerdict::Undecided, format!("the recording does not decide between {}", list(several)))
+            }
+        };
+        let sentence = format!("Law of friction: {sentence}.");
+        Self { verdict, chosen, sentence, candidates }
+    }
+
+    /// The law that explains recordings which that of the scene does not explain, as a finding.
+    pub(super) fn find_explanation(&self) -> Option<FitFinding> {
+        let own = self.candidates.first().filter(|own| !own.explains)?;
+        let best = self.candidates.iter().find(|one| Some(&one.law) == self.chosen.as_ref())?;
+        let sentence =
+            format!("Explained if friction follows {}{}", best.describe(), best.describe_terms(own));
+        Some(FitFinding {
+            hypothesis: Some("friction-law".to_owned()),
+            explains: Some(true),
+            chi2_per_dof: Some(best.chi2_per_dof),
+            ..FitFinding::new(FindingSource::Hypothesis, sentence)
+        })
+    }
+
+    /// Takes the verdicts of the parameters back that do not hold with every possible law, and widens their
+    /// intervals so that they contain the estimates with these laws.
+    pub(super) fn limit_verdicts(&self, job: &Job, parameters: &mut BTreeMap<String, ParameterResult>) {
+        let Some((own, others)) = self.candidates.split_first() else { return };
+        if self.verdict == LawVerdict::NoneExplains {
+            return;
+        }
+        for free in &job.parameters {
+            let Some(found) = parameters.get_mut(&free.name) else { continue };
+            if !own.is_possible() {
+                let chosen = self.candidates.iter().find(|one| Some(&one.law) == self.chosen.as_ref());
+                found
+                    .reasons
+                    .extend(chosen.map(|chosen| format!("the recording supports {}", chosen.describe())));
+            }
+            for other in others.iter().filter(|other| own.is_possible() && other.is_possible()) {
+                let Some(with_law) = other.parameters.get(&free.name) else { continue };
+                let sd = own.parameters.get(&free.name).and_then(LawEstimate::sd).unwrap_or(0.0);
+                if (with_law.estimate - found.estimate).abs() <= sd {
+                    continue;
+                }
+                let (low, high) = (with_law.lower_95, with_law.upper_95);
+                let [low, high] = [low, high].map(|end| end.unwrap_or(with_law.estimate));
+                found.lower_95 = found.lower_95.map(|end| end.min(low));
+                found.upper_95 = found.upper_95.map(|end| end.max(high));
+                let value = format_trimmed(with_law.estimate, 3);
+                found.reasons.push(format!("{} fits as well and gives {value}", other.describe()));
+            }
+            found.verdict = trace_verdict(free, found);
+        }
+    }
+}
+
+impl LawCandidate {
+    /// The further terms of the law in words, such as " with a rise with speed"; empty without any.
+    fn describe_further_terms(&self) -> String {
+        let terms = self.law.split_once(WITH).map(|(_, terms)| format!("{WITH}{terms}")).unwrap_or_default();
+        let terms = terms.replace("static_ratio", "a higher limit at rest");
+        terms.replace("viscous_s_per_m", "a rise with speed")
+    }
+
+    /// The law in words, such as "the exponential law with a rise with speed".
+    fn describe(&self) -> String {
+        let shape = self.law.split(WITH).next().unwrap_or_default();
+        format!("the {shape} law{}", self.describe_further_terms())
+    }
+
+    /// The parameters of the law that `own` lacks with their values, such as ": rs = 1.05 (1.04 to 1.06)".
+    fn describe_terms(&self, own: &Self) -> String {
+        let new = self.parameters.iter().filter(|(name, _)| !own.parameters.contains_key(*name));
+        let words: Vec<String> = new.map(|(name, found)| found.describe(name)).collect();
+        if words.is_empty() { String::new() } else { format!(": {}", join_with_and(&words)) }
+    }
+
+    /// A sentence on the parameters whose intervals hold for this law without the further terms of `other`: with
+    /// them they move by more than a standard deviation, or their intervals are more than twice as wide. Empty
+    /// if `other` has no further terms.
+    fn describe_assumption(&self, other: &Self) -> String {
+        const WIDER: f64 = 2.0;
+        let depends = |(name, own): &(&String, &LawEstimate)| {
+            let (Some(with_terms), Some(sd)) = (other.parameters.get(*name), own.sd()) else { return false };
+            (with_terms.estimate - own.estimate).abs() > sd
+                || with_terms.sd().is_some_and(|with_terms| with_terms > WIDER * sd)
+        };
+        let words =
+            |(name, _): (&String, &LawEstimate)| other.parameters.get(name).map(|found| found.describe(name));
+        let words: Vec<String> = self.parameters.iter().filter(depends).filter_map(words).collect();
+        let (terms, words) = (other.describe_further_terms(), join_with_and(&words));
+        if words.is_empty() || terms.is_empty() || !other.explains {
+            return String::new();
+        }
+        format!(". The intervals assume this law;{terms} they would be {words}")
+    }
+}
+
+impl LawEstimate {
+    /// Standard deviation; `None` without an interval.
+    fn sd(&self) -> Option<f64> {
+        Some((self.upper_95? - self.lower_95?) / (2.0 * Z_95))
+    }
+
+    /// The value with its interval, such as "A = 0.108 (0.102 to 0.115)".
+    fn describe(&self, name: &str) -> String {
+        let symbol = symbol_with_recording(name).unwrap_or_else(|| name.to_owned());
+        let unit = find_parameter(name).map_or("1", |row| row.unit);
+        let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
+        let number = |value: f64| format_trimmed(value, 3);
+        let ends = self.lower_95.zip(self.upper_95);
+        let ends =
+            ends.map_or(String::new(), |(low, high)| format!(" ({} to {})", number(low), number(high)));
+        format!("{symbol} = {}{unit}{ends}", number(self.estimate))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::uncertainty::ParameterVerdict;
+
+    /// A law whose parameters have a standard deviation of a tenth.
+    fn candidate(law: &str, criterion: Option<f64>, parameters: &[(&str, f64)]) -> LawCandidate {
+        let estimate = |value: f64| LawEstimate {
+            estimate: value,
+            lower_95: Some(value - 0.1 * Z_95),
+            upper_95: Some(value + 0.1 * Z_95),
+        };
+        LawCandidate {
+            law: law.to_owned(),
+            explains: criterion.is_some(),
+            chi2_per_dof: 1.0,
+            criterion,
+            parameters: parameters
+                .iter()
+                .map(|(name, value)| ((*name).to_owned(), estimate(*value)))
+                .collect(),
+        }
+    }
+
+    const TERMS: &str = "exponential with static_ratio and viscous_s_per_m";
+
+    fn judge(own: Option<f64>, other: Option<f64>) -> LawComparison {
+        let own = candidate("exponential", own, &[("friction.a", 0.5), ("friction.c", 0.3)]);
+        let terms = [("friction.a", 0.8), ("friction.c", 0.35), ("friction.static_ratio", 1.2)];
+        LawComparison::judge(vec![own, candidate(TERMS, other, &terms)])
+    }
+
+    #[test]
+    fn a_law_wins_by_odds_of_twenty() {
+        let verdict = |own, other| {
+            let found = judge(own, other);
+            (found.verdict, found.chosen)
+        };
+        let [own, other] = ["exponential", TERMS].map(|law| Some(law.to_owned()));
+        assert_eq!(verdict(Some(0.0), Some(6.1)), (LawVerdict::Preferred, own.clone()));
+        assert_eq!(verdict(Some(0.0), Some(5.9)), (LawVerdict::Undecided, own.clone()));
+        assert_eq!(verdict(Some(5.9), Some(0.0)), (LawVerdict::Undecided, other.clone()));
+        assert_eq!(verdict(Some(6.1), Some(0.0)), (LawVerdict::Preferred, other.clone()));
+        assert_eq!(verdict(None, Some(0.0)), (LawVerdict::Preferred, other));
+        assert_eq!(verdict(Some(0.0), None), (LawVerdict::Preferred, own));
+        assert_eq!(verdict(None, None), (LawVerdict::NoneExplains, None));
+    }
+
+    #[test]
+    fn the_verdict_is_one_sentence() {
+        let terms = "the exponential law with a higher limit at rest and a rise with speed";
+        let sentence = |own, other| judge(own, other).sentence;
+        assert_eq!(
+            sentence(Some(0.0), Some(9.0)),
+            format!(
+                "Law of friction: the exponential law is preferred to {terms}. The intervals assume this law; \
+                 with a higher limit at rest and a rise with speed they would be A = 0.8 (0.604 to 0.996)."
+            )
+        );
+        assert_eq!(
+            sentence(None, Some(0.0)),
+            format!(
+                "Law of friction: the exponential law does not explain the recording, unlike {terms}: \
+                 rs = 1.2 (1 to 1.4)."
+            )
+        );
+        assert!(
+            sentence(Some(9.0), Some(0.0)).contains("law fits clearly worse than the exponential law with")
+        );
+        assert!(
+            sentence(Some(1.0), Some(0.0)).contains("does not decide between the exponential law and the")
+        );
+        assert!(sentence(None, None).starts_with("Law of friction: none of the exponential law and the"));
+        let words = judge(None, Some(0.0)).find_explanation().unwrap().sentence;
+        assert_eq!(words, format!("Explained if friction follows {terms}: rs = 1.2 (1 to 1.4)"));
+        assert!(judge(Some(9.0), Some(0.0)).find_explanation().is_none());
+    }
+
+    /// A parameter stays identified if no possible law moves it by more than a standard deviation. Otherwise its
+    /// interval contains the estimates with all possible laws.
+    #[test]
+    fn a_possible_law_takes_back_only_what_it_moves() {
+        let job = Job::parse(
+            "job.toml",
+            "format = 1\ntitle = \"t\"\nscene = \"s.toml\"\nseed = 1\n[[recording]]\npath = \"r\"\n\
+             [[parameter]]\nname = \"friction.a\"\nlower = 0.05\nupper = 2.0\nscale = \"log\"\n\
+             [[parameter]]\nname = \"friction.c\"\nlower = 0.05\nupper = 2.0\nscale = \"log\"\n[[trace]]\n",
+        );
+        let job = job.unwrap();
+        let verdicts = |own, other| {
+            let result = |estimate: f64| ParameterResult {
+                estimate,
+                lower_95: Some(estimate - 0.1),
+                upper_95: Some(estimate + 0.1),
+                verdict: ParameterVerdict::Identified,
+                ..ParameterResult::default()
+            };
+            let mut found: BTreeMap<String, ParameterResult> = [("friction.a", 0.5), ("friction.c", 0.3)]
+                .map(|(name, z)| (name.to_owned(), result(z)))
+                .into();
+            judge(own, other).limit_verdicts(&job, &mut found);
+            found
+        };
+        use ParameterVerdict::{Identified, NotIdentified};
+        let all =
+            |found: &BTreeMap<String, ParameterResult>| found.values().map(|p| p.verdict).collect::<Vec<_>>();
+        assert_eq!(all(&verdicts(Some(0.0), Some(9.0))), [Identified; 2]);
+        assert_eq!(all(&verdicts(Some(9.0), Some(0.0))), [NotIdentified; 2]);
+        let both = verdicts(Some(0.0), Some(3.0));
+        assert_eq!(all(&both), [NotIdentified, Identified]);
+        let a = &both["friction.a"];
+        assert_eq!(a.lower_95, Some(0.4));
+        assert!((a.upper_95.unwrap() - (0.8 + 0.1 * Z_95)).abs() < 1e-12);
+        assert!(a.reasons[0].ends_with("fits as well and gives 0.8"), "{:?}", a.reasons);
+    }
+}
