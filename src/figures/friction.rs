@@ -7,6 +7,7 @@ use crate::compare::friction::{
 };
 use crate::compare::{ConditionComparison, FrictionPoint};
 use crate::figures::full_figure;
+use crate::fit::law::LawCandidate;
 use crate::model::friction::FrictionLaw;
 use crate::simulate::ModelSample;
 use crate::simulate::mode::TipMode;
@@ -43,6 +44,8 @@ pub struct FrictionPlot {
     pub interval_95: Vec<(f64, f64, f64)>,
     /// True law of a synthetic blade: speeds and coefficients; empty if unknown.
     pub truth: Vec<(f64, f64)>,
+    /// Other laws that the recordings support: label, and speeds and coefficients of each.
+    pub others: Vec<(String, Vec<(f64, f64)>)>,
     /// Speeds and coefficients measured while the recorded tip slides steadily.
     pub even: Vec<(f64, f64)>,
     /// Speed bins: lower edge, m/s, upper edge, m/s, and fraction of the slip time that the tip spends in the
@@ -117,7 +120,9 @@ fn law_series(law: &FrictionPlot) -> Vec<Series> {
         series("synthetic truth", Colour::Green, Mark::Dashed, &law.truth),
         Series { points: apart, ..even },
     ];
-    drawn.into_iter().filter(|s| !s.points.is_empty()).collect()
+    let others = law.others.iter().zip([Colour::Purple, Colour::SkyBlue, Colour::Orange].into_iter().cycle());
+    let others = others.map(|((label, points), colour)| series(label, colour, Mark::Dashed, points));
+    drawn.into_iter().chain(others).filter(|s| !s.points.is_empty()).collect()
 }
 
 /// The axis of the coefficients; its range does not include points far from the law.
@@ -125,7 +130,8 @@ fn coefficient_axis(law: &FrictionPlot) -> ChartAxis {
     const FAR: f64 = 0.5;
     const ROOM: f64 = 0.06;
     let axis = ChartAxis::linear("friction coefficient \u{b5}");
-    let own = || law.curve.iter().chain(&law.truth).map(|p| p.1);
+    let others = || law.others.iter().flat_map(|(_, points)| points);
+    let own = || law.curve.iter().chain(&law.truth).chain(others()).map(|p| p.1);
     let Some(mean) = own().reduce(f64::max).zip(own().reduce(f64::min)).map(|(a, b)| 0.5 * (a + b)) else {
         return axis;
     };
@@ -172,6 +178,7 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
         visited: Some(visited),
         interval_95: half.as_deref().map_or_else(Vec::new, band),
         truth: true_law(case).map_or_else(Vec::new, curve),
+        others: other_laws(case).into_iter().map(|(label, law)| (label, curve(law))).collect(),
         even: measured.iter().map(|p| (p.speed_m_per_s, p.coefficient)).collect(),
         shares: slip_time_shares(&slips, top),
         head: Some(mean_head_speed(case)),
@@ -189,6 +196,14 @@ fn claim_sentence(law: &FrictionLaw, fastest: f64) -> String {
     }
     let how = if moving < rest { "falls" } else { "rises" };
     format!("Friction {how} from {from} at rest to {to} at {}", format_speed(fastest))
+}
+
+/// Other laws that the recordings support as well as that of the fit, or instead of it.
+fn other_laws(case: &ConditionComparison) -> Vec<(String, FrictionLaw)> {
+    let laws = case.result.law.iter().flat_map(|law| law.candidates.iter().skip(1));
+    let drawn =
+        |other: &LawCandidate| Some((other.label(), other.friction_law(&case.model.scene, case.condition)?));
+    laws.filter(|other| other.is_possible()).filter_map(drawn).collect()
 }
 
 /// The true law of a synthetic blade; `None` if the description of the recording contains none.
@@ -254,7 +269,13 @@ fn figure_text(
             format_digits(off, 2)
         )
     });
-    let caption = format!("{} in the law of the fitted model{even}.", claim_sentence(law, fastest));
+    let others: Vec<String> = other_laws(case).into_iter().map(|(label, _)| format!("the {label}")).collect();
+    let others = if others.is_empty() {
+        String::new()
+    } else {
+        format!(" The recording supports {}.", join_with_and(&others))
+    };
+    let caption = format!("{} in the law of the fitted model{even}.{others}", claim_sentence(law, fastest));
     FigureText { caption, details: describe_uncertainty(case, half).unwrap_or_default() }
 }
 
@@ -310,6 +331,14 @@ mod tests {
             never.panels[0].series.iter().map(|s| s.label.as_str()).collect::<Vec<_>>(),
             ["law", "measured, tip slides evenly"]
         );
+    }
+
+    #[test]
+    fn other_laws_are_drawn_with_their_names() {
+        let other = ("rational law".to_owned(), vec![(0.0, 0.5), (1.0, 0.2)]);
+        let drawn = draw_figure(&FrictionPlot { others: vec![other], ..law() });
+        let last = drawn.panels[0].series.last().unwrap();
+        assert_eq!((last.label.as_str(), last.points[1]), ("rational law", Some((1000.0, 0.2))));
     }
 
     #[test]

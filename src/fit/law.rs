@@ -17,6 +17,7 @@ use super::trace::{
 use super::trace_run::{judge_descent, trace_verdict};
 use crate::model::friction::{FrictionLaw, FrictionShape};
 use crate::model::parameters::{find_parameter, name_if_in_recording, name_in_scene, symbol_with_recording};
+use crate::simulate::scene::Scene;
 use crate::text::{format_trimmed, join_with_and};
 use portable_math as math;
 use serde::{Deserialize, Serialize};
@@ -322,9 +323,12 @@ fn change_shape(
             }
         }
     }
-    if suffixes.len() > 1 {
-        suffixes.remove("");
-    }
+    match suffixes.len() {
+        // the parameters of a table are its points
+        0 => suffixes.insert(""),
+        1 => true,
+        _ => suffixes.remove(""),
+    };
     changed.unknowns.0.retain(|unknown| !is_own(unknown));
     let mut found = Vec::new();
     for suffix in suffixes {
@@ -528,10 +532,32 @@ impl LawCandidate {
         terms.replace("viscous_s_per_m", "a rise with speed")
     }
 
+    /// Name of the law, without its further terms.
+    fn shape_name(&self) -> &str {
+        self.law.split(WITH).next().unwrap_or_default()
+    }
+
+    /// The law as a label, such as "exponential law with a rise with speed".
+    pub(crate) fn label(&self) -> String {
+        format!("{} law{}", self.shape_name(), self.describe_further_terms())
+    }
+
     /// The law in words, such as "the exponential law with a rise with speed".
     fn describe(&self) -> String {
-        let shape = self.law.split(WITH).next().unwrap_or_default();
-        format!("the {shape} law{}", self.describe_further_terms())
+        format!("the {}", self.label())
+    }
+
+    /// The law with its estimates in a condition with this scene; `None` if the scene refuses the law.
+    pub(crate) fn friction_law(&self, scene: &Scene, condition: usize) -> Option<FrictionLaw> {
+        let shape = FrictionShape::from_name(self.shape_name()).unwrap_or(scene.linkage.friction.shape);
+        let mut scene = scene.with_friction_shape(shape).ok()?;
+        for (name, found) in self.parameters.iter().filter(|(name, _)| name.starts_with("friction.")) {
+            let key = name_if_in_recording(name, condition).filter(|key| shape.has_parameter(key));
+            if let Some(key) = key {
+                scene = scene.with_parameter(key, found.estimate).ok()?;
+            }
+        }
+        Some(scene.linkage.friction)
     }
 
     /// The parameters of the law that `own` lacks with their values, such as ": rs = 1.05 (1.04 to 1.06)".

@@ -96,6 +96,7 @@ pub fn law(name: &str) -> Figure {
         interval_95: speeds().map(|v| (v, coefficient(v) - 0.01, coefficient(v) + 0.02)).collect(),
         even: speeds().take(75).map(|v| (v, coefficient(v))).collect(),
         truth: speeds().map(|v| (v, coefficient(v) + 0.01)).collect(),
+        others: vec![("rational law".to_owned(), speeds().map(|v| (v, 0.4 / (1.0 + v))).collect())],
         shares: (0..10).map(f64::from).map(|i| (0.02 * i, 0.02 * i + 0.02, 0.01 * i)).collect(),
         head: Some(0.08),
     })
