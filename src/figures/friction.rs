@@ -201,9 +201,10 @@ fn claim_sentence(law: &FrictionLaw, fastest: f64) -> String {
 /// Other laws that the recordings support as well as that of the fit, or instead of it.
 fn other_laws(case: &ConditionComparison) -> Vec<(String, FrictionLaw)> {
     let laws = case.result.law.iter().flat_map(|law| law.candidates.iter().skip(1));
-    let drawn =
-        |other: &LawCandidate| Some((other.label(), other.friction_law(&case.model.scene, case.condition)?));
-    laws.filter(|other| other.is_possible()).filter_map(drawn).collect()
+    let drawn = |other: &LawCandidate| {
+        Some((other.format_label(), other.friction_law(&case.model.scene, case.condition)?))
+    };
+    laws.filter(|other| other.possible).filter_map(drawn).collect()
 }
 
 /// The true law of a synthetic blade; `None` if the description of the recording contains none.
@@ -270,10 +271,11 @@ fn figure_text(
         )
     });
     let others: Vec<String> = other_laws(case).into_iter().map(|(label, _)| format!("the {label}")).collect();
-    let others = if others.is_empty() {
-        String::new()
-    } else {
-        format!(" The recording supports {}.", join_with_and(&others))
+    let fits_own = case.result.law.iter().any(|law| law.candidates.first().is_some_and(|own| own.possible));
+    let others = match (others.len(), fits_own) {
+        (0, _) => String::new(),
+        (_, true) => format!(" It fits as well as {}.", join_with_and(&others)),
+        (_, false) => format!(" It fits clearly worse than {}.", join_with_and(&others)),
     };
     let caption = format!("{} in the law of the fitted model{even}.{others}", claim_sentence(law, fastest));
     FigureText { caption, details: describe_uncertainty(case, half).unwrap_or_default() }

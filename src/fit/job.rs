@@ -47,6 +47,8 @@ pub(super) struct JobIdentity<'a> {
     /// Cameras on which a fitted feature depends, with the indices of their conditions.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     cameras: Vec<(usize, FeatureCamera)>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    laws: Option<&'a [FrictionShape]>,
     aims: &'a [FitTarget],
     ensemble: Ensemble,
     largest_tilt_rad: Option<f64>,
@@ -139,6 +141,7 @@ impl Job {
             constants: &self.constants,
             traces: &self.traces,
             cameras: self.used_cameras(),
+            laws: self.laws.as_deref(),
             aims: &self.targets,
             ensemble: self.ensemble,
             largest_tilt_rad: self.largest_tilt_rad,

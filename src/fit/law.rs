@@ -1,8 +1,8 @@
 //! Comparison of friction laws: which of them the recordings support.
 //!
-//! The law of the scene is compared with itself with a limit at rest above the friction of slip, and with a
-//! rise of friction with speed, and with the other laws that the job names. Each law is fitted to the same
-//! frames, from the best end of the search. Laws are compared by the criterion of Schwarz (Ann. Stat. 6
+//! The law of the scene is compared with the same law with two further terms, a limit at rest above the friction
+//! of slip and a rise of friction with speed, and with the other laws that the job names. Each law is fitted to
+//! the same frames, from the best end of the search. Laws are compared by the criterion of Schwarz (Ann. Stat. 6
 //! (1978) 461), which prefers the law with fewer parameters among laws that fit equally well.
 
 use super::findings::{FindingSource, FitFinding};
@@ -15,6 +15,7 @@ use super::trace::{
     UnknownKind, Z_95, chi2_per_dof, next_iterate, outer_step, restart_search, start_stage,
 };
 use super::trace_run::{judge_descent, trace_verdict};
+use crate::checkpoint::or_infinite;
 use crate::model::friction::{FrictionLaw, FrictionShape};
 use crate::model::parameters::{find_parameter, name_if_in_recording, name_in_scene, symbol_with_recording};
 use crate::simulate::scene::Scene;
@@ -23,9 +24,11 @@ use portable_math as math;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Rise of the criterion from which a law has lost: odds of 20 to 1. Kass and Raftery (J. Am. Stat. Assoc. 90
+/// Difference of the criterion at which a law has lost: odds of 20 to 1. Kass and Raftery (J. Am. Stat. Assoc. 90
 /// (1995) 773) call this strong evidence.
-const LOST: f64 = 6.0;
+const LOST_FROM: f64 = 6.0;
+/// The same for a law with more parameters than the chosen one: it must fit better, not only nearly as well.
+const LOST_FROM_IF_LARGER: f64 = 2.0;
 /// Maximum number of iterates of the search for the parameters of a law.
 const MAX_ITERATES: usize = 60;
 /// Lowest and highest limit at rest, divided by the friction of slip. The search starts at the lowest. It is
@@ -33,17 +36,22 @@ const MAX_ITERATES: usize = 60;
 const STATIC_RATIOS: [f64; 2] = [1.0001, 2.0];
 /// Ratios at which further searches start, because the cost has a minimum of its own near a ratio of 1.
 const FURTHER_RATIOS: [f64; 3] = [1.03, 1.1, 1.3];
-/// Decrease of the cost below which a search ends. A law has lost only if its cost is higher by much more.
+/// A search ends after this number of steps in a row that lower the cost by less than `LEAST_GAIN` each. A law has
+/// lost only if its cost is higher by much more.
+const SMALL_STEPS: usize = 2;
 const LEAST_GAIN: f64 = 0.1;
 /// Highest rise of friction over the mean speed of the head, divided by the friction at zero speed.
-const MOST_RISE: f64 = 2.0;
+const MAX_RISE: f64 = 2.0;
 /// Range of a parameter of another law: the value that comes near the law of the scene, divided and
 /// multiplied by this factor.
 const RANGE_FACTOR: f64 = 30.0;
 /// Range of the exponent of a Stribeck law.
 const EXPONENTS: [f64; 2] = [0.25, 4.0];
 /// Word between the name of a law and its further terms.
-const WITH: &str = " with ";
+const TERM_SEPARATOR: &str = " with ";
+/// Distance from the end of a range, in the coordinate of an unknown, within which an end of an interval counts
+/// as at the end of the range.
+const NEAR: f64 = 1e-9;
 /// Smallest friction at zero speed that is a unit for other values.
 const MIN_LIMIT: f64 = 0.01;
 
@@ -64,9 +72,13 @@ pub enum LawVerdict {
 pub struct LawEstimate {
     /// Value in the SI unit of the parameter.
     pub estimate: f64,
-    /// Lower end of the 95 % interval of the linear model; `None` if it is not known.
+    /// Standard deviation of the linear model, in the SI unit of the parameter; `None` if it is not known.
+    pub sd: Option<f64>,
+    /// Lower end of the 95 % interval of the linear model; `None` if it reaches the end of the range, or is not
+    /// known.
     pub lower_95: Option<f64>,
-    /// Upper end of the 95 % interval of the linear model; `None` if it is not known.
+    /// Upper end of the 95 % interval of the linear model; `None` if it reaches the end of the range, or is not
+    /// known.
     pub upper_95: Option<f64>,
 }
 
@@ -77,21 +89,16 @@ pub struct LawCandidate {
     pub law: String,
     /// Whether the law explains the recordings.
     pub explains: bool,
-    /// Chi2 per degree of freedom.
+    /// Chi2 per degree of freedom; infinite if a run of the model fails.
+    #[serde(deserialize_with = "or_infinite")]
     pub chi2_per_dof: f64,
     /// Criterion of Schwarz, minus that of the chosen law; `None` if the law explains nothing.
     pub criterion: Option<f64>,
+    /// Whether the recordings do not decide against the law.
+    pub possible: bool,
     /// Estimates with this law: those of its free parameters, and for each free parameter of the job that
     /// this law lacks the nearest value.
     pub parameters: BTreeMap<String, LawEstimate>,
-}
-
-impl LawCandidate {
-    /// Whether the recordings do not decide against the law.
-    #[must_use]
-    pub fn is_possible(&self) -> bool {
-        self.criterion.is_some_and(|rise| rise < LOST)
-    }
 }
 
 /// Comparison of friction laws.
@@ -115,8 +122,8 @@ struct LawTrial {
     explains: bool,
 }
 
-/// A law that is to be fitted: its name, its model, and whether its formula differs from that of the scene.
-struct OtherLaw {
+/// A law that is compared with that of the scene: its name, its model, and whether its formula differs from that of the scene.
+struct RivalLaw {
     law: String,
     model: TraceModel,
     is_other_shape: bool,
@@ -124,8 +131,8 @@ struct OtherLaw {
 
 impl Problem {
     /// Compares the law of the scenes with other laws. `end` is the best end of the search, and `explained`
-    /// says whether it explains the recordings. `None` if no parameter of the law is free, or if the job
-    /// excludes the comparison.
+    /// says whether it explains the recordings. `None` if no parameter of the law is free, if the scenes
+    /// have different laws, if the job excludes the comparison, or if there is no other law.
     ///
     /// # Errors
     /// [`StopReason`] if the fit is to end.
@@ -137,10 +144,11 @@ impl Problem {
         journal: &mut Journal<'_>,
     ) -> Result<Option<LawComparison>, StopReason> {
         let named = self.job().laws.as_deref();
-        let shape = model.recordings.first().map(|shoot| shoot.scene.linkage.friction.shape);
+        let mut shapes = model.recordings.iter().map(|shoot| shoot.scene.linkage.friction.shape);
+        let shape = shapes.next().filter(|first| shapes.all(|shape| shape == *first));
         let frees_law = self.job().parameters.iter().any(|free| free.name.starts_with("friction."));
         let Some(shape) = shape.filter(|_| frees_law && named != Some(&[])) else { return Ok(None) };
-        let mut others: Vec<OtherLaw> = free_terms(model, self.job(), shape).into_iter().collect();
+        let mut others: Vec<RivalLaw> = add_free_terms(model, self.job(), shape).into_iter().collect();
         let named = named.unwrap_or_default().iter().filter(|other| **other != shape);
         others.extend(named.filter_map(|other| change_shape(model, end, shape, *other)));
         let mut trials = vec![LawTrial {
@@ -150,9 +158,12 @@ impl Problem {
             explains: explained,
         }];
         for other in others {
-            let mut go_on = || journal.announce(format!("fitting friction with the law {}", other.law));
-            go_on()?;
-            trials.extend(self.fit_law(&other, model, end, explained, &mut go_on)?);
+            let mut check_stop = || journal.announce(format!("fitting friction with the law {}", other.law));
+            check_stop()?;
+            trials.extend(self.fit_law(&other, model, end, explained, &mut check_stop)?);
+        }
+        if trials.len() == 1 {
+            return Ok(None);
         }
         if !explained {
             compare_on_same_segments(&mut trials, &mut || {
@@ -165,11 +176,11 @@ impl Problem {
     /// Fits a law; `None` if no scene accepts it.
     fn fit_law(
         &self,
-        OtherLaw { law, model, is_other_shape }: &OtherLaw,
+        RivalLaw { law, model, is_other_shape }: &RivalLaw,
         from: &TraceModel,
         end: &Iterate,
         explained: bool,
-        go_on: &mut dyn FnMut() -> Result<(), StopReason>,
+        check_stop: &mut dyn FnMut() -> Result<(), StopReason>,
     ) -> Result<Option<LawTrial>, StopReason> {
         let segment_s = self.segment_s().to_vec();
         let settings = TraceSearchSettings { segment_s, twins: 0, max_segments: None };
@@ -179,29 +190,39 @@ impl Problem {
         if !explained || *is_other_shape {
             let start = if explained { &points[0] } else { &starts };
             let first = start_stage(model, &settings, (0, false), start, &[]);
-            let descent = first.map(|first| follow_stages(model, &settings, first, go_on)).transpose()?;
+            let descent =
+                first.map(|first| follow_stages(model, &settings, first, check_stop)).transpose()?;
             points.extend(descent.iter().filter_map(|descent| Some(descent.last_iterate()?.point.clone())));
             stages = descent.filter(|_| !explained).map_or_else(Vec::new, |descent| descent.stages);
         }
         let at_rest = model.unknowns.position("friction.static_ratio").filter(|_| !is_other_shape);
         for point in points.clone() {
             points.extend(at_rest.iter().flat_map(|&at_rest| {
-                FURTHER_RATIOS.map(|ratio| {
+                let unknown = &model.unknowns.0[at_rest];
+                let places = FURTHER_RATIOS.map(|ratio| unknown.coordinate(ratio));
+                let inside = places.into_iter().filter(|z| (unknown.range[0]..=unknown.range[1]).contains(z));
+                let points = inside.map(|z| {
                     let mut point = point.clone();
-                    point[at_rest] = model.unknowns.0[at_rest].coordinate(ratio);
+                    point[at_rest] = z;
                     point
-                })
+                });
+                points.collect::<Vec<_>>()
             }));
         }
         let of_frames = stages.last().unwrap_or(end).clone();
-        let Some(at) = search_on_segments(model, &of_frames, &points, go_on)? else { return Ok(None) };
+        let Some(at) = search_on_segments(model, &of_frames, &points, check_stop)? else { return Ok(None) };
         let is_last = at.stage + 1 == settings.segment_s.len();
-        let rest = if is_last { vec![at] } else { follow_stages(model, &settings, at, go_on)?.stages };
+        let rest = if is_last { vec![at] } else { follow_stages(model, &settings, at, check_stop)?.stages };
         stages.retain(|before| rest.iter().all(|after| after.stage != before.stage));
         stages.extend(rest);
         let Some(at) = stages.last().cloned() else { return Ok(None) };
+        if !at.cost.is_finite() {
+            return Ok(None);
+        }
         let misfit = judge_descent(self, model, &TraceDescent { start: 0, stages, iterates: 1 });
-        let explains = (explained && at.cost <= end.cost) || misfit.is_some_and(|misfit| misfit.explained);
+        let is_last = at.stage + 1 == settings.segment_s.len();
+        let explains =
+            (explained && at.cost <= end.cost) || is_last && misfit.is_some_and(|misfit| misfit.explained);
         Ok(Some(LawTrial { law: law.clone(), model: model.clone(), at, explains }))
     }
 }
@@ -210,18 +231,18 @@ impl Problem {
 /// costs can be compared.
 fn compare_on_same_segments(
     trials: &mut [LawTrial],
-    go_on: &mut dyn FnMut() -> Result<(), StopReason>,
+    check_stop: &mut dyn FnMut() -> Result<(), StopReason>,
 ) -> Result<(), StopReason> {
     let chi2 = |trial: &&LawTrial| chi2_per_dof(&trial.model, &trial.at).0;
-    let explaining = trials.iter().filter(|trial| trial.explains);
-    let Some(anchor) = explaining.min_by(|a, b| chi2(a).total_cmp(&chi2(b))).map(|trial| trial.at.clone())
-    else {
+    let best = trials.iter().filter(|trial| trial.explains).min_by(|a, b| chi2(a).total_cmp(&chi2(b)));
+    let Some((anchor, unknowns)) = best.map(|best| (best.at.clone(), best.model.unknowns.clone())) else {
         return Ok(());
     };
     for trial in trials.iter_mut().filter(|trial| trial.explains && trial.at != anchor) {
-        if let Some(at) =
-            search_on_segments(&trial.model, &anchor, std::slice::from_ref(&trial.at.point), go_on)?
-        {
+        let own = trial.at.point.clone();
+        // the same law beside the constants of the best law
+        let beside = trial.model.unknowns.carry_point(&own, &unknowns, &anchor.point);
+        if let Some(at) = search_on_segments(&trial.model, &anchor, &[own, beside], check_stop)? {
             trial.at = at;
         }
     }
@@ -234,18 +255,16 @@ fn search_on_segments(
     model: &TraceModel,
     end: &Iterate,
     points: &[Vec<f64>],
-    go_on: &mut dyn FnMut() -> Result<(), StopReason>,
+    check_stop: &mut dyn FnMut() -> Result<(), StopReason>,
 ) -> Result<Option<Iterate>, StopReason> {
     let begun = points.iter().filter_map(|point| restart_search(model, end, point.clone()));
     let Some(mut at) = begun.min_by(|a, b| a.cost.total_cmp(&b.cost)) else { return Ok(None) };
-    while !at.settled {
-        go_on()?;
+    let mut small = 0;
+    while !at.settled && small < SMALL_STEPS {
+        check_stop()?;
         let next = outer_step(model, &at, false);
-        let gain = at.cost - next.cost;
+        small = if at.cost - next.cost < LEAST_GAIN { small + 1 } else { 0 };
         at = next;
-        if gain < LEAST_GAIN {
-            break;
-        }
     }
     Ok(Some(at))
 }
@@ -253,17 +272,17 @@ fn search_on_segments(
 /// The search through all stages that begins with the iterate `first`.
 ///
 /// # Errors
-/// The error of `go_on`, which is called before each step.
+/// The error of `check_stop`, which is called before each step.
 pub(super) fn follow_stages<E>(
     model: &TraceModel,
     settings: &TraceSearchSettings,
     first: Iterate,
-    go_on: &mut dyn FnMut() -> Result<(), E>,
+    check_stop: &mut dyn FnMut() -> Result<(), E>,
 ) -> Result<TraceDescent, E> {
     let mut descent = TraceDescent { start: 0, stages: vec![first.clone()], iterates: 1 };
     let mut at = first;
     while descent.iterates < MAX_ITERATES {
-        go_on()?;
+        check_stop()?;
         let Some(next) = next_iterate(model, settings, &at) else { break };
         descent.stages.pop_if(|before| before.stage == next.stage);
         descent.stages.push(next.clone());
@@ -277,16 +296,20 @@ pub(super) fn follow_stages<E>(
 
 /// The model with a limit at rest above the friction of slip, and with a rise of friction with speed, both
 /// free; `None` if the job frees both.
-fn free_terms(model: &TraceModel, job: &Job, shape: FrictionShape) -> Option<OtherLaw> {
+fn add_free_terms(model: &TraceModel, job: &Job, shape: FrictionShape) -> Option<RivalLaw> {
     let scene = &model.recordings.first()?.scene;
     let limit = scene.linkage.friction.nearest_value("friction.limit_at_zero")?;
-    let highest_s_per_m = MOST_RISE * limit.max(MIN_LIMIT) / mean_speed_m_per_s(model);
+    let highest_s_per_m = MAX_RISE * limit.max(MIN_LIMIT) / travel_speed_m_per_s(model);
     let terms =
         [("friction.static_ratio", STATIC_RATIOS), ("friction.viscous_s_per_m", [0.0, highest_s_per_m])];
     let is_free = |name: &str| job.parameters.iter().any(|free| is_same_quantity(&free.name, name));
+    let value = |shoot: &TraceRecording, name: &str| shoot.scene.value(name);
+    // a value that differs between the recordings is a condition, not a term
+    let is_shared =
+        |name: &str| model.recordings.windows(2).all(|pair| value(&pair[0], name) == value(&pair[1], name));
     let mut changed = model.clone();
     let mut names = Vec::new();
-    for (name, [lowest, highest]) in terms.into_iter().filter(|(name, _)| !is_free(name)) {
+    for (name, [lowest, highest]) in terms.into_iter().filter(|(name, _)| !is_free(name) && is_shared(name)) {
         let start = scene.value(name).map_or(lowest, |value| value.max(lowest));
         let highest = highest.max(2.0 * start);
         let unit = highest - lowest;
@@ -296,8 +319,8 @@ fn free_terms(model: &TraceModel, job: &Job, shape: FrictionShape) -> Option<Oth
         changed.unknowns.0.insert(job.parameters.len(), unknown);
         names.push(name.trim_start_matches("friction.").to_owned());
     }
-    let law = format!("{}{WITH}{}", shape.name(), join_with_and(&names));
-    (!names.is_empty()).then_some(OtherLaw { law, model: changed, is_other_shape: false })
+    let law = format!("{}{TERM_SEPARATOR}{}", shape.name(), join_with_and(&names));
+    (!names.is_empty()).then_some(RivalLaw { law, model: changed, is_other_shape: false })
 }
 
 /// The model with another law of friction, whose parameters are all free. The search starts near the law
@@ -307,7 +330,7 @@ fn change_shape(
     end: &Iterate,
     old: FrictionShape,
     shape: FrictionShape,
-) -> Option<OtherLaw> {
+) -> Option<RivalLaw> {
     let mut changed = model.clone();
     let is_own = |unknown: &TraceUnknown| match &unknown.kind {
         UnknownKind::Parameter { name, .. } => old.own_parameters().contains(&name_in_scene(name)),
@@ -338,18 +361,18 @@ fn change_shape(
                 .recordings
                 .iter()
                 .find(|shoot| name_if_in_recording(&name, shoot.condition).is_some())?;
-            found.push(law_unknown(name, &shoot.scene.linkage.friction, mean_speed_m_per_s(model)));
+            found.push(make_law_unknown(name, &shoot.scene.linkage.friction, travel_speed_m_per_s(model)));
         }
     }
     for shoot in &mut changed.recordings {
         shoot.scene = shoot.scene.with_friction_shape(shape).ok()?;
     }
     changed.unknowns.0.splice(0..0, found);
-    Some(OtherLaw { law: shape.name().to_owned(), model: changed, is_other_shape: true })
+    Some(RivalLaw { law: shape.name().to_owned(), model: changed, is_other_shape: true })
 }
 
 /// An unknown of a law, near the value in `law`.
-fn law_unknown(name: String, law: &FrictionLaw, speed_m_per_s: f64) -> TraceUnknown {
+fn make_law_unknown(name: String, law: &FrictionLaw, speed_m_per_s: f64) -> TraceUnknown {
     let key = name_in_scene(&name);
     let is_exponent = key == "friction.stribeck_exponent";
     let near = law.nearest_value(key).filter(|value| value.is_finite() && *value > 0.0);
@@ -362,7 +385,7 @@ fn law_unknown(name: String, law: &FrictionLaw, speed_m_per_s: f64) -> TraceUnkn
     let usual = match find_parameter(key).map_or("", |row| row.unit) {
         "m/s" => speed_m_per_s,
         "s/m" => 1.0 / speed_m_per_s,
-        _ => MIN_LIMIT,
+        _ => 0.5 * law.limit_at_zero(1.0).max(MIN_LIMIT),
     };
     let start = math::ln(near.unwrap_or(usual));
     let far = math::ln(RANGE_FACTOR);
@@ -370,8 +393,8 @@ fn law_unknown(name: String, law: &FrictionLaw, speed_m_per_s: f64) -> TraceUnkn
     TraceUnknown { kind, range: [start - far, start + far], prior: None, start }
 }
 
-/// Mean speed of the heads, m/s.
-fn mean_speed_m_per_s(model: &TraceModel) -> f64 {
+/// Largest travel of a head, divided by the time of its film, m/s.
+fn travel_speed_m_per_s(model: &TraceModel) -> f64 {
     /// Lower limit, m/s: a slow rig.
     const SLOWEST: f64 = 1e-4;
     let speed = |shoot: &TraceRecording| {
@@ -400,12 +423,18 @@ impl Problem {
             let dof = chi2_per_dof(&trial.model, &trial.at).1;
             trial.at.cost / unit + parameters * math::ln(dof as f64)
         };
-        let lowest = explaining().map(|(trial, _)| criterion(trial)).fold(f64::INFINITY, f64::min);
+        let size = |trial: &LawTrial| trial.model.unknowns.parameters().count();
+        let chosen = explaining().map(|(trial, _)| (criterion(trial), size(trial)));
+        let (lowest, smallest) =
+            chosen.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::INFINITY, usize::MAX));
         let candidate = |(trial, end): (&LawTrial, &Option<SearchEnd<'_>>)| LawCandidate {
             law: trial.law.clone(),
             explains: trial.explains,
             chi2_per_dof: chi2_per_dof(&trial.model, &trial.at).0,
             criterion: trial.explains.then(|| criterion(trial) - lowest),
+            possible: trial.explains
+                && criterion(trial) - lowest
+                    < if size(trial) > smallest { LOST_FROM_IF_LARGER } else { LOST_FROM },
             parameters: self.list_estimates(trial, end.as_ref()),
         };
         LawComparison::judge(trials.iter().zip(&ends).map(candidate).collect())
@@ -420,21 +449,30 @@ impl Problem {
             let (unknown, z) = (&model.unknowns.0[i], trial.at.point[i]);
             let UnknownKind::Parameter { name, .. } = &unknown.kind else { continue };
             let [lower, upper] = unknown.range;
-            let at = |side: f64| {
-                let end = (z + side * Z_95 * end?.sd[i]).clamp(lower, upper);
-                Some(unknown.value(end)).filter(|end| end.is_finite())
+            let far = end.map(|end| Z_95 * end.sd[i]).filter(|far| far.is_finite());
+            let inside = |end: &f64| (lower + NEAR..=upper - NEAR).contains(end);
+            let at = |side: f64| Some(z + side * far?).filter(inside).map(|end| unknown.value(end));
+            let estimate = LawEstimate {
+                estimate: unknown.value(z),
+                sd: far.map(|far| unknown.slope(z) * far / Z_95),
+                lower_95: at(-1.0),
+                upper_95: at(1.0),
             };
-            let estimate = unknown.value(z);
-            found.insert(name.clone(), LawEstimate { estimate, lower_95: at(-1.0), upper_95: at(1.0) });
+            found.insert(name.clone(), estimate);
         }
+        // another formula has no value of `A`, `B` and `C`
+        let has_values = |shoot: &&TraceRecording| {
+            let shape = shoot.scene.linkage.friction.shape;
+            matches!(shape, FrictionShape::Exponential | FrictionShape::Stribeck)
+        };
         for free in &self.job().parameters {
             let of_recording = |film: usize| {
-                let shoot = &model.recordings[film];
+                let shoot = model.recordings.get(film).filter(has_values)?;
                 let key = name_if_in_recording(&free.name, shoot.condition)?;
                 model.unknowns.scene_at(shoot, film, &trial.at.point)?.linkage.friction.nearest_value(key)
             };
             let Some(estimate) = (0..model.recordings.len()).find_map(of_recording) else { continue };
-            let nearest = LawEstimate { estimate, lower_95: None, upper_95: None };
+            let nearest = LawEstimate { estimate, sd: None, lower_95: None, upper_95: None };
             found.entry(free.name.clone()).or_insert(nearest);
         }
         found
@@ -444,7 +482,7 @@ impl Problem {
 impl LawComparison {
     /// The comparison of `candidates`, whose criterion is known; the first is the law of the scene.
     fn judge(candidates: Vec<LawCandidate>) -> Self {
-        let possible: Vec<&LawCandidate> = candidates.iter().filter(|one| one.is_possible()).collect();
+        let possible: Vec<&LawCandidate> = candidates.iter().filter(|one| one.possible).collect();
         let chosen = candidates.iter().find(|one| one.criterion == Some(0.0)).map(|one| one.law.clone());
         let list = |list: &[&LawCandidate]| {
             join_with_and(&list.iter().map(|one| one.describe()).collect::<Vec<_>>())
@@ -467,17 +505,24 @@ impl LawComparison {
             }
             ([], _) | (_, []) => {
                 let words = format!("none of {} explains the recording", list(&all));
-                (LawVerdict::NoneExplains, words + "; `laws` of the job names others")
+                let advice = if all.len() > 2 { "" } else { "; `laws` of the job names others" };
+                (LawVerdict::NoneExplains, words + advice)
             }
-            (several, _) => {
-                (LawVerdict::Undecided, format!("the recording does not decide between {}", list(several)))
+            (several, [own, ..]) => {
+                let lost = if own.possible {
+                    String::new()
+                } else {
+                    format!("; {} fits clearly worse", own.describe())
+                };
+                let words = format!("the recording does not decide between {}{lost}", list(several));
+                (LawVerdict::Undecided, words)
             }
         };
         let sentence = format!("Law of friction: {sentence}.");
         Self { verdict, chosen, sentence, candidates }
     }
 
-    /// The law that explains recordings which that of the scene does not explain, as a finding.
+    /// If another law explains the recordings and that of the scene does not: the other law, as a finding.
     pub(super) fn find_explanation(&self) -> Option<FitFinding> {
         let own = self.candidates.first().filter(|own| !own.explains)?;
         let best = self.candidates.iter().find(|one| Some(&one.law) == self.chosen.as_ref())?;
@@ -491,8 +536,8 @@ impl LawComparison {
         })
     }
 
-    /// Takes the verdicts of the parameters back that do not hold with every possible law, and widens their
-    /// intervals so that they contain the estimates with these laws.
+    /// Takes back the verdicts that do not hold with every possible law, and widens the intervals so that they
+    /// contain the estimates with these laws.
     pub(super) fn limit_verdicts(&self, job: &Job, parameters: &mut BTreeMap<String, ParameterResult>) {
         let Some((own, others)) = self.candidates.split_first() else { return };
         if self.verdict == LawVerdict::NoneExplains {
@@ -500,22 +545,27 @@ impl LawComparison {
         }
         for free in &job.parameters {
             let Some(found) = parameters.get_mut(&free.name) else { continue };
-            if !own.is_possible() {
-                let chosen = self.candidates.iter().find(|one| Some(&one.law) == self.chosen.as_ref());
-                found
-                    .reasons
-                    .extend(chosen.map(|chosen| format!("the recording supports {}", chosen.describe())));
+            if !own.possible {
+                let possible: Vec<String> =
+                    others.iter().filter(|other| other.possible).map(LawCandidate::describe).collect();
+                found.reasons.push(format!("the recording supports {} instead", possible.join(" or ")));
             }
-            for other in others.iter().filter(|other| own.is_possible() && other.is_possible()) {
-                let Some(with_law) = other.parameters.get(&free.name) else { continue };
-                let sd = own.parameters.get(&free.name).and_then(LawEstimate::sd).unwrap_or(0.0);
+            for other in others.iter().filter(|other| own.possible && other.possible) {
+                let Some(with_law) = other.parameters.get(&free.name) else {
+                    found
+                        .reasons
+                        .push(format!("{} fits as well, and has no such parameter", other.describe()));
+                    continue;
+                };
+                let sd = own.parameters.get(&free.name).and_then(|own| own.sd).unwrap_or(0.0);
                 if (with_law.estimate - found.estimate).abs() <= sd {
                     continue;
                 }
                 let (low, high) = (with_law.lower_95, with_law.upper_95);
                 let [low, high] = [low, high].map(|end| end.unwrap_or(with_law.estimate));
-                found.lower_95 = found.lower_95.map(|end| end.min(low));
-                found.upper_95 = found.upper_95.map(|end| end.max(high));
+                let (lower, upper) = (free.bounds.lower(), free.bounds.upper());
+                found.lower_95 = found.lower_95.map(|end| end.min(low)).filter(|end| *end > lower);
+                found.upper_95 = found.upper_95.map(|end| end.max(high)).filter(|end| *end < upper);
                 let value = format_trimmed(with_law.estimate, 3);
                 found.reasons.push(format!("{} fits as well and gives {value}", other.describe()));
             }
@@ -527,24 +577,28 @@ impl LawComparison {
 impl LawCandidate {
     /// The further terms of the law in words, such as " with a rise with speed"; empty without any.
     fn describe_further_terms(&self) -> String {
-        let terms = self.law.split_once(WITH).map(|(_, terms)| format!("{WITH}{terms}")).unwrap_or_default();
+        let terms = self
+            .law
+            .split_once(TERM_SEPARATOR)
+            .map(|(_, terms)| format!("{TERM_SEPARATOR}{terms}"))
+            .unwrap_or_default();
         let terms = terms.replace("static_ratio", "a higher limit at rest");
         terms.replace("viscous_s_per_m", "a rise with speed")
     }
 
     /// Name of the law, without its further terms.
     fn shape_name(&self) -> &str {
-        self.law.split(WITH).next().unwrap_or_default()
+        self.law.split(TERM_SEPARATOR).next().unwrap_or_default()
     }
 
     /// The law as a label, such as "exponential law with a rise with speed".
-    pub(crate) fn label(&self) -> String {
+    pub(crate) fn format_label(&self) -> String {
         format!("{} law{}", self.shape_name(), self.describe_further_terms())
     }
 
     /// The law in words, such as "the exponential law with a rise with speed".
     fn describe(&self) -> String {
-        format!("the {}", self.label())
+        format!("the {}", self.format_label())
     }
 
     /// The law with its estimates in a condition with this scene; `None` if the scene refuses the law.
@@ -573,9 +627,9 @@ impl LawCandidate {
     fn describe_assumption(&self, other: &Self) -> String {
         const WIDER: f64 = 2.0;
         let depends = |(name, own): &(&String, &LawEstimate)| {
-            let (Some(with_terms), Some(sd)) = (other.parameters.get(*name), own.sd()) else { return false };
+            let (Some(with_terms), Some(sd)) = (other.parameters.get(*name), own.sd) else { return false };
             (with_terms.estimate - own.estimate).abs() > sd
-                || with_terms.sd().is_some_and(|with_terms| with_terms > WIDER * sd)
+                || with_terms.sd.is_some_and(|with_terms| with_terms > WIDER * sd)
         };
         let words =
             |(name, _): (&String, &LawEstimate)| other.parameters.get(name).map(|found| found.describe(name));
@@ -589,20 +643,18 @@ impl LawCandidate {
 }
 
 impl LawEstimate {
-    /// Standard deviation; `None` without an interval.
-    fn sd(&self) -> Option<f64> {
-        Some((self.upper_95? - self.lower_95?) / (2.0 * Z_95))
-    }
-
     /// The value with its interval, such as "A = 0.108 (0.102 to 0.115)".
     fn describe(&self, name: &str) -> String {
         let symbol = symbol_with_recording(name).unwrap_or_else(|| name.to_owned());
         let unit = find_parameter(name).map_or("1", |row| row.unit);
         let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
         let number = |value: f64| format_trimmed(value, 3);
-        let ends = self.lower_95.zip(self.upper_95);
-        let ends =
-            ends.map_or(String::new(), |(low, high)| format!(" ({} to {})", number(low), number(high)));
+        let ends = match (self.lower_95, self.upper_95) {
+            (Some(low), Some(high)) => format!(" ({} to {})", number(low), number(high)),
+            (Some(low), None) => format!(" (at least {})", number(low)),
+            (None, Some(high)) => format!(" (at most {})", number(high)),
+            (None, None) => String::new(),
+        };
         format!("{symbol} = {}{unit}{ends}", number(self.estimate))
     }
 }
@@ -616,6 +668,7 @@ mod tests {
     fn candidate(law: &str, criterion: Option<f64>, parameters: &[(&str, f64)]) -> LawCandidate {
         let estimate = |value: f64| LawEstimate {
             estimate: value,
+            sd: Some(0.1),
             lower_95: Some(value - 0.1 * Z_95),
             upper_95: Some(value + 0.1 * Z_95),
         };
@@ -624,6 +677,7 @@ mod tests {
             explains: criterion.is_some(),
             chi2_per_dof: 1.0,
             criterion,
+            possible: criterion.is_some_and(|rise| rise < LOST_FROM),
             parameters: parameters
                 .iter()
                 .map(|(name, value)| ((*name).to_owned(), estimate(*value)))

@@ -71,7 +71,14 @@ impl Problem {
         if let (Some(end), true) = (best.last_iterate(), result.status.has_ended()) {
             match self.compare_laws(&model, end, result.explains_recordings(), &mut journal) {
                 Ok(law) => result.law = law,
-                Err(_) => result.status = FitStatus::Interrupted,
+                Err(_) => {
+                    result.status = FitStatus::Interrupted;
+                    for free in &self.job().parameters {
+                        let Some(found) = result.parameters.get_mut(&free.name) else { continue };
+                        found.reasons.push("laws of friction were not compared".to_owned());
+                        found.verdict = trace_verdict(free, found);
+                    }
+                }
             }
             if let Some(law) = &result.law {
                 law.limit_verdicts(self.job(), &mut result.parameters);
@@ -208,8 +215,12 @@ impl TraceFindings<'_> {
 
     /// Values of the free parameters at an iterate, by name.
     fn parameter_values(&self, at: &Iterate) -> BTreeMap<String, f64> {
-        let values = self.model.unknowns.0.iter().zip(&at.point).map(|(unknown, z)| unknown.value(*z));
-        self.problem.job().parameter_names().into_iter().zip(values).collect()
+        let unknowns = &self.model.unknowns;
+        let value = |name: String| {
+            let i = unknowns.position(&name)?;
+            Some((name, unknowns.0[i].value(at.point[i])))
+        };
+        self.problem.job().parameter_names().into_iter().filter_map(value).collect()
     }
 
     fn parameter_result(

@@ -34,6 +34,15 @@ impl ParameterRange {
             }
     }
 
+    /// The lowest admissible value; `None` if every value above 0 is admissible.
+    pub(crate) fn lowest(self) -> Option<f64> {
+        match self {
+            Self::Positive => None,
+            Self::NotNegative => Some(0.0),
+            Self::Within(least, _) => Some(least),
+        }
+    }
+
     /// The range in words.
     pub(crate) fn describe(self) -> String {
         match self {

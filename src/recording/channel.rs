@@ -135,6 +135,7 @@ pub(crate) fn central_moments(points: &[(f64, f64)]) -> ([f64; 2], [f64; 2]) {
 
 /// The tracked frames of a channel, the standard deviation of their noise, m, and the smallest change of
 /// position between two tracked frames that is not zero, m (0 if the position never changes).
+#[derive(Clone)]
 pub(super) struct TrackPoints {
     /// Frame number and position, m, of every tracked frame.
     pub points: Vec<(usize, f64)>,

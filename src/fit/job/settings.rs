@@ -73,9 +73,12 @@ pub(super) fn check_laws(written: &as_written::JobFile) -> Result<Option<Vec<Fri
     const FORMS: [&str; 3] = ["exponential", "stribeck", "rational"];
     let Some(names) = &written.laws else { return Ok(None) };
     if written.trace.is_empty() {
+        refuse!("laws", "found without a [[trace]]; features do not tell laws apart: remove `laws`");
+    }
+    if !names.is_empty() && !written.parameter.iter().any(|free| free.name.starts_with("friction.")) {
         refuse!(
             "laws",
-            "found without a [[trace]], expected one: features do not tell laws apart; remove it"
+            "found without a free parameter of friction; add one as [[parameter]], or remove `laws`"
         );
     }
     if let Some(name) = find_repeated(names.iter().map(String::as_str)) {

@@ -9,6 +9,7 @@ use super::rivals::describe_rival;
 use super::uncertainty_run::{SearchEnd, UncertaintyRun, Z_95, profile_distances};
 use super::unknowns::UnknownKind;
 use crate::fit::bootstrap::MIN_TWINS;
+use crate::model::parameters::find_parameter;
 use nalgebra::DMatrix;
 use portable_math as math;
 use std::collections::BTreeSet;
@@ -138,6 +139,15 @@ fn is_at_bound(model: &TraceModel, end: &Iterate, i: usize) -> bool {
     end.point[i] <= low + near || end.point[i] >= high - near
 }
 
+/// Whether unknown `i` is at the lowest value that a scene accepts, such as a damping of 0. No better value lies
+/// beyond it.
+fn is_at_natural_limit(model: &TraceModel, end: &Iterate, i: usize) -> bool {
+    let lowest = model.unknowns.parameter_name(i).and_then(find_parameter).and_then(|row| row.range.lowest());
+    let [low, high] = model.unknowns.0[i].range;
+    let is_low = end.point[i] <= low + 1e-6 * (high - low);
+    is_low && lowest.is_some_and(|lowest| model.unknowns.0[i].value(low) <= lowest)
+}
+
 /// Number of combinations of parameters without a prior that the recordings determine, plus the number of
 /// parameters with a prior.
 fn count_determined(model: &TraceModel, information: &DMatrix<f64>) -> usize {
@@ -174,8 +184,9 @@ fn shared_doubts(at: &SearchEnd<'_>, rank: usize) -> Vec<String> {
         let names: BTreeSet<&str> = chosen.filter_map(|i| model.unknowns.parameter_name(i)).collect();
         (!names.is_empty()).then(|| names.into_iter().collect::<Vec<_>>().join(", "))
     };
-    if let Some(names) = names(&|i| is_at_bound(model, end, i)) {
-        doubts.push(format!("{names} ends at a bound, which may exclude a better value"));
+    if let Some(names) = names(&|i| is_at_bound(model, end, i) && !is_at_natural_limit(model, end, i)) {
+        let end = if names.contains(',') { "end" } else { "ends" };
+        doubts.push(format!("{names} {end} at a bound, which may exclude a better value"));
     }
     let is_open = |i: usize| {
         let [low, high] = model.unknowns.0[i].range;

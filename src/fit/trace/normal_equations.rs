@@ -101,7 +101,7 @@ pub(super) fn damped_step(
         }
     }
     let mut step = -damped.clone().cholesky()?.solve(&slope);
-    // an unknown whose step would leave its range stays at the end of the range
+    // an unknown at an end of its range whose step points outwards keeps its value
     while let Some(i) = (0..z.len()).find(|&i| {
         let [low, high] = model.unknowns.0[i].range;
         (z[i] <= low && step[i] < 0.0) || (z[i] >= high && step[i] > 0.0)

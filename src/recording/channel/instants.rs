@@ -4,7 +4,7 @@
 use super::Channel;
 use super::flip::{self, Flip, TurnNeighbourhood};
 use super::turns::{find_turns, longest_hold};
-use super::{TrackPoints, present_points};
+use super::{TrackPoints, median_in_place, present_points};
 use crate::recording::Recording;
 use portable_math as math;
 use serde::Serialize;
@@ -107,10 +107,13 @@ impl ReversalInstants {
         let turns = find_turns(&head);
         let deflection = present_points(&Channel::Deflection.samples(recording));
         let noise_m = math::hypot(head.noise_m, tip.noise_m);
+        let mut sizes: Vec<f64> = deflection.iter().map(|(_, x)| x.abs()).collect();
+        let lean_m = 2.0 * median_in_place(&mut sizes).unwrap_or(0.0);
         let reversals = turns.iter().enumerate().map(|(i, turn)| {
-            let hold = longest_hold(&head, &tip, turn);
-            let (start, end) = hold.map_or((None, None), |hold| (hold.start, hold.end));
+            let last_turn = i.checked_sub(1).map_or(0.0, |last| turns[last].frame);
             let next_turn = turns.get(i + 1).map_or(f64::INFINITY, |next| next.frame);
+            let hold = longest_hold(&head, &tip, turn, lean_m, [last_turn, next_turn]);
+            let (start, end) = hold.map_or((None, None), |hold| (hold.start, hold.end));
             let flip = end.and_then(|release| {
                 let around = TurnNeighbourhood { turn: turn.frame, hold: start, release, next_turn };
                 let (start, end) = flip::find_flip(&deflection, noise_m, &around)?;
@@ -176,11 +179,20 @@ mod tests {
     /// A head on a cosine of 0.5 Hz (with turns at 1, 2, 3 s ...) and a tip that trails by 2 mm, rests around
     /// each turn, and is then dragged along again.
     fn stroke(start_s: f64, stop_s: f64, noise_m: f64, missing: impl Fn(usize) -> bool) -> Recording {
+        stroke_with_release(RELEASE_AFTER_S, [start_s, stop_s], noise_m, missing)
+    }
+
+    fn stroke_with_release(
+        release_after_s: f64,
+        [start_s, stop_s]: [f64; 2],
+        noise_m: f64,
+        missing: impl Fn(usize) -> bool,
+    ) -> Recording {
         let frames = ((stop_s - start_s) * RATE_HZ).round() as usize;
         let head = |t: f64| 0.018 * (1.0 - (TAU * 0.5 * t).cos());
         let tip = |t: f64| {
             let (turn, sign) = (t.round(), if t.round() as i64 % 2 == 0 { -1.0 } else { 1.0 });
-            let (hold, release) = (turn - HOLD_BEFORE_S, turn + RELEASE_AFTER_S);
+            let (hold, release) = (turn - HOLD_BEFORE_S, turn + release_after_s);
             let place = head(hold) - sign * 2e-3;
             // the tip stops along a parabola and leaves along a cubic, and is far away within 20 ms
             if t < hold {
@@ -241,6 +253,27 @@ mod tests {
         assert_near(Some(found[0].reversal_s), 1.0, 5.0);
         assert_near(found[0].hold_s, 1.0 - HOLD_BEFORE_S, 4.0);
         assert_near(found[0].release_s, 1.0 + RELEASE_AFTER_S, 4.0);
+    }
+
+    /// A marker that is `offset_m` beside the edge of the lip turns with the lip, slowly with the deflection and
+    /// quickly at the flip, while the head moves by 3.5 mm.
+    #[test]
+    fn a_marker_that_turns_with_the_lip_does_not_hide_them() {
+        let (release_after_s, flip_after_s, flip_s) = (0.2, 0.12, 2e-3);
+        for offset_m in [0.0, 2e-5, 1e-4, 2e-4] {
+            let still = stroke_with_release(release_after_s, [0.8, 1.4], 2e-6, |_| false);
+            let mut traces = still.traces().clone();
+            for (i, x) in traces.tip_x_m.iter_mut().enumerate() {
+                let t = 0.8 + i as f64 / RATE_HZ;
+                let lean = traces.head_x_m[i].zip(*x).map_or(0.0, |(head, tip)| (tip - head) / 5e-3);
+                let side = ((t - 1.0 - flip_after_s) / flip_s).tanh();
+                *x = x.map(|x| x + offset_m * (0.6 * lean.clamp(-1.0, 1.0) + 0.5 * side));
+            }
+            let found = ReversalInstants::find_instants(&still.with_traces(traces).unwrap());
+            let [found] = found.reversals[..] else { panic!("{found:?}") };
+            assert_near(found.hold_s, 1.0 - HOLD_BEFORE_S, 30.0);
+            assert_near(found.release_s, 1.0 + release_after_s, 10.0);
+        }
     }
 
     #[test]

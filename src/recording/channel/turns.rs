@@ -1,6 +1,6 @@
 //! Turns of the head, and the rest of the tip around them.
 
-use super::{TrackPoints, median_filter, median_position, noise_sd_m, value_range};
+use super::{TrackPoints, median_filter, median_of_three, median_position, noise_sd_m, value_range};
 use portable_math as math;
 
 /// Smallest distance that the head must move towards an extremum and away from it for the extremum to count
@@ -141,12 +141,38 @@ pub(super) struct TipHold {
     points: usize,
 }
 
-pub(super) fn longest_hold(head: &TrackPoints, tip: &TrackPoints, turn: &HeadTurn) -> Option<TipHold> {
+/// The longest rest of the tip around a turn. `lean_m` is twice the usual size of the deflection, m, and `turns` are the
+/// frames of the turns before and after, between which the tip may rest.
+pub(super) fn longest_hold(
+    head: &TrackPoints,
+    tip: &TrackPoints,
+    turn: &HeadTurn,
+    lean_m: f64,
+    [last_turn, next_turn]: [f64; 2],
+) -> Option<TipHold> {
     let tolerance_m = hold_tolerance_m(tip, turn);
     let half = (turn.last - turn.first) as f64 / 2.0;
     let seeds = (-SEEDS..=SEEDS).map(|k| turn.frame + half * k as f64 / SEEDS as f64);
     let holds = seeds.filter_map(|seed| hold_around(head, tip, tip.index_at_frame(seed), tolerance_m));
-    holds.reduce(|best, hold| if hold.points > best.points { hold } else { best })
+    let mut hold = holds.reduce(|best, hold| if hold.points > best.points { hold } else { best })?;
+    let block_m = (BLOCK_TOLERANCES * tolerance_m).max(BLOCK_SHARE * lean_m);
+    if let Some(end) = hold.end {
+        let rest = MarkerRest { head: head.points.clone(), tip: tip.clone(), tolerance_m, block_m };
+        hold.end = rest.find_departure(end, next_turn, RELEASE_POWER).unwrap_or(hold.end);
+    }
+    if let Some(start) = hold.start {
+        // the same backwards in time
+        let [of_head, of_tip] = [head, tip].map(|track| track.points.last().map(|(frame, _)| *frame));
+        let origin = of_head?.max(of_tip?);
+        let reverse =
+            |points: &[(usize, f64)]| points.iter().rev().map(|(frame, x)| (origin - frame, *x)).collect();
+        let tip = TrackPoints { points: reverse(&tip.points), ..*tip };
+        let rest = MarkerRest { head: reverse(&head.points), tip, tolerance_m, block_m };
+        let origin = origin as f64;
+        let found = rest.find_departure(origin - start, origin - last_turn, HOLD_POWER);
+        hold.start = found.map_or(hold.start, |found| found.map(|frame| origin - frame));
+    }
+    Some(hold)
 }
 
 /// Tolerance of the tip's position during a hold, m, from the noise in the middle third of the frames of the
@@ -206,4 +232,127 @@ fn departure_frame(tip: &TrackPoints, outside: usize, next: Option<usize>, place
     let frames_back =
         if next_root > root && frames_back.is_finite() { frames_back.min(MOST_EXTRAPOLATED) } else { 1.0 };
     frame + towards_hold * frames_back
+}
+
+// A marker beside the edge of the lip turns with the lip. So it moves while the tip rests: slowly while the head
+// moves, and quickly where the blade flips. It never moves nearly as far as the head.
+
+/// Motion of the head in a block, in tolerances of the tip's position: noise then adds little to the motion of
+/// the tip.
+const BLOCK_TOLERANCES: f64 = 20.0;
+/// Smallest motion of the head in a block, as a share of twice the usual deflection: it is longer than a cycle of
+/// stick and slip.
+const BLOCK_SHARE: f64 = 0.03;
+/// The tip rests in a block if it moves by less than this share of the motion of the head.
+const RESTS: f64 = 0.3;
+/// Number of blocks after the supposed end of a rest in which the tip is compared with the head.
+const COMPARED_BLOCKS: usize = 8;
+
+/// Tracks in which the rest of a tip is sought whose marker moves a little.
+struct MarkerRest {
+    /// Frame and position, m, of the head.
+    head: Vec<(usize, f64)>,
+    tip: TrackPoints,
+    tolerance_m: f64,
+    /// Motion of the head in a block, m.
+    block_m: f64,
+}
+
+/// Points of the tip in a block.
+struct RestBlock {
+    first: usize,
+    end: usize,
+    rests: bool,
+}
+
+impl MarkerRest {
+    fn head_at(&self, i: usize) -> f64 {
+        let at = super::index_at_frame(&self.head, self.tip.points[i].0 as f64);
+        median_of_three(&self.head, at.min(self.head.len() - 1))
+    }
+
+    fn tip_at(&self, i: usize) -> f64 {
+        median_of_three(&self.tip.points, i)
+    }
+
+    /// Whether the tip moves between two points by less than [`RESTS`] of the motion of the head.
+    fn rests_between(&self, first: usize, end: usize) -> bool {
+        (self.tip_at(end) - self.tip_at(first)).abs()
+            < RESTS * (self.head_at(end) - self.head_at(first)).abs()
+    }
+
+    /// Blocks of points from one point to another, in each of which the head moves by `block_m`.
+    fn blocks(&self, from: usize, to: usize) -> impl Iterator<Item = RestBlock> + '_ {
+        let mut first = from;
+        std::iter::from_fn(move || {
+            let start_m = self.head_at(first);
+            let end = (first + 1..to).find(|i| (self.head_at(*i) - start_m).abs() >= self.block_m)?;
+            let block = RestBlock { first, end, rests: self.rests_between(first, end) };
+            first = end;
+            Some(block)
+        })
+    }
+
+    /// Frame at which the tip leaves, if it rests on after the frame `end`, where its marker leaves its place.
+    /// `Some(None)` if it rests up to the frame `last`, and `None` if it really leaves at `end`.
+    fn find_departure(&self, end: f64, last: f64, power: f64) -> Option<Option<f64>> {
+        if self.head.is_empty() {
+            return None;
+        }
+        let points = self.tip.points.len();
+        let from = self.tip.index_at_frame(end).min(points.checked_sub(1)?);
+        let to = self.tip.index_at_frame(last.max(0.0)).min(points);
+        let near: Vec<RestBlock> = self.blocks(from, to).take(COMPARED_BLOCKS).collect();
+        let still = near.iter().filter(|block| block.rests).count();
+        let is_rest = near.len() == COMPARED_BLOCKS
+            && 2 * still > COMPARED_BLOCKS
+            && self.rests_between(from, near[COMPARED_BLOCKS - 1].end);
+        if !is_rest {
+            return None;
+        }
+        // the tip leaves where most blocks before are rests, and most blocks after are not
+        let blocks: Vec<RestBlock> = self.blocks(from, to).collect();
+        let mut wrong = blocks.iter().filter(|block| block.rests).count();
+        let (mut fewest, mut leaves) = (wrong, 0);
+        for (k, block) in blocks.iter().enumerate() {
+            wrong = if block.rests { wrong - 1 } else { wrong + 1 };
+            if wrong < fewest {
+                (fewest, leaves) = (wrong, k + 1);
+            }
+        }
+        let Some(after) = blocks.get(leaves) else { return Some(None) };
+        let moves_on =
+            blocks.get(leaves + COMPARED_BLOCKS).or(blocks.last()).map_or(to - 1, |block| block.end);
+        if self.rests_between(after.first, moves_on) {
+            return None;
+        }
+        // the marker moves along a line with the head; the tip leaves where the marker leaves the line
+        let start = blocks[leaves.saturating_sub(2)].first;
+        let middle = blocks[leaves.saturating_sub(1)].first.midpoint(after.first).max(start + 2);
+        let line = self.fit_line(start, middle.min(points));
+        let off = |i: usize| {
+            let off = self.tip.points[i].1 - line(self.head_at(i));
+            if off.abs() <= self.tolerance_m { 0.0 } else { off.signum() }
+        };
+        let left = |i: &usize| {
+            let side = off(*i);
+            side != 0.0 && (1..LEFT_FRAMES).all(|k| i + k >= points || off(i + k) == side)
+        };
+        let outside = (middle..points).find(left)?;
+        let place = line(self.head_at(outside));
+        Some(Some(departure_frame(&self.tip, outside, Some(outside + 1), place, power)))
+    }
+
+    /// Least-squares line of the position of the tip over that of the head.
+    fn fit_line(&self, first: usize, end: usize) -> impl Fn(f64) -> f64 {
+        let pairs = || (first..end).map(|i| (self.head_at(i), self.tip.points[i].1));
+        let count = (end - first).max(1) as f64;
+        let mean = pairs().fold([0.0; 2], |sum, (h, x)| [sum[0] + h / count, sum[1] + x / count]);
+        let moments = pairs().fold([0.0; 2], |sum, (h, x)| {
+            let h = h - mean[0];
+            [sum[0] + h * h, sum[1] + h * (x - mean[1])]
+        });
+        let slope = if moments[0] > 0.0 { moments[1] / moments[0] } else { 0.0 };
+        move |h| mean[1] + slope * (h - mean[0])
+    }
 }
