@@ -3,8 +3,7 @@
 //! that the file does not contain.
 //!
 //! Coordinates keep the origin of the file. They are only scaled to metres and, if y points down in the file,
-//! mirrored (`y` becomes `-y`). A new format is a row of `formats::layouts`, or a file that implements
-//! `FileFormat`.
+//! mirrored (`y` becomes `-y`). A new format is a row of `formats::layouts`, or a file with a `FormatParser`.
 
 mod assemble;
 mod error;

@@ -8,7 +8,7 @@ mod hash;
 mod phrase;
 mod unit;
 
-pub use hash::{TextHash, sha256, text_sha256};
+pub use hash::{TextHash, is_hashed_as_bytes, sha256, text_sha256};
 pub(crate) use phrase::{
     capitalise, format_interval, format_times, join_with_and, panic_message, pluralise, truncate_text,
     wrap_words,
@@ -20,6 +20,7 @@ pub use plain_charts::number::{
     format_digits, format_number, format_plain, format_short, round_to_digits, to_ascii,
 };
 pub use plain_charts::printable::{escape_controls, make_printable};
+pub(crate) use portable_math::{parse_finite, parse_positive};
 pub(crate) use unit::{
     choose_prefix, format_degrees, format_length, format_milliseconds, format_percent, format_rate,
     format_signed_percent, format_speed, label_with_unit,

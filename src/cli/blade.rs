@@ -5,7 +5,7 @@ use super::prelude::*;
 use crate::model::plausibility::PlausibilityFinding;
 use crate::model::section::{BladeEstimate, BladeSection};
 use crate::simulate::bench_checks::BenchChecks;
-use crate::text::{format_short, to_ascii};
+use crate::text::{format_short, parse_positive, to_ascii};
 use serde::Serialize;
 
 #[derive(Debug, Args)]
@@ -38,7 +38,7 @@ pub(crate) struct BladeArgs {
 const DEFAULT_FORCE_N: f64 = 0.01;
 
 fn parse_above_zero(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|number: &f64| number.is_finite() && *number > 0.0);
+    let number = parse_positive(text);
     number.ok_or_else(|| "expected a number above 0, without a unit".to_owned())
 }
 

@@ -143,13 +143,16 @@ impl ImportOptionArgs {
             write_recording(&self.out, &writer, &sources, &imported)?;
         }
         drop(steps);
+        // (the exports are as large as the traces, and the report needs memory too)
+        let names: Vec<String> = output_names(&sources).map(str::to_owned).collect();
+        drop(sources);
         if self.json {
-            let text = serde_json::to_string_pretty(&self.json_summary(&imported, &sources));
+            let text = serde_json::to_string_pretty(&self.json_summary(&imported, names));
             output::print_lines(&text.map_err(Failure::internal)?);
         } else if global.quiet {
             imported.report.warnings().for_each(|warning| warn_line!("warning: {warning}"));
         } else {
-            self.print_report(&imported, &sources);
+            self.print_report(&imported, &names);
         }
         Ok(CommandOutcome::Done)
     }
@@ -198,11 +201,11 @@ impl ImportOptionArgs {
         WritePolicy { exports, ..WritePolicy::new(OutputCommand::Import, self.overwrite) }
     }
 
-    fn json_summary(&self, imported: &Import, sources: &[ImportSource]) -> ImportSummary {
+    fn json_summary(&self, imported: &Import, files: Vec<String>) -> ImportSummary {
         ImportSummary {
             out: self.out.display().to_string(),
             written: !self.dry_run,
-            files: output_names(sources).map(str::to_owned).collect(),
+            files,
             format: imported.report.format.clone(),
             reason: imported.report.reason.clone(),
             notes: imported.report.notes.clone(),
@@ -210,7 +213,7 @@ impl ImportOptionArgs {
         }
     }
 
-    fn print_report(&self, imported: &Import, sources: &[ImportSource]) {
+    fn print_report(&self, imported: &Import, files: &[String]) {
         let grid = imported.recording.grid();
         let verb = if self.dry_run { "would write" } else { "wrote" };
         let kind = if imported.recording.is_synthetic() { "synthetic recording" } else { "recording" };
@@ -219,7 +222,7 @@ impl ImportOptionArgs {
         print_line!("format: {} ({})", imported.report.format, imported.report.reason);
         imported.report.notes.iter().for_each(|note| print_line!("note: {note}"));
         if self.dry_run {
-            print_preview(imported, sources);
+            print_preview(imported, files);
         }
         let inspection = Inspection::from_import(&imported.recording, &imported.file);
         inspection.verdict_lines().iter().for_each(|line| print_line!("verdict: {line}"));
@@ -253,8 +256,8 @@ fn output_names(sources: &[ImportSource]) -> impl Iterator<Item = &str> {
 const PREVIEWED_ROWS: usize = 3;
 
 /// Prints the names of the files and the first rows of the traces.
-fn print_preview(imported: &Import, sources: &[ImportSource]) {
-    print_line!("files: {}", output_names(sources).collect::<Vec<_>>().join(", "));
+fn print_preview(imported: &Import, files: &[String]) {
+    print_line!("files: {}", files.join(", "));
     let start: String = trace_blocks(&imported.recording).take(2).collect();
     for line in start.lines().take(PREVIEWED_ROWS + 1) {
         print_line!("{TRACE_FILE}: {line}");
@@ -343,8 +346,9 @@ fn write_recording(
 ) -> Outcome<()> {
     let names: Vec<&str> = output_names(sources).collect();
     let mut staging = OutputStaging::new(folder, writer, &names)?;
-    for (name, bytes) in import::source::preserved_files(sources) {
-        staging.stage_file(name, bytes)?;
+    let hashes = imported.file.source.iter().flat_map(|source| source.sha256.as_slice());
+    for ((name, bytes), sha256) in import::source::preserved_files(sources).into_iter().zip(hashes) {
+        staging.stage_hashed_file(name, bytes, sha256)?;
     }
     let trace = staging.stage_file(TRACE_FILE, files::ChunkReader::new(trace_blocks(&imported.recording)))?;
     let mut description = RecordingFile { trace_sha256: Some(trace), ..imported.file.clone() };

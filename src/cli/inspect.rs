@@ -8,7 +8,8 @@ use crate::recording::Recording;
 use crate::recording::channel::{Reversal, ReversalInstants};
 use crate::recording::files::{LevelEntry, RecordingFile};
 use crate::recording::quality::{
-    self, CameraTilt, ComponentVisibility, Grade, MotionSummary, Optics, Quality, QualityFinding,
+    self, CameraTilt, ComponentVisibility, Grade, MeasuredMotion, MotionSummary, Optics, Quality,
+    QualityFinding,
 };
 use crate::simulate::scene::Scene;
 use crate::text::format_degrees;
@@ -214,12 +215,13 @@ impl Inspection {
         let instants = ReversalInstants::find_instants(recording);
         let kept =
             file.iter().filter_map(|file| file.source.as_ref()).flat_map(|source| source.findings.clone());
-        let motion = quality::measure_motion(recording, &measurements, &instants);
-        let height = |scene: &Scene| quality::check_scene_height(&motion, scene.linkage.upright_height_m());
+        let motion = MeasuredMotion::measure(recording, &measurements, &instants);
+        let height =
+            |scene: &Scene| quality::check_scene_height(&motion.summary, scene.linkage.upright_height_m());
         let import: Vec<QualityFinding> =
             scene.and_then(height).into_iter().chain(more).chain(kept).collect();
-        let findings = quality::collect_findings(recording, &measurements, &optics, &instants, &import);
-        let slope = quality::measure_tilt(recording, &instants, &measurements);
+        let findings =
+            quality::judge_recording(recording, &measurements, &optics, (&instants, &motion), &import);
         let reversal = |turn: &Reversal| InspectedReversal {
             hold_s: turn.hold_s,
             reversal_s: turn.reversal_s,
@@ -229,10 +231,10 @@ impl Inspection {
             recording: recording.name().to_owned(),
             synthetic: recording.is_synthetic(),
             grade: quality::grade_findings(&findings),
-            tilt: slope.map_or_else(|reason| GlassSlope::NoTilt(reason.to_string()), GlassSlope::Tilt),
+            tilt: motion.tilt.map_or_else(|reason| GlassSlope::NoTilt(reason.to_string()), GlassSlope::Tilt),
             level: file.and_then(|file| file.level.clone()),
             components: scene.map(|scene| inspect_components(scene, &measurements)),
-            motion,
+            motion: motion.summary,
             measurements,
             findings,
             reversals: instants.reversals.iter().map(reversal).collect(),

@@ -27,7 +27,7 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Difference of the criterion at which a law has lost: odds of 20 to 1. Kass and Raftery (J. Am. Stat. Assoc. 90
 /// (1995) 773) call this strong evidence.
 const LOST_FROM: f64 = 6.0;
-/// The same for a law with more parameters than the chosen one: it must fit better, not only nearly as well.
+/// The same for a law that contains the chosen one: it must fit better, not only as well.
 const LOST_FROM_IF_LARGER: f64 = 2.0;
 /// Maximum number of iterates of the search for the parameters of a law.
 const MAX_ITERATES: usize = 60;
@@ -120,6 +120,16 @@ struct LawTrial {
     model: TraceModel,
     at: Iterate,
     explains: bool,
+}
+
+impl LawTrial {
+    /// Whether the other law is this one with fixed values of some parameters.
+    fn contains(&self, other: &Self) -> bool {
+        let rest = self.law.strip_prefix(&*other.law);
+        let [stribeck, exponential] = [FrictionShape::Stribeck, FrictionShape::Exponential];
+        rest.is_some_and(|rest| rest.starts_with(TERM_SEPARATOR))
+            || (self.law == stribeck.name() && other.law == exponential.name())
+    }
 }
 
 /// A law that is compared with that of the scene: its name, its model, and whether its formula differs from that of the scene.
@@ -423,18 +433,23 @@ impl Problem {
             let dof = chi2_per_dof(&trial.model, &trial.at).1;
             trial.at.cost / unit + parameters * math::ln(dof as f64)
         };
-        let size = |trial: &LawTrial| trial.model.unknowns.parameters().count();
-        let chosen = explaining().map(|(trial, _)| (criterion(trial), size(trial)));
-        let (lowest, smallest) =
-            chosen.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::INFINITY, usize::MAX));
+        let chosen = explaining().map(|(trial, _)| trial);
+        let chosen = chosen.min_by(|a, b| criterion(a).total_cmp(&criterion(b)));
+        let is_possible = |trial: &LawTrial, chosen: &LawTrial| {
+            let rise = criterion(trial) - criterion(chosen);
+            match () {
+                () if trial.contains(chosen) => rise < LOST_FROM_IF_LARGER,
+                () if chosen.contains(trial) => rise < LOST_FROM,
+                // fewer parameters are no evidence between laws of which neither contains the other
+                () => rise.min((trial.at.cost - chosen.at.cost) / unit) < LOST_FROM,
+            }
+        };
         let candidate = |(trial, end): (&LawTrial, &Option<SearchEnd<'_>>)| LawCandidate {
             law: trial.law.clone(),
             explains: trial.explains,
             chi2_per_dof: chi2_per_dof(&trial.model, &trial.at).0,
-            criterion: trial.explains.then(|| criterion(trial) - lowest),
-            possible: trial.explains
-                && criterion(trial) - lowest
-                    < if size(trial) > smallest { LOST_FROM_IF_LARGER } else { LOST_FROM },
+            criterion: chosen.filter(|_| trial.explains).map(|chosen| criterion(trial) - criterion(chosen)),
+            possible: trial.explains && chosen.is_some_and(|chosen| is_possible(trial, chosen)),
             parameters: self.list_estimates(trial, end.as_ref()),
         };
         LawComparison::judge(trials.iter().zip(&ends).map(candidate).collect())

@@ -327,8 +327,7 @@ pub struct FitResult {
     pub findings: Vec<FitFinding>,
     /// Results of the parameters, by key in the scene file preceded by its table.
     pub parameters: BTreeMap<String, ParameterResult>,
-    /// Which law of friction the traces support; `None` in a fit of features, and if no parameter of the law is
-    /// free.
+    /// Which law of friction the traces support; `None` if laws were not compared, as in a fit of features.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub law: Option<LawComparison>,
     /// Where and why the fitted blade or slider of the first condition chatters; `None` if the model does not

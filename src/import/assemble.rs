@@ -6,7 +6,6 @@ use super::options::ImportOptions;
 use super::source::{Import, ImportReport, ImportSource, base_name, preserved_files};
 use crate::import::reader::calibration::calibrate;
 use crate::import::reader::encoding::DecodedText;
-use crate::import::reader::findings::new_finding;
 use crate::import::reader::grid::{ClockGrid, GridPositions};
 use crate::import::reader::track_choice::TrackIndex;
 use crate::import::reader::track_file::TrackFile;
@@ -14,8 +13,8 @@ use crate::import::reader::{companion, findings, track_choice};
 use crate::recording::channel::ReversalInstants;
 use crate::recording::files::{CameraEntry, FrameClock, LevelEntry, OneOrMany, RecordingFile, SourceEntry};
 use crate::recording::quality::{
-    Check, Optics, Severity, check_position_steps, drop_untracked, find_untracked_frames, measure_quality,
-    measure_tilt,
+    Check, Optics, QualityFinding, Severity, check_position_steps, drop_untracked, find_untracked_frames,
+    measure_quality, measure_tilt,
 };
 use crate::recording::{Recording, Traces, rotate_traces};
 use crate::toml_file;
@@ -141,8 +140,9 @@ fn note_points(
     points: &[GridPositions; 2],
     report: &mut ImportReport,
 ) {
-    let lacks =
-        |found: String, advice: &str| new_finding(Check::Points, Severity::Caution, (0.0, ""), found, advice);
+    let lacks = |found: String, advice: &str| {
+        QualityFinding::advise((Check::Points, Severity::Caution), (0.0, ""), found, advice)
+    };
     for ((point, choice), on_grid) in ["tip", "head"].into_iter().zip(chosen).zip(points) {
         match choice {
             Some((file, track)) => {

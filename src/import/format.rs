@@ -6,7 +6,7 @@ pub(crate) use crate::import::reader::*;
 pub(crate) use crate::recording::files::YAxis;
 pub(crate) use crate::recording::quality::{Check, QualityFinding, Severity};
 
-/// A file format of a tracking program. Each module in `formats` implements this trait.
+/// A file format of a tracking program: a [`FormatParser`], or a row of a table.
 pub(crate) trait FileFormat: Sync {
     /// Name of the format on the command line.
     fn name(&self) -> &'static str;
@@ -17,4 +17,25 @@ pub(crate) trait FileFormat: Sync {
     /// Reads the clocks (frame numbers and times of the rows) and the tracks (positions of points), in the
     /// units of the file.
     fn read<'a>(&self, document: &'a Document<'a>, options: &ImportOptions) -> ImportResult<TrackFile<'a>>;
+}
+
+/// A format with functions of its own.
+pub(crate) struct FormatParser {
+    pub name: &'static str,
+    pub recognises: fn(&Document) -> Option<String>,
+    pub read: for<'a> fn(&'a Document<'a>, &ImportOptions) -> ImportResult<TrackFile<'a>>,
+}
+
+impl FileFormat for FormatParser {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn recognises(&self, document: &Document) -> Option<String> {
+        (self.recognises)(document)
+    }
+
+    fn read<'a>(&self, document: &'a Document<'a>, options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
+        (self.read)(document, options)
+    }
 }

@@ -15,22 +15,22 @@ mod wiperlab;
 
 use super::error::{ImportError, ImportResult};
 use super::options::ImportOptions;
-use super::reader::{Document, new_finding};
+use super::reader::Document;
 use crate::import::format::FileFormat;
 use crate::recording::quality::{Check, QualityFinding, Severity};
 use crate::toml_file;
 
 /// The formats with a parser of their own, in the order of detection.
 static PARSERS: [&dyn FileFormat; 9] = [
-    &wiperlab::Wiperlab,
-    &dice::Dice,
-    &kinovea::Kinovea,
-    &deeplabcut::DeepLabCut,
-    &dltdv::Dltdv,
-    &trackmate::TrackMate,
-    &sleap::Sleap,
-    &tracker::TrackerFormat,
-    &imagej::ImageJ,
+    &wiperlab::FORMAT,
+    &dice::FORMAT,
+    &kinovea::FORMAT,
+    &deeplabcut::FORMAT,
+    &dltdv::FORMAT,
+    &trackmate::FORMAT,
+    &sleap::FORMAT,
+    &tracker::FORMAT,
+    &imagej::FORMAT,
 ];
 
 /// The supported formats, in the order of detection.
@@ -131,7 +131,7 @@ pub(crate) fn find_doubtful_columns(
         let refusal = refusal_by_others(chosen, document, options)?;
         let found = format!("--columns names columns of a table that would be refused without it: {refusal}");
         let advice = "make sure that these columns are positions over time";
-        Some(new_finding(Check::OtherTable, Severity::Caution, (0.0, ""), found, advice))
+        Some(QualityFinding::advise((Check::OtherTable, Severity::Caution), (0.0, ""), found, advice))
     };
     options.columns.iter().flat_map(|_| documents.iter().filter_map(doubt)).collect()
 }

@@ -3,6 +3,7 @@
 use crate::import::error::ImportError;
 use crate::import::reader::CoordinateUnit;
 use crate::recording::files::YAxis;
+use crate::text::{parse_finite, parse_positive};
 use toml::Value;
 
 /// Options of an import. Some facts, such as the frame rate, have no safe default. If neither an option nor
@@ -93,7 +94,7 @@ impl CoordinateScale {
         };
         let is_digit = |c: char| c.is_ascii_digit() || matches!(c, '.' | 'e' | 'E' | '-' | '+');
         let (number, name) = length.split_at(length.find(|c| !is_digit(c)).ok_or_else(refuse)?);
-        let number = number.parse::<f64>().ok().filter(|n| n.is_finite() && *n > 0.0).ok_or_else(refuse)?;
+        let number = parse_positive(number).ok_or_else(refuse)?;
         let unit = unit(name.trim()).ok_or_else(refuse)?;
         // 1e-6 is not exact in binary: multiplying by it rounds twice, dividing by 1e6 rounds only once
         Ok(Self::MetresPerPixel(number / (1.0 / unit).round()))
@@ -236,7 +237,7 @@ impl ImportOptions {
         let pair = text.split_once('=').filter(|pair| !pair.0.trim().is_empty());
         let (key, value) = pair.ok_or_else(|| refuse("KEY=VALUE such as glass=wet"))?;
         let value = value.trim();
-        let number = || value.parse::<f64>().ok().filter(|v| v.is_finite()).map(Value::Float);
+        let number = || parse_finite(value).map(Value::Float);
         let truth = || value.parse::<bool>().ok().map(Value::Boolean);
         let whole = value.parse::<i64>().ok().map(Value::Integer);
         let typed = whole.or_else(number).or_else(truth).unwrap_or_else(|| Value::String(value.to_owned()));

@@ -25,7 +25,6 @@ use super::error::ImportResult;
 use super::source::{ImportSource, base_name};
 pub(crate) use column::{ColumnMeaning, ColumnUnit, CoordinateUnit, TimeUnit, squeeze_name};
 use encoding::DecodedText;
-pub(crate) use findings::new_finding;
 pub(crate) use instances::{InstanceFields, PointFields, RowOrder, RowPosition, RowStamp, TrackCollector};
 pub(crate) use layout::{LostRule, PointCells, TableLayout};
 pub(crate) use number::{CellNumber, parse_number};

@@ -158,6 +158,11 @@ impl TrackPoints {
     }
 }
 
+/// First and last tracked frame of a column.
+pub(crate) fn tracked_span(samples: &[Option<f64>]) -> Option<(usize, usize)> {
+    Some((samples.iter().position(Option::is_some)?, samples.iter().rposition(Option::is_some)?))
+}
+
 /// Frame number and position, m, of every tracked frame.
 pub(super) fn present_points(samples: &[Option<f64>]) -> Vec<(usize, f64)> {
     // (the reallocations of a growing vector would make the search for instants a fifth slower)
@@ -166,23 +171,38 @@ pub(super) fn present_points(samples: &[Option<f64>]) -> Vec<(usize, f64)> {
     points
 }
 
+/// Median of |x| of a standard normal variable.
+pub(crate) const NORMAL_MEDIAN: f64 = 0.674_489_75;
+
 /// Standard deviation of white noise on a smooth path, m, from the fourth differences of consecutive frames,
 /// which are zero for a path that is a polynomial of degree 3 in time.
 pub(super) fn noise_sd_m(points: &[(usize, f64)]) -> f64 {
     /// Fourth differences of white noise have 1 + 16 + 36 + 16 + 1 times the variance of the noise.
     const GAIN: f64 = 70.0;
-    /// Median of |x| of a standard normal variable.
-    const NORMAL_MEDIAN: f64 = 0.674_489_75;
     let in_a_row = points.windows(5).filter(|w| w[4].0 - w[0].0 == 4);
     let fourth = |w: &[(usize, f64)]| w[0].1 - 4.0 * w[1].1 + 6.0 * w[2].1 - 4.0 * w[3].1 + w[4].1;
-    let mut differences = Vec::with_capacity(points.len());
-    differences.extend(in_a_row.map(|w| fourth(w).abs()));
-    median_in_place(&mut differences).map_or(0.0, |m| m / (NORMAL_MEDIAN * GAIN.sqrt()))
+    find_median(in_a_row.map(|w| fourth(w).abs())).map_or(0.0, |m| m / (NORMAL_MEDIAN * GAIN.sqrt()))
 }
 
 pub(crate) fn median_in_place(values: &mut [f64]) -> Option<f64> {
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+    (!values.is_empty()).then(|| math::select_number(values, values.len() / 2))
+}
+
+/// Median of the values of an iterator; the upper of two middle values.
+pub(crate) fn find_median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    median_in_place(&mut collect_numbers(values.into_iter()))
+}
+
+/// Median of the values of an iterator; 0 without values.
+pub(crate) fn median_or_zero(values: impl IntoIterator<Item = f64>) -> f64 {
+    find_median(values).unwrap_or(0.0)
+}
+
+/// The values of an iterator that skips few. (A vector that grows would be copied several times.)
+pub(crate) fn collect_numbers(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut all = Vec::with_capacity(values.size_hint().1.unwrap_or(0));
+    all.extend(values);
+    all
 }
 
 /// Index of the first point at or after a frame.
@@ -192,7 +212,7 @@ pub(super) fn index_at_frame(points: &[(usize, f64)], frame: f64) -> usize {
 
 /// Median position, m; `None` without points.
 pub(super) fn median_position(points: &[(usize, f64)]) -> Option<f64> {
-    median_in_place(&mut points.iter().map(|p| p.1).collect::<Vec<_>>())
+    find_median(points.iter().map(|p| p.1))
 }
 
 /// Median of a point and its two neighbours; the median removes an outlier of a single frame.

@@ -1,5 +1,7 @@
 //! Frame numbers from a column of times; the times may be rounded, and rows may be missing.
 
+use portable_math as math;
+
 /// Largest allowed distance of a row's time from the time of its frame, in frames. Rounding to half a frame
 /// moves a time by up to a quarter of a frame; at more than a third, the nearest frame is uncertain.
 pub(crate) const OFF_GRID_LIMIT_FRAMES: f64 = 0.3;
@@ -137,34 +139,48 @@ fn refine_step(times_s: &[f64], first: f64, seed_s: f64) -> f64 {
     step_s
 }
 
+/// Adds a run of rows to the sums for the least-squares slope of time against frame number, about the means
+/// of the run: products of frame and time, and squares of the frame. Returns the mean frame and the mean
+/// time.
+fn add_run([cross, square]: &mut [f64; 2], frames: &[usize], times_s: &[f64]) -> [f64; 2] {
+    let count = frames.len() as f64;
+    let rows = || frames.iter().zip(times_s).map(|(frame, time_s)| (*frame as f64, *time_s));
+    let sums = rows().fold([0.0; 2], |sums, (frame, time_s)| [sums[0] + frame, sums[1] + time_s]);
+    let [mean_frame, mean_s] = sums.map(|sum| sum / count);
+    rows().for_each(|(frame, time_s)| {
+        *cross += (frame - mean_frame) * (time_s - mean_s);
+        *square += (frame - mean_frame) * (frame - mean_frame);
+    });
+    [mean_frame, mean_s]
+}
+
 /// Slope of time against frame number that all runs of rows share; a run ends where the next row is more than
 /// `longest` frames away. `None` if no run has two frames.
 fn slope_within_runs(frames: &[usize], times_s: &[f64], longest: usize) -> Option<f64> {
-    let (mut cross, mut square, mut start) = (0.0, 0.0, 0);
+    let (mut sums, mut start) = ([0.0; 2], 0);
     for end in 1..=frames.len() {
-        if end < frames.len() && frames[end].abs_diff(frames[end - 1]) <= longest {
-            continue;
+        if end == frames.len() || frames[end].abs_diff(frames[end - 1]) > longest {
+            add_run(&mut sums, &frames[start..end], &times_s[start..end]);
+            start = end;
         }
-        let (of_frames, of_times) = (&frames[start..end], &times_s[start..end]);
-        let count = of_frames.len() as f64;
-        let mean_frame = of_frames.iter().map(|frame| *frame as f64).sum::<f64>() / count;
-        let mean_s = of_times.iter().sum::<f64>() / count;
-        for (frame, time_s) in of_frames.iter().zip(of_times) {
-            let from_mean = *frame as f64 - mean_frame;
-            cross += from_mean * (time_s - mean_s);
-            square += from_mean * from_mean;
-        }
-        start = end;
     }
-    (square > 0.0).then(|| cross / square)
+    (sums[1] > 0.0).then(|| sums[0] / sums[1])
 }
+
+/// Distance from a frame, in frames, within which a time certainly belongs to this frame, in spite of the
+/// rounding of its computation.
+const SURELY_NEAREST: f64 = 0.499;
 
 /// Nearest frame of every row on a grid whose phase follows the rows with [`PHASE_GAIN`].
 fn follow_grid(times_s: &[f64], first: f64, seed_s: f64) -> Vec<usize> {
-    let mut phase_s = first;
+    let (mut phase_s, mut next) = (first, 0.0);
     let mut number = |time: &f64| {
-        let frame = ((time - phase_s) / seed_s).round().max(0.0);
-        phase_s += PHASE_GAIN * (time - phase_s - frame * seed_s);
+        let since_s = time - phase_s;
+        // (nearly every row is the next frame; then no division delays the rows after it)
+        let is_next = (since_s - next * seed_s).abs() < SURELY_NEAREST * seed_s;
+        let frame = if is_next { next } else { math::round(since_s / seed_s).max(0.0) };
+        phase_s += PHASE_GAIN * (since_s - frame * seed_s);
+        next = frame + 1.0;
         frame as usize
     };
     times_s.iter().map(&mut number).collect()
@@ -175,7 +191,7 @@ fn follow_grid(times_s: &[f64], first: f64, seed_s: f64) -> Vec<usize> {
 pub(crate) fn median_step_s(times_s: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> = times_s.windows(2).map(|w| w[1] - w[0]).collect();
     let middle = steps.len().checked_sub(1)? / 2;
-    Some(*steps.select_nth_unstable_by(middle, f64::total_cmp).1)
+    Some(math::select_number(&mut steps, middle))
 }
 
 /// The rate with the fewest digits near `fitted`, 1/s, for which `explains` is true; if there is none,
@@ -187,17 +203,16 @@ pub(crate) fn simplest_rate(fitted: f64, explains: impl Fn(f64) -> bool) -> f64 
 
 /// Intercept and slope of the least-squares line of time against frame number.
 fn fit_line(frames: &[usize], times_s: &[f64]) -> (f64, f64) {
-    let count = frames.len() as f64;
-    let mean_frame = frames.iter().map(|&n| n as f64).sum::<f64>() / count;
-    let mean_time = times_s.iter().sum::<f64>() / count;
-    let slope = slope_within_runs(frames, times_s, usize::MAX).unwrap_or(f64::NAN);
-    (mean_time - slope * mean_frame, slope)
+    let mut sums = [0.0; 2];
+    let [frame, time_s] = add_run(&mut sums, frames, times_s);
+    let slope = if sums[1] > 0.0 { sums[0] / sums[1] } else { f64::NAN };
+    (time_s - slope * frame, slope)
 }
 
 /// Numbers every row by its nearest frame on the fitted line. Returns whether a number changed; a line that
 /// does not rise, or a grid that is too long, changes none.
 fn renumber_frames(frames: &mut [usize], times_s: &[f64], (intercept, slope): (f64, f64)) -> bool {
-    let nearest = |time: &f64| ((time - intercept) / slope).round();
+    let nearest = |time: &f64| math::round((time - intercept) / slope);
     let (Some(first), Some(last)) = (times_s.first().map(nearest), times_s.last().map(nearest)) else {
         return false;
     };

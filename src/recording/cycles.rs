@@ -10,7 +10,7 @@
 //! are then measured on the path itself, between the levels at which the tip rests.
 
 use super::Recording;
-use super::channel::{central_moments, median_in_place, value_range};
+use super::channel::{NORMAL_MEDIAN, central_moments, find_median, median_or_zero, value_range};
 use super::noise::{noise_floor, quantisation_step};
 use super::quality::{ChannelQuality, outlier_frames};
 use crate::text::pluralise;
@@ -81,8 +81,6 @@ const LOCAL_INTERVALS: usize = 3;
 /// An interval of about two or three local periods has dropped beats if it differs from the whole number by
 /// less than this fraction of the period.
 const WHOLE_BEAT: f64 = 0.2;
-/// Median of the magnitude of a standard normal variable.
-const NORMAL_MEDIAN: f64 = 0.674_489_75;
 /// A period is odd, and left out of the scatter, if it is off by more than this number of standard
 /// deviations. They follow from the median, which odd periods do not change.
 const ODD_DEVIATIONS: f64 = 4.0;
@@ -219,7 +217,7 @@ impl Recording {
 #[must_use]
 pub fn median_interval_s(times_s: impl IntoIterator<Item = f64>) -> Option<f64> {
     let times_s: Vec<f64> = times_s.into_iter().collect();
-    median_in_place(&mut times_s.windows(2).map(|pair| pair[1] - pair[0]).collect::<Vec<_>>())
+    find_median(times_s.windows(2).map(|pair| pair[1] - pair[0]))
 }
 
 /// Path of the tip with its strokes laid end to end.
@@ -325,7 +323,7 @@ impl TipTravel {
         let periods = || ends.windows(2).map(|pair| frame(pair[1][0]) - frame(pair[0][0]));
         let durations = ends.iter().map(|[trough, crest]| frame(*crest) - frame(*trough));
         let fractions: Vec<f64> = durations.zip(periods()).map(|(rise, period)| rise / period).collect();
-        let (period, (fraction, sd)) = (find_median(periods()), mean_and_sd(&fractions));
+        let (period, (fraction, sd)) = (median_or_zero(periods()), mean_and_sd(&fractions));
         let most = 0.5 - CLEAR_DEVIATIONS * sd / (fractions.len() as f64).sqrt();
         let is_rising_fast = fraction <= MOST_RISING.min(most);
         Some(PathRises { ends, usual_m, period, fraction, is_rising_fast })
@@ -355,7 +353,7 @@ impl TipTravel {
                 near_m.windows(reach + 1).map(|part| part[reach] - part[0]).fold(f64::INFINITY, f64::min);
             slowest.push(step_m / reach as f64 * steps as f64 / travel_m);
         }
-        let is_slow = find_median(slowest) <= SLOW_STEP;
+        let is_slow = median_or_zero(slowest) <= SLOW_STEP;
         is_slow && rises.fraction <= MOST_RISING_AT_REST && self.is_distorted(rises)
     }
 
@@ -437,7 +435,7 @@ impl TipTravel {
         // (the median of normal noise has pi / 2 times the variance of the mean)
         let size_variance =
             FRAC_PI_2 * self.noise_m * self.noise_m * (1.0 / before.len() as f64 + 1.0 / after.len() as f64);
-        let (low, high) = (find_median(before), find_median(after));
+        let (low, high) = (median_or_zero(before), median_or_zero(after));
         let size_m = high - low;
         if size_m < LEAST_SLIP * rises.usual_m {
             return None;
@@ -531,10 +529,6 @@ fn usual_size(mut sizes: Vec<f64>) -> f64 {
     sizes.iter().find(is_half).copied().unwrap_or(0.0)
 }
 
-fn find_median(values: impl IntoIterator<Item = f64>) -> f64 {
-    median_in_place(&mut values.into_iter().collect::<Vec<_>>()).unwrap_or(0.0)
-}
-
 fn mean_and_sd(values: &[f64]) -> (f64, f64) {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     let squares = values.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>();
@@ -545,7 +539,7 @@ fn mean_and_sd(values: &[f64]) -> (f64, f64) {
 fn compare_intervals(intervals: &[f64]) -> Vec<(f64, f64)> {
     let ratio = |(at, interval): (usize, &f64)| {
         let near = at.saturating_sub(LOCAL_INTERVALS)..(at + LOCAL_INTERVALS + 1).min(intervals.len());
-        (interval / find_median(intervals[near].iter().copied()), *interval)
+        (interval / median_or_zero(intervals[near].iter().copied()), *interval)
     };
     intervals.iter().enumerate().map(ratio).filter(|(ratio, _)| *ratio < PAUSE).collect()
 }
@@ -568,19 +562,19 @@ fn summarise_slips(
     let beats = compared.iter().map(|(ratio, _)| count_beats(*ratio)).sum::<f64>();
     let (period, mean) = (total / beats, total / count);
     let total_sd = math::hypot(found[0].frame_sd, found[found.len() - 1].frame_sd);
-    let errors = 2.0 * find_median(found.iter().map(|slip| slip.frame_sd * slip.frame_sd));
+    let errors = 2.0 * median_or_zero(found.iter().map(|slip| slip.frame_sd * slip.frame_sd));
     let without_errors = |sd: f64| (sd * sd - errors / (period * period)).max(0.0).sqrt();
     // (relative to the local period, so that a drift is no scatter)
     let off = || compared.iter().map(|(ratio, _)| ratio / count_beats(*ratio) - 1.0);
-    let most = ODD_DEVIATIONS / NORMAL_MEDIAN * find_median(off().map(f64::abs));
+    let most = ODD_DEVIATIONS / NORMAL_MEDIAN * median_or_zero(off().map(f64::abs));
     let period_scatter =
         without_errors(mean_and_sd(&off().filter(|off| off.abs() <= most).collect::<Vec<_>>()).1);
     let of_ratios =
         without_errors(mean_and_sd(&compared.iter().map(|(ratio, _)| *ratio).collect::<Vec<_>>()).1);
     let mean_sd = math::hypot(total_sd / count, mean * of_ratios / count.sqrt());
     let sticks = found.windows(2).map(|pair| pair[1].motion[0] - pair[0].motion[1]);
-    let stick = find_median(sticks);
-    let slip = find_median(found.iter().map(|slip| slip.motion[1] - slip.motion[0]));
+    let stick = median_or_zero(sticks);
+    let slip = median_or_zero(found.iter().map(|slip| slip.motion[1] - slip.motion[0]));
     let (size_mean_m, size_sd_m) = mean_and_sd(&found.iter().map(|slip| slip.size_m).collect::<Vec<_>>());
     let is_timed = stick >= LEAST_STICK_FRAMES;
     let frames = if stick < 1.0 { "a frame" } else { "five frames" };
@@ -612,7 +606,7 @@ fn summarise_slips(
         period_sd_s: total_sd / beats / rate_hz,
         period_scatter,
         dropped_beats: (beats - count) as usize,
-        size_m: find_median(found.iter().map(|slip| slip.size_m)),
+        size_m: median_or_zero(found.iter().map(|slip| slip.size_m)),
         size_scatter: size_sd_m / size_mean_m,
         rising_fraction: rises.fraction,
         times: is_timed.then(|| StickTimes { stick_s: stick / rate_hz, slip_s: slip / rate_hz }),

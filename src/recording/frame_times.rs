@@ -157,6 +157,11 @@ impl Recording {
         self
     }
 
+    /// Whether the tracks are interpolated to a grid on which the frames were not taken.
+    pub(crate) fn is_resampled(&self) -> bool {
+        self.departure_frames.is_some()
+    }
+
     /// Statement in words that the tracks are interpolated to a grid, with the rate of the grid and the
     /// largest distance of the true times from it; `None` for a recording that was taken on a grid.
     pub(crate) fn describe_resampling(&self) -> Option<String> {

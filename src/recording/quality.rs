@@ -26,6 +26,7 @@ use crate::recording::channel::{Channel, ReversalInstants};
 use crate::text::{format_decimals, format_or_dash, to_ascii};
 pub(crate) use checks::check_position_steps;
 pub use finding::{Check, QualityFinding, Severity};
+pub(crate) use measurement::FrameGaps;
 pub use measurement::{ChannelQuality, ComponentVisibility, Optics, Quality, Visibility, measure_quality};
 use measurement::{FEWEST_CYCLES, NYQUIST_SHARE};
 pub(crate) use mechanism::motion_lines;
@@ -49,6 +50,32 @@ pub fn collect_findings(
     instants: &ReversalInstants,
     import: &[QualityFinding],
 ) -> Vec<QualityFinding> {
+    let motion = MeasuredMotion::measure(recording, measured, instants);
+    judge_recording(recording, measured, optics, (instants, &motion), import)
+}
+
+/// Tilt and motion of a recording, which several findings need.
+pub(crate) struct MeasuredMotion {
+    pub tilt: Result<CameraTilt, TiltNotFound>,
+    pub summary: MotionSummary,
+}
+
+impl MeasuredMotion {
+    pub(crate) fn measure(recording: &Recording, measured: &Quality, instants: &ReversalInstants) -> Self {
+        let tilt = measure_tilt(recording, instants, measured);
+        Self { summary: mechanism::summarise_motion(recording, measured, instants, tilt.as_ref().ok()), tilt }
+    }
+}
+
+/// Like [`collect_findings`], for a recording whose motion has been measured.
+#[must_use]
+pub(crate) fn judge_recording(
+    recording: &Recording,
+    measured: &Quality,
+    optics: &Optics,
+    (instants, known): (&ReversalInstants, &MeasuredMotion),
+    import: &[QualityFinding],
+) -> Vec<QualityFinding> {
     let exchanges = jumps::find_exchanges(recording, measured);
     let put_back = (!exchanges.is_empty())
         .then(|| change_traces(recording, |traces| jumps::put_back_exchanged(traces, &exchanges)))
@@ -65,7 +92,11 @@ pub fn collect_findings(
     found.extend(checks::check_clock(recording));
     let rest = leave_out_filled(recording, measured, &untracked);
     let (tracked, quality) = rest.as_ref().map_or((recording, measured), |(rest, quality)| (rest, quality));
-    let motion = measure_motion(tracked, quality, instants);
+    let is_changed = put_back.is_some() || rest.is_some();
+    let own_motion = is_changed.then(|| measure_motion(tracked, quality, instants));
+    let motion = own_motion.as_ref().unwrap_or(&known.summary);
+    let own_tilt = put_back.as_ref().map(|recording| measure_tilt(recording, instants, measured));
+    let tilt = own_tilt.as_ref().unwrap_or(&known.tilt);
     let jumped = jumps::find_head_jumps(tracked, quality, &untracked);
     let stretch = (!jumped.is_empty())
         .then(|| change_traces(tracked, |traces| jumps::keep_longest_stretch(traces, &jumped)))
@@ -78,7 +109,7 @@ pub fn collect_findings(
     found.extend(jumps::check_exchanges(&exchanges));
     found.extend(jumps::check_head_jumps(&jumped));
     found.extend(columns::check_columns(stretch.as_ref().unwrap_or(tracked).traces(), quality, instants));
-    found.extend(mechanism::check_mechanism(&motion, measured));
+    found.extend(mechanism::check_mechanism(motion, measured));
     found.extend(
         columns.iter().filter_map(|column| prefilter::check_prefilter(column, measured.frame_rate_hz)),
     );
@@ -86,7 +117,7 @@ pub fn collect_findings(
     found.extend(checks::check_grid(measured));
     found.push(checks::check_exposure(measured));
     found.extend(motion::check_motion(recording));
-    found.extend(tilt::check_tilt(recording, measured, instants));
+    found.extend(tilt::check_tilt(recording, measured, tilt.as_ref().ok()));
     found.push(motion::check_turns(instants));
     for column in &columns {
         found.extend(checks::check_track_column(column, recording.grid(), optics));
@@ -132,7 +163,7 @@ fn leave_out_filled(
     let is_filled =
         |found: &&UntrackedFrames| matches!(found.check, Check::HeldPoints | Check::InterpolatedPoints);
     let filled: Vec<UntrackedFrames> = untracked.iter().filter(is_filled).cloned().collect();
-    if filled.is_empty() || recording.describe_resampling().is_some() {
+    if filled.is_empty() || recording.is_resampled() {
         return None;
     }
     let rest = recording.clone().with_traces(drop_untracked(recording.traces().clone(), &filled)).ok()?;

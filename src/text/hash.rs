@@ -80,6 +80,12 @@ pub fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
+/// Whether the hash of a text by [`TextHash`] is that of its bytes: it has no byte-order mark and no CRLF.
+#[must_use]
+pub fn is_hashed_as_bytes(text: &[u8]) -> bool {
+    !text.starts_with(BYTE_ORDER_MARK) && !text.contains(&b'\r')
+}
+
 /// SHA-256 of a complete text, as computed by [`TextHash`].
 #[must_use]
 pub fn text_sha256(text: impl AsRef<[u8]>) -> String {

@@ -1,5 +1,5 @@
 //! Mathematical functions, normal draws and quadrature whose results are the same to the last bit on every
-//! machine, and sorting by a number.
+//! machine, sorting by a number, and reading of decimal numbers.
 //!
 //! The functions of `f64` call the system's library, whose rounding is not specified: glibc has one version
 //! for processors with fused multiply-add and another for those without. The functions here consist only of
@@ -13,12 +13,14 @@
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))] // tests may call them
 
+mod decimal;
 pub mod gauss_legendre;
 mod normal;
 mod sort;
 
+pub use decimal::{parse_finite, parse_positive};
 pub use normal::StandardNormal;
-pub use sort::sort_by_number;
+pub use sort::{select_number, sort_by_number};
 
 /// The sine of an angle in rad.
 #[must_use]
@@ -141,9 +143,50 @@ pub fn powi(x: f64, n: i32) -> f64 {
     }
 }
 
+/// The nearest whole number; a half is rounded away from zero.
+///
+/// The result is that of [`f64::round`]. On processors of the x86-64 baseline, that method calls the system's
+/// library, which takes several times as long.
+#[must_use]
+#[inline]
+pub fn round(x: f64) -> f64 {
+    /// From 2^52 on, every number is whole.
+    const ALL_WHOLE: f64 = 4_503_599_627_370_496.0;
+    if x.is_nan() || x.abs() >= ALL_WHOLE {
+        return x;
+    }
+    let whole = x as i64 as f64;
+    let step = if (x - whole).abs() >= 0.5 { 1.0_f64.copysign(x) } else { 0.0 };
+    (whole + step).copysign(x)
+}
+
 /// `sqrt(x^2 + y^2)` without overflow of the squares.
 #[must_use]
 #[inline]
 pub fn hypot(x: f64, y: f64) -> f64 {
     libm::hypot(x, y)
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngCore, SeedableRng};
+
+    /// Halves, their neighbours, the numbers around 2^52 and random bits.
+    #[test]
+    fn rounding_is_that_of_the_standard_library() {
+        let mut draws = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(1);
+        let halves = (0..200).map(|i| f64::from(i) / 2.0);
+        let around = halves.flat_map(|x| [x, x.next_up(), x.next_down()]);
+        let large = (0..60).map(|i| 4_503_599_627_370_496.0 - f64::from(i) / 2.0);
+        let special = [f64::NAN, f64::INFINITY, f64::MAX, f64::MIN_POSITIVE, 9.3e18, 1.9e19];
+        let random = (0..100_000).map(|_| f64::from_bits(draws.next_u64()));
+        let near_one = (0..100_000).map(|i| f64::from(i) * 0.37 - 9.0);
+        for x in around.chain(large).chain(special).chain(random).chain(near_one) {
+            for x in [x, -x] {
+                let (ours, theirs) = (super::round(x), x.round());
+                let same = ours.to_bits() == theirs.to_bits() || (ours.is_nan() && theirs.is_nan());
+                assert!(same, "{x:e}: {ours:e}, expected {theirs:e}");
+            }
+        }
+    }
 }

@@ -171,7 +171,7 @@ class FitResult(Mapping[str, Any]):
     def law(self) -> dict[str, Any] | None:
         """Which law of friction the recordings support: ``verdict``, ``chosen``, ``sentence``, ``candidates``.
 
-        None in a fit of features, and if no parameter of the law is free.
+        None if laws were not compared, as in a fit of features.
         """
         law: dict[str, Any] | None = self.get("law")
         return law

@@ -12,6 +12,7 @@ use super::write_failure;
 use crate::cli::failure::{Failure, Outcome};
 use crate::cli::interrupt;
 use crate::recording::files::TRACE_FILE;
+use crate::text::is_hashed_as_bytes;
 use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Read, Seek};
@@ -69,6 +70,16 @@ impl OutputStaging {
 
     /// Writes a file under a temporary name and returns the hash of its contents.
     pub(crate) fn stage_file(&mut self, name: &str, contents: impl Read) -> Outcome<String> {
+        self.stage_with_hash(name, contents, None)
+    }
+
+    /// Writes bytes whose SHA-256 is known under a temporary name.
+    pub(crate) fn stage_hashed_file(&mut self, name: &str, bytes: &[u8], sha256: &str) -> Outcome<String> {
+        let hash = is_hashed_as_bytes(bytes).then(|| sha256.to_owned());
+        self.stage_with_hash(name, bytes, hash)
+    }
+
+    fn stage_with_hash(&mut self, name: &str, contents: impl Read, hash: Option<String>) -> Outcome<String> {
         let path = self.folder.join(name);
         self.made.create(path.parent().unwrap_or(Path::new("")))?;
         let dialect = self.guard.as_ref().map_or(CsvDialect::Plain, |(_, writer)| writer.csv);
@@ -76,7 +87,7 @@ impl OutputStaging {
         let staged = if is_converted {
             write_temporary_table(&path, contents, dialect)
         } else {
-            write_temporary(&path, contents)
+            write_temporary(&path, contents, hash)
         };
         let (file, sha256) = staged.map_err(|error| write_failure(&path, &error))?;
         self.files.push(StagedFile { name: name.to_owned(), path, file, sha256: sha256.clone() });
@@ -176,7 +187,7 @@ impl<'a> MarkerUpdate<'a> {
     fn write_marker(&self, marker: &FolderMarker) -> Outcome<()> {
         let path = self.folder.join(MARKER_FILE);
         let text = serde_json::to_string_pretty(marker).map_err(Failure::internal)? + "\n";
-        let written = write_temporary(&path, text.as_bytes()).and_then(|(file, _)| {
+        let written = write_temporary(&path, text.as_bytes(), None).and_then(|(file, _)| {
             file.as_file().sync_all()?;
             file.persist(&path).map_err(io::Error::from)
         });
@@ -257,13 +268,22 @@ pub(crate) fn check_path_free(path: &Path) -> Outcome<()> {
 /// Size of the buffer through which a file is copied, in bytes.
 const COPIED_BYTES: usize = 1 << 16;
 
-/// Writes a file under a temporary name and locks it, if the file system can; returns the file with its hash.
-fn write_temporary(path: &Path, contents: impl Read) -> io::Result<(NamedTempFile, String)> {
+/// Writes a file under a temporary name and locks it, if the file system can; returns the file with its hash,
+/// which is computed unless it is given.
+fn write_temporary(
+    path: &Path,
+    mut contents: impl Read,
+    hash: Option<String>,
+) -> io::Result<(NamedTempFile, String)> {
     let within = path.parent().unwrap_or(Path::new(""));
     let mut builder = tempfile::Builder::new();
     builder.prefix(TEMPORARY_NAME.0).suffix(TEMPORARY_NAME.1).permissions(readable_by_all());
     let mut file = interrupt::track_temporary_file(|| builder.tempfile_in(within))?;
     let _ = file.as_file().try_lock();
+    if let Some(hash) = hash {
+        io::copy(&mut contents, file.as_file_mut())?;
+        return Ok((file, hash));
+    }
     let mut contents = io::BufReader::with_capacity(COPIED_BYTES, HashingReader::new(contents));
     io::copy(&mut contents, file.as_file_mut())?;
     Ok((file, contents.into_inner().hash.finish()))
@@ -278,7 +298,7 @@ fn write_temporary_table(
     let mut converted = tempfile::tempfile_in(path.parent().unwrap_or(Path::new("")))?;
     dialect.convert_table(plain, io::BufWriter::new(&mut converted))?;
     converted.rewind()?;
-    write_temporary(path, converted)
+    write_temporary(path, converted, None)
 }
 
 /// Removes temporary files left by programs that were killed.

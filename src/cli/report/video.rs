@@ -20,7 +20,7 @@ impl FramePictures {
     /// The pictures of the recording at `path`. `None` if its description names none, or if the tracks were
     /// interpolated to a grid: the frames of the grid are not those of the pictures.
     pub(crate) fn load(path: &Path, loaded: &LoadedRecording) -> Outcome<Option<Self>> {
-        let file = loaded.file.as_ref().filter(|_| loaded.recording.describe_resampling().is_none());
+        let file = loaded.file.as_ref().filter(|_| !loaded.recording.is_resampled());
         let Some((file, video)) = file.and_then(|file| Some((file, file.video.as_ref()?))) else {
             return Ok(None);
         };

@@ -6,7 +6,7 @@ use super::segment_simulation::LinkState;
 use super::unknowns::CameraParameters;
 use crate::model::Linkage;
 use crate::model::modes::body_frequencies;
-use crate::recording::channel::median_in_place;
+use crate::recording::channel::median_or_zero;
 use crate::simulate::equilibrium::equilibrium_angles;
 use crate::simulate::scene::Scene;
 use crate::text::format_trimmed;
@@ -154,7 +154,7 @@ fn usual_lean_m(scene: &Scene, film: &CameraObservation, view: &CameraParameters
     let least_speed = least_sliding_speed(film);
     let seen = (from..to).step_by(apart).filter_map(|frame| recorded_motion(scene, film, view, frame));
     let sliding = seen.filter(|seen| seen.speed_m_per_s.abs() > least_speed);
-    median_in_place(&mut sliding.map(|seen| seen.lean[0].abs()).collect::<Vec<_>>()).unwrap_or(0.0)
+    median_or_zero(sliding.map(|seen| seen.lean[0].abs()))
 }
 
 /// Motion of the blade when the shutter opens for a frame, from parabolas fitted to the neighbouring frames.

@@ -3,6 +3,7 @@
 
 use crate::import::format::*;
 use crate::import::reader::findings::picked_frames_finding;
+use crate::import::source::base_name;
 
 /// First cells of the header rows; a table of one animal has no row `individuals`.
 const ROW_NAMES: [&str; 4] = ["scorer", "individuals", "bodyparts", "coords"];
@@ -21,54 +22,49 @@ const HEADER_ADVICE: &str = "the rows above the numbers are scorer, bodyparts, c
 const TABLE_ADVICE: &str = "import the CSV that analyze_videos writes with save_as_csv=True for one camera, the one \
     without `_skeleton` in its name";
 
-pub(crate) struct DeepLabCut;
+pub(super) const FORMAT: FormatParser =
+    FormatParser { name: "deeplabcut", recognises: recognise_export, read: read_export };
 
-impl FileFormat for DeepLabCut {
-    fn name(&self) -> &'static str {
-        "deeplabcut"
+fn recognise_export(document: &Document) -> Option<String> {
+    let table = document.table.as_ref().ok()?;
+    if let Some(row) = find_skeleton_row(table) {
+        let line = row.line;
+        return Some(format!("line {line} names lengths and orientations as DeepLabCut's skeleton does"));
     }
+    let rows = table.head.iter().take(ROW_NAMES.len());
+    let rows: Vec<&TextRow> = rows.filter(|row| ROW_NAMES.contains(&row.first_cell())).collect();
+    let described: Vec<String> =
+        rows.iter().map(|row| format!("line {} starts with `{}`", row.line, row.first_cell())).collect();
+    (rows.len() > 1 || rows.first().is_some_and(|row| row.first_cell() == ROW_NAMES[0]))
+        .then(|| described.join(", "))
+}
 
-    fn recognises(&self, document: &Document) -> Option<String> {
-        let table = document.table.as_ref().ok()?;
-        if let Some(row) = find_skeleton_row(table) {
-            let line = row.line;
-            return Some(format!("line {line} names lengths and orientations as DeepLabCut's skeleton does"));
-        }
-        let rows = table.head.iter().take(ROW_NAMES.len());
-        let rows: Vec<&TextRow> = rows.filter(|row| ROW_NAMES.contains(&row.first_cell())).collect();
-        let described: Vec<String> =
-            rows.iter().map(|row| format!("line {} starts with `{}`", row.line, row.first_cell())).collect();
-        (rows.len() > 1 || rows.first().is_some_and(|row| row.first_cell() == ROW_NAMES[0]))
-            .then(|| described.join(", "))
+fn read_export<'a>(document: &'a Document<'a>, _options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
+    let table = document.table()?;
+    if let Some(row) = find_skeleton_row(table) {
+        let place = table.cell_location(row.line, row.position(SKELETON[0]).unwrap_or(0));
+        let expected = "a table of body parts with the columns x, y and likelihood";
+        let found = "lengths and orientations of a skeleton";
+        return Err(ImportError::wrong_table(place, found, expected, TABLE_ADVICE));
     }
-
-    fn read<'a>(&self, document: &'a Document<'a>, _options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
-        let table = document.table()?;
-        if let Some(row) = find_skeleton_row(table) {
-            let place = table.cell_location(row.line, row.position(SKELETON[0]).unwrap_or(0));
-            let expected = "a table of body parts with the columns x, y and likelihood";
-            let found = "lengths and orientations of a skeleton";
-            return Err(ImportError::wrong_table(place, found, expected, TABLE_ADVICE));
-        }
-        let header = DeepLabCutHeader::find(table)?;
-        let names_pictures = table.head.get(header.start).is_some_and(|row| {
-            table.parse_cell(row.first_cell()) == CellNumber::Text && row.first_cell().contains('.')
-        });
-        let labelled = header.index_cells > 1 || names_pictures;
-        let mut export = if labelled {
-            read_labels(document, table, &header)?
-        } else {
-            let layout = TableLayout::new(header.start, header.cells, header.points.clone());
-            TableLayout { frame: Some(0), ..layout }.read_tracks(document, table, pixel_facts())?
-        };
-        if labelled || header.points.iter().all(|point| point.confidence.is_none()) {
-            // (predictions have a likelihood; positions without one may be labels set by hand)
-            let picked = export.clocks.iter().filter_map(|clock| picked_frames_finding(document.file, clock));
-            export.findings.extend(picked);
-        }
-        export.findings.extend(filtering_finding(document, &table.head[0]));
-        Ok(export)
+    let header = DeepLabCutHeader::find(table)?;
+    let names_pictures = table.head.get(header.start).is_some_and(|row| {
+        table.parse_cell(row.first_cell()) == CellNumber::Text && row.first_cell().contains('.')
+    });
+    let labelled = header.index_cells > 1 || names_pictures;
+    let mut export = if labelled {
+        read_labels(document, table, &header)?
+    } else {
+        let layout = TableLayout::new(header.start, header.cells, header.points.clone());
+        TableLayout { frame: Some(0), ..layout }.read_tracks(document, table, pixel_facts())?
+    };
+    if labelled || header.points.iter().all(|point| point.confidence.is_none()) {
+        // (predictions have a likelihood; positions without one may be labels set by hand)
+        let picked = export.clocks.iter().filter_map(|clock| picked_frames_finding(document.file, clock));
+        export.findings.extend(picked);
     }
+    export.findings.extend(filtering_finding(document, &table.head[0]));
+    Ok(export)
 }
 
 fn pixel_facts() -> Facts {
@@ -93,7 +89,7 @@ fn filtering_finding(document: &Document, scorers: &TextRow) -> Option<QualityFi
         document.file
     );
     let advice = "import the unfiltered table (without `_filtered` in its name) if chatter or noise matters";
-    Some(new_finding(Check::Filtered, Severity::Caution, (1.0, ""), found, advice))
+    Some(QualityFinding::advise((Check::Filtered, Severity::Caution), (1.0, ""), found, advice))
 }
 
 /// Contents of the header rows: scorer, individual, body part, coordinate.
@@ -207,7 +203,7 @@ fn read_labels<'a>(
         let cells: Vec<&str> = (0..header.index_cells).map(|cell| record.cell(cell)).collect();
         let path = cells.join("/");
         let (folder, _) = path.rsplit_once(['/', '\\']).unwrap_or_default();
-        folder.rsplit(['/', '\\']).next().unwrap_or_default().to_owned()
+        base_name(folder).to_owned()
     };
     let (video, other) = table.find_change(header.start, video_of)?;
     if let Some((line, other)) = other {

@@ -21,57 +21,51 @@ const ONE_SUBSET: &str =
 const TRACKING_MODE: &str = "run DICe in tracking mode with a subset on the tip and one on the head (separate output \
     file for each subset), and import their DICe_solution_N.txt together";
 
-pub(crate) struct Dice;
+pub(super) const FORMAT: FormatParser =
+    FormatParser { name: "dice", recognises: recognise_export, read: read_export };
 
-impl FileFormat for Dice {
-    fn name(&self) -> &'static str {
-        "dice"
-    }
+fn recognise_export(document: &Document) -> Option<String> {
+    let (_, row) = find_header(document.table.as_ref().ok()?)?;
+    Some(format!("line {} names {} and {} as DICe does", row.line, REFERENCE[0], REFERENCE[1]))
+}
 
-    fn recognises(&self, document: &Document) -> Option<String> {
-        let (_, row) = find_header(document.table.as_ref().ok()?)?;
-        Some(format!("line {} names {} and {} as DICe does", row.line, REFERENCE[0], REFERENCE[1]))
-    }
-
-    fn read<'a>(&self, document: &'a Document<'a>, _options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
-        let table = document.table()?;
-        let Some((index, row)) = find_header(table) else {
-            let found = format!("`{}` and no row that names the columns", table.first_texts().join(" "));
-            let place = table.location(table.first_line(), 1);
-            return Err(ImportError::format(place, found, REFERENCE.join(" and "), TRACKING_MODE));
-        };
-        refuse_incremental(document)?;
-        let at = |name: &str| row.position(name);
-        let [Some(dx), Some(dy)] = DISPLACEMENT.map(at) else {
-            return Err(ImportError::wrong_table(
-                table.location(row.line, 1),
-                format!("{} without {}", REFERENCE.join(" and "), DISPLACEMENT.join(" and ")),
-                "the displacements too: the coordinates alone are where the subset was in the reference picture, \
-                    the same in every frame",
-                "add DISPLACEMENT_X and DISPLACEMENT_Y to DICe's output fields and run it again",
-            ));
-        };
-        let (Some(frame), [Some(x), Some(y)]) = (at(FRAME), REFERENCE.map(at)) else {
-            let found = format!("the columns {}", row.texts().join(", "));
-            let place = table.location(row.line, 1);
-            return Err(ImportError::wrong_table(place, found, ONE_SUBSET, TRACKING_MODE));
-        };
-        refuse_full_field(table, index + 1, [frame, x, y])?;
-        let rule = |name: &str, is, words| at(name).map(|cell| LostRule { cell: Some(cell), is, words });
-        let sigma = rule("SIGMA", |sigma, _| sigma < 0.0, "with a SIGMA below 0");
-        let status = |flag: f64, _: f64| !SUCCESSFUL.contains(&flag);
-        let status = rule("STATUS_FLAG", status, "whose STATUS_FLAG is a failure");
-        let (name, lost) = (document.stem.to_owned(), sigma.into_iter().chain(status).collect());
-        let points = vec![PointCells { name, x: vec![x, dx], y: vec![y, dy], ..PointCells::default() }];
-        let layout = TableLayout::new(index + 1, row.used_width(), points);
-        let layout = TableLayout { frame: Some(frame), lost, ..layout };
-        let facts = Facts::pixels_down("DICe counts pixels from the upper left corner of the picture");
-        let mut export = layout.read_tracks(document, table, facts)?;
-        let note =
-            "positions are COORDINATE_X + DISPLACEMENT_X, and so for y; the track is called like its file";
-        export.notes.push(note.to_owned());
-        Ok(export)
-    }
+fn read_export<'a>(document: &'a Document<'a>, _options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
+    let table = document.table()?;
+    let Some((index, row)) = find_header(table) else {
+        let found = format!("`{}` and no row that names the columns", table.first_texts().join(" "));
+        let place = table.location(table.first_line(), 1);
+        return Err(ImportError::format(place, found, REFERENCE.join(" and "), TRACKING_MODE));
+    };
+    refuse_incremental(document)?;
+    let at = |name: &str| row.position(name);
+    let [Some(dx), Some(dy)] = DISPLACEMENT.map(at) else {
+        return Err(ImportError::wrong_table(
+            table.location(row.line, 1),
+            format!("{} without {}", REFERENCE.join(" and "), DISPLACEMENT.join(" and ")),
+            "the displacements too: the coordinates alone are where the subset was in the reference picture, \
+                the same in every frame",
+            "add DISPLACEMENT_X and DISPLACEMENT_Y to DICe's output fields and run it again",
+        ));
+    };
+    let (Some(frame), [Some(x), Some(y)]) = (at(FRAME), REFERENCE.map(at)) else {
+        let found = format!("the columns {}", row.texts().join(", "));
+        let place = table.location(row.line, 1);
+        return Err(ImportError::wrong_table(place, found, ONE_SUBSET, TRACKING_MODE));
+    };
+    refuse_full_field(table, index + 1, [frame, x, y])?;
+    let rule = |name: &str, is, words| at(name).map(|cell| LostRule { cell: Some(cell), is, words });
+    let sigma = rule("SIGMA", |sigma, _| sigma < 0.0, "with a SIGMA below 0");
+    let status = |flag: f64, _: f64| !SUCCESSFUL.contains(&flag);
+    let status = rule("STATUS_FLAG", status, "whose STATUS_FLAG is a failure");
+    let (name, lost) = (document.stem.to_owned(), sigma.into_iter().chain(status).collect());
+    let points = vec![PointCells { name, x: vec![x, dx], y: vec![y, dy], ..PointCells::default() }];
+    let layout = TableLayout::new(index + 1, row.used_width(), points);
+    let layout = TableLayout { frame: Some(frame), lost, ..layout };
+    let facts = Facts::pixels_down("DICe counts pixels from the upper left corner of the picture");
+    let mut export = layout.read_tracks(document, table, facts)?;
+    let note = "positions are COORDINATE_X + DISPLACEMENT_X, and so for y; the track is called like its file";
+    export.notes.push(note.to_owned());
+    Ok(export)
 }
 
 /// Index of the row of column names, and the row itself.

@@ -4,37 +4,26 @@
 use crate::import::format::*;
 use std::collections::BTreeMap;
 
-pub(crate) struct Dltdv;
+pub(super) const FORMAT: FormatParser =
+    FormatParser { name: "dltdv", recognises: recognise_export, read: read_export };
 
-impl FileFormat for Dltdv {
-    fn name(&self) -> &'static str {
-        "dltdv"
+fn recognise_export(document: &Document) -> Option<String> {
+    let table = document.table.as_ref().ok();
+    let flat = table.and_then(recognise_flat_table);
+    let positions = flat.or_else(|| table.and_then(recognise_sparse_table));
+    positions.or_else(|| find_other_content(document).map(|what| format!("line 1 is that of DLTdv's {what}")))
+}
+
+fn read_export<'a>(document: &'a Document<'a>, _options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
+    if let Some(what) = find_other_content(document) {
+        let advice = "import the file of the same export that ends in xypts.csv or xypts.tsv";
+        let (place, found) = (format!("{}:1:1", document.file), format!("DLTdv's {what}"));
+        return Err(ImportError::wrong_table(place, found, "positions in the picture of a camera", advice));
     }
-
-    fn recognises(&self, document: &Document) -> Option<String> {
-        let table = document.table.as_ref().ok();
-        let flat = table.and_then(recognise_flat_table);
-        let positions = flat.or_else(|| table.and_then(recognise_sparse_table));
-        positions
-            .or_else(|| find_other_content(document).map(|what| format!("line 1 is that of DLTdv's {what}")))
-    }
-
-    fn read<'a>(&self, document: &'a Document<'a>, _options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
-        if let Some(what) = find_other_content(document) {
-            let advice = "import the file of the same export that ends in xypts.csv or xypts.tsv";
-            let (place, found) = (format!("{}:1:1", document.file), format!("DLTdv's {what}"));
-            return Err(ImportError::wrong_table(
-                place,
-                found,
-                "positions in the picture of a camera",
-                advice,
-            ));
-        }
-        let table = document.table()?;
-        match recognise_sparse_table(table) {
-            Some(_) => read_sparse_table(document, table),
-            None => read_flat_table(document, table),
-        }
+    let table = document.table()?;
+    match recognise_sparse_table(table) {
+        Some(_) => read_sparse_table(document, table),
+        None => read_flat_table(document, table),
     }
 }
 

@@ -34,39 +34,34 @@ static MTRACKJ: ProgramTable = ProgramTable {
     ..PLAIN_ROW
 };
 
-pub(crate) struct ImageJ;
+pub(super) const FORMAT: FormatParser =
+    FormatParser { name: "imagej", recognises: recognise_export, read: read_export };
 
-impl FileFormat for ImageJ {
-    fn name(&self) -> &'static str {
-        "imagej"
+fn recognise_export(document: &Document) -> Option<String> {
+    if let Some(plugin) = find_plugin(document) {
+        return plugin.recognises(document).or(Some("it has columns of the plugin MTrackJ".to_owned()));
     }
+    let row = document.table.as_ref().ok()?.head.first()?;
+    let results = is_results_header(&row.texts());
+    results.then(|| format!("line {} is the header of ImageJ's Results table", row.line))
+}
 
-    fn recognises(&self, document: &Document) -> Option<String> {
-        if let Some(plugin) = find_plugin(document) {
-            return plugin.recognises(document).or(Some("it has columns of the plugin MTrackJ".to_owned()));
-        }
-        let row = document.table.as_ref().ok()?.head.first()?;
-        let results = is_results_header(&row.texts());
-        results.then(|| format!("line {} is the header of ImageJ's Results table", row.line))
+fn read_export<'a>(document: &'a Document<'a>, options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
+    let table = document.table()?;
+    if let Some(plugin) = find_plugin(document) {
+        let advice = "set the frame interval in Image > Properties and measure again, if every time is 0; else \
+            correct the track";
+        let read = plugin.read(document, options);
+        return read.map_err(|error| explain_duplicate(error, "one row a track and time", advice));
     }
-
-    fn read<'a>(&self, document: &'a Document<'a>, options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
-        let table = document.table()?;
-        if let Some(plugin) = find_plugin(document) {
-            let advice = "set the frame interval in Image > Properties and measure again, if every time is 0; else \
-                correct the track";
-            let read = plugin.read(document, options);
-            return read.map_err(|error| explain_duplicate(error, "one row a track and time", advice));
-        }
-        match table.head.first().filter(|row| is_results_header(&row.texts())) {
-            Some(row) => read_results(document, table, row),
-            None => {
-                let found = format!("`{}`", table.first_texts().join(" "));
-                let advice = "switch on Edit > Options > Input/Output > Save column headers and save the table again, \
-                    or number the columns: --format generic --columns frame=4,tip-x=2,tip-y=3";
-                let expected = "the header of a table of ImageJ, with X, Y and Slice";
-                Err(ImportError::format(table.location(table.first_line(), 1), found, expected, advice))
-            }
+    match table.head.first().filter(|row| is_results_header(&row.texts())) {
+        Some(row) => read_results(document, table, row),
+        None => {
+            let found = format!("`{}`", table.first_texts().join(" "));
+            let advice = "switch on Edit > Options > Input/Output > Save column headers and save the table again, \
+                or number the columns: --format generic --columns frame=4,tip-x=2,tip-y=3";
+            let expected = "the header of a table of ImageJ, with X, Y and Slice";
+            Err(ImportError::format(table.location(table.first_line(), 1), found, expected, advice))
         }
     }
 }

@@ -34,39 +34,29 @@ static TRAJECTORIES: ProgramTable = ProgramTable {
     ..PLAIN_ROW
 };
 
-pub(crate) struct Kinovea;
+pub(super) const FORMAT: FormatParser =
+    FormatParser { name: TRAJECTORIES.name, recognises: recognise_export, read: read_export };
 
-impl FileFormat for Kinovea {
-    fn name(&self) -> &'static str {
-        TRAJECTORIES.name
+fn recognise_export(document: &Document) -> Option<String> {
+    if document.text.trim_start().starts_with(TITLE) {
+        return Some(format!("line 1 starts with `{TITLE}`"));
     }
+    let other = || other_export(document).map(|(_, found)| found.to_owned());
+    TRAJECTORIES.recognises(document).or_else(other)
+}
 
-    fn recognises(&self, document: &Document) -> Option<String> {
-        if document.text.trim_start().starts_with(TITLE) {
-            return Some(format!("line 1 starts with `{TITLE}`"));
-        }
-        let other = || other_export(document).map(|(_, found)| found.to_owned());
-        TRAJECTORIES.recognises(document).or_else(other)
+fn read_export<'a>(document: &'a Document<'a>, options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
+    if document.text.trim_start().starts_with(TITLE) {
+        return read_text_export(document);
     }
-
-    fn read<'a>(&self, document: &'a Document<'a>, options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
-        if document.text.trim_start().starts_with(TITLE) {
-            return read_text_export(document);
-        }
-        if let Some((place, found)) = other_export(document) {
-            let advice = format!(
-                "{EXPORT_MENU}; if a table has positions along the sweep and nothing else is left, leave --format \
-                 out and say so: --columns time-ms=1,tip-x=2,..."
-            );
-            return Err(ImportError::wrong_table(
-                place,
-                found,
-                "positions of tracked points as x and y",
-                advice,
-            ));
-        }
-        TRAJECTORIES.read(document, options)
+    if let Some((place, found)) = other_export(document) {
+        let advice = format!(
+            "{EXPORT_MENU}; if a table has positions along the sweep and nothing else is left, leave --format \
+             out and say so: --columns time-ms=1,tip-x=2,..."
+        );
+        return Err(ImportError::wrong_table(place, found, "positions of tracked points as x and y", advice));
     }
+    TRAJECTORIES.read(document, options)
 }
 
 /// Place and contents of a Kinovea export that has no x and y of points; `None` for any other file.

@@ -514,5 +514,10 @@ fn local_origin_finding(export: &TrackFile) -> Option<QualityFinding> {
     );
     let advice = "tip minus head is right as long as both points are of this file; the head's own motion needs an \
         export in fixed coordinates";
-    Some(new_finding(Check::RelativePositions, Severity::Caution, (AT_ORIGIN, ""), found, advice))
+    Some(QualityFinding::advise(
+        (Check::RelativePositions, Severity::Caution),
+        (AT_ORIGIN, ""),
+        found,
+        advice,
+    ))
 }

@@ -9,6 +9,7 @@ use crate::import::reader::layout::{self, ClockCell};
 use crate::import::reader::rate::EVEN_FRAMES;
 use crate::recording::clock::{median_step_s, number_frames};
 pub(super) use columns::unnamed_columns_error;
+use portable_math as math;
 
 /// Format whose header names the columns.
 pub(super) static PLAIN: PlainFormat = PlainFormat { name: "plain" };
@@ -75,8 +76,13 @@ pub(super) struct TableColumns {
 }
 
 impl TableColumns {
+    /// The row of column names.
+    fn header_row<'t>(&self, table: &'t DelimitedTable) -> Option<&'t TextRow> {
+        self.header.and_then(|row| table.head.get(row))
+    }
+
     fn name<'t>(&self, table: &'t DelimitedTable, column: usize) -> &'t str {
-        self.header.and_then(|row| table.head.get(row)).map_or("", |row| row.cell(column))
+        self.header_row(table).map_or("", |row| row.cell(column))
     }
 
     fn clock(&self) -> impl Iterator<Item = usize> {
@@ -95,7 +101,7 @@ impl TableColumns {
     /// Columns of times or frame numbers that are not read, with their meaning.
     fn unused_clocks(&self, table: &DelimitedTable) -> Vec<(usize, ColumnMeaning)> {
         let used = self.used_columns();
-        let names = self.header.and_then(|row| table.head.get(row)).map_or(&[][..], |row| &row.cells);
+        let names = self.header_row(table).map_or(&[][..], |row| &row.cells);
         let meanings = names.iter().enumerate().filter(|(column, _)| !used.contains(column));
         meanings.filter_map(|(column, name)| Some((column, ColumnMeaning::parse_clock(name)?))).collect()
     }
@@ -109,7 +115,7 @@ impl TableColumns {
             self.time = None;
             return Ok(());
         }
-        let line = self.header.and_then(|row| table.head.get(row)).map_or(1, |row| row.line);
+        let line = self.header_row(table).map_or(1, |row| row.line);
         let below = self.units.and_then(|row| table.head.get(row)).map_or("", |row| row.cell(column));
         let below = if below.is_empty() { String::new() } else { format!(", `{below}`") };
         let problem = format!(
@@ -148,32 +154,25 @@ impl TableColumns {
     /// The column that seems to name the objects of a table whose rows become one track. It is not read,
     /// has few values, each in rows that follow one another, and the point jumps where the value changes.
     fn find_unread_objects(&self, table: &DelimitedTable) -> ImportResult<Option<ObjectColumn>> {
-        let [point] = &self.points[..] else { return Ok(None) };
-        let used = self.used_columns();
-        let width = self.header.and_then(|row| table.head.get(row)).map_or(0, TextRow::used_width);
-        let mut candidates: Vec<ObjectColumn> =
-            (0..width).filter(|column| !used.contains(column)).map(ObjectColumn::new).collect();
-        if candidates.is_empty() || self.track.is_some() {
-            return Ok(None);
-        }
+        let ([point], None) = (&self.points[..], self.track) else { return Ok(None) };
+        let (used, width) = (self.used_columns(), self.header_row(table).map_or(0, TextRow::used_width));
+        let unused = (0..width).filter(|column| !used.contains(column));
+        let mut candidates: Vec<ObjectColumn> = unused.map(ObjectColumn::new).collect();
         let coordinates: Vec<usize> = point.x.iter().chain(&point.y).copied().collect();
-        let (mut last, mut steps) = (None, vec![]);
-        table.find_in_rows(self.start, |record| {
+        let (mut last, mut steps): (Option<Vec<f64>>, _) = (None, vec![]);
+        let start = if candidates.is_empty() { table.head.len() } else { self.start };
+        table.find_in_rows(start, |record| {
             let numbers = coordinates.iter().map(|cell| table.parse_cell(record.cell(*cell)).value());
             let Some(now) = numbers.collect::<Option<Vec<f64>>>() else { return Ok(None::<()>) };
-            let step = last.as_ref().map_or(0.0, |last: &Vec<f64>| {
-                last.iter().zip(&now).map(|(last, now)| (now - last).abs()).fold(0.0, f64::max)
-            });
+            let apart = last.iter().flatten().zip(&now).map(|(last, now)| (now - last).abs());
+            let step = apart.fold(0.0, f64::max);
             last = Some(now);
             steps.push(step);
             candidates.retain_mut(|column| column.add_row(record.cell(column.at), step, record.line));
             Ok(candidates.is_empty().then_some(()))
         })?;
         let place = (ObjectColumn::QUANTILE * steps.len().saturating_sub(1) as f64) as usize;
-        if candidates.is_empty() || steps.is_empty() {
-            return Ok(None);
-        }
-        let step = *steps.select_nth_unstable_by(place, f64::total_cmp).1;
+        let step = if steps.is_empty() { 0.0 } else { math::select_number(&mut steps, place) };
         Ok(candidates.into_iter().find(|column| column.names_objects(step, steps.len())))
     }
 
@@ -190,7 +189,12 @@ impl TableColumns {
         if !self.by_header {
             let value = (found.values.len() as f64, "objects");
             let advice = format!("if it does, add track={number} to --columns");
-            return Ok(Some(new_finding(Check::Points, Severity::Caution, value, problem, &advice)));
+            return Ok(Some(QualityFinding::advise(
+                (Check::Points, Severity::Caution),
+                value,
+                problem,
+                &advice,
+            )));
         }
         let advice = format!(
             "if it does, add --columns frame=A,x=B,y=C,track={number} with the numbers of the other columns; to read \
@@ -231,7 +235,7 @@ impl TableColumns {
             }
             point
         };
-        let named = self.header.and_then(|row| table.head.get(row)).map_or(0, TextRow::used_width);
+        let named = self.header_row(table).map_or(0, TextRow::used_width);
         // (in some of the first rows the last cell may be blank, so the most common width is used)
         let filled = table.head.iter().skip(self.start).map(TextRow::used_width).collect::<Vec<_>>();
         TableLayout {
@@ -297,7 +301,7 @@ impl TableColumns {
         );
         let advice = "name that column: --columns time=...; frequencies and times are wrong without it";
         let value = (fit.worst_frames, "frames");
-        Ok(Some(new_finding(Check::UnevenClock, Severity::Serious, value, found, advice)))
+        Ok(Some(QualityFinding::advise((Check::UnevenClock, Severity::Serious), value, found, advice)))
     }
 }
 
@@ -332,17 +336,14 @@ impl ObjectColumn {
         if self.values.last().is_some_and(|last| last == text) {
             return true;
         }
-        if self.values.iter().any(|value| value == text) || self.values.len() == Self::MOST_VALUES {
-            return false;
+        match self.values.len() {
+            0 => {}
+            1 => (self.smallest_jump, self.line) = (step, line),
+            _ => self.smallest_jump = self.smallest_jump.min(step),
         }
-        if !self.values.is_empty() {
-            self.smallest_jump = self.smallest_jump.min(step);
-        }
-        if self.values.len() == 1 {
-            self.line = line;
-        }
+        let is_new = self.values.iter().all(|value| value != text) && self.values.len() < Self::MOST_VALUES;
         self.values.push(text.to_owned());
-        true
+        is_new
     }
 
     /// Whether the values name objects, if the point usually moves by `step` from row to row.

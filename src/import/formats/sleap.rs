@@ -19,65 +19,60 @@ const TRACK_FIRST: &str = "give every instance a track of its own in SLEAP (run 
     tracker, or at most one instance), and export again";
 
 /// Tables of SLEAP and sleap-io, except those in DeepLabCut's layout.
-pub(crate) struct Sleap;
+pub(super) const FORMAT: FormatParser =
+    FormatParser { name: "sleap", recognises: recognise_export, read: read_export };
 
-impl FileFormat for Sleap {
-    fn name(&self) -> &'static str {
-        "sleap"
-    }
+fn recognise_export(document: &Document) -> Option<String> {
+    let row = document.table.as_ref().ok()?.head.first()?;
+    let of_nodes = row.cells.iter().any(|name| name.ends_with(".x")) || (row.has(NODE) && row.has("x"));
+    (row.has(FRAME) && of_nodes)
+        .then(|| format!("line {} names `{FRAME}` and coordinates of nodes as SLEAP does", row.line))
+}
 
-    fn recognises(&self, document: &Document) -> Option<String> {
-        let row = document.table.as_ref().ok()?.head.first()?;
-        let of_nodes = row.cells.iter().any(|name| name.ends_with(".x")) || (row.has(NODE) && row.has("x"));
-        (row.has(FRAME) && of_nodes)
-            .then(|| format!("line {} names `{FRAME}` and coordinates of nodes as SLEAP does", row.line))
-    }
-
-    fn read<'a>(&self, document: &'a Document<'a>, _options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
-        let table = document.table()?;
-        let header = table.head.first().ok_or_else(|| ImportError::empty(document.file))?;
-        let columns = SleapColumns::find(table, header)?;
-        table.refuse_comment_names(header.line, "a track or video", "rename it in SLEAP and export again")?;
-        let points = columns.instances[0].nodes.iter().map(PointCells::fields).collect();
-        let fields = InstanceFields { has_frame: true, has_time: false, clock_cell: columns.frame, points };
-        let mut collector = TrackCollector::new(fields);
-        let width = header.used_width();
-        let mut rows = table.rows(1);
-        while let Some(record) = rows.next_row()? {
-            if record.is_empty() {
-                continue;
-            }
-            table.check_row_length(&record, width, width)?;
-            for instance in &columns.instances {
-                columns.read_instance(table, &record, instance, &mut collector)?;
-            }
+fn read_export<'a>(document: &'a Document<'a>, _options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
+    let table = document.table()?;
+    let header = table.head.first().ok_or_else(|| ImportError::empty(document.file))?;
+    let columns = SleapColumns::find(table, header)?;
+    table.refuse_comment_names(header.line, "a track or video", "rename it in SLEAP and export again")?;
+    let points = columns.instances[0].nodes.iter().map(PointCells::fields).collect();
+    let fields = InstanceFields { has_frame: true, has_time: false, clock_cell: columns.frame, points };
+    let mut collector = TrackCollector::new(fields);
+    let width = header.used_width();
+    let mut rows = table.rows(1);
+    while let Some(record) = rows.next_row()? {
+        if record.is_empty() {
+            continue;
         }
-        // (this follows the rows, because a row that is cut short also seems to name another video)
-        columns.refuse_other_video(table)?;
-        let found = collector.finish(document.file, RowOrder::Any);
-        let (clocks, mut tracks) = found.map_err(duplicate_instance_error)?;
-        match (columns.node, columns.instances.as_slice(), tracks.as_mut_slice()) {
-            (Some(_), ..) => name_by_node(&mut tracks),
-            // (if there is one instance with one node, the track gets the name of the node)
-            (None, [InstanceColumns { nodes, .. }], [track]) if nodes.len() == 1 => {
-                track.name.clone_from(&nodes[0].name)
-            }
-            _ => {}
+        table.check_row_length(&record, width, width)?;
+        for instance in &columns.instances {
+            columns.read_instance(table, &record, instance, &mut collector)?;
         }
-        // (a table of labels has the same columns as a table of predictions, so its frame numbers are
-        // checked)
-        let longest = clocks.iter().max_by_key(|clock| clock.len());
-        let finding = longest.and_then(|clock| picked_frames_finding(document.file, clock));
-        Ok(TrackFile {
-            findings: finding.into_iter().collect(),
-            clocks,
-            tracks,
-            texts: header.cells.clone(),
-            facts: Facts::pixels_down("SLEAP writes image pixels, y downwards"),
-            table: Some(table),
-            ..TrackFile::for_document(document)
-        })
     }
+    // (this follows the rows, because a row that is cut short also seems to name another video)
+    columns.refuse_other_video(table)?;
+    let found = collector.finish(document.file, RowOrder::Any);
+    let (clocks, mut tracks) = found.map_err(duplicate_instance_error)?;
+    match (columns.node, columns.instances.as_slice(), tracks.as_mut_slice()) {
+        (Some(_), ..) => name_by_node(&mut tracks),
+        // (if there is one instance with one node, the track gets the name of the node)
+        (None, [InstanceColumns { nodes, .. }], [track]) if nodes.len() == 1 => {
+            track.name.clone_from(&nodes[0].name)
+        }
+        _ => {}
+    }
+    // (a table of labels has the same columns as a table of predictions, so its frame numbers are
+    // checked)
+    let longest = clocks.iter().max_by_key(|clock| clock.len());
+    let finding = longest.and_then(|clock| picked_frames_finding(document.file, clock));
+    Ok(TrackFile {
+        findings: finding.into_iter().collect(),
+        clocks,
+        tracks,
+        texts: header.cells.clone(),
+        facts: Facts::pixels_down("SLEAP writes image pixels, y downwards"),
+        table: Some(table),
+        ..TrackFile::for_document(document)
+    })
 }
 
 /// Names the tracks of a table with one row per point: by the node if there is only one instance, by the

@@ -13,69 +13,64 @@ const MOMENTUM: [&str; 2] = ["px", "py"];
 const TIME: &str = "t";
 const FRAME: &str = "frame";
 
-pub(crate) struct TrackerFormat;
+pub(super) const FORMAT: FormatParser =
+    FormatParser { name: "tracker", recognises: recognise_export, read: read_export };
 
-impl FileFormat for TrackerFormat {
-    fn name(&self) -> &'static str {
-        "tracker"
+fn recognise_export(document: &Document) -> Option<String> {
+    let table = document.table.as_ref().ok()?;
+    let row = table.head.get(find_header(table)?)?;
+    if table.multi {
+        return Some(format!("line 1 is `#multi:` and line {} names t, x and y", row.line));
     }
+    let names = row.texts();
+    let positions = names.contains(&WORLD[0]) || names.contains(&IMAGE[0]);
+    let momentum = MOMENTUM.iter().all(|name| names.contains(name));
+    let names_of = match (positions, momentum || has_title(table)) {
+        (true, _) => "t and positions as Tracker does",
+        (_, true) => "t as Tracker does, and no positions",
+        _ => return None,
+    };
+    names.contains(&TIME).then(|| format!("line {} names {names_of}", row.line))
+}
 
-    fn recognises(&self, document: &Document) -> Option<String> {
-        let table = document.table.as_ref().ok()?;
-        let row = table.head.get(find_header(table)?)?;
-        if table.multi {
-            return Some(format!("line 1 is `#multi:` and line {} names t, x and y", row.line));
-        }
-        let names = row.texts();
-        let positions = names.contains(&WORLD[0]) || names.contains(&IMAGE[0]);
-        let momentum = MOMENTUM.iter().all(|name| names.contains(name));
-        let names_of = match (positions, momentum || has_title(table)) {
-            (true, _) => "t and positions as Tracker does",
-            (_, true) => "t as Tracker does, and no positions",
-            _ => return None,
-        };
-        names.contains(&TIME).then(|| format!("line {} names {names_of}", row.line))
+fn read_export<'a>(document: &'a Document<'a>, _options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
+    let table = document.table()?;
+    let header = find_header(table).ok_or_else(|| no_header_error(table))?;
+    let row = &table.head[header];
+    let columns = row.texts();
+    let above = header.checked_sub(1).and_then(|above| table.head.get(above));
+    let titles = above.map(TextRow::texts).unwrap_or_default();
+    let pair = if columns.contains(&WORLD[0]) { WORLD } else { IMAGE };
+    let mut points = find_points(&columns, &titles, pair);
+    if points.is_empty() {
+        return Err(no_positions_error(table, row, &columns));
     }
-
-    fn read<'a>(&self, document: &'a Document<'a>, _options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
-        let table = document.table()?;
-        let header = find_header(table).ok_or_else(|| no_header_error(table))?;
-        let row = &table.head[header];
-        let columns = row.texts();
-        let above = header.checked_sub(1).and_then(|above| table.head.get(above));
-        let titles = above.map(TextRow::texts).unwrap_or_default();
-        let pair = if columns.contains(&WORLD[0]) { WORLD } else { IMAGE };
-        let mut points = find_points(&columns, &titles, pair);
-        if points.is_empty() {
-            return Err(no_positions_error(table, row, &columns));
-        }
-        let notes = name_unnamed_points(&mut points, document.stem);
-        // (the unit and the axes of world coordinates are those of the user's calibration)
-        let open = "Tracker's x and y point up unless its axes were turned; image pixels point down";
-        let facts = if pair == WORLD {
-            Facts { y_axis_open: Some(open), ..Facts::default() }
-        } else {
-            Facts::pixels_down("Tracker's pixelx and pixely are image pixels, y downwards")
-        };
-        let at = |name: &str| columns.iter().position(|column| *column == name);
-        // (speeds after the positions are blank at the ends of a track, and some editors remove trailing
-        // blanks)
-        let layout = |((frame, time), points): (ClockColumns, Vec<PointCells>)| {
-            let cells = points.iter().flat_map(|point| point.x.iter().chain(&point.y).copied());
-            let width = cells.chain(time).chain(frame).max().map_or(0, |last| last + 1);
-            let most = row.used_width();
-            TableLayout { most, frame, time, ..TableLayout::new(header + 1, width, points) }
-        };
-        let mut export = if clocks_agree(table, header + 1, &columns)? {
-            layout(((at(FRAME), at(TIME)), points)).read_tracks(document, table, facts)?
-        } else {
-            let groups = group_by_clock(table, row, &titles, points)?;
-            let layouts = groups.into_iter().map(layout).collect();
-            layout::read_clocks_apart(layouts, document, table, facts)?
-        };
-        export.notes.extend(notes);
-        Ok(export)
-    }
+    let notes = name_unnamed_points(&mut points, document.stem);
+    // (the unit and the axes of world coordinates are those of the user's calibration)
+    let open = "Tracker's x and y point up unless its axes were turned; image pixels point down";
+    let facts = if pair == WORLD {
+        Facts { y_axis_open: Some(open), ..Facts::default() }
+    } else {
+        Facts::pixels_down("Tracker's pixelx and pixely are image pixels, y downwards")
+    };
+    let at = |name: &str| columns.iter().position(|column| *column == name);
+    // (speeds after the positions are blank at the ends of a track, and some editors remove trailing
+    // blanks)
+    let layout = |((frame, time), points): (ClockColumns, Vec<PointCells>)| {
+        let cells = points.iter().flat_map(|point| point.x.iter().chain(&point.y).copied());
+        let width = cells.chain(time).chain(frame).max().map_or(0, |last| last + 1);
+        let most = row.used_width();
+        TableLayout { most, frame, time, ..TableLayout::new(header + 1, width, points) }
+    };
+    let mut export = if clocks_agree(table, header + 1, &columns)? {
+        layout(((at(FRAME), at(TIME)), points)).read_tracks(document, table, facts)?
+    } else {
+        let groups = group_by_clock(table, row, &titles, points)?;
+        let layouts = groups.into_iter().map(layout).collect();
+        layout::read_clocks_apart(layouts, document, table, facts)?
+    };
+    export.notes.extend(notes);
+    Ok(export)
 }
 
 /// Index of the row of column names.

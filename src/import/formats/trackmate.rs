@@ -24,31 +24,26 @@ const MOST_NAMES: usize = 10;
 const EXPORT_ADVICE: &str = "in TrackMate's display panel press Tracks, choose the tab Spots and then \
     Export to CSV; or run the action Export tracks to XML file";
 
-pub(crate) struct TrackMate;
+pub(super) const FORMAT: FormatParser =
+    FormatParser { name: "trackmate", recognises: recognise_export, read: read_export };
 
-impl FileFormat for TrackMate {
-    fn name(&self) -> &'static str {
-        "trackmate"
+fn recognise_export(document: &Document) -> Option<String> {
+    if let Some(root) = XmlReader::root_name(document) {
+        return ROOTS.contains(&root.as_str()).then(|| format!("the root element is <{root}>"));
     }
+    let table = document.table.as_ref().ok()?;
+    let named = |row: &TextRow| row.has(POSITION[0]) && (row.has(FRAME) || row.has(TRACK));
+    let other = |row: &TextRow| row.has(TRACK) && OTHER_COLUMNS.iter().any(|name| row.has(name));
+    let (_, row) = table.find_row(HEADER_ROWS, |row| named(row) || other(row))?;
+    Some(format!("line {} names the columns of a table of TrackMate", row.line))
+}
 
-    fn recognises(&self, document: &Document) -> Option<String> {
-        if let Some(root) = XmlReader::root_name(document) {
-            return ROOTS.contains(&root.as_str()).then(|| format!("the root element is <{root}>"));
-        }
-        let table = document.table.as_ref().ok()?;
-        let named = |row: &TextRow| row.has(POSITION[0]) && (row.has(FRAME) || row.has(TRACK));
-        let other = |row: &TextRow| row.has(TRACK) && OTHER_COLUMNS.iter().any(|name| row.has(name));
-        let (_, row) = table.find_row(HEADER_ROWS, |row| named(row) || other(row))?;
-        Some(format!("line {} names the columns of a table of TrackMate", row.line))
-    }
-
-    fn read<'a>(&self, document: &'a Document<'a>, options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
-        let spots = match XmlReader::root_name(document) {
-            Some(_) => read_xml(document)?,
-            None => read_spot_table(document)?,
-        };
-        spots.into_track_file(document, options)
-    }
+fn read_export<'a>(document: &'a Document<'a>, options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
+    let spots = match XmlReader::root_name(document) {
+        Some(_) => read_xml(document)?,
+        None => read_spot_table(document)?,
+    };
+    spots.into_track_file(document, options)
 }
 
 /// Spots of a file, collected by track.
@@ -155,7 +150,9 @@ impl<'a> TrackMateSpots<'a> {
         let advice = "forbid splitting and merging in TrackMate's tracker, or cut the links in TrackScheme, if one \
             of them is needed";
         let value = (count as f64, "");
-        Ok((count > 0).then(|| new_finding(Check::BranchingTracks, Severity::Caution, value, found, advice)))
+        Ok((count > 0).then(|| {
+            QualityFinding::advise((Check::BranchingTracks, Severity::Caution), value, found, advice)
+        }))
     }
 }
 

@@ -154,13 +154,9 @@ fn convert_times(export: &mut TrackFile, options: &ImportOptions) -> ImportResul
             return Ok(numbered);
         }
     };
-    // (1e-3 is not exact in binary: multiplying by it rounds twice, dividing by 1000 rounds only once)
-    let parts = (1.0 / factor).round();
     for clock in &mut export.clocks {
         clock.digit *= factor;
-        if let Some(time) = &mut clock.time {
-            if factor < 1.0 && factor == 1.0 / parts { time.divide(parts) } else { time.scale(factor) }
-        }
+        clock.time.iter_mut().for_each(|time| time.convert_unit(factor));
     }
     Ok(true)
 }

@@ -2,21 +2,36 @@
 //! its name in the header.
 
 use crate::import::options::CoordinateScale;
+use crate::text::parse_positive;
 
 /// Names of columns of frame numbers, in lower case and without separators; the last three are the Japanese
 /// words furemu (frame), furemu bango (frame number) and koma (picture of a film).
 const FRAMES: &str = "frame frames frameno framenr framenumber framenum frameidx frameindex frameid frame# bild \
     bildnr bildnummer \u{30d5}\u{30ec}\u{30fc}\u{30e0} \u{30d5}\u{30ec}\u{30fc}\u{30e0}\u{756a}\u{53f7} \u{30b3}\u{30de}";
-/// Names of columns of times, in lower case and without separators, with the unit that a name implies (`None`
-/// if it implies none).
-const TIMES: [(&str, Option<TimeUnit>); 5] = [
-    // (the last name is the Japanese word jikan, time)
-    ("t time zeit temps tempo tiempo \u{6642}\u{9593}", None),
+/// Names of columns of times, in lower case and without separators, with the unit of those that contain none.
+const TIMES: [(&str, TimeUnit); 3] = [
+    // (the first name in another script is the Japanese word jikan, time)
+    (
+        "t time zeit temps tempo tiempo \u{6642}\u{9593} seconds second sec timesec milliseconds millisecond msec ms \
+         timems timemsec",
+        TimeUnit::AssumedSeconds,
+    ),
     // (a timestamp may be in seconds or milliseconds, and may count from 1970)
-    ("timestamp", Some(TimeUnit::Unknown)),
-    ("seconds second sec timesec", Some(TimeUnit::Seconds(1.0))),
-    ("milliseconds millisecond msec ms timems timemsec", Some(TimeUnit::Seconds(1e-3))),
-    ("tick ticks", Some(TimeUnit::Unreadable)),
+    ("timestamp", TimeUnit::Unknown),
+    ("tick ticks", TimeUnit::Unreadable),
+];
+/// Names of the units of time, in lower case, with their lengths, s.
+const TIME_UNITS: [(&str, f64); 10] = [
+    ("s sec secs second seconds", 1.0),
+    ("ms msec millis millisec millisecond milliseconds", 1e-3),
+    ("h hr hrs hour hours", 3600.0),
+    ("d day days", 86_400.0),
+    ("min mins minute minutes", 60.0),
+    ("us usec \u{b5}s \u{3bc}s micros microsec microsecond microseconds", 1e-6),
+    ("ns nsec nanos nanosec nanosecond nanoseconds", 1e-9),
+    ("cs", 1e-2),
+    ("ds", 0.1),
+    ("ks", 1000.0),
 ];
 /// Units that are also words or names of points, in lower case. A column name that ends in one of the times
 /// names a unit only if a name of times comes before it; lengths need brackets or a slash.
@@ -178,7 +193,10 @@ fn parse_clock(base: &str, unit: Option<&str>) -> Option<ColumnMeaning> {
     Some(match (unit, own) {
         (Some(unit), _) if squeeze_name(unit).starts_with("frame") => ColumnMeaning::Frame,
         (Some(unit), _) => ColumnMeaning::Time(TimeUnit::parse(unit).unwrap_or(TimeUnit::Unreadable)),
-        (None, own) => ColumnMeaning::Time(own.unwrap_or(TimeUnit::AssumedSeconds)),
+        (None, own) => {
+            let unit = plain.strip_prefix("time").unwrap_or(&plain);
+            ColumnMeaning::Time(TimeUnit::parse(unit).unwrap_or(*own))
+        }
     })
 }
 
@@ -252,20 +270,7 @@ impl TimeUnit {
     pub(crate) fn parse(name: &str) -> Option<Self> {
         let name = trim_brackets(name).to_lowercase();
         let (factor, symbol) = split_factor(&name)?;
-        let seconds = match symbol {
-            "s" | "sec" | "secs" | "second" | "seconds" => 1.0,
-            "ms" | "msec" | "millis" | "millisec" | "millisecond" | "milliseconds" => 1e-3,
-            "h" | "hr" | "hrs" | "hour" | "hours" => 3600.0,
-            "d" | "day" | "days" => 86_400.0,
-            "min" | "mins" | "minute" | "minutes" => 60.0,
-            "us" | "usec" | "\u{b5}s" | "\u{3bc}s" | "micros" | "microsec" | "microsecond"
-            | "microseconds" => 1e-6,
-            "ns" | "nsec" | "nanos" | "nanosec" | "nanosecond" | "nanoseconds" => 1e-9,
-            "cs" => 1e-2,
-            "ds" => 0.1,
-            "ks" => 1000.0,
-            _ => return None,
-        };
+        let (_, seconds) = TIME_UNITS.iter().find(|(names, _)| is_listed(names, symbol))?;
         Some(Self::Seconds(factor * seconds))
     }
 }
@@ -365,7 +370,7 @@ fn split_factor(unit: &str) -> Option<(f64, &str)> {
         return Some((1.0, unit));
     }
     let (number, symbol) = unit.split_once(' ')?;
-    let factor = number.parse::<f64>().ok().filter(|factor| factor.is_finite() && *factor > 0.0)?;
+    let factor = parse_positive(number)?;
     Some((factor, symbol.trim()))
 }
 

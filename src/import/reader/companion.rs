@@ -5,10 +5,10 @@
 use super::rate::RATE_AGREEMENT;
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::options::ImportOptions;
-use crate::import::reader::findings::new_finding;
 use crate::import::reader::track_file::{Clock, Fact, TrackFile};
 use crate::import::source::{CompanionFile, ImportSource, base_name};
 use crate::recording::quality::{Check, QualityFinding, Severity};
+use crate::text::parse_positive;
 
 /// Paths that companion files of the export `file` may have, in the order in which they are read.
 pub(crate) fn companion_names(file: &str) -> Vec<String> {
@@ -53,7 +53,7 @@ pub(crate) fn read_camera_records(
 }
 
 fn record_finding(severity: Severity, value: (f64, &str), found: String) -> QualityFinding {
-    new_finding(Check::CameraRecord, severity, value, found, "--frame-rate-hz counts")
+    QualityFinding::advise((Check::CameraRecord, severity), value, found, "--frame-rate-hz counts")
 }
 
 /// Rates up to this one, 1/s, are placeholders: software that converts videos writes 1 where it knows none.
@@ -95,7 +95,12 @@ fn take_settings(
         let found = format!("{} says {rate_hz} frames/s, a placeholder that no video of a blade has", name());
         let advice = "give the rate at which the camera recorded as --frame-rate-hz";
         let value = (rate_hz, "1/s");
-        export.findings.push(new_finding(Check::CameraRecord, Severity::Caution, value, found, advice));
+        export.findings.push(QualityFinding::advise(
+            (Check::CameraRecord, Severity::Caution),
+            value,
+            found,
+            advice,
+        ));
         return Ok(());
     }
     if settings.step.frames > 1 {
@@ -328,10 +333,6 @@ impl<'a> CameraRecord<'a> {
 
 fn shorten_value(text: &str) -> String {
     text.chars().take(LONGEST_SHOWN).collect()
-}
-
-fn parse_positive(text: &str) -> Option<f64> {
-    text.parse::<f64>().ok().filter(|value| value.is_finite() && *value > 0.0)
 }
 
 /// Converts a text such as `1/10000`, `0.0001` or `10000`, with or without a unit, to an exposure time in

@@ -1,7 +1,6 @@
 //! Finds numbers that lost digits because a spreadsheet saved only the digits that it showed.
 
 use crate::import::error::ImportResult;
-use crate::import::reader::findings::new_finding;
 use crate::import::reader::table::DelimitedTable;
 use crate::recording::quality::{Check, QualityFinding, Severity};
 
@@ -55,8 +54,8 @@ pub(crate) fn cut_numbers_finding(
             table.cell_location(line, cell),
             cell + 1
         );
-        let number = (count as f64, "");
-        new_finding(Check::SpreadsheetRounding, Severity::Caution, number, found, CUT_NUMBER_ADVICE)
+        let (kind, number) = ((Check::SpreadsheetRounding, Severity::Caution), (count as f64, ""));
+        QualityFinding::advise(kind, number, found, CUT_NUMBER_ADVICE)
     }))
 }
 

@@ -4,7 +4,7 @@
 use super::spreadsheet;
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::reader::number::{CellNumber, parse_number};
-use crate::import::reader::rows::{TextRow, parse_rows};
+use crate::import::reader::rows::{TextRow, count_lines, parse_rows};
 
 /// Number of lines at the start of a file from which its dialect (delimiter and decimal mark) is found. Up to
 /// as many lines are added from the rest of the file, at even distances.
@@ -93,7 +93,7 @@ fn sample_lines(text: &str) -> Vec<NumberedLine<'_>> {
         bytes.get(from..).and_then(|rest| rest.iter().position(|b| *b == b'\n')).map(|end| from + end + 1)
     };
     while let Some(start) = line_end(at + stride) {
-        number += bytes[at..start].iter().filter(|b| **b == b'\n').count();
+        number += count_lines(&bytes[at..start]);
         at = start;
         let line = text.get(start..).and_then(|rest| rest.lines().next()).unwrap_or_default();
         if !line.trim().is_empty() {

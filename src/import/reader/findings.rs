@@ -6,7 +6,7 @@ use super::rate::{FrameRate, find_quantum_s};
 use super::track_file::Clock;
 use crate::import::options::CoordinateScale;
 use crate::recording::clock::OFF_GRID_LIMIT_FRAMES;
-use crate::recording::quality::{Check, QualityFinding, Severity};
+use crate::recording::quality::{Check, FrameGaps, QualityFinding, Severity};
 use crate::text::format_rate;
 use std::collections::BTreeMap;
 
@@ -32,20 +32,10 @@ const FEWEST_WHOLE: usize = 8;
 /// the phase of a component at a fifth of the frame rate by 7 degrees.
 const COARSE_FRAMES: f64 = 0.1;
 
-pub(crate) fn new_finding(
-    check: Check,
-    severity: Severity,
-    (value, unit): (f64, &str),
-    found: String,
-    advice: &str,
-) -> QualityFinding {
-    QualityFinding::new(check, severity, value, unit, found).with_advice(advice)
-}
-
 /// Finding about times that are rounded to a noticeable fraction of a frame; `implied_hz` is the rate that
 /// they imply.
-pub(crate) fn rounded_times_finding(file: &str, times: &[f64], implied_hz: f64) -> Option<QualityFinding> {
-    let quantum_s = find_quantum_s(times).filter(|_| !times.is_empty())?;
+pub(crate) fn rounded_times_finding(file: &str, clock: &Clock, implied_hz: f64) -> Option<QualityFinding> {
+    let quantum_s = find_quantum_s(clock).filter(|_| !clock.times().is_empty())?;
     let frames = quantum_s * implied_hz;
     // the rounding changes nothing if a frame lasts a whole number of rounding steps
     let even = (1.0 / frames - (1.0 / frames).round()).abs() <= 1e-6 && frames <= 1.0 + 1e-6;
@@ -54,7 +44,7 @@ pub(crate) fn rounded_times_finding(file: &str, times: &[f64], implied_hz: f64) 
     let advice = "the frames are taken from the grid of the rate, so nothing is lost; export frame numbers or \
         more digits if the rate is in doubt";
     (!even && frames > OFF_GRID_LIMIT_FRAMES / 100.0)
-        .then(|| new_finding(Check::RoundedTimes, severity, (quantum_s, "s"), found, advice))
+        .then(|| QualityFinding::advise((Check::RoundedTimes, severity), (quantum_s, "s"), found, advice))
 }
 
 /// Finding about the frame rate `implied_hz` that the times imply. `playback` says whether the times are
@@ -62,7 +52,7 @@ pub(crate) fn rounded_times_finding(file: &str, times: &[f64], implied_hz: f64) 
 pub(crate) fn implied_rate_finding(file: &str, implied_hz: f64, playback: bool) -> QualityFinding {
     let meaning = if playback { "taken as playback: the times only count frames" } else { "as declared" };
     let found = format!("{file}: the times imply {implied_hz:.6} rows/s ({meaning})");
-    new_finding(Check::ImpliedRate, Severity::Note, (implied_hz, "1/s"), found, "")
+    QualityFinding::advise((Check::ImpliedRate, Severity::Note), (implied_hz, "1/s"), found, "")
 }
 
 /// Finding about two statements of the frame rate that differ by more than their errors.
@@ -79,14 +69,14 @@ pub(crate) fn rate_difference(used: &FrameRate, other: &FrameRate) -> Option<Qua
     let advice = "find out from the camera which is right, and give it as --frame-rate-hz";
     let value = (other.hz, "1/s");
     (difference > used.error + other.error)
-        .then(|| new_finding(Check::ImpliedRate, Severity::Caution, value, found, advice))
+        .then(|| QualityFinding::advise((Check::ImpliedRate, Severity::Caution), value, found, advice))
 }
 
 /// Finding about times that lie on no grid and are ignored, because the file also has frame numbers.
 pub(crate) fn ignored_times_finding(file: &str) -> QualityFinding {
     let found = format!("{file}: the times follow no even rate, but its frame numbers place the rows");
     let advice = "if the camera has no even rate, name the column of times alone (--columns time=...)";
-    new_finding(Check::UnevenClock, Severity::Caution, (0.0, ""), found, advice)
+    QualityFinding::advise((Check::UnevenClock, Severity::Caution), (0.0, ""), found, advice)
 }
 
 /// Largest allowed relative error of a frame rate without a finding. A larger error shifts the frequencies
@@ -105,7 +95,7 @@ pub(crate) fn coarse_rate_finding(rate: &FrameRate) -> Option<QualityFinding> {
     let advice = "give the rate of the camera as --frame-rate-hz, or export more digits";
     let value = (rate.hz * rate.error, "1/s");
     (rate.error > COARSE_RATE)
-        .then(|| new_finding(Check::ImpliedRate, Severity::Caution, value, found, advice))
+        .then(|| QualityFinding::advise((Check::ImpliedRate, Severity::Caution), value, found, advice))
 }
 
 /// Finding about times that are declared as seconds but look like frame numbers.
@@ -115,7 +105,7 @@ pub(crate) fn counted_frames_finding(implied: &FrameRate) -> QualityFinding {
         format_rate(implied.hz)
     );
     let advice = "if they are, say --time frames and give --frame-rate-hz";
-    new_finding(Check::ImpliedRate, Severity::Serious, (implied.hz, "1/s"), found, advice)
+    QualityFinding::advise((Check::ImpliedRate, Severity::Serious), (implied.hz, "1/s"), found, advice)
 }
 
 /// Finding about coordinates in pixels that `--scale` takes for lengths.
@@ -127,14 +117,14 @@ pub(crate) fn unit_mismatch_finding(
     let (declared, stated) = (scale.describe(), unit.describe());
     let found = format!("--scale takes the coordinates for {declared}, but they are {stated} ({why})");
     let advice = "--scale counts; leave it out or correct it unless the coordinates were converted since";
-    new_finding(Check::Unit, Severity::Caution, (scale.metres(), "m"), found, advice)
+    QualityFinding::advise((Check::Unit, Severity::Caution), (scale.metres(), "m"), found, advice)
 }
 
 /// Finding about a direction of y in `--y-axis` that differs from the one that the file or its format states.
 pub(crate) fn y_axis_mismatch_finding(declared: &str, stated: &str, why: &str) -> QualityFinding {
     let found = format!("--y-axis says {declared}, but y points {stated} ({why})");
     let advice = "--y-axis counts; leave it out unless the picture or the coordinates were turned over";
-    new_finding(Check::YAxis, Severity::Caution, (0.0, ""), found, advice)
+    QualityFinding::advise((Check::YAxis, Severity::Caution), (0.0, ""), found, advice)
 }
 
 /// Findings about consecutive frames with a point at exactly (0, 0) or (-1, -1), and about coordinates that
@@ -152,20 +142,27 @@ pub(crate) fn position_findings(
         (Check::ZeroRun, 0.0, ZERO_RUN),
         (Check::MinusOneRun, OUTSIDE_PICTURE, if in_pixels { 1 } else { ZERO_RUN }),
     ] {
-        let (frame, run) = longest_run(x, y, value);
+        let is_at = |place: &Option<f64>| *place == Some(value);
+        let runs = FrameGaps::count_gaps(x.iter().zip(y).map(|(x, y)| !(is_at(x) && is_at(y))));
+        let (frame, run) = (runs.longest_from, runs.longest);
         if run >= fewest {
             let found = format!(
                 "{name}: {run} frames in a row from frame {frame} at exactly ({value}, {value}), which often \
                  means a lost point"
             );
             let advice = "if so, have the program export lost points as empty cells";
-            findings.push(new_finding(check, Severity::Caution, (run as f64, "frames"), found, advice));
+            findings.push(QualityFinding::advise(
+                (check, Severity::Caution),
+                (run as f64, "frames"),
+                found,
+                advice,
+            ));
         }
     }
     let (mut count, mut whole, mut largest) = (0, true, 0.0_f64);
-    for value in x.iter().chain(y).flatten() {
+    x.iter().chain(y).flatten().for_each(|value| {
         (count, whole, largest) = (count + 1, whole && value.fract() == 0.0, largest.max(value.abs()));
-    }
+    });
     let whole = whole && count >= FEWEST_WHOLE && largest > 0.0;
     let large = largest > PIXEL_LIKE_LIMIT && scale.metres() >= MILLIMETRE_M;
     if !in_pixels && (whole || large) {
@@ -178,22 +175,9 @@ pub(crate) fn position_findings(
         let advice = "they look like pixels; if so, give --scale as a length a pixel";
         let possible = !whole && largest * scale.metres() <= LARGEST_COORDINATE_M;
         let severity = if possible { Severity::Note } else { Severity::Caution };
-        findings.push(new_finding(Check::UnitSuspicion, severity, (largest, ""), found, advice));
+        findings.push(QualityFinding::advise((Check::UnitSuspicion, severity), (largest, ""), found, advice));
     }
     findings
-}
-
-/// The longest sequence of consecutive frames at exactly (`value`, `value`): index of its first frame, and
-/// its number of frames.
-fn longest_run(x: &[Option<f64>], y: &[Option<f64>], value: f64) -> (usize, usize) {
-    let (mut longest, mut run) = ((0, 0), 0);
-    for (frame, (x, y)) in x.iter().zip(y).enumerate() {
-        run = if *x == Some(value) && *y == Some(value) { run + 1 } else { 0 };
-        if run > longest.1 {
-            longest = (frame + 1 - run, run);
-        }
-    }
-    longest
 }
 
 /// Finding about positions that were removed because their confidence is below `limit`.
@@ -203,7 +187,7 @@ pub(crate) fn rejected_finding(name: &str, count: usize, tracked: usize, limit: 
         "{name}: {count} of {tracked} positions below the confidence {limit} count as missing ({:.1} %)",
         100.0 * share
     );
-    new_finding(Check::ConfidenceRejected, Severity::Note, (share, ""), found, "")
+    QualityFinding::advise((Check::ConfidenceRejected, Severity::Note), (share, ""), found, "")
 }
 
 // Tables whose rows are labels of single pictures that were picked from a video.
@@ -229,8 +213,9 @@ pub(crate) fn picked_frames_finding(file: &str, clock: &Clock) -> Option<Quality
          are no time series, and no spectrum, transition or fit of them has a meaning"
     );
     let value = (count as f64, "frames");
-    (!is_series)
-        .then(|| new_finding(Check::PickedFrames, Severity::Serious, value, found, PICKED_FRAMES_ADVICE))
+    (!is_series).then(|| {
+        QualityFinding::advise((Check::PickedFrames, Severity::Serious), value, found, PICKED_FRAMES_ADVICE)
+    })
 }
 
 #[cfg(test)]

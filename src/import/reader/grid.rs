@@ -1,6 +1,6 @@
 //! Puts the tracks of tip and head on one grid of frames.
 
-use super::track_file::Column;
+use super::track_file::{Column, convert_numbers};
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::options::{CoordinateScale, ImportOptions, TimeColumn};
 use crate::import::reader::calibration::ImportCalibration;
@@ -11,6 +11,7 @@ use crate::import::reader::track_file::TrackFile;
 use crate::import::reader::{findings, timing};
 use crate::import::source::ImportReport;
 use crate::recording::FrameGrid;
+use crate::recording::channel::tracked_span;
 use crate::recording::clock::MAX_FRAMES;
 use crate::recording::files::YAxis;
 
@@ -81,12 +82,12 @@ impl ClockGrid {
             let export = &exports[*file];
             let implied =
                 placed.implied_hz.map(|hz| findings::implied_rate_finding(export.file, hz, playback));
-            let times = export.clocks[*clock].times();
+            let clock = &export.clocks[*clock];
             let rounded = placed
                 .implied_hz
                 .filter(|_| !playback)
-                .and_then(|hz| findings::rounded_times_finding(export.file, &times, hz));
-            let uneven = placed.numbered && !playback && is_uneven(&export.clocks[*clock]);
+                .and_then(|hz| findings::rounded_times_finding(export.file, clock, hz));
+            let uneven = placed.numbered && !playback && is_uneven(clock);
             let ignored = uneven.then(|| findings::ignored_times_finding(export.file));
             for finding in implied.into_iter().chain(rounded).chain(ignored) {
                 // (two clocks of one file often give equal findings; one is enough)
@@ -167,7 +168,13 @@ impl GridPositions {
         let Some(PlacedClock { placed, shift, .. }) = clocks.used.iter().find(is_clock) else {
             return none();
         };
+        let numbered = placed.frames.iter().zip(0..);
+        let is_complete = placed.frames.len() == clocks.grid.frames
+            && numbered.into_iter().all(|(frame, number)| frame + shift == number);
         let column = |values: Column| {
+            if is_complete {
+                return values.iter().collect();
+            }
             let mut on_grid = empty();
             for (value, frame) in values.iter().zip(&placed.frames) {
                 let frame = usize::try_from(frame + shift).ok();
@@ -220,16 +227,14 @@ impl GridPositions {
     }
 
     pub(crate) fn tracked_frames(&self) -> Option<(usize, usize)> {
-        Some((self.x.iter().position(Option::is_some)?, self.x.iter().rposition(Option::is_some)?))
+        tracked_span(&self.x)
     }
 }
 
 fn convert_lengths(values: &mut [Option<f64>], scale: CoordinateScale) {
-    let metres = scale.metres();
-    // (a double cannot hold 1e-3 exactly: multiplying by it rounds twice, dividing by 1000 rounds once)
-    let parts = (1.0 / metres).round();
-    let is_fraction = matches!(scale, CoordinateScale::Unit(_)) && metres < 1.0 && metres == 1.0 / parts;
-    for value in values.iter_mut().flatten() {
-        *value = if is_fraction { *value / parts } else { *value * metres };
+    let values = values.iter_mut().flatten();
+    match scale {
+        CoordinateScale::Unit(metres) => convert_numbers(values, metres),
+        CoordinateScale::MetresPerPixel(metres) => values.for_each(|value| *value *= metres),
     }
 }

@@ -12,6 +12,7 @@ use crate::import::reader::column::CoordinateUnit;
 use crate::import::reader::instances::{
     InstanceFields, PointFields, RowOrder, RowPosition, RowStamp, TrackCollector,
 };
+use crate::import::source::base_name;
 use crate::recording::quality::{Check, QualityFinding, Severity};
 use portable_math as math;
 
@@ -306,8 +307,7 @@ struct RowCounts {
 /// Frame number at the end of the name of a picture in a cell.
 fn picture_number(table: &DelimitedTable, record: &RowView, cell: usize) -> ImportResult<f64> {
     let path = record.cell(cell);
-    let picture = path.rsplit(['/', '\\']).next().unwrap_or_default();
-    trailing_number(picture).ok_or_else(|| {
+    trailing_number(base_name(path)).ok_or_else(|| {
         let remedy = (
             "a picture whose name ends in its frame number, such as img0042.png",
             "rename the pictures by their frames in the table, or import the table of analyze_videos, which numbers \
@@ -394,7 +394,8 @@ fn count_decimals(text: &str, decimal: char) -> i32 {
         Some(at) => (&text[..at], text[at + 1..].replace('\u{2212}', "-").parse().unwrap_or(0)),
         None => (text, 0),
     };
-    let decimals = mantissa.find(decimal).map_or(0, |at| mantissa.len() - at - 1);
+    let is_mark = |byte: u8| char::from(byte) == decimal; // (decimal marks are ASCII)
+    let decimals = mantissa.bytes().position(is_mark).map_or(0, |at| mantissa.len() - at - 1);
     i32::try_from(decimals).unwrap_or(0).saturating_sub(exponent)
 }
 

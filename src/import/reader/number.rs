@@ -1,6 +1,8 @@
 //! Reads numbers as they are spelled in tables: with decimal point or comma, with typographic minus signs, or
 //! as a word that means a missing value.
 
+use crate::text::parse_finite;
+
 /// Texts of a cell that mean a missing value, in lower case.
 const MISSING_WORDS: [&str; 9] = ["", "nan", "na", "none", "-", "*", "null", "#n/a", "n/a"];
 /// Maximum length of a number with a decimal comma or a typographic minus sign, bytes. A number with 17
@@ -32,11 +34,6 @@ pub(crate) fn parse_number(text: &str, decimal: char) -> CellNumber {
         return CellNumber::Value(value);
     }
     if is_missing(text) { CellNumber::Missing } else { parse_spelled(text, decimal) }
-}
-
-/// Parses a finite number. Rust's parser also accepts `inf`, `nan` and `infinity`; these are refused here.
-fn parse_finite(text: &str) -> Option<f64> {
-    text.parse::<f64>().ok().filter(|value| value.is_finite())
 }
 
 fn is_missing(text: &str) -> bool {

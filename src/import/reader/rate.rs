@@ -1,8 +1,10 @@
 //! Frame rates, each with the largest error that its source allows.
 
 use super::track_file::{Clock, TrackFile};
-use crate::recording::clock;
+use crate::recording::clock::{self, FrameFit};
 use crate::text::format_rate;
+use portable_math as math;
+use std::borrow::Cow;
 
 /// Largest allowed relative difference between two statements of the frame rate, in addition to their errors.
 /// If they differ by more, the import is refused.
@@ -28,18 +30,24 @@ pub(crate) const UNEVEN_RATE: f64 = 0.2;
 
 /// Whether the times of a clock lie on no grid of equal steps, whatever its rate.
 pub(crate) fn is_uneven(clock: &Clock) -> bool {
-    *clock.uneven.get_or_init(|| has_uneven_times(&clock.times(), clock.digit))
+    *clock.uneven.get_or_init(|| {
+        fit_own_grid(clock).is_some_and(|fit| {
+            let times = clock.times();
+            let limit = EVEN_FRAMES + rounding_s(clock) / fit.frame_s;
+            let far = (0..times.len()).filter(|row| fit.distance(&times, *row) > limit).count();
+            far > 1 && far as f64 > UNEVEN_ROWS * times.len() as f64
+        })
+    })
 }
 
-/// Whether times lie on no grid. `digit_s` is the value of their last digit, s.
-fn has_uneven_times(times: &[f64], digit_s: f64) -> bool {
-    let Some(step_s) = clock::median_step_s(times).filter(|step_s| *step_s > 0.0) else { return false };
-    let fit = clock::number_frames(times, step_s);
-    fit.is_some_and(|fit| {
-        let limit = EVEN_FRAMES + rounding_s(times, digit_s) / fit.frame_s;
-        let far = (0..times.len()).filter(|row| fit.distance(times, *row) > limit).count();
-        far > 1 && far as f64 > UNEVEN_ROWS * times.len() as f64
-    })
+/// The grid that fits the times of a clock from their median step; `None` if that is not positive.
+pub(crate) fn fit_own_grid(clock: &Clock) -> Option<&FrameFit> {
+    let fit = || {
+        let times = clock.times();
+        let step_s = clock::median_step_s(&times).filter(|step_s| *step_s > 0.0)?;
+        clock::number_frames(&times, step_s)
+    };
+    clock.fit.get_or_init(fit).as_ref()
 }
 
 /// Whether an export has a clock without frame numbers whose times lie on no grid.
@@ -64,7 +72,7 @@ impl FrameRate {
     pub(crate) fn from_statement(hz: f64, source: impl Into<String>) -> Self {
         let written = hz.to_string();
         let decimals = written.split_once('.').map_or(0, |(_, decimals)| decimals.len());
-        let half_digit = if decimals > 0 { 0.5 / portable_math::powi(10.0, decimals as i32) } else { 0.0 };
+        let half_digit = if decimals > 0 { 0.5 / math::powi(10.0, decimals as i32) } else { 0.0 };
         Self { hz, error: OSCILLATOR_ERROR.max(half_digit / hz), source: source.into() }
     }
 
@@ -90,28 +98,26 @@ pub(crate) fn implied_rate(export: &TrackFile) -> Option<FrameRate> {
     let timed = export.clocks.iter().filter(|clock| clock.time.is_some());
     let longest = timed.max_by_key(|clock| clock.len())?;
     let (frames, times, hz) = number_rows(longest)?;
-    let quantum_s = find_quantum_s(&times);
+    let quantum_s = find_quantum_s(longest);
     let hz = clock::simplest_rate(hz, |rate| times_fit_rate(&times, &frames, rate, quantum_s));
     let source = format!("the times of {}", export.file);
-    let rounding_s = rounding_s(&times, longest.digit);
+    let rounding_s = rounding_s(longest);
     let written_s = if longest.digit > 0.0 { longest.digit } else { rounding_s };
     Some(FrameRate { hz, error: times_error(&times, &frames, rounding_s, written_s), source })
 }
 
 /// Frame numbers and times of the rows of a clock, and the frame rate, 1/s. If the file has frame numbers,
 /// the rate is that between the first and last row; otherwise it is the rate of the grid that fits the times.
-fn number_rows(clock: &Clock) -> Option<(Vec<f64>, Vec<f64>, f64)> {
+fn number_rows(clock: &Clock) -> Option<(Vec<f64>, Cow<'_, [f64]>, f64)> {
     if let (Some(frames), Some(times)) = (&clock.frame, &clock.time) {
         let rows = frames.iter().zip(times.iter()).filter_map(|(frame, time)| frame.zip(time));
         let (frames, times): (Vec<f64>, Vec<f64>) = rows.unzip();
         let hz = (frames.last()? - frames.first()?) / (times.last()? - times.first()?);
-        return (hz.is_finite() && hz > 0.0).then_some((frames, times, hz));
+        return (hz.is_finite() && hz > 0.0).then_some((frames, times.into(), hz));
     }
-    let times = clock.times();
-    let step_s = clock::median_step_s(&times)?;
-    let fit = (step_s > 0.0).then(|| clock::number_frames(&times, step_s))??;
+    let fit = fit_own_grid(clock)?;
     let frames = fit.frames.iter().map(|frame| *frame as f64).collect();
-    Some((frames, times, 1.0 / fit.frame_s))
+    Some((frames, clock.times(), 1.0 / fit.frame_s))
 }
 
 /// Largest relative error of the frame rate that times imply. `digit_s` is the value of their last digit that
@@ -149,10 +155,10 @@ fn is_round(hz: f64) -> bool {
     format!("{hz:.1e}").parse::<f64>().is_ok_and(|round| (hz / round - 1.0).abs() <= EQUAL_STEPS)
 }
 
-/// Step to which times are rounded, s: the largest power of ten of which all times are multiples, and at
-/// least `digit_s`, the value of their last digit.
-pub(crate) fn rounding_s(times: &[f64], digit_s: f64) -> f64 {
-    find_quantum_s(times).unwrap_or(digit_s).max(digit_s)
+/// Step to which the times of a clock are rounded, s: the largest power of ten of which all times are
+/// multiples, and at least the value of their last digit.
+pub(crate) fn rounding_s(clock: &Clock) -> f64 {
+    find_quantum_s(clock).unwrap_or(clock.digit).max(clock.digit)
 }
 
 /// Steps to which programs round times, s.
@@ -169,12 +175,15 @@ fn times_fit_rate(times: &[f64], frames: &[f64], rate_hz: f64, quantum_s: Option
     times.iter().zip(frames).all(fits)
 }
 
-/// Largest step of `QUANTA_S`, s, of which all times are multiples; `None` if there is none.
-pub(crate) fn find_quantum_s(times: &[f64]) -> Option<f64> {
-    QUANTA_S.into_iter().find(|quantum| are_multiples(times, *quantum))
+/// Largest step of `QUANTA_S`, s, of which all times of a clock are multiples; `None` if there is none.
+pub(crate) fn find_quantum_s(clock: &Clock) -> Option<f64> {
+    *clock.quantum_s.get_or_init(|| {
+        let times = clock.times();
+        QUANTA_S.into_iter().find(|quantum| are_multiples(&times, *quantum))
+    })
 }
 
 /// Whether every time is a multiple of `quantum_s`.
 fn are_multiples(times: &[f64], quantum_s: f64) -> bool {
-    times.iter().all(|t| (t / quantum_s - (t / quantum_s).round()).abs() <= 1e-6)
+    times.iter().all(|t| (t / quantum_s - math::round(t / quantum_s)).abs() <= 1e-6)
 }

@@ -81,7 +81,27 @@ impl<'r> RowView<'r> {
 
 /// Number of line feeds in `bytes`.
 pub(crate) fn count_lines(bytes: &[u8]) -> usize {
-    bytes.iter().filter(|byte| **byte == b'\n').count()
+    // (the count of 255 bytes fits into a byte, so that the processor counts in many bytes at once)
+    let count = |part: &[u8]| part.iter().map(|byte| u8::from(*byte == b'\n')).sum::<u8>();
+    bytes.chunks(255).map(|part| usize::from(count(part))).sum()
+}
+
+/// Number of bytes that [`mark_bytes`] compares at once.
+const CHUNK: usize = 8;
+
+/// Marks the bytes of a chunk that are equal to `wanted`: the highest bit of byte i of the result is 1 if
+/// byte i of the chunk is equal.
+fn mark_bytes(chunk: &[u8], wanted: u8) -> u64 {
+    const ONES: u64 = u64::MAX / 255;
+    const LOW_BITS: u64 = 0x7f * ONES;
+    let word = match chunk.try_into() {
+        Ok(bytes) => u64::from_le_bytes(bytes),
+        // (the end of a text; zero is no byte that is looked for)
+        Err(_) => chunk.iter().rev().fold(0, |word, byte| word << 8 | u64::from(*byte)),
+    };
+    let difference = word ^ (u64::from(wanted) * ONES);
+    // (the sum carries into the highest bit of a byte unless its other bits are zero)
+    !(((difference & LOW_BITS) + LOW_BITS) | difference | LOW_BITS)
 }
 
 /// Removes the blanks and the quotation marks around the text of a cell.
@@ -126,14 +146,15 @@ impl<'t> RowReader<'t> {
     pub(crate) fn next_row(&mut self) -> ImportResult<Option<RowView<'_>>> {
         let text = self.text;
         while let Some(rest) = text.get(self.next..).filter(|rest| !rest.is_empty()) {
-            let end = rest.find('\n').unwrap_or(rest.len());
-            let (row, line) = (rest[..end].trim_end_matches('\r'), self.next_line);
+            let (row, has_quotes) = self.split_line(rest);
+            let line = self.next_line;
             self.start = self.next;
-            (self.next, self.next_line) = (self.next + end + 1, line + 1);
+            (self.next, self.next_line) = (self.next + row.len() + 1, line + 1);
+            let row = row.trim_end_matches('\r');
             if row.is_empty() || is_comment(row) {
                 continue;
             }
-            let lines = self.split_row(row);
+            let lines = if has_quotes { self.split_quoted_row() } else { 1 };
             if lines > 1 {
                 return Err(ImportError::format(
                     format!("{}:{line}:1", self.file),
@@ -147,18 +168,45 @@ impl<'t> RowReader<'t> {
         Ok(None)
     }
 
-    /// Splits a row into cells. Returns the number of lines that the row occupies; a quoted cell may contain
-    /// line ends.
-    fn split_row(&mut self, row: &'t str) -> usize {
+    /// Splits the first line of a text into cells, as far as they are not in quotation marks. Returns the
+    /// line, and whether a delimiter other than blanks separates its cells and one of them has quotation
+    /// marks.
+    fn split_line(&mut self, text: &'t str) -> (&'t str, bool) {
         self.cells.clear();
-        let Some(byte) = self.delimiter.byte() else {
-            self.cells.extend(row.split_whitespace().map(Cow::Borrowed));
-            return 1;
+        let Some(delimiter) = self.delimiter.byte() else {
+            let line = text.split('\n').next().unwrap_or_default();
+            self.cells.extend(line.split_whitespace().map(Cow::Borrowed));
+            return (line, false);
         };
-        if !row.contains('"') {
-            self.cells.extend(row.split(char::from(byte)).map(Cow::Borrowed));
-            return 1;
+        let (mut start, mut end, mut has_quotes) = (0, text.len(), false);
+        'line: for (index, chunk) in text.as_bytes().chunks(CHUNK).enumerate() {
+            let mut marks =
+                [delimiter, b'\n', b'"'].iter().fold(0, |all, mark| all | mark_bytes(chunk, *mark));
+            while marks != 0 {
+                let at = CHUNK * index + marks.trailing_zeros() as usize / 8;
+                match text.as_bytes()[at] {
+                    b'\n' => {
+                        end = at;
+                        break 'line;
+                    }
+                    b'"' => has_quotes = true,
+                    _ => {
+                        self.cells.push(Cow::Borrowed(&text[start..at]));
+                        start = at + 1;
+                    }
+                }
+                marks &= marks - 1;
+            }
         }
+        self.cells.push(Cow::Borrowed(text[start..end].trim_end_matches('\r')));
+        (&text[..end], has_quotes)
+    }
+
+    /// Splits the current row, which has cells in quotation marks, into cells. Returns the number of lines
+    /// that the row occupies; a quoted cell may contain line ends.
+    fn split_quoted_row(&mut self) -> usize {
+        let Some(byte) = self.delimiter.byte() else { return 1 };
+        self.cells.clear();
         let (text, start) = (self.text, self.start);
         let is_next = |(from, reader): &(usize, csv::Reader<&[u8]>)| {
             let between = text.get(from + reader.position().byte() as usize..start);
@@ -186,4 +234,31 @@ pub(crate) fn parse_rows(lines: &[NumberedLine], delimiter: Delimiter) -> Vec<Te
         Some(TextRow { line: *line, cells, start: 0 })
     };
     lines.iter().filter_map(parse).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_are_found_wherever_they_are() {
+        for length in 0..=CHUNK {
+            for chunk in
+                [vec![b','; length], vec![b'+'; length], vec![0xac; length], (0x28..).take(length).collect()]
+            {
+                let found = mark_bytes(&chunk, b',');
+                let is_marked = |at: usize| found >> (8 * at) & 0xff;
+                let expected = |at: usize| if chunk.get(at) == Some(&b',') { 0x80 } else { 0 };
+                assert!((0..CHUNK).all(|at| is_marked(at) == expected(at)), "{chunk:?} {found:x}");
+            }
+        }
+    }
+
+    #[test]
+    fn lines_are_counted_in_long_texts() {
+        for lines in [0, 1, 254, 255, 256, 1000] {
+            assert_eq!(count_lines("\n".repeat(lines).as_bytes()), lines);
+            assert_eq!(count_lines("ab\n".repeat(lines).as_bytes()), lines);
+        }
+    }
 }

@@ -2,10 +2,13 @@
 //! equally spaced frames that fits the times.
 
 use crate::import::error::{ImportError, ImportResult};
-use crate::import::reader::rate::{RATE_AGREEMENT, UNEVEN_RATE, find_quantum_s, is_uneven, rounding_s};
+use crate::import::reader::rate::{
+    RATE_AGREEMENT, UNEVEN_RATE, find_quantum_s, fit_own_grid, is_uneven, rounding_s,
+};
 use crate::import::reader::track_file::{Clock, Column, Track, TrackFile};
 use crate::recording::channel::median_in_place;
 use crate::recording::clock::{self, FrameFit, MAX_FRAMES, OFF_GRID_LIMIT_FRAMES};
+use portable_math as math;
 
 /// Largest `--frame-step` that an error message suggests. A message suggests this option if the declared rate
 /// is a whole multiple of the rate that the times imply.
@@ -97,7 +100,7 @@ pub(crate) fn refuse_clock_mismatch(
         placed.frames.first().filter(|_| timed).map(|first| placed.start_s - *first as f64 / rate_hz)
     };
     let [Some(first_s), Some(other_s)] = placed.map(zero_s) else { return Ok(()) };
-    let rounding_s = find_quantum_s(&rows.clock.times()).unwrap_or(0.0);
+    let rounding_s = find_quantum_s(rows.clock).unwrap_or(0.0);
     // (the rates of the two clocks may differ within the tolerance, and then their times drift apart over
     // many frames)
     let [first, other] = placed.map(|placed| placed.frames.first().copied().unwrap_or(0));
@@ -167,7 +170,7 @@ fn place_by_number(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<Ro
         span_s.map(|span| (last - first) as f64 / span).filter(|rate| rate.is_finite() && *rate > 0.0);
     if let Some(implied) = implied_hz.filter(|_| !declared.playback) {
         // in a short recording, the rounding of the first and last time changes the implied rate
-        let rounding_s = find_quantum_s(&clock.times()).unwrap_or(0.0);
+        let rounding_s = find_quantum_s(clock).unwrap_or(0.0);
         let expected_s = (last - first) as f64 / declared.rate_hz;
         if span_s.is_none_or(|span| (span - expected_s).abs() > rounding_s) {
             check_rate(rows, implied, declared, None)?;
@@ -203,8 +206,8 @@ fn refuse_disagreeing_clocks(rows: ClockRows, frames: &[i64]) -> ImportResult<()
         .collect();
     let mut per_frame: Vec<f64> = steps.iter().map(|(_, counted, step_s)| step_s / counted).collect();
     let Some(middle) = per_frame.len().checked_sub(1).map(|last| last / 2) else { return Ok(()) };
-    let median_s = *per_frame.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let rounding_s = 2.0 * rounding_s(&rows.clock.times(), rows.clock.digit);
+    let median_s = math::select_number(&mut per_frame, middle);
+    let rounding_s = 2.0 * rounding_s(rows.clock);
     let differs = |frame_s: f64, (_, counted, step_s): &(usize, f64, f64)| {
         (step_s - counted * frame_s).abs() > MOST_APART * frame_s + rounding_s
     };
@@ -246,10 +249,11 @@ fn apply_frame_step(frames: &mut [i64], step: usize) -> ImportResult<()> {
 }
 
 fn place_by_time(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<RowFrames> {
-    let times = read_times(rows, declared)?;
+    check_times(rows, declared)?;
+    let times = rows.clock.times();
     let row_s = declared.step as f64 / declared.rate_hz;
     if !declared.playback && is_uneven(rows.clock) {
-        return keep_times(rows, times, declared);
+        return keep_times(rows, times.into_owned(), declared);
     }
     let fit = if declared.playback {
         fit_shown_grid(rows, &times)?
@@ -310,7 +314,7 @@ fn refuse_coarse_times(
     declared: DeclaredTiming,
 ) -> ImportResult<()> {
     let limit_s = 2.0 * OFF_GRID_LIMIT_FRAMES * row_s; // (rounding changes a time by half a quantum at most)
-    let quantum_s = find_quantum_s(times).filter(|quantum| *quantum > limit_s);
+    let quantum_s = find_quantum_s(rows.clock).filter(|quantum| *quantum > limit_s);
     let Some(quantum_s) = quantum_s else { return Ok(()) };
     let steps = times.windows(2).map(|w| w[1] - w[0]);
     let (least, most) =
@@ -333,9 +337,8 @@ fn refuse_coarse_times(
 
 /// Fits a frame grid whose rate is taken from the times, not from the user.
 fn fit_shown_grid(rows: ClockRows, times: &[f64]) -> ImportResult<FrameFit> {
-    let fit = clock::median_step_s(times).and_then(|seed_s| clock::number_frames(times, seed_s));
-    let row = match fit {
-        Some(fit) if fit.is_on_grid() => return Ok(fit),
+    let row = match fit_own_grid(rows.clock) {
+        Some(fit) if fit.is_on_grid() => return Ok(fit.clone()),
         Some(fit) => fit.worst_row,
         None => {
             let jump = |row: usize| times[row] - times[row - 1];
@@ -350,19 +353,19 @@ fn format_number(value: f64) -> String {
     if value == 0.0 || (1e-9..1e15).contains(&value.abs()) { value.to_string() } else { format!("{value:e}") }
 }
 
-fn read_times(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<Vec<f64>> {
-    let mut times: Vec<f64> = Vec::with_capacity(rows.clock.len());
-    for row in 0..rows.clock.len() {
-        let Some(time) = rows.clock.time.as_ref().and_then(|column| column.get(row)) else {
-            return Err(cell_error(rows, row, NO_NUMBER, None));
-        };
-        if times.last() == Some(&time) && !repeats_row_above(rows, row) && are_rows_frames(rows, declared) {
+/// Refuses a row without a time, and a time that is not after that of the row above.
+fn check_times(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<()> {
+    let Some(times) = &rows.clock.time else { return Err(cell_error(rows, 0, NO_NUMBER, None)) };
+    let mut last = None;
+    for (row, time) in times.iter().enumerate() {
+        let Some(time) = time else { return Err(cell_error(rows, row, NO_NUMBER, None)) };
+        if last == Some(time) && !repeats_row_above(rows, row) && are_rows_frames(rows, declared) {
             return Err(cell_error(rows, row, ROUNDED_TIME, Some(time)));
         }
-        refuse_disorder(rows, row, times.last().copied(), time)?;
-        times.push(time);
+        refuse_disorder(rows, row, last, time)?;
+        last = Some(time);
     }
-    Ok(times)
+    Ok(())
 }
 
 /// Whether the last digit of the times is larger than a frame, and the number of rows is the number of frames

@@ -2,9 +2,8 @@
 
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::options::ImportOptions;
-use crate::import::reader::findings::new_finding;
 use crate::import::reader::track_file::TrackFile;
-use crate::recording::quality::{Check, Severity};
+use crate::recording::quality::{Check, QualityFinding, Severity};
 use crate::toml_file::suggest_key;
 use std::collections::HashMap;
 
@@ -39,7 +38,7 @@ pub(crate) fn number_repeated_names(exports: &mut [TrackFile]) {
                 export.file
             );
             let advice = "choose one with --point, or give each track a name of its own and export again";
-            new_finding(Check::TrackNames, Severity::Caution, (times as f64, ""), found, advice)
+            QualityFinding::advise((Check::TrackNames, Severity::Caution), (times as f64, ""), found, advice)
         }));
     }
 }

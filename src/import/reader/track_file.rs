@@ -6,8 +6,10 @@ use crate::import::error::TextLocation;
 use crate::import::reader::column::{CoordinateUnit, TimeUnit};
 use crate::import::reader::table::DelimitedTable;
 use crate::import::source::base_name;
+use crate::recording::clock::FrameFit;
 use crate::recording::files::YAxis;
 use crate::recording::quality::QualityFinding;
+use std::borrow::Cow;
 use std::cell::OnceCell;
 
 /// Frame number and time of every row of one or more tracks.
@@ -23,8 +25,11 @@ pub(crate) struct Clock {
     pub time: Option<Column>,
     /// Value of one unit in the last written digit of the times, in their unit; 0 if it is not known.
     pub digit: f64,
-    /// Whether the times lie on no grid; computed on first use.
+    /// What the times show, each computed on first use: whether they lie on no grid, the grid that fits them
+    /// from their median step, and the step to which they are rounded, s.
     pub uneven: OnceCell<bool>,
+    pub fit: OnceCell<Option<FrameFit>>,
+    pub quantum_s: OnceCell<Option<f64>>,
 }
 
 /// Converts line numbers to `u32`, the type in which [`Clock`] stores them.
@@ -34,8 +39,11 @@ pub(crate) fn clock_lines(lines: impl IntoIterator<Item = usize>) -> Vec<u32> {
 
 impl Clock {
     /// The times that are not missing.
-    pub(crate) fn times(&self) -> Vec<f64> {
-        self.time.iter().flat_map(Column::iter).flatten().collect()
+    pub(crate) fn times(&self) -> Cow<'_, [f64]> {
+        match &self.time {
+            Some(Column(times)) if !times.iter().any(|time| time.is_nan()) => Cow::Borrowed(times),
+            times => Cow::Owned(times.iter().flat_map(Column::iter).flatten().collect()),
+        }
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -123,6 +131,17 @@ impl<'a> TrackFile<'a> {
     }
 }
 
+/// Converts numbers from a unit of the given length. 1e-3 is not exact in binary: multiplying by it rounds
+/// twice, dividing by 1000 rounds once.
+pub(crate) fn convert_numbers<'n>(numbers: impl Iterator<Item = &'n mut f64>, unit: f64) {
+    let parts = (1.0 / unit).round();
+    if unit < 1.0 && unit == 1.0 / parts {
+        numbers.for_each(|number| *number /= parts);
+    } else {
+        numbers.for_each(|number| *number *= unit);
+    }
+}
+
 /// Numbers of a column of a table. A missing number is stored as NaN and returned as `None`.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Column(Vec<f64>);
@@ -140,12 +159,9 @@ impl Column {
         self.0.iter().map(|value| Some(*value).filter(|value| !value.is_nan()))
     }
 
-    pub(crate) fn scale(&mut self, factor: f64) {
-        self.0.iter_mut().for_each(|value| *value *= factor);
-    }
-
-    pub(crate) fn divide(&mut self, divisor: f64) {
-        self.0.iter_mut().for_each(|value| *value /= divisor);
+    /// Converts all numbers from a unit of the given length.
+    pub(crate) fn convert_unit(&mut self, unit: f64) {
+        convert_numbers(self.0.iter_mut(), unit);
     }
 
     pub(crate) fn has_values(&self) -> bool {

@@ -4,6 +4,7 @@
 use super::instants::{InstantKind, InstantNotFound, ReversalInstants};
 use super::phase::ReversalPhase;
 use crate::recording::Recording;
+use crate::text::parse_finite;
 use serde::Serialize;
 use std::fmt;
 use std::ops::Range;
@@ -204,7 +205,7 @@ fn parse_end(part: &str) -> Result<WindowEnd, &'static str> {
         return Ok(WindowEnd::Open);
     }
     if !part.starts_with(|c: char| c.is_alphabetic()) {
-        return parse_seconds(part).map(WindowEnd::Time).ok_or("seconds");
+        return parse_finite(part).map(WindowEnd::Time).ok_or("seconds");
     }
     let named = |anchor: InstantKind| Some((anchor, part.strip_prefix(anchor.name())?));
     let (anchor, rest) = InstantKind::ALL.into_iter().find_map(named).ok_or(EXPECTED_END)?;
@@ -212,7 +213,7 @@ fn parse_end(part: &str) -> Result<WindowEnd, &'static str> {
     let offset_s = match rest.trim() {
         "" => 0.0,
         rest if rest.starts_with(['+', '-']) => {
-            parse_seconds(rest).ok_or("an offset in seconds after `+` or `-`")?
+            parse_finite(rest).ok_or("an offset in seconds after `+` or `-`")?
         }
         _ => return Err("`+` or `-` and an offset in seconds after the instant"),
     };
@@ -234,11 +235,6 @@ fn parse_reversal(text: &str) -> Result<(usize, &str), &'static str> {
     let (number, rest) = rest.split_once(']').ok_or("`]` after the number of the reversal")?;
     let number = number.parse().ok().filter(|n| *n >= 1);
     Ok((number.ok_or("the number of a reversal, counted from 1, in `[]`")?, rest))
-}
-
-/// Parses a finite number; words such as `inf` are not seconds.
-fn parse_seconds(text: &str) -> Option<f64> {
-    text.parse().ok().filter(|value: &f64| value.is_finite())
 }
 
 #[cfg(test)]

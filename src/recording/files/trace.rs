@@ -3,6 +3,7 @@
 use super::FilesError;
 use crate::recording::clock::{self, FRAMES_WITHOUT_ROWS, FrameFit};
 use crate::recording::{FrameGrid, Recording, Traces};
+use crate::text::parse_finite;
 use rayon::prelude::*;
 use std::fmt::Write;
 
@@ -18,6 +19,8 @@ const POSITIONS: usize = 4;
 /// Number of rows in a block of text (about half a megabyte); [`BLOCKS`] blocks are written in parallel.
 const BLOCK_ROWS: usize = 4096;
 const BLOCKS: usize = 8;
+/// Usual length of a cell, bytes.
+const CELL_BYTES: usize = 16;
 
 /// A rounded frame rate is always accepted if every time is within this distance, in frames, of its frame.
 /// Times printed with 16 digits are far closer to their frames.
@@ -39,7 +42,7 @@ pub fn trace_blocks(recording: &Recording) -> impl Iterator<Item = String> {
     let frames = recording.grid().frames;
     let rows = (0..frames).step_by(BLOCK_ROWS * BLOCKS).flat_map(move |start| {
         let block = |index: usize| {
-            let mut text = String::new();
+            let mut text = String::with_capacity(BLOCK_ROWS * (columns.len() + 1) * CELL_BYTES);
             for frame in start + index * BLOCK_ROWS..frames.min(start + (index + 1) * BLOCK_ROWS) {
                 let cells = columns.iter().map(|(_, column)| column.get(frame).copied().flatten());
                 push_trace_row(&mut text, recording.time_s(frame), cells);
@@ -68,7 +71,7 @@ pub fn push_trace_row(text: &mut String, time_s: f64, cells: impl IntoIterator<I
 /// long.
 fn push_number(text: &mut String, value: f64) {
     if value == 0.0 || (1e-4..1e16).contains(&value.abs()) {
-        let mut buffer = ryu::Buffer::new();
+        let mut buffer = zmij::Buffer::new();
         let digits = buffer.format_finite(value); // (in this range: plain digits, always with a point)
         text.push_str(digits.strip_suffix(".0").unwrap_or(digits));
     } else {
@@ -149,14 +152,14 @@ impl<'a> TraceTable<'a> {
             );
             FilesError::refuse(file, problem)
         };
-        let finite = |cell: &str| cell.parse::<f64>().ok().filter(|v| v.is_finite());
         let first = cells.next().unwrap_or_default();
-        let time = finite(first).ok_or_else(|| refuse(names[0], first, "a finite number of seconds"))?;
+        let time =
+            parse_finite(first).ok_or_else(|| refuse(names[0], first, "a finite number of seconds"))?;
         if self.times_s.last().is_some_and(|&last| time <= last) {
             return Err(refuse(names[0], first, "a time after that of the row above"));
         }
         for ((cell, name), column) in cells.zip(&names[1..]).zip(&mut self.columns) {
-            let value = finite(cell);
+            let value = parse_finite(cell);
             if value.is_none() && !cell.is_empty() {
                 return Err(refuse(name, cell, "a finite number or an empty cell"));
             }

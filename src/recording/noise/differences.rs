@@ -1,6 +1,7 @@
 //! Noise and step of one column, from the differences between neighbouring frames.
 
-use crate::recording::channel::median_in_place;
+use crate::recording::channel::{collect_numbers, median_in_place};
+use portable_math as math;
 
 /// Median absolute deviation of a normal distribution in units of its standard deviation.
 const MAD_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
@@ -23,18 +24,13 @@ const MOST_STEPS: f64 = 20_000.0;
 /// slowly from frame to frame do not contribute.
 #[must_use]
 pub fn noise_floor(samples: &[Option<f64>]) -> Option<f64> {
-    let third = |w: &[Option<f64>]| match *w {
-        [Some(a), Some(b), Some(c), Some(d)] => Some((d - 3.0 * c + 3.0 * b - a).abs()),
-        _ => None,
-    };
-    noise_of_differences(samples.windows(4).filter_map(third), 3)
+    noise_of_differences(third_differences(samples).map(f64::abs), 3)
 }
 
 /// Standard deviation of white noise from the mean square of the third differences. Steps of a sensor that
 /// are as large as its noise do not change it, as they change [`noise_floor`]; outliers do.
 pub(crate) fn mean_square_noise(samples: &[Option<f64>]) -> Option<f64> {
-    let squares: Vec<f64> =
-        (3..samples.len()).filter_map(|k| difference_at(samples, k, 3)).map(|d| d * d).collect();
+    let squares: Vec<f64> = third_differences(samples).map(|d| d * d).collect();
     let mean = squares.iter().sum::<f64>() / squares.len() as f64;
     (squares.len() >= FEWEST_DIFFERENCES).then(|| (mean / DIFFERENCE_VARIANCES[3]).sqrt())
 }
@@ -42,7 +38,7 @@ pub(crate) fn mean_square_noise(samples: &[Option<f64>]) -> Option<f64> {
 /// Standard deviation of the white noise whose absolute differences of this order have the same median as
 /// `sizes`.
 pub(crate) fn noise_of_differences(sizes: impl Iterator<Item = f64>, order: usize) -> Option<f64> {
-    let mut sizes: Vec<f64> = sizes.collect();
+    let mut sizes = collect_numbers(sizes);
     if sizes.len() < FEWEST_DIFFERENCES {
         return None;
     }
@@ -60,30 +56,69 @@ const DIFFERENCE_WEIGHTS: [&[f64]; 6] = [
 ];
 
 /// The difference of an order up to 5 that ends at `frame`.
+#[inline(always)] // (the order is mostly known to the compiler, which leaves one case)
 pub(crate) fn difference_at(samples: &[Option<f64>], frame: usize, order: usize) -> Option<f64> {
     let stencil = samples.get(frame.checked_sub(order)?..=frame)?;
-    let weighted = stencil.iter().rev().zip(DIFFERENCE_WEIGHTS[order]);
+    match *stencil {
+        [Some(a), Some(b)] => Some(b - a),
+        [Some(a), Some(b), Some(c)] => Some(c - 2.0 * b + a),
+        [Some(a), Some(b), Some(c), Some(d)] => Some(d - 3.0 * c + 3.0 * b - a),
+        [_, _] | [_, _, _] | [_, _, _, _] => None,
+        _ => weighted_difference(stencil),
+    }
+}
+
+fn weighted_difference(stencil: &[Option<f64>]) -> Option<f64> {
+    let weighted = stencil.iter().rev().zip(DIFFERENCE_WEIGHTS[stencil.len() - 1]);
     weighted.map(|(sample, weight)| Some((*sample)? * weight)).sum()
+}
+
+/// The third differences of all frames in which they exist.
+fn third_differences(samples: &[Option<f64>]) -> impl Iterator<Item = f64> {
+    samples.windows(4).filter_map(|stencil| difference_at(stencil, 3, 3))
+}
+
+/// The third difference that is centred between `frame` and the frame before it. A jump of size 1 between
+/// these two frames gives -2 here, and 1 for the frames before and after it.
+#[inline]
+pub(crate) fn difference_across(samples: &[Option<f64>], frame: usize) -> Option<f64> {
+    difference_at(samples, frame + 1, 3)
+}
+
+/// The third difference at the frame `beside`, which is next to a jump at the frame `jump`, as a fraction of
+/// that at the jump; positive if their signs differ. Without noise, it is 0.5 for a jump of the position, and
+/// 1 for a jump of the speed.
+pub(crate) fn fraction_beside_jump(samples: &[Option<f64>], jump: usize, beside: usize) -> Option<f64> {
+    Some(-difference_across(samples, beside)? / difference_across(samples, jump)?)
 }
 
 /// Quantisation step of the samples, in their unit: the greatest common divisor of the differences between
 /// neighbouring frames. `None` if there is no such step.
 #[must_use]
 pub fn quantisation_step(samples: &[Option<f64>]) -> Option<f64> {
-    let rounding = ROUNDING * samples.iter().flatten().fold(0.0_f64, |most, v| most.max(v.abs()));
+    let (mut farthest_place, mut largest) = (0.0_f64, 0.0_f64);
+    let mut last = None;
+    for sample in samples {
+        farthest_place = farthest_place.max(sample.map_or(0.0, f64::abs));
+        largest = largest.max(sample.zip(last).map_or(0.0, |(place, last): (f64, f64)| (place - last).abs()));
+        last = *sample;
+    }
+    let rounding = ROUNDING * farthest_place;
     let moves = || samples.windows(2).filter_map(|w| Some((w[1]? - w[0]?).abs())).filter(|&d| d > rounding);
-    let largest = moves().fold(0.0, f64::max);
     if moves().take(FEWEST_DIFFERENCES).count() < FEWEST_DIFFERENCES {
         return None;
     }
     let mut step = moves().next()?;
     let mut farthest = step;
     for distance in moves() {
+        let divisor = approximate_common_divisor(distance, step, rounding);
+        if divisor == step && distance <= farthest {
+            continue; // (nearly every distance is a multiple of the step, which the correction then keeps)
+        }
         // (rounding errors grow with each remainder of Euclid's algorithm; the largest distance, which is a
         // whole number of steps, corrects the step)
         farthest = distance.max(farthest);
-        step = approximate_common_divisor(distance, step, rounding);
-        step = farthest / (farthest / step).round();
+        step = farthest / math::round(farthest / divisor);
         if step < largest / MOST_STEPS {
             return None;
         }
@@ -94,7 +129,7 @@ pub fn quantisation_step(samples: &[Option<f64>]) -> Option<f64> {
 /// Euclid's algorithm, in which a remainder within `rounding` of zero is zero.
 fn approximate_common_divisor(mut larger: f64, mut smaller: f64, rounding: f64) -> f64 {
     while smaller > rounding {
-        let remainder = (larger - (larger / smaller).round() * smaller).abs();
+        let remainder = (larger - math::round(larger / smaller) * smaller).abs();
         (larger, smaller) = (smaller, remainder);
     }
     larger

@@ -4,7 +4,7 @@
 
 use super::ChannelNoise;
 use super::blocks::{NoiseBlock, dot_product, project_out};
-use crate::recording::channel::median_in_place;
+use crate::recording::channel::find_median;
 use nalgebra::{DMatrix, DVector};
 use portable_math as math;
 use short_spectra::noise::{AutoregressiveNoise, Whitener, raise_order};
@@ -126,7 +126,7 @@ pub(super) fn estimate_sd_like(blocks: &[NoiseBlock], like: &AutoregressiveNoise
         .iter()
         .zip(freedoms())
         .map(|([squares, _], n)| squares / (n * math::powi(1.0 - 2.0 / (9.0 * n), 3)));
-    let sd = median_in_place(&mut variances.collect::<Vec<_>>())?.sqrt();
+    let sd = find_median(variances)?.sqrt();
     // (the variance of the median of a normal variable is pi/2 times that of the mean)
     Some([sd, sd * (0.25 * PI / freedoms().sum::<f64>()).sqrt()])
 }

@@ -88,17 +88,22 @@ impl<'a> DifferenceAxis<'a> {
     /// Measures an axis; `None` if the column has no values, only one value, or too few frames for an
     /// estimate of the noise. `step_m` is the larger step of the two columns of the point, because both
     /// columns have the same number of decimals.
-    fn measure_axis(column: &MeasuredColumn<'a>, order: usize, step_m: f64) -> Option<Self> {
+    fn measure_axis((column, spacing_m): &SpacedColumn<'a>, order: usize, step_m: f64) -> Option<Self> {
         let (samples, noise_m) = (column.samples, column.quality.noise_m?);
         let first = samples.iter().flatten().next()?;
         samples.iter().flatten().find(|value| *value != first)?;
         let zero_m = if order == 1 { 0.0 } else { (ROUNDED_STEPS * step_m).max(ZERO_SHARE * noise_m) };
-        let width_m = value_spacing(samples).max(step_m).max(ROUNDED_VALUES * zero_m);
+        let width_m = spacing_m.max(step_m).max(ROUNDED_VALUES * zero_m);
         Some(Self { samples, order, noise_m, zero_m, width_m })
     }
 
     fn is_zero(&self, frame: usize) -> bool {
-        difference_at(self.samples, frame, self.order).is_some_and(|size| size.abs() <= self.zero_m)
+        // (every frame is looked at several times, and a difference of known order is faster)
+        let difference = match self.order {
+            1 => difference_at(self.samples, frame, 1),
+            order => difference_at(self.samples, frame, order),
+        };
+        difference.is_some_and(|size| size.abs() <= self.zero_m)
     }
 
     /// Standard deviation of the noise around a run, m; motion makes it too large rather than too small.
@@ -155,8 +160,11 @@ fn point_chance(axes: &[DifferenceAxis<'_>], other: &[DifferenceAxis<'_>], run: 
     axes.iter().map(|axis| axis.chance(run, noise_m)).product()
 }
 
-fn measure_axes<'a>(point: &[MeasuredColumn<'a>], order: usize) -> Vec<DifferenceAxis<'a>> {
-    let step_m = point.iter().filter_map(|column| column.quality.step_m).fold(0.0, f64::max);
+/// A column with the distance between its values, m.
+type SpacedColumn<'a> = (MeasuredColumn<'a>, f64);
+
+fn measure_axes<'a>(point: &[SpacedColumn<'a>], order: usize) -> Vec<DifferenceAxis<'a>> {
+    let step_m = point.iter().filter_map(|(column, _)| column.quality.step_m).fold(0.0, f64::max);
     point.iter().filter_map(|column| DifferenceAxis::measure_axis(column, order, step_m)).collect()
 }
 
@@ -201,7 +209,8 @@ const FEWEST_FILLED: usize = 2;
 /// position, and frames of one point on a straight line between others.
 pub(super) fn find_filled_frames(columns: &[MeasuredColumn<'_>; 4]) -> Vec<UntrackedFrames> {
     let frames = columns[0].samples.len();
-    let (tip, head) = columns.split_at(2);
+    let spaced = columns.map(|column| (column, value_spacing(column.samples)));
+    let (tip, head) = spaced.split_at(2);
     let repeats = [measure_axes(tip, 1), measure_axes(head, 1)];
     let both = event_runs(frames, 1, |&i| repeats.iter().all(|axes| are_zero(axes, i)));
     let both = improbable_runs(both, frames, 1, |run| {

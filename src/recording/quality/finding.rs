@@ -174,7 +174,7 @@ impl QualityFinding {
     }
 
     /// A finding on the whole recording with advice, which is empty if there is nothing to do.
-    pub(super) fn advise(
+    pub(crate) fn advise(
         (check, severity): (Check, Severity),
         (value, unit): (f64, &str),
         found: impl Into<String>,

@@ -8,7 +8,7 @@ use super::finding::{Check, QualityFinding, Severity};
 use super::measurement::{ChannelQuality, Quality};
 use super::outliers::smallest_movement;
 use super::untracked::UntrackedFrames;
-use crate::recording::noise::differences::difference_at;
+use crate::recording::noise::differences::{difference_across, difference_at, fraction_beside_jump};
 use crate::recording::{Recording, Traces};
 use portable_math as math;
 use std::collections::VecDeque;
@@ -29,14 +29,17 @@ const MORE_THAN_STEPS: f64 = 3.0;
 const AROUND: usize = 30;
 /// Minimum number of frames around a jump, on either side, that have a third difference.
 const FEWEST_AROUND: usize = 8;
-/// Allowed size of the third differences next to a jump, as fractions of that at the jump. Without noise, the
-/// fraction is 0.5 for a jump of the position, and 1 for a jump of the speed.
+/// Allowed size of the third differences next to a jump, as fractions of that at the jump
+/// ([`fraction_beside_jump`]).
 const BESIDE_JUMP: Range<f64> = 0.35..0.65;
 /// A point jumps together with the head if it jumps by more than this fraction of the jump of the head.
 const TOGETHER: f64 = 0.25;
 /// Points change places if their distances from the path of the other point are below this fraction of their
 /// distances from their own path.
 const CROSSED: f64 = 0.2;
+/// A length is certainly below a limit if the sum of its parts is below this fraction of the limit, in spite
+/// of rounding.
+const SURELY_SHORTER: f64 = 0.999;
 /// Longest gap, in frames, over which the paths of the points are continued.
 const LONGEST_GAP: usize = 5;
 /// Maximum number of jumps that a finding lists.
@@ -46,7 +49,7 @@ const NAMED_JUMPS: usize = 4;
 /// frames lie on no grid.
 pub(super) fn find_exchanges(recording: &Recording, measured: &Quality) -> Vec<usize> {
     let traces = recording.traces();
-    if recording.describe_resampling().is_some() {
+    if recording.is_resampled() {
         return vec![];
     }
     let sizes = [&measured.tip_x, &measured.head_x, &measured.tip_y, &measured.head_y];
@@ -54,38 +57,40 @@ pub(super) fn find_exchanges(recording: &Recording, measured: &Quality) -> Vec<u
     let has_heights = [&traces.tip_y_m, &traces.head_y_m].iter().all(|y| y.iter().any(Option::is_some));
     let mut exchanges = vec![];
     // the last two frames with both points, after exchanged points are put back, and the distances of the
-    // points from their continued paths
-    let mut last: VecDeque<(usize, [[f64; 2]; 2])> = VecDeque::new();
-    let mut misses: VecDeque<f64> = VecDeque::new();
+    // points from their own and from each other's continued paths
+    let mut last: [Option<(usize, PointPair)>; 2] = [None; 2];
+    let mut misses: VecDeque<[PointPair; 2]> = VecDeque::new();
     for frame in 0..traces.tip_x_m.len() {
         let Some(mut points) = both_points(traces, frame, has_heights) else { continue };
         if exchanges.len() % 2 == 1 {
             points.swap(0, 1);
         }
-        if last.back().is_some_and(|(before, _)| frame - before > LONGEST_GAP) {
-            (last, misses) = (VecDeque::new(), VecDeque::new());
+        if last[1].is_some_and(|(before, _)| frame - before > LONGEST_GAP) {
+            (last, misses) = ([None; 2], VecDeque::new());
         }
-        if let [(first, from), (second, to)] = *last.make_contiguous() {
+        if let [Some((first, from)), Some((second, to))] = last {
             let ahead = (frame - second) as f64 / (second - first) as f64;
             let path =
                 |point: usize, axis: usize| to[point][axis] + ahead * (to[point][axis] - from[point][axis]);
-            let miss = |points: &[[f64; 2]; 2]| {
-                let of = |point: usize| {
-                    math::hypot(points[point][0] - path(point, 0), points[point][1] - path(point, 1))
-                };
-                of(0).max(of(1))
+            let miss = |points: PointPair| {
+                [0, 1].map(|point| [0, 1].map(|axis| points[point][axis] - path(point, axis)))
             };
-            let (own, other) = (miss(&points), miss(&[points[1], points[0]]));
-            let usual = misses.iter().copied().fold(0.0, f64::max);
-            let jumps = own > least_m && own > MORE_THAN_AROUND * usual && misses.len() >= FEWEST_AROUND;
-            if jumps && other < CROSSED * own {
-                exchanges.push(frame);
-                points.swap(0, 1);
+            let (own, other) = (miss(points), miss([points[1], points[0]]));
+            // (most frames are on their paths, and need no root)
+            let may_jump = own.iter().any(|[x, y]| x.abs() + y.abs() > SURELY_SHORTER * least_m);
+            if may_jump && misses.len() >= FEWEST_AROUND {
+                let miss_m = |[own, other]: &[PointPair; 2]| largest_length(own).min(largest_length(other));
+                let usual_m = misses.iter().map(miss_m).fold(0.0, f64::max);
+                let own_m = largest_length(&own);
+                let jumps = own_m > least_m && own_m > MORE_THAN_AROUND * usual_m;
+                if jumps && largest_length(&other) < CROSSED * own_m {
+                    exchanges.push(frame);
+                    points.swap(0, 1);
+                }
             }
-            misses.push_back(own.min(other));
-            last.pop_front();
+            misses.push_back([own, other]);
         }
-        last.push_back((frame, points));
+        last = [last[1], Some((frame, points))];
         if misses.len() > AROUND {
             misses.pop_front();
         }
@@ -93,8 +98,15 @@ pub(super) fn find_exchanges(recording: &Recording, measured: &Quality) -> Vec<u
     exchanges
 }
 
-/// Positions of tip and head in a frame, x and y. In a recording without heights, they count as equal.
-fn both_points(traces: &Traces, frame: usize, has_heights: bool) -> Option<[[f64; 2]; 2]> {
+/// x and y of tip and head.
+type PointPair = [[f64; 2]; 2];
+
+fn largest_length([tip, head]: &PointPair) -> f64 {
+    math::hypot(tip[0], tip[1]).max(math::hypot(head[0], head[1]))
+}
+
+/// Positions of tip and head in a frame. In a recording without heights, they count as equal.
+fn both_points(traces: &Traces, frame: usize, has_heights: bool) -> Option<PointPair> {
     let height = |column: &[Option<f64>]| if has_heights { column[frame] } else { Some(0.0) };
     let [tip_y, head_y] = [height(&traces.tip_y_m)?, height(&traces.head_y_m)?];
     Some([[traces.tip_x_m[frame]?, tip_y], [traces.head_x_m[frame]?, head_y]])
@@ -153,7 +165,7 @@ pub(super) fn find_head_jumps(
     untracked: &[UntrackedFrames],
 ) -> Vec<HeadJump> {
     let traces = recording.traces();
-    if recording.describe_resampling().is_some() {
+    if recording.is_resampled() {
         return vec![];
     }
     let of_head = || untracked.iter().filter(|found| found.concerns("head"));
@@ -161,40 +173,42 @@ pub(super) fn find_head_jumps(
         let mut runs = of_head().flat_map(|found| &found.runs);
         !runs.any(|run| (run.start..=run.end).contains(&frame))
     };
-    let jump = |frame: usize| Some(-0.5 * difference_at(&traces.tip_x_m, frame + 1, 3)?);
     let frames = jump_frames(&traces.head_x_m, least_jump_m(&measured.head_x));
-    let tracked = frames.into_iter().filter(|(frame, _)| is_tracked(*frame));
-    tracked.map(|(frame, head_m)| HeadJump { frame, head_m, tip_m: jump(frame).unwrap_or(0.0) }).collect()
+    let [head_m, tip_m] = [&traces.head_x_m, &traces.tip_x_m]
+        .map(|samples| move |frame| difference_across(samples, frame).map_or(0.0, |size| -0.5 * size));
+    let tracked = frames.into_iter().filter(|frame| is_tracked(*frame));
+    tracked.map(|frame| HeadJump { frame, head_m: head_m(frame), tip_m: tip_m(frame) }).collect()
 }
 
 fn least_jump_m(channel: &ChannelQuality) -> f64 {
     BEYOND_NOISE * channel.noise_m.unwrap_or(0.0) + BEYOND_STEPS * channel.step_m.unwrap_or(0.0)
 }
 
-/// First frames after a jump of a column, with the size of the jump, m.
-fn jump_frames(samples: &[Option<f64>], least_m: f64) -> Vec<(usize, f64)> {
+/// First frames after a jump of a column.
+fn jump_frames(samples: &[Option<f64>], least_m: f64) -> Vec<usize> {
     let least_m = least_m.max(BEYOND_STEPS * smallest_movement(samples).unwrap_or(0.0));
-    // (a jump of size 1 gives third differences of 1, -2 and 1)
-    let third = |frame: usize| difference_at(samples, frame + 1, 3);
-    let is_jump = |frame: usize| {
-        let size = third(frame)?;
-        let is_beside = |outer: f64| BESIDE_JUMP.contains(&(-outer / size));
-        if size.abs() < 2.0 * least_m || !is_beside(third(frame - 1)?) || !is_beside(third(frame + 1)?) {
-            return None;
-        }
-        let moved = |frame: usize| difference_at(samples, frame, 1);
-        let usual = |frames: Range<usize>| {
-            let rough: Vec<f64> = frames.clone().filter_map(third).map(f64::abs).collect();
-            let step = frames.filter_map(moved).map(f64::abs).fold(0.0, f64::max);
-            let most = rough.iter().copied().fold(0.0, f64::max);
-            (rough.len() >= FEWEST_AROUND)
-                .then_some((MORE_THAN_AROUND * most).max(2.0 * MORE_THAN_STEPS * step))
-        };
-        let before = usual(frame.saturating_sub(AROUND)..frame - 1)?;
-        let after = usual(frame + 2..(frame + AROUND).min(samples.len()))?;
-        (size.abs() > before.max(after)).then_some((frame, -0.5 * size))
+    let third = |frame: usize| difference_across(samples, frame);
+    let usual = |frames: Range<usize>| {
+        let rough: Vec<f64> = frames.clone().filter_map(third).map(f64::abs).collect();
+        let steps = frames.filter_map(|frame| difference_at(samples, frame, 1)).map(f64::abs);
+        let most = rough.iter().copied().fold(0.0, f64::max);
+        let least = (MORE_THAN_AROUND * most).max(2.0 * MORE_THAN_STEPS * steps.fold(0.0, f64::max));
+        (rough.len() >= FEWEST_AROUND).then_some(least)
     };
-    (2..samples.len()).filter_map(is_jump).collect()
+    let is_jump = |frame: usize| {
+        let size_m = third(frame)?.abs();
+        if size_m < 2.0 * least_m {
+            return Some(false);
+        }
+        let is_beside = |beside: usize| {
+            let fraction = fraction_beside_jump(samples, frame, beside);
+            fraction.is_some_and(|fraction| BESIDE_JUMP.contains(&fraction))
+        };
+        let before = || usual(frame.saturating_sub(AROUND)..frame - 1);
+        let after = || usual(frame + 2..(frame + AROUND).min(samples.len()));
+        Some(is_beside(frame - 1) && is_beside(frame + 1) && size_m > before()?.max(after()?))
+    };
+    (2..samples.len()).filter(|frame| is_jump(*frame).unwrap_or(false)).collect()
 }
 
 /// Finding on jumps of the head: where the tip jumps too, frames are lost; otherwise perhaps those of the

@@ -9,7 +9,7 @@ use super::finding::{Check, QualityFinding, Severity};
 use super::measurement::Quality;
 use super::regression::{fit_rows, polynomial_row};
 use crate::recording::Traces;
-use crate::recording::channel::median_in_place;
+use crate::recording::channel::find_median;
 use std::ops::Range;
 
 /// Largest accepted growth of a lag over the recording, as a fraction of the number of frames: a loss of more
@@ -72,12 +72,11 @@ pub(super) fn measure_lag_frames(traces: &Traces, measured: &Quality, slope: f64
 
 fn best_lag(traces: &Traces, range: Range<usize>, noise_m: f64, slope: f64) -> Option<BestLag> {
     let (first, last) = (range.start + MOST_LAG as usize, range.end.checked_sub(MOST_LAG as usize)?);
-    let middle =
-        |samples: &[Option<f64>]| median_in_place(&mut samples.iter().flatten().copied().collect::<Vec<_>>());
+    let middle = |samples: &[Option<f64>]| find_median(samples.iter().filter_map(|sample| *sample));
     let (tip_x, head_x, head_y) = (&traces.tip_x_m, &traces.head_x_m, &traces.head_y_m);
     let level_m = middle(&head_y[range.clone()])? - slope * middle(&head_x[range.clone()])?;
     let apart = || range.clone().filter_map(|i| Some(tip_x[i]? - head_x[i]?));
-    let centre_m = median_in_place(&mut apart().collect::<Vec<_>>())?;
+    let centre_m = find_median(apart())?;
     let reach_m = apart().map(|d| (d - centre_m).abs()).fold(0.0, f64::max);
     if last < first + 2 * MOST_LAG as usize || reach_m <= 0.0 {
         return None;

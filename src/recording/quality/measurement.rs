@@ -235,7 +235,7 @@ impl ComponentVisibility {
 
 /// Numbers and lengths of the runs of consecutive missing frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct FrameGaps {
+pub(crate) struct FrameGaps {
     pub missing: usize,
     pub runs: usize,
     /// Length of the longest run, frames.
@@ -251,7 +251,12 @@ impl FrameGaps {
         let (mut gaps, mut run, mut last) = (Self::default(), 0, None);
         for (frame, present) in present.enumerate() {
             if present {
-                gaps.stride = last.map_or(0, |last| greatest_common_divisor(gaps.stride, frame - last));
+                gaps.stride = match last {
+                    // (1 has no other divisor)
+                    Some(_) if gaps.stride == 1 => 1,
+                    Some(last) => greatest_common_divisor(gaps.stride, frame - last),
+                    None => 0,
+                };
                 last = Some(frame);
             }
             run = if present { 0 } else { run + 1 };

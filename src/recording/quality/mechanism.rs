@@ -6,9 +6,9 @@ use super::lag::measure_lag_frames;
 use super::measurement::Quality;
 use super::motion::{LARGEST_VIEW_M, head_height_m, largest_travel_m};
 use super::regression::fit_rows;
-use super::tilt::measure_tilt;
+use super::tilt::{CameraTilt, measure_tilt};
 use crate::recording::Recording;
-use crate::recording::channel::{Channel, ReversalInstants, median_in_place};
+use crate::recording::channel::{Channel, ReversalInstants, find_median};
 use crate::recording::clock::is_playback_rate;
 use crate::text::format_rate;
 use portable_math as math;
@@ -84,19 +84,30 @@ pub fn measure_motion(
     measured: &Quality,
     instants: &ReversalInstants,
 ) -> MotionSummary {
+    let tilt = measure_tilt(recording, instants, measured).ok();
+    summarise_motion(recording, measured, instants, tilt.as_ref())
+}
+
+/// Like [`measure_motion`], with the tilt of the recording, if it shows one.
+pub(super) fn summarise_motion(
+    recording: &Recording,
+    measured: &Quality,
+    instants: &ReversalInstants,
+    tilt: Option<&CameraTilt>,
+) -> MotionSummary {
     let recording = &*recording.resample_to_grid();
     let (traces, rate_hz) = (recording.traces(), measured.frame_rate_hz);
-    let slope = measure_tilt(recording, instants, measured).map_or(0.0, |tilt| math::tan(tilt.angle_rad));
+    let slope = tilt.map_or(0.0, |tilt| math::tan(tilt.angle_rad));
     let strokes = instants.reversals.len() + 1;
     let speeds = head_speeds_m_per_s(&traces.head_x_m, rate_hz, strokes);
     let turns: Vec<f64> = instants.reversals.iter().map(|turn| turn.reversal_s).collect();
-    let between = median_in_place(&mut turns.windows(2).map(|turns| turns[1] - turns[0]).collect::<Vec<_>>());
+    let between = find_median(turns.windows(2).map(|turns| turns[1] - turns[0]));
     let between = between.filter(|stroke_s| *stroke_s > 0.0);
     MotionSummary {
         blade_height_m: head_height_m(traces),
         travel_m: largest_travel_m(traces),
         peak_speed_m_per_s: speeds.iter().copied().reduce(f64::max),
-        median_speed_m_per_s: median_in_place(&mut speeds.clone()),
+        median_speed_m_per_s: find_median(speeds.iter().copied()),
         stroke_s: between.or_else(|| stroke_of_cosine_s(&traces.head_x_m, rate_hz)),
         fastest_oscillation_hz: fastest_oscillation_hz(&Channel::Deflection.samples(recording), measured),
         lag_frames: measure_lag_frames(traces, measured, slope),
@@ -105,10 +116,8 @@ pub fn measure_motion(
 
 fn head_speeds_m_per_s(head_x: &[Option<f64>], rate_hz: f64, strokes: usize) -> Vec<f64> {
     let length = head_x.len() / (SPEEDS * strokes) + 1;
-    let medians = head_x
-        .chunks(length)
-        .map(|block| median_in_place(&mut block.iter().flatten().copied().collect::<Vec<_>>()));
-    let medians: Vec<Option<f64>> = medians.collect();
+    let median = |block: &[Option<f64>]| find_median(block.iter().filter_map(|x| *x));
+    let medians: Vec<Option<f64>> = head_x.chunks(length).map(median).collect();
     let speed = |pair: &[Option<f64>]| Some((pair[1]? - pair[0]?).abs() * rate_hz / length as f64);
     // (the last block may be shorter and is left out)
     medians[..medians.len().saturating_sub(1)].windows(2).filter_map(speed).collect()

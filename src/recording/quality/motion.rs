@@ -2,8 +2,9 @@
 
 use super::finding::{Check, QualityFinding, Severity};
 use super::measurement::MOST_POSITIONS;
-use crate::recording::channel::{ReversalInstants, median_in_place};
+use crate::recording::channel::{ReversalInstants, collect_numbers, find_median, tracked_span};
 use crate::recording::{FrameGrid, Recording, Traces};
+use portable_math as math;
 
 /// The finding on overlap is a caution if, at the start and the end of the recording, only one point is
 /// tracked in more than this fraction of the frames. A late start of a track affects fewer frames.
@@ -25,11 +26,6 @@ pub(super) fn check_motion(recording: &Recording) -> Vec<QualityFinding> {
     let (traces, grid) = (recording.traces(), recording.grid());
     let found = [check_overlap(traces, grid), check_travel(traces)];
     found.into_iter().flatten().collect()
-}
-
-/// First and last tracked frame of a column.
-fn tracked_span(samples: &[Option<f64>]) -> Option<(usize, usize)> {
-    Some((samples.iter().position(Option::is_some)?, samples.iter().rposition(Option::is_some)?))
 }
 
 /// Finding on the range of frames that both tracks cover.
@@ -62,10 +58,15 @@ fn check_overlap(traces: &Traces, grid: FrameGrid) -> Option<QualityFinding> {
 /// Range of the positions of a column, m, without the outermost 1 % at either end.
 pub(super) fn trimmed_range_m(samples: &[Option<f64>]) -> Option<f64> {
     let some = samples.iter().step_by(samples.len() / MOST_POSITIONS + 1);
-    let mut positions: Vec<f64> = some.flatten().copied().collect();
-    positions.sort_unstable_by(f64::total_cmp);
+    find_trimmed_ends(some.flatten().copied()).map(|[low, high]| high - low)
+}
+
+/// Smallest and largest position without the outermost 1 % at either end.
+pub(super) fn find_trimmed_ends(positions: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
+    let mut positions = collect_numbers(positions);
     let trimmed = (TRIMMED * positions.len() as f64) as usize;
-    Some(positions.get(positions.len().checked_sub(1 + trimmed)?)? - positions.get(trimmed)?)
+    let last = positions.len().checked_sub(1 + trimmed)?;
+    Some([trimmed, last].map(|rank| math::select_number(&mut positions, rank)))
 }
 
 /// Travel of the point that travels farther, m.
@@ -95,7 +96,7 @@ fn check_travel(traces: &Traces) -> Option<QualityFinding> {
 pub(super) fn head_height_m(traces: &Traces) -> Option<f64> {
     let both = traces.tip_y_m.iter().zip(&traces.head_y_m);
     let apart = both.filter_map(|(tip, head)| Some((*head)? - (*tip)?));
-    median_in_place(&mut apart.step_by(traces.tip_y_m.len() / MOST_POSITIONS + 1).collect::<Vec<_>>())
+    find_median(apart.step_by(traces.tip_y_m.len() / MOST_POSITIONS + 1))
 }
 
 /// Finding on the number of turns of the head; windows can be named after these turns.

@@ -14,7 +14,8 @@
 //! is near and the point afterwards continues its earlier path.
 
 use super::measurement::ChannelQuality;
-use crate::recording::noise::differences::difference_at;
+use crate::recording::noise::differences::{difference_across, fraction_beside_jump};
+use std::ops::Range;
 
 /// Largest number of frames from the first to the last of the four neighbours of a point: without a gap there
 /// are four. Over a longer time the motion is no cubic.
@@ -48,8 +49,8 @@ const THIRD_DIFFERENCE_SD: f64 = 4.472_135_954_999_58;
 /// Largest number of frames between a jump away and the jump back. Motion of the blade itself moves it away
 /// and back in a longer time.
 const LONGEST_ABSENCE: usize = 30;
-/// Smallest size of the third difference next to a jump, as a fraction of the third difference at the jump.
-/// Without noise, this fraction is 0.5.
+/// Smallest size of the third difference next to a jump, as a fraction of the third difference at the jump
+/// ([`fraction_beside_jump`]).
 const BESIDE_JUMP: f64 = 0.25;
 /// Number of frames before a jump away, and after the jump back, in which no other jump may occur.
 const CALM_FRAMES: usize = 4;
@@ -89,33 +90,37 @@ pub(super) fn smallest_movement(samples: &[Option<f64>]) -> Option<f64> {
     moves.filter(|&size| size > 0.0).reduce(f64::min)
 }
 
-/// Runs of two and more frames between a jump away and the jump back. A jump of size 1 from one frame to the
-/// next gives third differences of 1, -2 and 1.
-fn find_absences(samples: &[Option<f64>], least_m: f64) -> Vec<std::ops::RangeInclusive<usize>> {
-    let third = |frame: usize| difference_at(samples, frame + 2, 3);
+/// Runs of two and more frames between a jump away and the jump back.
+fn find_absences(samples: &[Option<f64>], least_m: f64) -> Vec<Range<usize>> {
+    let third = |frame: usize| difference_across(samples, frame);
     let size = |frame: usize| third(frame).map_or(0.0, f64::abs);
-    let is_jump =
-        |&i: &usize| size(i) > least_m && size(i) >= size(i + 1) && size(i) >= size(i.wrapping_sub(1));
+    let is_jump = |frame: &usize| {
+        let own = size(*frame);
+        own > least_m && own >= size(frame + 1) && own >= size(frame - 1)
+    };
+    let is_beside = |jump: usize, outer: usize| {
+        let fraction = fraction_beside_jump(samples, jump, outer);
+        fraction.is_some_and(|fraction| (BESIDE_JUMP..1.0 - BESIDE_JUMP).contains(&fraction))
+    };
     let returns = |away: usize, back: usize| {
         let (out, home) = (third(away)?, third(back)?);
         let least = out.abs().min(home.abs());
-        let is_beside = |outer: f64, jump: f64| (BESIDE_JUMP..1.0 - BESIDE_JUMP).contains(&(-outer / jump));
         let before = away.saturating_sub(CALM_FRAMES)..away - 1;
-        let mut others = before.chain(away + 2..back.saturating_sub(1)).chain(back + 2..back + CALM_FRAMES);
+        let mut others = before.chain(away + 2..back - 1).chain(back + 2..back + CALM_FRAMES);
         Some(
             (2..=LONGEST_ABSENCE).contains(&(back - away))
                 && (out + home).abs() <= BOTH_SIDES * least
-                && is_beside(third(away - 1)?, out)
-                && is_beside(third(back + 1)?, home)
+                && is_beside(away, away - 1)
+                && is_beside(back, back + 1)
                 && others.all(|frame| MORE_THAN_AROUND * size(frame) < least),
         )
     };
-    let jumps: Vec<usize> = (1..samples.len()).filter(is_jump).collect();
+    let jumps: Vec<usize> = (2..samples.len()).filter(is_jump).collect();
     let (mut absences, mut last) = (vec![], 0);
     for pair in jumps.windows(2) {
         // (after a jump back, the point is tracked until it jumps away again)
         if pair[0] > last && returns(pair[0], pair[1]).unwrap_or(false) {
-            absences.push(pair[0] + 1..=pair[1]);
+            absences.push(pair[0]..pair[1]);
             last = pair[1];
         }
     }
@@ -130,13 +135,41 @@ const UNBROKEN_SD: f64 = 1.394_433_377_556_792_8;
 struct TrackedPoints {
     frames: Vec<usize>,
     values: Vec<f64>,
+    /// Weights for a point without a gap around it.
+    unbroken: CubicWeights,
+}
+
+/// Distances in frames from a point to its two neighbours on either side, without a gap.
+const UNBROKEN: [f64; 4] = [-2.0, -1.0, 1.0, 2.0];
+
+/// Weights of the neighbours of a point in the value of the cubic through them.
+#[derive(Clone, Copy)]
+struct CubicWeights {
+    weights: [f64; 4],
+    /// Standard deviation of the distance of the point from the cubic in white noise of standard deviation 1.
+    sd: f64,
+}
+
+impl CubicWeights {
+    /// Weights of neighbours with the distances `at` from the point, in frames.
+    fn new(at: [f64; 4]) -> Self {
+        let weight = |i: usize| {
+            let others = (0..4).filter(|other| *other != i);
+            others.map(|other| at[other] / (at[other] - at[i])).product::<f64>()
+        };
+        let weights = [0, 1, 2, 3].map(weight);
+        Self { weights, sd: weights.iter().fold(1.0, |variance, weight| variance + weight * weight).sqrt() }
+    }
 }
 
 impl TrackedPoints {
     fn new(samples: &[Option<f64>]) -> Self {
-        let tracked = samples.iter().enumerate().filter_map(|(frame, x)| Some((frame, (*x)?)));
-        let (frames, values) = tracked.unzip();
-        Self { frames, values }
+        let (mut frames, mut values) = (Vec::with_capacity(samples.len()), Vec::with_capacity(samples.len()));
+        for (frame, x) in samples.iter().enumerate().filter_map(|(frame, x)| Some((frame, (*x)?))) {
+            frames.push(frame);
+            values.push(x);
+        }
+        Self { frames, values, unbroken: CubicWeights::new(UNBROKEN) }
     }
 
     /// Distances in frames from a point to its two neighbours on either side; `None` if they span too much.
@@ -150,19 +183,12 @@ impl TrackedPoints {
     /// Distance of a point from the cubic through its neighbours, and the standard deviation of this distance
     /// in white noise of standard deviation 1.
     fn distance_from_cubic(&self, point: usize) -> Option<(f64, f64)> {
-        let at = self.neighbours(point)?;
-        let weight = |i: usize| {
-            let others = (0..4).filter(|other| *other != i);
-            others.map(|other| at[other] / (at[other] - at[i])).product::<f64>()
-        };
+        let is_unbroken = self.frames.get(point + 2)? - self.frames[point.checked_sub(2)?] == 4;
+        let own = || self.neighbours(point).map(CubicWeights::new);
+        let CubicWeights { weights, sd } = if is_unbroken { self.unbroken } else { own()? };
         let values = [point - 2, point - 1, point + 1, point + 2].map(|neighbour| self.values[neighbour]);
-        let (mut cubic, mut variance) = (0.0, 1.0);
-        for (i, value) in values.into_iter().enumerate() {
-            let weight = weight(i);
-            cubic += weight * value;
-            variance += weight * weight;
-        }
-        Some((self.values[point] - cubic, variance.sqrt()))
+        let cubic = values.iter().zip(weights).fold(0.0, |cubic, (value, weight)| cubic + weight * value);
+        Some((self.values[point] - cubic, sd))
     }
 
     fn lies_off_both_lines(&self, point: usize, miss_m: f64, noise_m: f64) -> Option<bool> {

@@ -50,8 +50,8 @@ const ROUNDING: f64 = 1e-26;
 
 /// Cut-off frequency of the low-pass filter that a trace went through, Hz; `None` if the trace shows no
 /// filter.
-pub(crate) fn cutoff_hz(samples: &[Option<f64>], frame_rate_hz: f64) -> Option<f64> {
-    let bands = median_band_powers(&collect_segments(samples))?;
+fn cutoff_hz(spectrum: &SegmentSpectrum, samples: &[Option<f64>], frame_rate_hz: f64) -> Option<f64> {
+    let bands = spectrum.median_band_powers()?;
     let largest = samples.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
     let ends_at = |start: usize| {
         let plateau = &bands[start..start + PLATEAU];
@@ -94,35 +94,63 @@ struct PrefilterBand {
     scatter: f64,
 }
 
-/// Segments spread over the recording, half overlapping, each minus its trend and multiplied by a Hann
-/// window.
-fn collect_segments(samples: &[Option<f64>]) -> Vec<Vec<f64>> {
-    let starts: Vec<usize> = (0..samples.len().saturating_sub(SEGMENT - 1)).step_by(SEGMENT / 2).collect();
-    let every = starts.len() / MOST_SEGMENTS + 1;
-    let segment = |&start: &usize| windowed_segment(&samples[start..start + SEGMENT]);
-    starts.iter().step_by(every).filter_map(segment).collect()
+/// Number of frequency bins of a segment, from zero up to the Nyquist frequency.
+pub(super) const BINS: usize = SEGMENT / 2;
+
+/// Power of a frequency bin over the segments.
+#[derive(Clone, Copy)]
+pub(super) struct BinPower {
+    pub lower_quartile: f64,
+    pub median: f64,
 }
 
-fn median_band_powers(segments: &[Vec<f64>]) -> Option<Vec<PrefilterBand>> {
-    if segments.len() < FEWEST_SEGMENTS {
-        return None;
-    }
-    let band = |edges: &[usize]| {
-        let of_bin = |bin| {
-            let mut powers: Vec<f64> = segments.iter().map(|s| goertzel_power(s, bin)).collect();
-            powers.sort_unstable_by(f64::total_cmp);
-            (powers[powers.len() / 4], powers[powers.len() / 2])
+/// Powers of the segments of a trace.
+pub(super) struct SegmentSpectrum {
+    pub segments: usize,
+    /// One entry for each of [`BINS`]; empty without segments.
+    pub bins: Vec<BinPower>,
+}
+
+impl SegmentSpectrum {
+    /// Computes the powers of segments spread over the recording, half overlapping, each minus its trend and
+    /// multiplied by a Hann window.
+    pub(super) fn from_samples(samples: &[Option<f64>]) -> Self {
+        let starts: Vec<usize> =
+            (0..samples.len().saturating_sub(SEGMENT - 1)).step_by(SEGMENT / 2).collect();
+        let (every, hann) = (starts.len() / MOST_SEGMENTS + 1, hann_window());
+        let segment = |&start: &usize| windowed_segment(&samples[start..start + SEGMENT], &hann);
+        let twice_cosines = std::array::from_fn(|bin| 2.0 * math::cos(TAU * bin as f64 / SEGMENT as f64));
+        let power = |values: Vec<f64>| goertzel_powers(&values, &twice_cosines);
+        let powers: Vec<[f64; BINS]> = starts.iter().step_by(every).filter_map(segment).map(power).collect();
+        let of_bin = |bin: usize| {
+            let mut sorted: Vec<f64> = powers.iter().map(|powers| powers[bin]).collect();
+            sorted.sort_unstable_by(f64::total_cmp);
+            let median = *sorted.get(sorted.len() / 2)?;
+            Some(BinPower { lower_quartile: sorted[sorted.len() / 4], median })
         };
-        let quartiles: Vec<(f64, f64)> = (edges[0]..edges[1]).map(of_bin).collect();
-        let quartile: f64 = quartiles.iter().map(|q| q.0).sum();
-        let median: f64 = quartiles.iter().map(|q| q.1).sum();
-        PrefilterBand { power: median / quartiles.len() as f64, scatter: median / quartile }
-    };
-    Some(EDGES.windows(2).map(band).collect())
+        Self { segments: powers.len(), bins: (0..BINS).filter_map(of_bin).collect() }
+    }
+
+    fn median_band_powers(&self) -> Option<Vec<PrefilterBand>> {
+        if self.segments < FEWEST_SEGMENTS {
+            return None;
+        }
+        let band = |edges: &[usize]| {
+            let bins = &self.bins[edges[0]..edges[1]];
+            let quartile: f64 = bins.iter().map(|bin| bin.lower_quartile).sum();
+            let median: f64 = bins.iter().map(|bin| bin.median).sum();
+            PrefilterBand { power: median / bins.len() as f64, scatter: median / quartile }
+        };
+        Some(EDGES.windows(2).map(band).collect())
+    }
+}
+
+fn hann_window() -> [f64; SEGMENT] {
+    std::array::from_fn(|i| 0.5 - 0.5 * math::cos(TAU * (i as f64 + 0.5) / SEGMENT as f64))
 }
 
 /// A segment minus its least-squares parabola, with a Hann window; `None` if too many frames are missing.
-fn windowed_segment(samples: &[Option<f64>]) -> Option<Vec<f64>> {
+fn windowed_segment(samples: &[Option<f64>], hann: &[f64; SEGMENT]) -> Option<Vec<f64>> {
     let mut values = interpolate_gaps(samples)?;
     let centre = (SEGMENT - 1) as f64 / 2.0;
     let place = |i: usize| (i as f64 - centre) / centre;
@@ -137,8 +165,7 @@ fn windowed_segment(samples: &[Option<f64>]) -> Option<Vec<f64>> {
         }
         values.iter_mut().enumerate().for_each(|(i, x)| *x -= along / square * shape(i));
     }
-    let hann = |i: usize| 0.5 - 0.5 * math::cos(TAU * (i as f64 + 0.5) / SEGMENT as f64);
-    values.iter_mut().enumerate().for_each(|(i, x)| *x *= hann(i));
+    values.iter_mut().zip(hann).for_each(|(x, weight)| *x *= weight);
     Some(values)
 }
 
@@ -157,12 +184,21 @@ fn interpolate_gaps(samples: &[Option<f64>]) -> Option<Vec<f64>> {
     Some(values)
 }
 
-/// Power of a segment at a bin (Goertzel's recurrence).
-pub(super) fn goertzel_power(values: &[f64], bin: usize) -> f64 {
-    let twice_cosine = 2.0 * math::cos(TAU * bin as f64 / SEGMENT as f64);
-    let (last, before) =
-        values.iter().fold((0.0, 0.0), |(last, before), x| (x + twice_cosine * last - before, last));
-    last * last + before * before - twice_cosine * last * before
+/// Powers of a segment at all bins (Goertzel's recurrence); `twice_cosines` has `2 cos(2 pi k/n)` of every
+/// bin.
+fn goertzel_powers(values: &[f64], twice_cosines: &[f64; BINS]) -> [f64; BINS] {
+    let (mut last, mut before) = ([0.0; BINS], [0.0; BINS]);
+    // (the bins are independent of each other, so the processor computes several at once)
+    for x in values {
+        for bin in 0..BINS {
+            let next = x + twice_cosines[bin] * last[bin] - before[bin];
+            before[bin] = std::mem::replace(&mut last[bin], next);
+        }
+    }
+    std::array::from_fn(|bin| {
+        let (last, before) = (last[bin], before[bin]);
+        last * last + before * before - twice_cosines[bin] * last * before
+    })
 }
 
 /// Finding that a column was low-pass filtered before its export.
@@ -170,10 +206,11 @@ pub(super) fn check_prefilter(column: &MeasuredColumn, frame_rate_hz: f64) -> Op
     if column.quality.coarse_step_m().is_some() {
         return None;
     }
-    let (cut_hz, words) = match find_smoothing(&collect_segments(column.samples)) {
+    let spectrum = SegmentSpectrum::from_samples(column.samples);
+    let (cut_hz, words) = match find_smoothing(&spectrum) {
         Some(filter) => (filter.cutoff * frame_rate_hz, filter.describe()),
         None => {
-            let cut_hz = cutoff_hz(column.samples, frame_rate_hz)?;
+            let cut_hz = cutoff_hz(&spectrum, column.samples, frame_rate_hz)?;
             let words = "so the trace was low-passed before it was exported";
             (cut_hz, format!("the noise ends at about {cut_hz:.0} Hz, {words}"))
         }
@@ -202,15 +239,15 @@ mod tests {
     fn the_power_of_a_cosine_is_at_its_bin() {
         let cosine: Vec<f64> = (0..SEGMENT).map(|i| (TAU * 9.0 * i as f64 / SEGMENT as f64).cos()).collect();
         let half = SEGMENT as f64 / 2.0;
-        assert!(
-            (goertzel_power(&cosine, 9) - half * half).abs() < 1e-8 && goertzel_power(&cosine, 10) < 1e-8
-        );
+        let cosines = std::array::from_fn(|bin| 2.0 * (TAU * bin as f64 / SEGMENT as f64).cos());
+        let powers = goertzel_powers(&cosine, &cosines);
+        assert!((powers[9] - half * half).abs() < 1e-8 && powers[10] < 1e-8);
     }
 
     #[test]
     fn a_segment_is_freed_of_its_parabola() {
         let parabola: Vec<Option<f64>> =
             (0..SEGMENT).map(|i| Some(3.0 + 0.2 * i as f64 - 0.01 * (i * i) as f64)).collect();
-        assert!(windowed_segment(&parabola).unwrap().iter().all(|x| x.abs() < 1e-10));
+        assert!(windowed_segment(&parabola, &hann_window()).unwrap().iter().all(|x| x.abs() < 1e-10));
     }
 }

@@ -4,8 +4,8 @@
 //! power of short segments is compared with this shape for every usual window, above a fifth of the Nyquist
 //! frequency, where little motion is left.
 
-use super::prefilter::{SEGMENT, goertzel_power};
-use crate::recording::channel::median_in_place;
+use super::prefilter::{SEGMENT, SegmentSpectrum};
+use crate::recording::channel::find_median;
 use portable_math as math;
 use std::f64::consts::TAU;
 
@@ -52,14 +52,12 @@ impl Smoothing {
 }
 
 /// The filter whose frequency response fits the spectrum of the noise; `None` for too few segments, or if no
-/// filter fits far better than a flat spectrum. The segments are detrended and multiplied by a Hann window.
-pub(super) fn find_smoothing(segments: &[Vec<f64>]) -> Option<Smoothing> {
-    if segments.len() < FEWEST_SEGMENTS {
+/// filter fits far better than a flat spectrum.
+pub(super) fn find_smoothing(spectrum: &SegmentSpectrum) -> Option<Smoothing> {
+    if spectrum.segments < FEWEST_SEGMENTS {
         return None;
     }
-    let power =
-        |bin| median_in_place(&mut segments.iter().map(|s| goertzel_power(s, bin)).collect::<Vec<_>>());
-    let powers: Vec<f64> = (0..SEGMENT / 2).map(power).collect::<Option<_>>()?;
+    let powers: Vec<f64> = spectrum.bins.iter().map(|bin| bin.median).collect();
     let white = log_deviation(&powers, &[1.0; SEGMENT / 2])?;
     if white < NOT_WHITE.0 {
         return None;
@@ -84,7 +82,7 @@ fn log_deviation(powers: &[f64], shape: &[f64]) -> Option<f64> {
     let with_floor = |floor: f64| {
         let log = |bin: usize| math::ln(powers[bin] / (shape[bin] + floor));
         let logs: Vec<f64> = (FIRST_BIN..powers.len()).map(log).collect();
-        let middle = median_in_place(&mut logs.clone())?;
+        let middle = find_median(logs.iter().copied())?;
         let mean_square = logs.iter().map(|log| math::powi(log - middle, 2)).sum::<f64>() / logs.len() as f64;
         mean_square.is_finite().then(|| mean_square.sqrt())
     };

@@ -11,7 +11,7 @@ use super::finding::{Check, QualityFinding, Severity};
 use super::measurement::Quality;
 use super::motion::head_height_m;
 use crate::recording::Recording;
-use crate::recording::channel::{ReversalInstants, median_in_place};
+use crate::recording::channel::{ReversalInstants, median_or_zero};
 use crate::text::{format_degrees, format_with_sd, to_ascii};
 use glass_line::{GlassLine, TipPath};
 use portable_math as math;
@@ -183,7 +183,7 @@ impl CameraTilt {
         for (flat_x, flat_y, x_m, y_m) in columns {
             let heights = x_m.iter().zip(y_m).filter_map(|(x, y)| Some((*y)? - glass_y((*x)?)));
             // a position without a height is taken at the median height
-            let usual_m = median_in_place(&mut heights.collect::<Vec<f64>>()).unwrap_or(0.0);
+            let usual_m = median_or_zero(heights);
             for (i, (x, y)) in x_m.iter().zip(y_m).enumerate() {
                 let Some(x) = x else { continue };
                 let [along, height] = along_glass(*x, y.unwrap_or_else(|| glass_y(*x) + usual_m));
@@ -211,12 +211,12 @@ fn unbend(per_m: f64, [x, y]: [f64; 2]) -> [f64; 2] {
 pub(in crate::recording::quality) fn check_tilt(
     recording: &Recording,
     measured: &Quality,
-    instants: &ReversalInstants,
+    tilt: Option<&CameraTilt>,
 ) -> Vec<QualityFinding> {
-    let Ok(tilt) = measure_tilt(recording, instants, measured) else { return vec![] };
+    let Some(tilt) = tilt else { return vec![] };
     let effect =
         TiltEffect { height_m: head_height_m(recording.traces()), noise_m: measured.deflection_floor_m() };
-    [effect.tilt_finding(&tilt), effect.curvature_finding(&tilt)].into_iter().flatten().collect()
+    [effect.tilt_finding(tilt), effect.curvature_finding(tilt)].into_iter().flatten().collect()
 }
 
 /// Effect of a tilt on the deflection: a rotation of the picture moves the head, which is above the tip,

@@ -160,7 +160,7 @@ fn what_a_killed_program_left_goes_and_what_others_hold_or_wrote_stays() {
 #[test]
 fn a_file_on_its_way_is_held() {
     let folder = TempDir::new().unwrap();
-    let (file, _) = write_temporary(&folder.path().join("a"), &b"a"[..]).unwrap();
+    let (file, _) = write_temporary(&folder.path().join("a"), &b"a"[..], None).unwrap();
     file.as_file().set_modified(SystemTime::now() - 2 * ABANDONED_AFTER).unwrap();
     assert!(!is_abandoned(file.path()));
     assert!(

@@ -1,7 +1,8 @@
 //! Least-squares fit of a line and a parabola to the path of the tip; each stroke has its own height.
 
+use super::super::motion::find_trimmed_ends;
 use crate::recording::Recording;
-use crate::recording::channel::{ReversalInstants, median_in_place};
+use crate::recording::channel::{NORMAL_MEDIAN, ReversalInstants, median_or_zero};
 use portable_math as math;
 
 /// Smallest mean square of the fitted parabola `q`, relative to the fourth power of the standard deviation of
@@ -117,8 +118,6 @@ const OUTLYING_PLACES: f64 = 0.25;
 /// A tip farther from the line than this number of standard deviations is off the glass; by chance, a tip on
 /// the glass is farther in 1 frame of 16,000.
 const NEAR_DEVIATIONS: f64 = 4.0;
-/// Median of |x| of a standard normal variable.
-const NORMAL_MEDIAN: f64 = 0.674_489_75;
 /// A tip within this distance of the line always counts as on the glass, m: the rounding of a trace without
 /// noise.
 const LEAST_DISTANCE_M: f64 = 1e-9;
@@ -147,10 +146,8 @@ pub(super) fn fit_glass_line(path: &TipPath, travel_m: f64, step_m: f64) -> Glas
 
 /// Marks the points that are not outliers along the sweep.
 fn inliers_along_sweep(path: &TipPath) -> Vec<bool> {
-    let mut sorted: Vec<f64> = path.points.iter().map(|point| point.x_m).collect();
-    sorted.sort_unstable_by(f64::total_cmp);
-    let end = sorted.len() / 100;
-    let (low, high) = (sorted[end], sorted[sorted.len() - 1 - end]);
+    let ends = find_trimmed_ends(path.points.iter().map(|point| point.x_m));
+    let [low, high] = ends.unwrap_or_default();
     let beyond = BEYOND_STEPS * (high - low);
     path.points.iter().map(|p| p.x_m >= low - beyond && p.x_m <= high + beyond).collect()
 }
@@ -186,20 +183,12 @@ fn median_slope(path: &TipPath, travel_m: f64) -> f64 {
             slopes.extend(far.map(|b| (a.1 - b.1) / (a.0 - b.0)));
         }
     }
-    median_or_zero(slopes.into_iter())
-}
-
-/// Median of the values; 0 without values.
-fn median_or_zero(values: impl Iterator<Item = f64>) -> f64 {
-    median_in_place(&mut values.collect::<Vec<_>>()).unwrap_or(0.0)
+    median_or_zero(slopes)
 }
 
 /// Maximum number of frames from which the tilt is measured; of a longer recording, only every n-th frame is
 /// used. These frames determine the angle far better than needed.
 const MOST_FRAMES: usize = 100_000;
-/// Fraction of the positions at either end of their range that are left out when the travel of a stroke is
-/// measured, because they may be outliers.
-const TRIMMED: f64 = 0.01;
 
 /// Position of the tip in a frame in which both coordinates are known.
 #[derive(Debug, Clone, Copy)]
@@ -253,11 +242,7 @@ impl TipPath {
 }
 
 fn stroke_travel_m(stroke: &[TipPoint]) -> f64 {
-    let mut places: Vec<f64> = stroke.iter().map(|point| point.x_m).collect();
-    places.sort_unstable_by(f64::total_cmp);
-    let trimmed = (TRIMMED * places.len() as f64) as usize;
-    let ends = places.get(trimmed).zip(places.get(places.len().saturating_sub(1 + trimmed)));
-    ends.map_or(0.0, |(low, high)| high - low)
+    find_trimmed_ends(stroke.iter().map(|point| point.x_m)).map_or(0.0, |[low, high]| high - low)
 }
 
 /// Maximum number of values from which the correlation of errors is computed. Longer recordings are averaged
