@@ -23,6 +23,7 @@ pub mod identifiability;
 pub mod job;
 pub mod journal;
 pub mod law;
+mod law_search;
 pub mod ledger;
 pub mod linear_model;
 pub mod misfit;

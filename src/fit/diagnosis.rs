@@ -9,12 +9,11 @@ mod lost_frames;
 
 use super::findings::{FindingSource, FitFinding};
 use super::journal::Journal;
-use super::law::follow_stages;
 use super::misfit::{StageMisfit, TraceMisfit};
 use super::problem::Problem;
 use super::trace::{
     Iterate, SegmentState, TraceDescent, TraceModel, TraceSearchSettings, UnknownKind, chi2_per_dof,
-    outer_step, start_point, start_stage, trace_covariance,
+    follow_stages, outer_step, start_point, start_stage, trace_covariance,
 };
 use super::trace_run::judge_descent;
 use crate::recording::Recording;

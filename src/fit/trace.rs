@@ -35,7 +35,7 @@ pub(crate) use head_errors::chi2_by_head_errors;
 pub(crate) use iterate::TraceDescent;
 pub use iterate::{Iterate, SegmentState, TraceSearchSettings, chi2_per_dof};
 pub use levenberg_marquardt::{first_iterate, next_iterate};
-pub(crate) use levenberg_marquardt::{outer_step, restart_search, start_stage};
+pub(crate) use levenberg_marquardt::{follow_stages, outer_step, restart_search, start_stage};
 pub use model::{TraceModel, TraceRecording};
 pub(crate) use normal_equations::trace_covariance;
 pub use search::{TraceSearchOutcome, search_trace, start_point, undersampled_mode};

@@ -50,7 +50,8 @@ scale = "log"
 segment_s = [0.004, 0.008, 0.016, 0.032]
 "#;
 
-/// The fit of the exponential law to a film of a blade with the table `friction`; `laws` are compared with it.
+/// The fit of the exponential law to a film of a blade with the table `friction`; `laws` are compared with
+/// it.
 fn fit_film(friction: &str, laws: &str) -> FitResult {
     let truth = Scene::parse("truth.toml", &SCENE.replace(EXPONENTIAL, friction)).unwrap();
     let effort = SolverOptions::new(truth.run.relative_tolerance);
@@ -88,8 +89,8 @@ fn an_exponential_film_keeps_its_law_and_names_what_it_assumes() {
     assert!(fit_film(EXPONENTIAL, "laws = []").law.is_none());
 }
 
-/// A limit at rest that is a fifth above the friction of slip changes the residuals by a fiftieth, and moves the
-/// stiffness of the shoulder by four deviations.
+/// A limit at rest that is a fifth above the friction of slip changes the residuals by a fiftieth, and moves
+/// the stiffness of the shoulder by four deviations.
 #[test]
 fn a_higher_limit_at_rest_takes_identified_away() {
     let result = fit_film(&format!("{EXPONENTIAL}static_ratio = 1.2\n"), "");

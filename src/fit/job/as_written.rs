@@ -40,9 +40,9 @@ pub(crate) struct JobFile {
     /// Constants of the scene that are free within priors, in a job with [[trace]]: "exact" for none, "3 %"
     /// for all, or a list; if left out, every constant within the default prior of its kind.
     pub nuisance: Option<JobNuisanceEntry>,
-    /// Laws of friction, "exponential", "stribeck" or "rational", that are compared with the law of the scene,
-    /// in a job with [[trace]]. The law of the scene with two further
-    /// terms, a limit at rest and a rise with speed, is always compared, unless the list is empty.
+    /// Laws of friction, "exponential", "stribeck" or "rational", that are compared with the law of the
+    /// scene, in a job with [[trace]]. The law of the scene with two further terms, a limit at rest and a
+    /// rise with speed, is always compared, unless the list is empty.
     pub laws: Option<Vec<String>>,
     /// Recordings of which every frame is fitted.
     #[serde(default)]

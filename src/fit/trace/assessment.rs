@@ -139,8 +139,8 @@ fn is_at_bound(model: &TraceModel, end: &Iterate, i: usize) -> bool {
     end.point[i] <= low + near || end.point[i] >= high - near
 }
 
-/// Whether unknown `i` is at the lowest value that a scene accepts, such as a damping of 0. No better value lies
-/// beyond it.
+/// Whether unknown `i` is at the lowest value that a scene accepts, such as a damping of 0. No better value
+/// lies beyond it.
 fn is_at_natural_limit(model: &TraceModel, end: &Iterate, i: usize) -> bool {
     let lowest = model.unknowns.parameter_name(i).and_then(find_parameter).and_then(|row| row.range.lowest());
     let [low, high] = model.unknowns.0[i].range;

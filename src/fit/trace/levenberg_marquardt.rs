@@ -3,7 +3,7 @@
 
 use super::camera_observation::CameraObservation;
 use super::initial_states::{RescuePolicy, fit_states, join_states, rescue_states, update_states};
-use super::iterate::{Iterate, SegmentState, TraceSearchSettings, is_slider};
+use super::iterate::{Iterate, SegmentState, TraceDescent, TraceSearchSettings, is_slider};
 use super::model::TraceModel;
 use super::normal_equations::{NormalEquations, carry_states, damped_step, normal_equations};
 use super::normal_equations::{recording_models, segments_cost};
@@ -19,6 +19,8 @@ pub(super) const MAX_STEPS: usize = 40;
 const MAX_JUNK_STEPS: usize = 6;
 /// Maximum number of steps in the fit of a segment's starting state after each outer step.
 pub(super) const MAX_STATE_STEPS: usize = 8;
+/// Maximum number of iterates of a search that is not the main one.
+const MAX_ITERATES: usize = 60;
 const FIRST_DAMPING: f64 = 1e-3;
 
 /// The first iterate of a search that starts at `point`; `None` if a scene refuses the point.
@@ -113,6 +115,29 @@ fn continue_plain(model: &TraceModel, settings: &TraceSearchSettings, before: &I
     let next = start_stage(model, settings, (stage, before.whole), &before.point, &before.segments)?;
     let cost = total_cost(model, &next.point, &next.segments, true);
     Some(Iterate { plain: true, cost, ..next })
+}
+
+/// The search through all stages that begins with the iterate `first`.
+///
+/// # Errors
+/// The error of `check_stop`, which is called before each step.
+pub(crate) fn follow_stages<E>(
+    model: &TraceModel,
+    settings: &TraceSearchSettings,
+    first: Iterate,
+    check_stop: &mut dyn FnMut() -> Result<(), E>,
+) -> Result<TraceDescent, E> {
+    let mut descent = TraceDescent { start: 0, stages: vec![first.clone()], iterates: 1 };
+    let mut at = first;
+    while descent.iterates < MAX_ITERATES {
+        check_stop()?;
+        let Some(next) = next_iterate(model, settings, &at) else { break };
+        descent.stages.pop_if(|before| before.stage == next.stage);
+        descent.stages.push(next.clone());
+        descent.iterates += 1;
+        at = next;
+    }
+    Ok(descent)
 }
 
 /// The iterate after bad segments were restarted from other starting states; `None` if this lowers the cost

@@ -114,8 +114,8 @@ impl<'a> SearchEnd<'a> {
         Some(Self { model, settings, seed, at, covariance, widening, sd })
     }
 
-    /// Difference of the cost that is worth 1 in chi2. It exceeds 1 if the noise is larger than measured, or if the
-    /// estimates scatter more than the linear model says.
+    /// Difference of the cost that is worth 1 in chi2. It exceeds 1 if the noise is larger than measured, or
+    /// if the estimates scatter more than the linear model says.
     pub(crate) fn cost_unit(&self) -> f64 {
         self.widening * math::powi(self.covariance.beyond_linear, 2)
     }

@@ -240,7 +240,8 @@ impl TraceUnknowns {
         Some(scene)
     }
 
-    /// A point of the unknowns `from` in these unknowns. Unknowns that only `self` has are taken from `start`.
+    /// A point of the unknowns `from` in these unknowns. Unknowns that only `self` has are taken from
+    /// `start`.
     pub(crate) fn carry_point(&self, start: &[f64], from: &Self, point: &[f64]) -> Vec<f64> {
         let carry = |(unknown, start): (&TraceUnknown, &f64)| {
             let found = from.0.iter().zip(point).find(|(old, _)| old.kind == unknown.kind);

@@ -255,16 +255,16 @@ mod tests {
         assert_near(found[0].release_s, 1.0 + RELEASE_AFTER_S, 4.0);
     }
 
-    /// A marker that is `offset_m` beside the edge of the lip turns with the lip, slowly with the deflection and
-    /// quickly at the flip, while the head moves by 3.5 mm.
+    /// A marker that is `offset_m` beside the edge of the lip turns with the lip, slowly with the deflection
+    /// and quickly at the flip, while the head moves by 3.5 mm.
     #[test]
     fn a_marker_that_turns_with_the_lip_does_not_hide_them() {
         let (release_after_s, flip_after_s, flip_s) = (0.2, 0.12, 2e-3);
         for offset_m in [0.0, 2e-5, 1e-4, 2e-4] {
-            let still = stroke_with_release(release_after_s, [0.8, 1.4], 2e-6, |_| false);
+            let still = stroke_with_release(release_after_s, [0.95, 1.3], 2e-6, |_| false);
             let mut traces = still.traces().clone();
             for (i, x) in traces.tip_x_m.iter_mut().enumerate() {
-                let t = 0.8 + i as f64 / RATE_HZ;
+                let t = 0.95 + i as f64 / RATE_HZ;
                 let lean = traces.head_x_m[i].zip(*x).map_or(0.0, |(head, tip)| (tip - head) / 5e-3);
                 let side = ((t - 1.0 - flip_after_s) / flip_s).tanh();
                 *x = x.map(|x| x + offset_m * (0.6 * lean.clamp(-1.0, 1.0) + 0.5 * side));

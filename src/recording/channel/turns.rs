@@ -141,8 +141,8 @@ pub(super) struct TipHold {
     points: usize,
 }
 
-/// The longest rest of the tip around a turn. `lean_m` is twice the usual size of the deflection, m, and `turns` are the
-/// frames of the turns before and after, between which the tip may rest.
+/// The longest rest of the tip around a turn. `lean_m` is twice the usual size of the deflection, m, and
+/// `turns` are the frames of the turns before and after, between which the tip may rest.
 pub(super) fn longest_hold(
     head: &TrackPoints,
     tip: &TrackPoints,
@@ -234,14 +234,14 @@ fn departure_frame(tip: &TrackPoints, outside: usize, next: Option<usize>, place
     frame + towards_hold * frames_back
 }
 
-// A marker beside the edge of the lip turns with the lip. So it moves while the tip rests: slowly while the head
-// moves, and quickly where the blade flips. It never moves nearly as far as the head.
+// A marker beside the edge of the lip turns with the lip. So it moves while the tip rests: slowly while the
+// head moves, and quickly where the blade flips. It never moves nearly as far as the head.
 
-/// Motion of the head in a block, in tolerances of the tip's position: noise then adds little to the motion of
-/// the tip.
+/// Motion of the head in a block, in tolerances of the tip's position: noise then adds little to the motion
+/// of the tip.
 const BLOCK_TOLERANCES: f64 = 20.0;
-/// Smallest motion of the head in a block, as a share of twice the usual deflection: it is longer than a cycle of
-/// stick and slip.
+/// Smallest motion of the head in a block, as a share of twice the usual deflection: it is longer than a
+/// cycle of stick and slip.
 const BLOCK_SHARE: f64 = 0.03;
 /// The tip rests in a block if it moves by less than this share of the motion of the head.
 const RESTS: f64 = 0.3;
@@ -293,8 +293,8 @@ impl MarkerRest {
         })
     }
 
-    /// Frame at which the tip leaves, if it rests on after the frame `end`, where its marker leaves its place.
-    /// `Some(None)` if it rests up to the frame `last`, and `None` if it really leaves at `end`.
+    /// Frame at which the tip leaves, if it rests on after the frame `end`, where its marker leaves its
+    /// place. `Some(None)` if it rests up to the frame `last`, and `None` if it really leaves at `end`.
     fn find_departure(&self, end: f64, last: f64, power: f64) -> Option<Option<f64>> {
         if self.head.is_empty() {
             return None;

@@ -138,8 +138,8 @@ fn everywhere(t: &str) -> Report {
     }
 }
 
-/// The law of friction, and where and why the blade chatters, are in the answer of the page and among the lines
-/// of the terminal.
+/// The law of friction, and where and why the blade chatters, are in the answer of the page and among the
+/// lines of the terminal.
 #[test]
 fn the_page_and_the_terminal_name_the_law_and_say_why_the_blade_chatters() {
     let sentences = vec!["It chatters.".to_owned(), "At 1 m/s, on the neck.".to_owned()];
