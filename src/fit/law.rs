@@ -148,7 +148,9 @@ impl LawCandidate {
 
     /// The law as a label, such as "exponential law with a rise with speed".
     pub(crate) fn format_label(&self) -> String {
-        format!("{} law{}", self.shape_name(), self.describe_further_terms())
+        // Stribeck is a person
+        let name = self.shape_name().replace("stribeck", "Stribeck");
+        format!("{name} law{}", self.describe_further_terms())
     }
 
     /// The law in words, such as "the exponential law with a rise with speed".
