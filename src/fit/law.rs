@@ -114,9 +114,23 @@ impl LawComparison {
         Self { verdict, chosen, sentence, candidates }
     }
 
-    /// If another law explains the recordings and that of the scene does not: the other law, as a finding.
+    /// What explains recordings that the fit does not explain, as a finding: other values with the law of the
+    /// scene, or another law.
     pub(super) fn find_explanation(&self) -> Option<FitFinding> {
-        let own = self.candidates.first().filter(|own| !own.explains)?;
+        let own = self.candidates.first()?;
+        if own.explains {
+            let values = own.parameters.iter().map(|(name, found)| found.describe(name)).collect::<Vec<_>>();
+            let sentence = format!(
+                "Explained with values that no start of the search reached, {}: fit again with narrower bounds",
+                join_with_and(&values)
+            );
+            return Some(FitFinding {
+                hypothesis: Some("missed-minimum".to_owned()),
+                explains: Some(true),
+                chi2_per_dof: Some(own.chi2_per_dof),
+                ..FitFinding::new(FindingSource::Hypothesis, sentence)
+            });
+        }
         let best = self.candidates.iter().find(|one| Some(&one.law) == self.chosen.as_ref())?;
         let sentence =
             format!("Explained if friction follows {}{}", best.describe(), best.describe_terms(own));
@@ -293,6 +307,10 @@ pub(super) mod tests {
         assert!(sentence(None, None).starts_with("Law of friction: none of the exponential law and the"));
         let words = judge(None, Some(0.0)).find_explanation().unwrap().sentence;
         assert_eq!(words, format!("Explained if friction follows {terms}: rs = 1.2 (1 to 1.4)"));
-        assert!(judge(Some(9.0), Some(0.0)).find_explanation().is_none());
+        let missed = judge(Some(0.0), Some(9.0)).find_explanation().unwrap().sentence;
+        assert!(
+            missed.starts_with("Explained with values that no start of the search reached, A = 0.5"),
+            "{missed}"
+        );
     }
 }

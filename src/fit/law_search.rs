@@ -111,6 +111,20 @@ impl Problem {
         if trials.len() == 1 {
             return Ok(None);
         }
+        let chi2 = |trial: &&LawTrial| chi2_per_dof(&trial.model, &trial.at).0;
+        let best =
+            trials[1..].iter().filter(|trial| trial.explains).min_by(|a, b| chi2(a).total_cmp(&chi2(b)));
+        if let Some(best) = best.filter(|_| !explained) {
+            // the search may have missed the minimum of the law of the scene
+            let point = model.unknowns.carry_point(&end.point, &best.model.unknowns, &best.at.point);
+            let mut check_stop = || journal.announce("comparing laws of friction".to_owned());
+            if let Some(at) = search_on_segments(model, &best.at, &[point], &mut check_stop)? {
+                let descent = TraceDescent { start: 0, stages: vec![at.clone()], iterates: 1 };
+                if judge_descent(self, model, &descent).is_some_and(|misfit| misfit.explained) {
+                    (trials[0].at, trials[0].explains) = (at, true);
+                }
+            }
+        }
         if !explained {
             compare_on_same_segments(&mut trials, &mut || {
                 journal.announce("comparing laws of friction".to_owned())
