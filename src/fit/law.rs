@@ -118,7 +118,7 @@ impl LawComparison {
     /// scene, or another law.
     pub(super) fn find_explanation(&self) -> Option<FitFinding> {
         let own = self.candidates.first()?;
-        if own.explains {
+        if own.possible {
             let values = own.parameters.iter().map(|(name, found)| found.describe(name)).collect::<Vec<_>>();
             let sentence = format!(
                 "Explained with values that no start of the search reached, {}: fit again with narrower bounds",
