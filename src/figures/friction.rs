@@ -274,7 +274,7 @@ fn figure_text(
     let fits_own = case.result.law.iter().any(|law| law.candidates.first().is_some_and(|own| own.possible));
     let others = match (others.len(), fits_own) {
         (0, _) => String::new(),
-        (_, true) => format!(" It fits as well as {}.", join_with_and(&others)),
+        (_, true) => format!(" The recording does not exclude {}.", join_with_and(&others)),
         (_, false) => format!(" It fits clearly worse than {}.", join_with_and(&others)),
     };
     let caption = format!("{} in the law of the fitted model{even}.{others}", claim_sentence(law, fastest));

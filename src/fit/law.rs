@@ -196,11 +196,9 @@ impl LawCandidate {
     /// with them they move by more than a standard deviation, or their intervals are more than twice as wide.
     /// Empty if `other` has no further terms.
     fn describe_assumption(&self, other: &Self) -> String {
-        const WIDER: f64 = 2.0;
         let depends = |(name, own): &(&String, &LawEstimate)| {
-            let (Some(with_terms), Some(sd)) = (other.parameters.get(*name), own.sd) else { return false };
-            (with_terms.estimate - own.estimate).abs() > sd
-                || with_terms.sd.is_some_and(|with_terms| with_terms > WIDER * sd)
+            let with_terms = other.parameters.get(*name).zip(own.sd);
+            with_terms.is_some_and(|(with_terms, sd)| with_terms.departs_from(own.estimate, sd))
         };
         let words =
             |(name, _): (&String, &LawEstimate)| other.parameters.get(name).map(|found| found.describe(name));
@@ -214,6 +212,13 @@ impl LawCandidate {
 }
 
 impl LawEstimate {
+    /// Whether the estimate differs from that of another law by more than the standard deviation `sd` of the
+    /// other law, or is known less than half as well.
+    pub(super) fn departs_from(&self, estimate: f64, sd: f64) -> bool {
+        const WIDER: f64 = 2.0;
+        (self.estimate - estimate).abs() > sd || self.sd.is_some_and(|own| own > WIDER * sd)
+    }
+
     /// The value with its interval, such as "A = 0.108 (0.102 to 0.115)".
     fn describe(&self, name: &str) -> String {
         let symbol = symbol_with_recording(name).unwrap_or_else(|| name.to_owned());

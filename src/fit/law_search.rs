@@ -440,20 +440,22 @@ impl LawComparison {
                 let Some(with_law) = other.parameters.get(&free.name) else {
                     found
                         .reasons
-                        .push(format!("{} fits as well, and has no such parameter", other.describe()));
+                        .push(format!("{} is possible too, and has no such parameter", other.describe()));
                     continue;
                 };
                 let sd = own.parameters.get(&free.name).and_then(|own| own.sd).unwrap_or(0.0);
-                if (with_law.estimate - found.estimate).abs() <= sd {
+                if !with_law.departs_from(found.estimate, sd) {
                     continue;
                 }
-                let (low, high) = (with_law.lower_95, with_law.upper_95);
-                let [low, high] = [low, high].map(|end| end.unwrap_or(with_law.estimate));
+                // an end that the other law leaves open is open
+                let end =
+                    |end: Option<f64>| if with_law.sd.is_some() { end } else { Some(with_law.estimate) };
+                let (low, high) = (end(with_law.lower_95), end(with_law.upper_95));
                 let (lower, upper) = (free.bounds.lower(), free.bounds.upper());
-                found.lower_95 = found.lower_95.map(|end| end.min(low)).filter(|end| *end > lower);
-                found.upper_95 = found.upper_95.map(|end| end.max(high)).filter(|end| *end < upper);
+                found.lower_95 = found.lower_95.zip(low).map(|(a, b)| a.min(b)).filter(|end| *end > lower);
+                found.upper_95 = found.upper_95.zip(high).map(|(a, b)| a.max(b)).filter(|end| *end < upper);
                 let value = format_trimmed(with_law.estimate, 3);
-                found.reasons.push(format!("{} fits as well and gives {value}", other.describe()));
+                found.reasons.push(format!("{} is possible too and gives {value}", other.describe()));
             }
             found.verdict = trace_verdict(free, found);
         }
@@ -501,6 +503,6 @@ mod tests {
         let a = &both["friction.a"];
         assert_eq!(a.lower_95, Some(0.4));
         assert!((a.upper_95.unwrap() - (0.8 + 0.1 * Z_95)).abs() < 1e-12);
-        assert!(a.reasons[0].ends_with("fits as well and gives 0.8"), "{:?}", a.reasons);
+        assert!(a.reasons[0].ends_with("is possible too and gives 0.8"), "{:?}", a.reasons);
     }
 }

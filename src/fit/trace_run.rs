@@ -4,6 +4,7 @@ use super::FitError;
 use super::checkpoint::FitHeader;
 use super::context::FitContext;
 use super::diagnosis::diagnose_misfit;
+use super::findings::{FindingSource, FitFinding};
 use super::identifiability::Identifiability;
 use super::job::{FreeParameter, TraceChannel};
 use super::journal::{Journal, OnProgress, StopReason};
@@ -90,7 +91,11 @@ impl Problem {
             match diagnose_misfit(self, &model, best, misfit, &mut journal) {
                 Some(findings) => {
                     result.findings = findings;
-                    result.findings.extend(result.law.as_ref().and_then(LawComparison::find_explanation));
+                    let by_law = result.law.as_ref().and_then(LawComparison::find_explanation);
+                    let is_hypothesis = |finding: &FitFinding| finding.source == FindingSource::Hypothesis;
+                    let place =
+                        result.findings.iter().position(is_hypothesis).unwrap_or(result.findings.len());
+                    result.findings.splice(place..place, by_law);
                 }
                 None => result.status = FitStatus::Interrupted,
             }

@@ -4,7 +4,7 @@
 use super::Channel;
 use super::flip::{self, Flip, TurnNeighbourhood};
 use super::turns::{find_turns, longest_hold};
-use super::{TrackPoints, median_in_place, present_points};
+use super::{TrackPoints, median_or_zero, present_points};
 use crate::recording::Recording;
 use portable_math as math;
 use serde::Serialize;
@@ -107,8 +107,7 @@ impl ReversalInstants {
         let turns = find_turns(&head);
         let deflection = present_points(&Channel::Deflection.samples(recording));
         let noise_m = math::hypot(head.noise_m, tip.noise_m);
-        let mut sizes: Vec<f64> = deflection.iter().map(|(_, x)| x.abs()).collect();
-        let lean_m = 2.0 * median_in_place(&mut sizes).unwrap_or(0.0);
+        let lean_m = 2.0 * median_or_zero(deflection.iter().map(|(_, x)| x.abs()));
         let reversals = turns.iter().enumerate().map(|(i, turn)| {
             let last_turn = i.checked_sub(1).map_or(0.0, |last| turns[last].frame);
             let next_turn = turns.get(i + 1).map_or(f64::INFINITY, |next| next.frame);
