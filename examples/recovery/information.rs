@@ -34,12 +34,17 @@ pub fn descend_from(problem: &Problem, truth: &Scene) -> Option<(TraceModel, Ite
             *coordinate = value.ln().clamp(unknown.range[0], unknown.range[1]);
         }
     }
-    let settings =
-        TraceSearchSettings { segment_s: problem.segment_s().to_vec(), twins: 0, max_segments: None };
-    let mut at = first_iterate(&model, &settings, &point)?;
-    while let Some(next) = next_iterate(&model, &settings, &at) {
-        at = next;
-    }
+    let settings = TraceSearchSettings::without_twins(problem.segment_s().to_vec());
+    let follow = |mut at: Iterate| {
+        while let Some(next) = next_iterate(&model, &settings, &at) {
+            at = next;
+        }
+        at
+    };
+    let short = follow(first_iterate(&model, &settings, &point)?);
+    // the last stage again, with segments that count to their end, as in a fit
+    let last = settings.segment_s.len().checked_sub(2)?;
+    let at = follow(Iterate { stage: last, whole: true, plain: false, settled: true, ..short });
     // otherwise the cost is not chi2, or the model cannot run through a segment
     (at.plain && chi2_per_dof(&model, &at).0.is_finite()).then_some((model, at))
 }

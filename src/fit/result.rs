@@ -103,7 +103,8 @@ pub struct NuisanceResult {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recording: Option<String>,
     /// Key of the constant in the scene file, or a camera error: `tilt_rad`, `scale_relative`, `offset_x_m`,
-    /// `offset_drop_m`, `curvature_per_m`, `tip_along_lip_m`, `tip_across_lip_m`, `clock_s` or a drift.
+    /// `offset_drop_m`, `curvature_per_m`, `tip_along_lip_m`, `tip_across_lip_m`,
+    /// `head_above_hinge_m`, `clock_s` or a drift.
     pub name: String,
     /// Mean of the prior, in the unit that `name` states; `None` if nothing is known before the fit.
     pub prior: Option<f64>,

@@ -19,6 +19,7 @@ mod lobes;
 mod model;
 mod normal_equations;
 mod prior_conflict;
+mod projection;
 mod rivals;
 mod search;
 mod segment_simulation;

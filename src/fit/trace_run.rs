@@ -267,7 +267,7 @@ impl TraceFindings<'_> {
         found.reasons.extend(wide.then(|| "the interval is wider than the bounds".to_owned()));
         let alone = self.problem.segment_s().len() < 2;
         found.reasons.extend(alone.then(|| ONE_LENGTH_NOTE.to_owned()));
-        found.reasons.extend(known.doubts.iter().cloned());
+        found.reasons.extend(known.doubts.iter().chain(&own.doubts).cloned());
         let mut seen = BTreeSet::new();
         found.reasons.retain(|reason| seen.insert(reason.clone()));
         found.verdict = trace_verdict(free, &found);

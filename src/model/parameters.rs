@@ -248,7 +248,7 @@ pub(crate) fn describe_parameters<'a>(names: impl IntoIterator<Item = &'a str>) 
 }
 
 /// Errors of a camera that a fit estimates, each with its meaning.
-const CAMERA_ERRORS: [(&str, &str); 10] = [
+const CAMERA_ERRORS: [(&str, &str); 11] = [
     ("tilt_rad", "tilt of the camera"),
     ("scale_relative", "scale of the camera"),
     ("offset_x_m", "offset of the camera along the sweep"),
@@ -258,6 +258,7 @@ const CAMERA_ERRORS: [(&str, &str); 10] = [
     ("curvature_per_m", "curvature of the glass"),
     ("tip_along_lip_m", "distance of the tracked point along the lip"),
     ("tip_across_lip_m", "distance of the tracked point across the lip"),
+    ("head_above_hinge_m", "height of the tracked point above the hinge of the head"),
     ("clock_s", "clock of the camera"),
 ];
 

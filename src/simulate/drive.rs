@@ -84,18 +84,6 @@ impl Drive {
         }
     }
 
-    /// The same motion with every length multiplied by `factor`.
-    pub(crate) fn scale_lengths(&self, factor: f64) -> Self {
-        match self {
-            _ if factor == 1.0 => self.clone(),
-            &Self::Cosine { amplitude_m, frequency_hz, delay_s } => {
-                Self::Cosine { amplitude_m: factor * amplitude_m, frequency_hz, delay_s }
-            }
-            Self::Uniform { speed_m_per_s } => Self::Uniform { speed_m_per_s: factor * speed_m_per_s },
-            Self::Recorded(spline) => Self::Recorded(Arc::new(spline.scale_lengths(factor))),
-        }
-    }
-
     /// Time at which the cosine starts, `t0`, s; 0 for other motions.
     pub(crate) fn delay_s(&self) -> f64 {
         if let Self::Cosine { delay_s, .. } = *self { delay_s } else { 0.0 }

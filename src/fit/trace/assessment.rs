@@ -5,7 +5,7 @@ use super::levenberg_marquardt::MAX_STEPS;
 use super::model::TraceModel;
 use super::normal_equations::trace_covariance;
 use super::prior_conflict::prior_conflicts;
-use super::rivals::describe_rival;
+use super::rivals::{describe_rival, has_lost};
 use super::uncertainty_run::{SearchEnd, UncertaintyRun, Z_95, profile_distances};
 use super::unknowns::UnknownKind;
 use crate::fit::bootstrap::MIN_TWINS;
@@ -26,7 +26,7 @@ pub struct UnknownEstimate {
     /// Estimated value, in the SI unit of the unknown.
     pub value: f64,
     /// Ends of the 95 % interval, in the SI unit of the unknown. The interval combines curvature, scatter of
-    /// the segments, profile and bias.
+    /// the segments, profile and bias, and contains the estimates of other minima that fit nearly as well.
     pub ends_95: [f64; 2],
     /// Standard deviation of the unknown's coordinate, including the bias.
     pub sd: f64,
@@ -38,6 +38,8 @@ pub struct UnknownEstimate {
     by_heads: f64,
     /// Whether the estimate is at an end of the range of the unknown.
     pub at_bound: bool,
+    /// Reasons to doubt this estimate alone.
+    pub doubts: Vec<String>,
 }
 
 impl UnknownEstimate {
@@ -103,7 +105,7 @@ pub(super) fn assess_end(
     let shorter = last_of(UncertaintyRun::Shorter);
     let mut doubts = shared_doubts(end, rank);
     doubts.extend(lonely);
-    doubts.extend(others.iter().filter_map(|other| describe_rival(end, other)));
+    let rivals: Vec<&Iterate> = others.iter().copied().filter(|other| !has_lost(end, other)).collect();
     let lengths = shorter.and_then(|shorter| compare_segment_lengths(model, at, shorter, sd));
     let (biases, disagreement) = lengths.unwrap_or_else(|| (vec![0.0; n], None));
     doubts.extend(disagreement);
@@ -111,14 +113,19 @@ pub(super) fn assess_end(
     let estimate = |i: usize| {
         let (unknown, z, bias) = (&model.unknowns.0[i], at.point[i], biases[i]);
         let [below, above] = distances[i].map(|end| math::hypot(end, Z_95 * bias));
+        let [low, high] = rivals.iter().fold([z - below, z + above], |[low, high], rival| {
+            let place = rival.point[i];
+            [low.min(place - Z_95 * sd[i]), high.max(place + Z_95 * sd[i])]
+        });
         UnknownEstimate {
             kind: unknown.kind.clone(),
             value: unknown.value(z),
-            ends_95: [-below, above].map(|far| unknown.value(z + far)),
+            ends_95: [low, high].map(|end| unknown.value(end)),
             sd: math::hypot(sd[i], bias),
             twins_95: None,
             by_heads: end.covariance.heads[(i, i)],
             at_bound: is_at_bound(model, at, i),
+            doubts: rivals.iter().filter_map(|rival| describe_rival(end, rival, i)).collect(),
         }
     };
     let estimates = (0..n).map(estimate).collect();

@@ -27,7 +27,7 @@ use std::sync::Arc;
 /// if a scene refuses the parameter values. The result does not depend on earlier calls.
 pub(crate) fn fit_states_at(model: &TraceModel, segment_s: &[f64], point: &[f64]) -> Option<Iterate> {
     let segment_s = segment_s.last().copied().into_iter().collect();
-    let last = TraceSearchSettings { segment_s, twins: 0, max_segments: None };
+    let last = TraceSearchSettings::without_twins(segment_s);
     refit_plain(model, start_stage(model, &last, (0, true), point, &[])?)
 }
 
@@ -254,7 +254,12 @@ fn camera_unknowns(film: usize, source: &TraceSource<'_>, data: &CameraObservati
     let along = match head {
         HeadSource::Scene => zero(CameraUnknown::OffsetX, along_m),
         HeadSource::Recording => {
-            CameraPrior { start: along_m, ..normal(CameraUnknown::OffsetX, 0.0, doubt.offset_sd_m) }
+            // (the head of a tilted picture appears beside the tip under it)
+            let beside_m = linkage.upright_height_m() * math::sin(angle_rad);
+            CameraPrior {
+                start: along_m - beside_m,
+                ..normal(CameraUnknown::OffsetX, 0.0, doubt.offset_sd_m)
+            }
         }
     };
     let drop = zero(CameraUnknown::OffsetDrop, drop_m);
@@ -267,6 +272,11 @@ fn camera_unknowns(film: usize, source: &TraceSource<'_>, data: &CameraObservati
         CameraPrior { size: with_drop(drop.size), ..drop },
         normal(CameraUnknown::TipAlong, 0.0, with_tip(doubt.offset_sd_m)),
         normal(CameraUnknown::TipAcross, 0.0, with_tip(doubt.offset_sd_m)),
+        normal(
+            CameraUnknown::HeadAbove,
+            0.0,
+            if data.own_head && bends { with_drop(doubt.offset_sd_m) } else { 0.0 },
+        ),
         normal(CameraUnknown::DriftX, 0.0, doubt.drift_sd_m_per_s),
         normal(CameraUnknown::DriftDrop, 0.0, with_drop(doubt.drift_sd_m_per_s)),
         normal(CameraUnknown::Scale, 0.0, doubt.scale_sd),

@@ -85,13 +85,12 @@ impl FittedTraces {
             show(&mut single_run, start.first_frame, &shown);
             for (at, frame) in shown.iter().enumerate() {
                 let [tip, head, drop] = frame.truth;
-                let head_shown = model.head_in_picture(start.first_frame + at, head);
-                head_x_m[start.first_frame + at] = Some(head_shown);
-                shifts[0].push(frame.picture[0] - head_shown - (tip - head));
+                head_x_m[start.first_frame + at] = Some(frame.head_x_m);
+                shifts[0].push(frame.picture[0] - frame.head_x_m - (tip - head));
                 shifts[1].push(frame.picture[1] - drop);
             }
         }
-        let CameraParameters { clock_s, offset_x_m, .. } = model.camera;
+        let CameraParameters { clock_s, offset_x_m, .. } = model.geometry.camera;
         let along_m = if film.own_head { 0.0 } else { offset_x_m };
         let [tip_m, drop_m] = shifts.map(|mut shifts| median_in_place(&mut shifts).unwrap_or(0.0));
         Self {

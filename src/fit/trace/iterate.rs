@@ -16,6 +16,15 @@ pub struct TraceSearchSettings {
     pub max_segments: Option<usize>,
 }
 
+impl TraceSearchSettings {
+    /// Settings of a search over all segments, without twins. `segment_s` are the lengths of the segments in
+    /// each stage, s, in ascending order.
+    #[must_use]
+    pub fn without_twins(segment_s: Vec<f64>) -> Self {
+        Self { segment_s, twins: 0, max_segments: None }
+    }
+}
+
 /// A segment with its starting state and its misfit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 /// Maximum number of outer steps (steps of the unknowns) in a phase.
-pub(super) const MAX_STEPS: usize = 40;
+pub(super) const MAX_STEPS: usize = 60;
 /// Maximum number of outer steps of a stage, after the first, whose iterates explain nothing. With a right
 /// model, the end of the stage before already fits well, so more steps would not help.
 const MAX_JUNK_STEPS: usize = 6;
@@ -243,7 +243,7 @@ pub(super) fn is_long(film: &CameraObservation, segment: &SegmentState, length_s
 }
 
 fn cut_recording(at: &RecordingModel<'_>, film: usize, length_s: f64) -> Vec<SegmentState> {
-    let starts = segment_boundaries(&at.scene, at.observation, &at.camera, length_s);
+    let starts = segment_boundaries(&at.scene, at.observation, &at.geometry.camera, length_s);
     let end = at.observation.settings.frames[1];
     let lasts = starts.iter().skip(1).map(|next| next.frame).chain([end]);
     let segment = |(start, last): (&SegmentBoundary, usize)| SegmentState {

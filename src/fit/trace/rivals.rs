@@ -59,19 +59,17 @@ fn is_same_valley(end: &SearchEnd<'_>, other: &Iterate) -> bool {
     })
 }
 
-/// A reason to doubt the end if the recordings do not decide against `other`. It names the parameter that
-/// differs most.
-pub(super) fn describe_rival(end: &SearchEnd<'_>, other: &Iterate) -> Option<String> {
-    if has_lost(end, other) {
+/// A reason to doubt the estimate of a parameter if the minimum `rival`, against which the recordings do not
+/// decide, moves it by more than a standard deviation.
+pub(super) fn describe_rival(end: &SearchEnd<'_>, rival: &Iterate, i: usize) -> Option<String> {
+    let unknowns = &end.model.unknowns;
+    let name = unknowns.parameter_name(i)?;
+    if (rival.point[i] - end.at.point[i]).abs() <= end.sd[i] {
         return None;
     }
-    let unknowns = &end.model.unknowns;
-    let apart = |i: &usize| ((other.point[*i] - end.at.point[*i]) / end.sd[*i]).abs();
-    let furthest = unknowns.parameters().max_by(|a, b| apart(a).total_cmp(&apart(b)))?;
-    let name = unknowns.parameter_name(furthest)?;
     let unit = find_parameter(name).map_or("1", |parameter| parameter.unit);
     let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
-    let value = format_trimmed(unknowns.0[furthest].value(other.point[furthest]), 3);
+    let value = format_trimmed(unknowns.0[i].value(rival.point[i]), 3);
     Some(format!("another minimum, with {name} at {value}{unit}, fits nearly as well"))
 }
 

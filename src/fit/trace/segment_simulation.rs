@@ -4,7 +4,8 @@ use super::camera_observation::CameraObservation;
 use super::iterate::Iterate;
 use super::model::{TraceModel, TraceRecording};
 use super::normal_equations::recording_models;
-use super::unknowns::{CameraParameters, CameraUnknown, TraceUnknowns, UnknownKind};
+use super::projection::{FrameProjection, PictureGeometry};
+use super::unknowns::{CameraUnknown, TraceUnknowns, UnknownKind};
 use crate::model::Pose;
 use crate::model::parameters::name_if_in_recording;
 use crate::model::shoulder::Shoulder;
@@ -15,7 +16,6 @@ use crate::simulate::sensitivity::{
 };
 use crate::simulate::{RunStatus, SolverOptions};
 use nalgebra::{DMatrix, DVector, Vector4};
-use portable_math as math;
 use std::cell::RefCell;
 
 /// Angles, rad, and rates, rad/s, of neck and lip.
@@ -120,6 +120,8 @@ impl TangentObserver for ShutterAverage<'_> {
 pub(super) struct ShownFrame {
     /// Position of the tip along the sweep and drop of the head in the picture, m.
     pub picture: [f64; 2],
+    /// Position of the head along the sweep in the picture, m.
+    pub head_x_m: f64,
     /// True positions of tip and head along the sweep, and true drop, m.
     pub truth: [f64; 3],
 }
@@ -135,7 +137,7 @@ pub(super) struct LinearizedSegment {
 /// The model of a recording at one point of the search.
 pub(super) struct RecordingModel<'a> {
     pub observation: &'a CameraObservation,
-    pub camera: CameraParameters,
+    pub geometry: PictureGeometry,
     pub scene: Scene,
     /// Whether the place of the tip's marker on the lip is estimated.
     has_tip_marker: bool,
@@ -155,9 +157,9 @@ enum UnknownEffect {
     /// unknown.
     Run(usize, f64),
     /// The unknown changes the picture. Fields: kind of camera error, and derivative of the value of this
-    /// error with respect to the coordinate of the unknown. A scale error that also changes the run has a
-    /// third field: index of the direction along which the run is differentiated, and derivative of the
-    /// quantity that varies along this direction with respect to the scale error.
+    /// error with respect to the coordinate of the unknown. An error that also stretches the motion of the
+    /// recorded head has a third field: index of the direction along which the run is differentiated, and
+    /// relative change of the motion per unit of the error.
     Picture(CameraUnknown, f64, Option<(usize, f64)>),
 }
 
@@ -184,6 +186,8 @@ impl<'a> RecordingModel<'a> {
         .filter_map(|(unit, direction)| (unit > 0.0).then_some(direction))
         .collect();
         let states = TangentSeeds::new(&scene, &directions).ok()?;
+        let geometry = PictureGeometry::new(view, scene.linkage.upright_height_m(), film.centre_m);
+        let mut stretched = None;
         let mut effects = Vec::new();
         for (unknown, z) in unknowns.0.iter().zip(z) {
             let mut direction = |direction: TangentDirection| {
@@ -202,14 +206,13 @@ impl<'a> RecordingModel<'a> {
                 UnknownKind::Camera { what: CameraUnknown::Clock, .. } => {
                     UnknownEffect::Run(direction(TangentDirection::DriveDelay), slope)
                 }
-                // the recorded head drives the model, so true lengths are those of the picture divided by
-                // 1 + scale
-                UnknownKind::Camera { what: CameraUnknown::Scale, .. } if film.own_head => {
-                    let by_scale = -1.0 / (1.0 + view.scale);
-                    let own = Some((direction(TangentDirection::DriveScale), by_scale));
-                    UnknownEffect::Picture(CameraUnknown::Scale, slope, own)
+                UnknownKind::Camera { what, .. } => {
+                    let stretch = geometry.stretch_by(*what).filter(|_| film.own_head).map(|by| {
+                        let along = stretched.get_or_insert_with(|| direction(TangentDirection::DriveScale));
+                        (*along, by)
+                    });
+                    UnknownEffect::Picture(*what, slope, stretch)
                 }
-                UnknownKind::Camera { what, .. } => UnknownEffect::Picture(*what, slope, None),
             });
         }
         let none = TangentSeeds::new(&scene, &[]).ok()?;
@@ -217,7 +220,7 @@ impl<'a> RecordingModel<'a> {
         let has_tip_marker = effects.iter().any(|effect| {
             matches!(effect, UnknownEffect::Picture(CameraUnknown::TipAlong | CameraUnknown::TipAcross, ..))
         });
-        Some(Self { observation: film, camera: view, scene, has_tip_marker, none, states, all, effects })
+        Some(Self { observation: film, geometry, scene, has_tip_marker, none, states, all, effects })
     }
 
     /// Scales of the four numbers of a starting state, rad and rad/s.
@@ -244,9 +247,10 @@ impl<'a> RecordingModel<'a> {
     /// frames if the run ends early.
     pub(super) fn show_frames(&self, frames: [usize; 2], state: &LinkState) -> Vec<ShownFrame> {
         let (shot, complete) = self.run_segment(frames, state, &self.none);
-        let show = |(at, means): (usize, &[f64; 4])| ShownFrame {
-            picture: self.project_to_picture(frames[0] + at, *means),
-            truth: [means[0], means[1], means[2]],
+        let show = |(at, means): (usize, &[f64; 4])| {
+            let shown = self.project_frame(frames[0] + at, *means);
+            let truth = [means[0], means[1], means[2]];
+            ShownFrame { picture: shown.picture(), head_x_m: shown.head_in_picture(), truth }
         };
         shot.means[..complete].iter().enumerate().map(show).collect()
     }
@@ -269,7 +273,7 @@ impl<'a> RecordingModel<'a> {
         state: &LinkState,
         seeds: &TangentSeeds,
     ) -> (SegmentObservation, usize) {
-        let (film, clock_s) = (self.observation, self.camera.clock_s);
+        let (film, clock_s) = (self.observation, self.geometry.camera.clock_s);
         let (lead, count, directions) = (film.lead_s(), last - first, seeds.len());
         let mut scene = self.scene.clone();
         scene.start_s = film.times_s[first] - clock_s - lead;
@@ -349,6 +353,9 @@ impl<'a> RecordingModel<'a> {
         effects: &[UnknownEffect],
     ) -> Option<LinearizedSegment> {
         let shot = self.simulate_segment(frames, state, seeds)?;
+        let show = |(i, means): (usize, &[f64; 4])| self.project_frame(shot.first + i, *means);
+        let shown: Vec<FrameProjection<'_>> = shot.means.iter().enumerate().map(show).collect();
+        let by_means: Vec<[[f64; 2]; 4]> = shown.iter().map(FrameProjection::by_means).collect();
         let mut residuals = self.model_minus_measured(&shot);
         let rows = residuals.len();
         let mut by_state = DMatrix::zeros(rows, STATES);
@@ -356,18 +363,18 @@ impl<'a> RecordingModel<'a> {
         let units = self.scene.linkage.angle_units();
         let columns = by_state.as_mut_slice().chunks_mut(rows.max(1)).enumerate();
         for (direction, (_, column)) in columns.filter(|(i, _)| units[i % 2] > 0.0).enumerate() {
-            self.add_run_derivative(&shot, direction, 1.0, column);
+            self.add_run_derivative(&shot, &by_means, direction, 1.0, column);
         }
         let mut by_unknown = DMatrix::zeros(rows, effects.len());
         for (effect, column) in effects.iter().zip(by_unknown.as_mut_slice().chunks_mut(rows.max(1))) {
             match effect {
                 UnknownEffect::Nowhere => {}
-                UnknownEffect::Run(i, slope) => self.add_run_derivative(&shot, *i, *slope, column),
+                UnknownEffect::Run(i, slope) => self.add_run_derivative(&shot, &by_means, *i, *slope, column),
                 UnknownEffect::Picture(what, slope, run) => {
                     if let Some((i, by_value)) = run {
-                        self.add_run_derivative(&shot, *i, slope * by_value, column);
+                        self.add_run_derivative(&shot, &by_means, *i, slope * by_value, column);
                     }
-                    self.add_picture_derivative(&shot, *what, *slope, column);
+                    self.add_to_column(&shot, column, |i, _| shown[i].by_camera(*what).map(|by| slope * by));
                 }
             }
         }
@@ -379,57 +386,10 @@ impl<'a> RecordingModel<'a> {
         finite.then_some(LinearizedSegment { residuals, by_state, by_unknown })
     }
 
-    /// Distance along the sweep, m, from the edge of the lip to its marker, at the lip angle `lip`, rad.
-    fn marker_shift(&self, lip: f64) -> f64 {
-        let [along_m, across_m] = self.camera.tip_marker_m;
-        if self.has_tip_marker { along_m * math::sin(lip) + across_m * math::cos(lip) } else { 0.0 }
-    }
-
-    /// Derivative of [`Self::marker_shift`] with respect to the angle of the lip, m/rad.
-    fn marker_slope(&self, lip: f64) -> f64 {
-        let [along_m, across_m] = self.camera.tip_marker_m;
-        along_m * math::cos(lip) - across_m * math::sin(lip)
-    }
-
-    /// Position of the tip and drop of the head as the picture shows them, m, from the true means of tip,
-    /// head and drop, and the angle of the lip.
-    fn project_to_picture(&self, frame: usize, [tip, head, drop, lip]: [f64; 4]) -> [f64; 2] {
-        let (film, view) = (self.observation, &self.camera);
-        let scale = 1.0 + view.scale;
-        let shown = self.scaled_head_m(frame, head);
-        let along = film.head_m[frame] - film.centre_m;
-        let [offset_x_m, offset_drop_m] = view.offsets_m(film.after_middle_s(frame));
-        let tip = tip + self.marker_shift(lip);
-        let [bent_x_m, bent_drop_m] = self.bend_by_curvature(along, drop);
-        [
-            shown
-                + scale * (tip - head - view.tilt_rad * drop)
-                + offset_x_m
-                + view.curvature_per_m * bent_x_m,
-            scale * drop - view.tilt_rad * along + offset_drop_m + view.curvature_per_m * bent_drop_m,
-        ]
-    }
-
-    /// Changes of tip and drop in the picture per curvature of the glass, m^2; `along` is the distance from
-    /// the middle along the glass, m. The head is above the glass and appears nearer to the centre of the
-    /// arc. If the recorded head drives the model, the distance from head to tip is larger by as much.
-    fn bend_by_curvature(&self, along: f64, drop: f64) -> [f64; 2] {
-        let height = self.scene.linkage.upright_height_m() - drop;
-        [if self.observation.own_head { height * along } else { 0.0 }, -0.5 * along * along]
-    }
-
-    /// Position of the head along the sweep on the scale of the picture, m, from its true position.
-    fn scaled_head_m(&self, frame: usize, head: f64) -> f64 {
-        if self.observation.own_head {
-            self.observation.head_m[frame]
-        } else {
-            (1.0 + self.camera.scale) * head
-        }
-    }
-
-    /// Position of the head along the sweep in the picture, m, from its true position.
-    pub(super) fn head_in_picture(&self, frame: usize, head: f64) -> f64 {
-        self.scaled_head_m(frame, head) + if self.observation.own_head { 0.0 } else { self.camera.offset_x_m }
+    fn project_frame(&self, frame: usize, means: [f64; 4]) -> FrameProjection<'_> {
+        let film = self.observation;
+        let seen_head_m = film.own_head.then(|| film.head_m[frame]);
+        self.geometry.project_frame(seen_head_m, film.after_middle_s(frame), means)
     }
 
     /// Model minus measurement, m: first for the tip, frame by frame, then for the drop.
@@ -437,7 +397,7 @@ impl<'a> RecordingModel<'a> {
         let mut found =
             DVector::zeros(self.observation.count_data(shot.first, shot.first + shot.means.len()));
         self.add_to_column(shot, found.as_mut_slice(), |i, seen| {
-            let shown = self.project_to_picture(shot.first + i, shot.means[i]);
+            let shown = self.project_frame(shot.first + i, shot.means[i]).picture();
             [shown[0] - seen[0].unwrap_or(0.0), shown[1] - seen[1].unwrap_or(0.0)]
         });
         found
@@ -468,54 +428,21 @@ impl<'a> RecordingModel<'a> {
     }
 
     /// Adds the derivative of the residuals along a direction of the run, multiplied by `slope`, to a column.
+    /// `by_means` are the derivatives of the picture with respect to the means, frame by frame.
     fn add_run_derivative(
         &self,
         shot: &SegmentObservation,
+        by_means: &[[[f64; 2]; 4]],
         direction: usize,
         slope: f64,
         column: &mut [f64],
     ) {
-        let (film, view) = (self.observation, &self.camera);
-        let scale = 1.0 + view.scale;
         self.add_to_column(shot, column, |i, _| {
-            let of = |k: usize| shot.slopes[(i * shot.channels + k) * shot.directions + direction];
-            let [mut tip, head, drop] = [of(0), of(1), of(2)];
-            if self.has_tip_marker {
-                tip += self.marker_slope(shot.means[i][3]) * of(3);
-            }
-            let shown = if film.own_head { 0.0 } else { scale * head };
-            [slope * (shown + scale * (tip - head - view.tilt_rad * drop)), slope * scale * drop]
-        });
-    }
-
-    /// Adds the derivative of the residuals with respect to a camera error, multiplied by `slope`, to a
-    /// column.
-    fn add_picture_derivative(
-        &self,
-        shot: &SegmentObservation,
-        what: CameraUnknown,
-        slope: f64,
-        column: &mut [f64],
-    ) {
-        let (film, view) = (self.observation, &self.camera);
-        let scale = 1.0 + view.scale;
-        self.add_to_column(shot, column, |i, _| {
-            let (frame, [tip, head, drop, lip]) = (shot.first + i, shot.means[i]);
-            let tip = tip + self.marker_shift(lip);
-            let shown = if film.own_head { 0.0 } else { head };
-            let by_value = match what {
-                CameraUnknown::OffsetX => [1.0, 0.0],
-                CameraUnknown::OffsetDrop => [0.0, 1.0],
-                CameraUnknown::TipAlong => [scale * math::sin(lip), 0.0],
-                CameraUnknown::TipAcross => [scale * math::cos(lip), 0.0],
-                CameraUnknown::DriftX => [film.after_middle_s(frame), 0.0],
-                CameraUnknown::DriftDrop => [0.0, film.after_middle_s(frame)],
-                CameraUnknown::Scale => [shown + tip - head - view.tilt_rad * drop, drop],
-                CameraUnknown::Tilt => [-scale * drop, film.centre_m - film.head_m[frame]],
-                CameraUnknown::Curvature => self.bend_by_curvature(film.head_m[frame] - film.centre_m, drop),
-                CameraUnknown::Clock => [0.0; 2],
-            };
-            by_value.map(|by_value| slope * by_value)
+            let of = |k: usize| slope * shot.slopes[(i * shot.channels + k) * shot.directions + direction];
+            (0..shot.channels).fold([0.0; 2], |sum, k| {
+                let [tip, drop] = by_means[i][k];
+                [sum[0] + of(k) * tip, sum[1] + of(k) * drop]
+            })
         });
     }
 }

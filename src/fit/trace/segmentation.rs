@@ -189,20 +189,23 @@ fn recorded_motion(
     let start_s = film.times_s[frame] - film.lead_s();
     let head = scene.drive.motion_at(start_s - view.clock_s);
     let (scale, upright_m) = (1.0 + view.scale, scene.linkage.upright_height_m());
+    let along_m = |k: usize| film.head_m[k] - film.centre_m;
+    // a head above sloping glass appears farther down the slope than the glass under it
+    let slope =
+        |k: usize| if film.own_head { view.tilt_rad + view.curvature_per_m * along_m(k) } else { 0.0 };
     let (lean, lean_rate) = fit_parabola(film, frame, |k| {
         let head = film.head_m[k] * if film.own_head { 1.0 } else { scale };
-        let bent = film.own_head.then(|| view.curvature_per_m * upright_m * (film.head_m[k] - film.centre_m));
-        let offset = view.offsets_m(film.after_middle_s(k))[0] + bent.unwrap_or(0.0);
-        Some((film.tip_x_m[k]? - head - offset) / scale)
+        let offset = view.offsets_m(film.after_middle_s(k))[0];
+        Some((film.tip_x_m[k]? - head - offset) / scale - slope(k) * upright_m)
     })?;
     let fall = fit_parabola(film, frame, |k| {
-        let along = film.head_m[k] - film.centre_m;
+        let along = along_m(k);
         let level = film.drop_m[k]? + view.tilt_rad * along + 0.5 * view.curvature_per_m * along * along;
         Some((level - view.offsets_m(film.after_middle_s(k))[1]) / scale)
     });
     film.tip_x_m[frame].or(film.drop_m[frame])?;
     Some(RecordedMotion {
-        lean: [lean + fall.map_or(0.0, |(drop, _)| view.tilt_rad * drop), lean_rate],
+        lean: [lean + fall.map_or(0.0, |(drop, _)| slope(frame) * drop), lean_rate],
         speed_m_per_s: lean_rate + head.velocity_m_per_s,
     })
 }

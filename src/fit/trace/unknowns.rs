@@ -2,9 +2,11 @@
 //! Each has a dimensionless coordinate whose size is of the order of 1.
 
 use super::model::TraceRecording;
+use super::projection::PictureGeometry;
 use crate::model::parameters::name_if_in_recording;
-use crate::simulate::scene::Scene;
+use crate::simulate::scene::{Drive, Scene};
 use portable_math as math;
+use std::sync::Arc;
 
 /// Kind of error of the camera that took a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,6 +24,9 @@ pub enum CameraUnknown {
     /// lip, the marker is at a larger position along the sweep than the middle. The marker turns with the
     /// lip.
     TipAcross,
+    /// Height of the head's marker above the hinge, m. Only glass that slopes shows it: there the marker appears
+    /// farther down the slope than the hinge.
+    HeadAbove,
     /// Rate of change of [`Self::OffsetX`], m/s; `OffsetX` itself is the offset at the middle of the fitted
     /// frames.
     DriftX,
@@ -45,7 +50,7 @@ impl CameraUnknown {
     pub(super) fn coordinate_unit(self) -> f64 {
         match self {
             Self::OffsetX | Self::OffsetDrop | Self::DriftX | Self::DriftDrop => 1e-4,
-            Self::TipAlong | Self::TipAcross => 1e-4,
+            Self::TipAlong | Self::TipAcross | Self::HeadAbove => 1e-4,
             Self::Scale | Self::Tilt => 1e-2,
             Self::Curvature => 0.1,
             Self::Clock => 1e-4,
@@ -59,6 +64,7 @@ impl CameraUnknown {
             Self::OffsetDrop => "offset_drop_m",
             Self::TipAlong => "tip_along_lip_m",
             Self::TipAcross => "tip_across_lip_m",
+            Self::HeadAbove => "head_above_hinge_m",
             Self::DriftX => "drift_x_m_per_s",
             Self::DriftDrop => "drift_drop_m_per_s",
             Self::Scale => "scale_relative",
@@ -156,6 +162,7 @@ pub(crate) struct CameraParameters {
     pub offset_drop_m: f64,
     /// [`CameraUnknown::TipAlong`] and [`CameraUnknown::TipAcross`], m.
     pub tip_marker_m: [f64; 2],
+    pub head_above_m: f64,
     pub drift_x_m_per_s: f64,
     pub drift_drop_m_per_s: f64,
     pub scale: f64,
@@ -215,6 +222,7 @@ impl TraceUnknowns {
             offset_x_m: value(CameraUnknown::OffsetX),
             offset_drop_m: value(CameraUnknown::OffsetDrop),
             tip_marker_m: [value(CameraUnknown::TipAlong), value(CameraUnknown::TipAcross)],
+            head_above_m: value(CameraUnknown::HeadAbove),
             drift_x_m_per_s: value(CameraUnknown::DriftX),
             drift_drop_m_per_s: value(CameraUnknown::DriftDrop),
             scale: value(CameraUnknown::Scale),
@@ -234,8 +242,12 @@ impl TraceUnknowns {
                 scene = scene.with_parameter(name, unknown.value(*z)).ok()?;
             }
         }
-        if shoot.observation.own_head {
-            scene.drive = scene.drive.scale_lengths(1.0 / (1.0 + self.camera_at(film, point).scale));
+        if let Some(curve) = &shoot.observation.own_curve {
+            let upright_m = scene.linkage.upright_height_m();
+            let centre_m = shoot.observation.centre_m;
+            let geometry = PictureGeometry::new(self.camera_at(film, point), upright_m, centre_m);
+            let place_m = |seen_m: f64| centre_m + geometry.locate_head(seen_m);
+            scene.drive = Drive::Recorded(Arc::new(curve.map_positions(place_m)));
         }
         Some(scene)
     }

@@ -73,10 +73,24 @@ impl HeadSpline {
         Self { grid: *grid, first_frame: frames[0], knots_s, pieces, piece_of_frame, curve: None }
     }
 
-    /// The same motion with every length multiplied by `factor`.
-    pub(super) fn scale_lengths(&self, factor: f64) -> Self {
-        let pieces = self.pieces.iter().map(|piece| piece.map(|c| factor * c)).collect();
-        Self { pieces, ..self.clone() }
+    /// The spline through the positions at the knots, m, after a map that is nearly linear over the distance
+    /// between two knots.
+    pub(crate) fn map_positions(&self, map: impl Fn(f64) -> f64) -> Self {
+        /// Distance over which the slope of the map is taken, m.
+        const NEAR_M: f64 = 1e-5;
+        let places: Vec<f64> = self.knots_s.iter().map(|t| map(self.motion_at(*t).position_m)).collect();
+        let ends = self.span_s().map(|t| {
+            let motion = self.motion_at(t);
+            let slope = (map(motion.position_m + NEAR_M) - map(motion.position_m - NEAR_M)) / (2.0 * NEAR_M);
+            slope * motion.acceleration_m_per_s2 / math::powi(self.grid.frame_rate_hz, 2)
+        });
+        Self::interpolate_positions(&self.grid, &self.knot_frames(), &places, ends)
+    }
+
+    /// Frames of the knots.
+    fn knot_frames(&self) -> Vec<usize> {
+        let frame = |time_s: &f64| ((time_s - self.grid.start_s) * self.grid.frame_rate_hz).round() as usize;
+        self.knots_s.iter().map(frame).collect()
     }
 
     /// Number of coefficients of the smooth curve; 0 if there is no curve.
@@ -102,9 +116,7 @@ impl HeadSpline {
     /// returns independent numbers with the standard normal distribution. Without a curve, the same spline.
     pub(crate) fn draw_like(&self, draw: impl FnMut() -> f64) -> Self {
         let Some(curve) = &self.curve else { return self.clone() };
-        let frame = |time_s: &f64| ((time_s - self.grid.start_s) * self.grid.frame_rate_hz).round() as usize;
-        let knots: Vec<usize> = self.knots_s.iter().map(frame).collect();
-        Self::follow_curve(&self.grid, curve.draw_like(draw), &knots)
+        Self::follow_curve(&self.grid, curve.draw_like(draw), &self.knot_frames())
     }
 
     /// Standard deviation of the tracked positions about the smooth curve, m, if there is a curve.
@@ -245,6 +257,22 @@ mod tests {
             let t = 0.25 + 0.2 * f64::from(i) / 1000.0;
             let error = spline.motion_at(t).position_m - bump(t);
             assert!(error.abs() < 1e-13, "at {t}: {error:e}");
+        }
+    }
+
+    /// A linear map is exact. A map whose slope changes by a hundredth over the motion is exact to rounding
+    /// errors of a tracker.
+    #[test]
+    fn positions_are_mapped() {
+        let spline = smoothed(&all(|t| 0.01 * (30.0 * t).sin()));
+        for (bend, tolerance) in [(0.0, 1e-14), (0.3, 1e-8)] {
+            let map = |x: f64| 0.5 + x * (0.97 + bend * x);
+            let mapped = spline.map_positions(map);
+            for i in 0..=1000 {
+                let t = 0.25 + 0.2 * f64::from(i) / 1000.0;
+                let error = mapped.motion_at(t).position_m - map(spline.motion_at(t).position_m);
+                assert!(error.abs() < tolerance, "at {t}: {error:e}");
+            }
         }
     }
 
