@@ -124,7 +124,10 @@ impl TriedProblem {
 
 /// Settings for the segments on which hypotheses are tried.
 fn tried_settings(length_s: f64) -> TraceSearchSettings {
-    TraceSearchSettings { segment_s: vec![length_s], twins: 0, max_segments: Some(TRIED_SEGMENTS) }
+    TraceSearchSettings {
+        max_segments: Some(TRIED_SEGMENTS),
+        ..TraceSearchSettings::without_twins(vec![length_s])
+    }
 }
 
 /// A hypothesis with its changed problems.
@@ -317,7 +320,7 @@ impl TriedHypothesis {
         let (mut misfits, mut ends) = (Vec::new(), Vec::new());
         for part in &self.parts {
             let segment_s = part.problem.segment_s().to_vec();
-            let settings = TraceSearchSettings { segment_s, twins: 0, max_segments: None };
+            let settings = TraceSearchSettings::without_twins(segment_s);
             let first = start_stage(&part.model, &settings, (0, false), &part.at.point, &part.at.segments)?;
             let descent = follow_stages(&part.model, &settings, first, &mut || Ok::<_, ()>(())).ok()?;
             misfits.push(judge_descent(&part.problem, &part.model, &descent)?);

@@ -142,8 +142,7 @@ impl Problem {
         explained: bool,
         check_stop: &mut dyn FnMut() -> Result<(), StopReason>,
     ) -> Result<Option<LawTrial>, StopReason> {
-        let segment_s = self.segment_s().to_vec();
-        let settings = TraceSearchSettings { segment_s, twins: 0, max_segments: None };
+        let settings = TraceSearchSettings::without_twins(self.segment_s().to_vec());
         let starts: Vec<f64> = model.unknowns.0.iter().map(|unknown| unknown.start).collect();
         let near = model.unknowns.carry_point(&starts, &from.unknowns, &end.point);
         let (mut points, mut stages) = (vec![near], Vec::new());
@@ -346,8 +345,7 @@ fn travel_speed_m_per_s(model: &TraceModel) -> f64 {
 impl Problem {
     /// Judges laws that were fitted; the first is that of the scene.
     fn judge_laws(&self, trials: &[LawTrial]) -> LawComparison {
-        let segment_s = self.segment_s().to_vec();
-        let settings = TraceSearchSettings { segment_s, twins: 0, max_segments: None };
+        let settings = TraceSearchSettings::without_twins(self.segment_s().to_vec());
         let seed = self.job().search.seed;
         let ends: Vec<Option<SearchEnd<'_>>> =
             trials.iter().map(|trial| SearchEnd::new(&trial.model, &settings, seed, &trial.at)).collect();

@@ -135,7 +135,6 @@ pub(crate) fn central_moments(points: &[(f64, f64)]) -> ([f64; 2], [f64; 2]) {
 
 /// The tracked frames of a channel, the standard deviation of their noise, m, and the smallest change of
 /// position between two tracked frames that is not zero, m (0 if the position never changes).
-#[derive(Clone)]
 pub(super) struct TrackPoints {
     /// Frame number and position, m, of every tracked frame.
     pub points: Vec<(usize, f64)>,
@@ -155,6 +154,11 @@ impl TrackPoints {
     /// Index of the first point at or after a frame.
     pub(super) fn index_at_frame(&self, frame: f64) -> usize {
         index_at_frame(&self.points, frame)
+    }
+
+    /// Points from the frame `first` to the frame `last`.
+    fn points_between(&self, first: f64, last: f64) -> &[(usize, f64)] {
+        &self.points[self.index_at_frame(first)..self.index_at_frame(last + 1.0)]
     }
 }
 

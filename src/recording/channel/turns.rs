@@ -1,7 +1,10 @@
 //! Turns of the head, and the rest of the tip around them.
 
-use super::{TrackPoints, median_filter, median_of_three, median_position, noise_sd_m, value_range};
+use super::{
+    TrackPoints, index_at_frame, median_filter, median_of_three, median_position, noise_sd_m, value_range,
+};
 use portable_math as math;
+use std::borrow::Cow;
 
 /// Smallest distance that the head must move towards an extremum and away from it for the extremum to count
 /// as a turn, m: one pixel of the usual size, 20 um. Jitter of a resting head is smaller.
@@ -157,20 +160,22 @@ pub(super) fn longest_hold(
     let mut hold = holds.reduce(|best, hold| if hold.points > best.points { hold } else { best })?;
     let block_m = (BLOCK_TOLERANCES * tolerance_m).max(BLOCK_SHARE * lean_m);
     if let Some(end) = hold.end {
-        let rest = MarkerRest { head: head.points.clone(), tip: tip.clone(), tolerance_m, block_m };
-        hold.end = rest.find_departure(end, next_turn, RELEASE_POWER).unwrap_or(hold.end);
+        let [head, tip] = [head, tip].map(|track| track.points_between(last_turn, next_turn).into());
+        let rest = MarkerRest { head, tip, tolerance_m, block_m };
+        hold.end = rest.find_departure(end, next_turn, RELEASE_POWER);
     }
     if let Some(start) = hold.start {
         // the same backwards in time
-        let [of_head, of_tip] = [head, tip].map(|track| track.points.last().map(|(frame, _)| *frame));
-        let origin = of_head?.max(of_tip?);
-        let reverse =
-            |points: &[(usize, f64)]| points.iter().rev().map(|(frame, x)| (origin - frame, *x)).collect();
-        let tip = TrackPoints { points: reverse(&tip.points), ..*tip };
-        let rest = MarkerRest { head: reverse(&head.points), tip, tolerance_m, block_m };
+        let [head, tip] = [head, tip].map(|track| track.points_between(last_turn, next_turn));
+        let origin = head.last()?.0.max(tip.last()?.0);
+        let [head, tip] = [head, tip].map(|points| {
+            let reversed = points.iter().rev().map(|(frame, x)| (origin - frame, *x));
+            reversed.collect::<Vec<_>>().into()
+        });
+        let rest = MarkerRest { head, tip, tolerance_m, block_m };
         let origin = origin as f64;
         let found = rest.find_departure(origin - start, origin - last_turn, HOLD_POWER);
-        hold.start = found.map_or(hold.start, |found| found.map(|frame| origin - frame));
+        hold.start = found.map(|frame| origin - frame);
     }
     Some(hold)
 }
@@ -197,7 +202,7 @@ fn hold_around(head: &TrackPoints, tip: &TrackPoints, seed: usize, tolerance_m: 
         value_range(&median_filter(&head.points[head.index_at_frame(from)..head.index_at_frame(to)]));
     let head_moves = high - low >= HEAD_TOLERANCES * tolerance_m;
     let (before, after) = (first.checked_sub(1), Some(last + 1).filter(|i| *i < tip.points.len()));
-    let departure = |outside, next, power| departure_frame(tip, outside, next, place, power);
+    let departure = |outside, next, power| departure_frame(&tip.points, outside, next, place, power);
     let start = before.map(|outside| departure(outside, outside.checked_sub(1), HOLD_POWER));
     let end = after.map(|outside| departure(outside, Some(outside + 1), RELEASE_POWER));
     head_moves.then_some(TipHold { start, end, points: last - first + 1 })
@@ -222,10 +227,10 @@ fn hold_extent(tip: &TrackPoints, seed: usize, place: f64, tolerance_m: f64) -> 
 
 /// Start or end of a hold, in frames: the time `t0` of the path `distance = c |t - t0|^power` through two
 /// points outside the hold, where `distance` is measured from the position of the hold.
-fn departure_frame(tip: &TrackPoints, outside: usize, next: Option<usize>, place: f64, power: f64) -> f64 {
-    let (frame, x) = tip.points[outside];
+fn departure_frame(tip: &[(usize, f64)], outside: usize, next: Option<usize>, place: f64, power: f64) -> f64 {
+    let (frame, x) = tip[outside];
     let frame = frame as f64;
-    let Some((next_frame, next_x)) = next.and_then(|i| tip.points.get(i)) else { return frame };
+    let Some((next_frame, next_x)) = next.and_then(|i| tip.get(i)) else { return frame };
     let [root, next_root] = [x, *next_x].map(|x| math::powf((x - place).abs(), 1.0 / power));
     let towards_hold = if *next_frame as f64 > frame { -1.0 } else { 1.0 };
     let frames_back = root / (next_root - root) * (*next_frame as f64 - frame).abs();
@@ -248,11 +253,10 @@ const RESTS: f64 = 0.3;
 /// Number of blocks after the supposed end of a rest in which the tip is compared with the head.
 const COMPARED_BLOCKS: usize = 8;
 
-/// Tracks in which the rest of a tip is sought whose marker moves a little.
-struct MarkerRest {
-    /// Frame and position, m, of the head.
-    head: Vec<(usize, f64)>,
-    tip: TrackPoints,
+/// Tracks in which the rest of a tip is sought whose marker moves a little: frame and position, m.
+struct MarkerRest<'a> {
+    head: Cow<'a, [(usize, f64)]>,
+    tip: Cow<'a, [(usize, f64)]>,
     tolerance_m: f64,
     /// Motion of the head in a block, m.
     block_m: f64,
@@ -265,14 +269,14 @@ struct RestBlock {
     rests: bool,
 }
 
-impl MarkerRest {
+impl MarkerRest<'_> {
     fn head_at(&self, i: usize) -> f64 {
-        let at = super::index_at_frame(&self.head, self.tip.points[i].0 as f64);
+        let at = index_at_frame(&self.head, self.tip[i].0 as f64);
         median_of_three(&self.head, at.min(self.head.len() - 1))
     }
 
     fn tip_at(&self, i: usize) -> f64 {
-        median_of_three(&self.tip.points, i)
+        median_of_three(&self.tip, i)
     }
 
     /// Whether the tip moves between two points by less than [`RESTS`] of the motion of the head.
@@ -293,22 +297,22 @@ impl MarkerRest {
         })
     }
 
-    /// Frame at which the tip leaves, if it rests on after the frame `end`, where its marker leaves its
-    /// place. `Some(None)` if it rests up to the frame `last`, and `None` if it really leaves at `end`.
-    fn find_departure(&self, end: f64, last: f64, power: f64) -> Option<Option<f64>> {
-        if self.head.is_empty() {
-            return None;
+    /// Frame at which the tip leaves: the frame `end`, where its marker leaves its place, or a later one if the
+    /// tip rests on. `None` if it rests up to the frame `last`.
+    fn find_departure(&self, end: f64, last: f64, power: f64) -> Option<f64> {
+        if self.head.is_empty() || self.tip.is_empty() {
+            return Some(end);
         }
-        let points = self.tip.points.len();
-        let from = self.tip.index_at_frame(end).min(points.checked_sub(1)?);
-        let to = self.tip.index_at_frame(last.max(0.0)).min(points);
+        let points = self.tip.len();
+        let from = index_at_frame(&self.tip, end).min(points - 1);
+        let to = index_at_frame(&self.tip, last.max(0.0)).min(points);
         let near: Vec<RestBlock> = self.blocks(from, to).take(COMPARED_BLOCKS).collect();
         let still = near.iter().filter(|block| block.rests).count();
         let is_rest = near.len() == COMPARED_BLOCKS
             && 2 * still > COMPARED_BLOCKS
             && self.rests_between(from, near[COMPARED_BLOCKS - 1].end);
         if !is_rest {
-            return None;
+            return Some(end);
         }
         // the tip leaves where most blocks before are rests, and most blocks after are not
         let blocks: Vec<RestBlock> = self.blocks(from, to).collect();
@@ -320,32 +324,32 @@ impl MarkerRest {
                 (fewest, leaves) = (wrong, k + 1);
             }
         }
-        let Some(after) = blocks.get(leaves) else { return Some(None) };
+        let Some(after) = blocks.get(leaves) else { return None };
         let moves_on =
             blocks.get(leaves + COMPARED_BLOCKS).or(blocks.last()).map_or(to - 1, |block| block.end);
         if self.rests_between(after.first, moves_on) {
-            return None;
+            return Some(end);
         }
         // the marker moves along a line with the head; the tip leaves where the marker leaves the line
         let start = blocks[leaves.saturating_sub(2)].first;
         let middle = blocks[leaves.saturating_sub(1)].first.midpoint(after.first).max(start + 2);
         let line = self.fit_line(start, middle.min(points));
         let off = |i: usize| {
-            let off = self.tip.points[i].1 - line(self.head_at(i));
+            let off = self.tip[i].1 - line(self.head_at(i));
             if off.abs() <= self.tolerance_m { 0.0 } else { off.signum() }
         };
         let left = |i: &usize| {
             let side = off(*i);
             side != 0.0 && (1..LEFT_FRAMES).all(|k| i + k >= points || off(i + k) == side)
         };
-        let outside = (middle..points).find(left)?;
+        let Some(outside) = (middle..points).find(left) else { return Some(end) };
         let place = line(self.head_at(outside));
-        Some(Some(departure_frame(&self.tip, outside, Some(outside + 1), place, power)))
+        Some(departure_frame(&self.tip, outside, Some(outside + 1), place, power))
     }
 
     /// Least-squares line of the position of the tip over that of the head.
     fn fit_line(&self, first: usize, end: usize) -> impl Fn(f64) -> f64 {
-        let pairs = || (first..end).map(|i| (self.head_at(i), self.tip.points[i].1));
+        let pairs = || (first..end).map(|i| (self.head_at(i), self.tip[i].1));
         let count = (end - first).max(1) as f64;
         let mean = pairs().fold([0.0; 2], |sum, (h, x)| [sum[0] + h / count, sum[1] + x / count]);
         let moments = pairs().fold([0.0; 2], |sum, (h, x)| {
