@@ -1,8 +1,8 @@
 //! Where the picture of a camera shows a blade on curved glass, with derivatives.
 //!
 //! The glass is an arc. At the middle of the film it makes the angle of the tilt with the x axis of the
-//! picture. The picture is not linear in tilt and curvature: on a blade 3 mm high with a slope of 0.04 rad, the
-//! terms of second order are as large as the tracking noise.
+//! picture. The picture is not linear in tilt and curvature: on a blade 3 mm high with a slope of 0.04 rad,
+//! the terms of second order are as large as the tracking noise.
 
 use super::unknowns::{CameraParameters, CameraUnknown};
 use portable_math as math;
@@ -284,7 +284,7 @@ mod tests {
             let found = geometry.project_frame(None, after_s, MEANS).picture();
             let expected = [scale * (CENTRE_M + tip_x) + offset, shown_drop];
             assert!((0..2).all(|k| (found[k] - expected[k]).abs() < 1e-12), "{found:?} {expected:?}");
-            // the recorded head is at the height of an upright blade; in the middle of the film it is at the centre
+            // a recorded head is taken at the height of an upright blade
             let [upright_x, _] = exact_point(&camera, head - CENTRE_M, UPRIGHT_M + camera.head_above_m);
             let zero = CENTRE_M + scale * UPRIGHT_M * tilt.sin();
             let seen = zero + scale * upright_x;

@@ -154,8 +154,8 @@ fn doubted_end<'a>(
     (!end.is_junk(model) && (end.count_bad_segments() > 0 || contradicts())).then_some(end)
 }
 
-/// End of a search from the point of `end` with narrower priors. They draw the constants out of a minimum that
-/// only constants far from their priors make possible.
+/// End of a search from the point of `end` with narrower priors. They draw the constants out of a minimum
+/// that only constants far from their priors make possible.
 fn search_with_narrow_priors(
     model: &TraceModel,
     settings: &TraceSearchSettings,

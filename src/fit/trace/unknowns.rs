@@ -24,8 +24,8 @@ pub enum CameraUnknown {
     /// lip, the marker is at a larger position along the sweep than the middle. The marker turns with the
     /// lip.
     TipAcross,
-    /// Height of the head's marker above the hinge, m. Only glass that slopes shows it: there the marker appears
-    /// farther down the slope than the hinge.
+    /// Height of the head's marker above the hinge, m. Only glass that slopes shows it: there the marker
+    /// appears farther down the slope than the hinge.
     HeadAbove,
     /// Rate of change of [`Self::OffsetX`], m/s; `OffsetX` itself is the offset at the middle of the fitted
     /// frames.

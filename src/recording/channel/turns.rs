@@ -297,8 +297,8 @@ impl MarkerRest<'_> {
         })
     }
 
-    /// Frame at which the tip leaves: the frame `end`, where its marker leaves its place, or a later one if the
-    /// tip rests on. `None` if it rests up to the frame `last`.
+    /// Frame at which the tip leaves: the frame `end`, where its marker leaves its place, or a later one if
+    /// the tip rests on. `None` if it rests up to the frame `last`.
     fn find_departure(&self, end: f64, last: f64, power: f64) -> Option<f64> {
         if self.head.is_empty() || self.tip.is_empty() {
             return Some(end);
