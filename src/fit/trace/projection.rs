@@ -90,6 +90,11 @@ impl PictureGeometry {
         self.upright_m + self.camera.head_above_m
     }
 
+    /// Whether the glass slopes anywhere in the picture.
+    pub(super) fn slopes(&self) -> bool {
+        self.camera.tilt_rad != 0.0 || self.camera.curvature_per_m != 0.0
+    }
+
     /// Relative change of the true motion of a recorded head per unit of a camera error, in the middle of the
     /// film; `None` for an error that does not stretch the motion.
     pub(super) fn stretch_by(&self, what: CameraUnknown) -> Option<f64> {
@@ -147,7 +152,7 @@ impl FrameProjection<'_> {
     /// Position of the tip along the sweep and drop of the head in the picture, m.
     pub(super) fn picture(&self) -> [f64; 2] {
         let [offset_x_m, offset_drop_m] = self.geometry.camera.offsets_m(self.after_s);
-        let drop_m = self.scale() * (self.geometry.upright_m - self.head.at[1]);
+        let drop_m = self.scale() * (self.geometry.upright_head_m() - self.head.at[1]);
         [self.show_along(&self.tip) + offset_x_m, drop_m + offset_drop_m]
     }
 
@@ -192,13 +197,13 @@ impl FrameProjection<'_> {
             CameraUnknown::TipAcross => [scale * (along * cos + up * sin), 0.0],
             CameraUnknown::HeadAbove => {
                 let aside = self.seen_head.map_or(0.0, |(_, head)| head.by_height[0]);
-                [-scale * aside, -scale * self.head.by_height[1]]
+                [-scale * aside, scale * (1.0 - self.head.by_height[1])]
             }
             CameraUnknown::DriftX => [self.after_s, 0.0],
             CameraUnknown::DriftDrop => [0.0, self.after_s],
             CameraUnknown::Scale => {
                 let zero_m = self.seen_head.map_or(-self.geometry.centre_m, |(_, head)| head.at[0]);
-                [self.tip.at[0] - zero_m, self.geometry.upright_m - self.head.at[1]]
+                [self.tip.at[0] - zero_m, self.geometry.upright_head_m() - self.head.at[1]]
             }
             CameraUnknown::Tilt => change(&|point| point.by_tilt),
             CameraUnknown::Curvature => change(&|point| point.by_curvature),
@@ -277,8 +282,9 @@ mod tests {
             let marker = [along * lip.sin() + across * lip.cos(), across * lip.sin() - along * lip.cos()];
             let [tip_x, _] = exact_point(&camera, tip - CENTRE_M + marker[0], marker[1]);
             let (scale, after_s) = (1.0 + camera.scale, 0.1);
-            let shown_drop =
-                scale * (UPRIGHT_M - y) + camera.offset_drop_m + after_s * camera.drift_drop_m_per_s;
+            let shown_drop = scale * (UPRIGHT_M + camera.head_above_m - y)
+                + camera.offset_drop_m
+                + after_s * camera.drift_drop_m_per_s;
             let offset = camera.offset_x_m + after_s * camera.drift_x_m_per_s;
             // the scene moves the head
             let found = geometry.project_frame(None, after_s, MEANS).picture();

@@ -251,6 +251,8 @@ pub fn undersampled_mode(model: &TraceModel, at: &Iterate) -> Option<[f64; 2]> {
 /// chi2 as cost are preferred; of these, the descent with the lowest cost is the best.
 fn best_descent(descents: &[TraceDescent]) -> usize {
     let rank = |descent: &TraceDescent| match descent.last_iterate() {
+        // (without a segment, the cost is that of the priors alone)
+        Some(end) if end.segments.is_empty() => (Reverse(0), true, f64::INFINITY),
         Some(end) => (Reverse(end.stage), !end.plain, end.cost),
         None => (Reverse(0), true, f64::INFINITY),
     };

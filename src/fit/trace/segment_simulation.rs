@@ -126,6 +126,17 @@ pub(super) struct ShownFrame {
     pub truth: [f64; 3],
 }
 
+/// Derivative of the height of the head of the upright blade with respect to a parameter of the scene, m per
+/// unit of the parameter; `None` if the height does not depend on it.
+fn upright_slope(scene: &Scene, name: &str) -> Option<f64> {
+    /// Relative change of the parameter; the height is linear in the lengths.
+    const CHANGE: f64 = 1e-3;
+    let value = scene.value(name)?;
+    let changed = scene.with_parameter(name, value * (1.0 + CHANGE)).ok()?;
+    let rise_m = changed.linkage.upright_height_m() - scene.linkage.upright_height_m();
+    (rise_m != 0.0).then(|| rise_m / (CHANGE * value))
+}
+
 /// Residuals of a segment, and the derivatives of the residuals with respect to the starting state and with
 /// respect to the unknowns.
 pub(super) struct LinearizedSegment {
@@ -148,19 +159,20 @@ pub(super) struct RecordingModel<'a> {
     effects: Vec<UnknownEffect>,
 }
 
-/// Effect of an unknown on the residuals of a recording.
-enum UnknownEffect {
-    /// No effect, because the unknown belongs to another recording.
-    Nowhere,
-    /// The unknown changes the run. Fields: index of the direction along which the run is differentiated, and
+/// Effect of an unknown on the residuals of a recording. It is empty if the unknown belongs to another
+/// recording.
+#[derive(Default)]
+struct UnknownEffect {
+    /// Changes of the run. Fields: index of the direction along which the run is differentiated, and
     /// derivative of the quantity that varies along this direction with respect to the coordinate of the
     /// unknown.
-    Run(usize, f64),
-    /// The unknown changes the picture. Fields: kind of camera error, and derivative of the value of this
-    /// error with respect to the coordinate of the unknown. An error that also stretches the motion of the
-    /// recorded head has a third field: index of the direction along which the run is differentiated, and
-    /// relative change of the motion per unit of the error.
-    Picture(CameraUnknown, f64, Option<(usize, f64)>),
+    runs: Vec<(usize, f64)>,
+    /// Change of the picture of the same run: kind of camera error, and derivative of the value of this error
+    /// with respect to the coordinate of the unknown.
+    picture: Option<(CameraUnknown, f64)>,
+    /// Shift of the whole run along the sweep, m, per coordinate. The motion of a recorded head is stretched
+    /// about its middle, and [`TangentDirection::DriveScale`] stretches it about zero.
+    shift_m: f64,
 }
 
 impl<'a> RecordingModel<'a> {
@@ -195,30 +207,36 @@ impl<'a> RecordingModel<'a> {
                 directions.len() - 1
             };
             let slope = unknown.slope(*z);
-            effects.push(match &unknown.kind {
-                UnknownKind::Parameter { name, .. } => match name_if_in_recording(name, shoot.condition) {
-                    Some(name) => {
-                        UnknownEffect::Run(direction(TangentDirection::Parameter(name.to_owned())), slope)
+            let mut effect = UnknownEffect::default();
+            match &unknown.kind {
+                UnknownKind::Parameter { name, .. } => {
+                    if let Some(name) = name_if_in_recording(name, shoot.condition) {
+                        let along = direction(TangentDirection::Parameter(name.to_owned()));
+                        effect.runs.push((along, slope));
+                        let by_length = upright_slope(&scene, name).filter(|_| geometry.slopes());
+                        // a longer blade lifts the marker of the head
+                        effect.picture = by_length.map(|by| (CameraUnknown::HeadAbove, slope * by));
                     }
-                    None => UnknownEffect::Nowhere,
-                },
-                UnknownKind::Camera { film, .. } if *film != number => UnknownEffect::Nowhere,
+                }
+                UnknownKind::Camera { film, .. } if *film != number => {}
                 UnknownKind::Camera { what: CameraUnknown::Clock, .. } => {
-                    UnknownEffect::Run(direction(TangentDirection::DriveDelay), slope)
+                    effect.runs.push((direction(TangentDirection::DriveDelay), slope));
                 }
-                UnknownKind::Camera { what, .. } => {
-                    let stretch = geometry.stretch_by(*what).filter(|_| film.own_head).map(|by| {
-                        let along = stretched.get_or_insert_with(|| direction(TangentDirection::DriveScale));
-                        (*along, by)
-                    });
-                    UnknownEffect::Picture(*what, slope, stretch)
-                }
-            });
+                UnknownKind::Camera { what, .. } => effect.picture = Some((*what, slope)),
+            }
+            if let Some((what, slope)) = effect.picture.filter(|_| film.own_head)
+                && let Some(by) = geometry.stretch_by(what)
+            {
+                let along = *stretched.get_or_insert_with(|| direction(TangentDirection::DriveScale));
+                effect.runs.push((along, slope * by));
+                effect.shift_m = -slope * by * film.centre_m;
+            }
+            effects.push(effect);
         }
         let none = TangentSeeds::new(&scene, &[]).ok()?;
         let all = TangentSeeds::new(&scene, &directions).ok()?;
         let has_tip_marker = effects.iter().any(|effect| {
-            matches!(effect, UnknownEffect::Picture(CameraUnknown::TipAlong | CameraUnknown::TipAcross, ..))
+            matches!(effect.picture, Some((CameraUnknown::TipAlong | CameraUnknown::TipAcross, _)))
         });
         Some(Self { observation: film, geometry, scene, has_tip_marker, none, states, all, effects })
     }
@@ -367,15 +385,14 @@ impl<'a> RecordingModel<'a> {
         }
         let mut by_unknown = DMatrix::zeros(rows, effects.len());
         for (effect, column) in effects.iter().zip(by_unknown.as_mut_slice().chunks_mut(rows.max(1))) {
-            match effect {
-                UnknownEffect::Nowhere => {}
-                UnknownEffect::Run(i, slope) => self.add_run_derivative(&shot, &by_means, *i, *slope, column),
-                UnknownEffect::Picture(what, slope, run) => {
-                    if let Some((i, by_value)) = run {
-                        self.add_run_derivative(&shot, &by_means, *i, slope * by_value, column);
-                    }
-                    self.add_to_column(&shot, column, |i, _| shown[i].by_camera(*what).map(|by| slope * by));
-                }
+            for (i, slope) in &effect.runs {
+                self.add_run_derivative(&shot, &by_means, *i, *slope, column);
+            }
+            if let Some((what, slope)) = effect.picture {
+                self.add_to_column(&shot, column, |i, _| {
+                    let (by, [tip, head, ..]) = (shown[i].by_camera(what), by_means[i]);
+                    std::array::from_fn(|k| slope * by[k] + effect.shift_m * (tip[k] + head[k]))
+                });
             }
         }
         let whitening = self.observation.segment_whitening(frames);
@@ -494,4 +511,74 @@ pub fn segment_residuals(model: &TraceModel, at: &Iterate) -> Vec<SegmentResidua
         }
     }
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::job::Job;
+    use crate::fit::trace::{fit_states_at, start_point};
+    use crate::fit::{MeasuredRecording, Problem};
+    use crate::simulate::twin::{Camera, TrackingModel, add_tracking_noise, film_scene};
+
+    const JOB: &str = "format = 1\ntitle = \"t\"\nscene = \"s.toml\"\nseed = 1\n[[recording]]\npath = \"r\"\n\
+        [[parameter]]\nname = \"friction.a\"\nlower = 0.02\nupper = 0.5\nscale = \"log\"\n[[trace]]\n";
+
+    /// Derivatives of the residuals against central differences, where the glass slopes and is curved and the
+    /// zero of the picture is a metre away.
+    #[test]
+    fn residuals_are_differentiated_on_sloping_glass() {
+        const CHANGE: f64 = 1e-4;
+        let text = include_str!("../../../data/scenes/actual-blade.toml");
+        let scene = Scene::parse("s.toml", text).unwrap();
+        let camera = Camera { frame_rate_hz: 5_000.0, exposure_s: 5e-5 };
+        let tracking =
+            TrackingModel { metres_per_pixel: 2e-5, noise_px: 0.1, dropout_fraction: 0.0, seed: 7 };
+        let effort = SolverOptions::from_scene(&scene);
+        let seen = film_scene(&scene, &camera, 0.7, 0.8, effort).unwrap().recording;
+        let mut traces = seen.traces().clone();
+        for x in traces.tip_x_m.iter_mut().chain(&mut traces.head_x_m).flatten() {
+            *x += 1.0;
+        }
+        let recording = add_tracking_noise(&seen.with_traces(traces).unwrap(), "r", &tracking).unwrap();
+        let measured = MeasuredRecording { recording, exposure_s: Some(camera.exposure_s) };
+        let problem =
+            Problem::new(Job::parse("job.toml", JOB).unwrap(), vec![scene], vec![measured]).unwrap();
+        let model = problem.trace_model().unwrap().unwrap();
+        let mut point = start_point(&model, 1, 0);
+        for (z, unknown) in point.iter_mut().zip(&model.unknowns.0) {
+            if let UnknownKind::Camera { what, .. } = &unknown.kind {
+                *z = match what {
+                    CameraUnknown::Tilt => 5.0,
+                    CameraUnknown::Curvature | CameraUnknown::HeadAbove => 3.0,
+                    _ => *z,
+                };
+            }
+        }
+        let at = fit_states_at(&model, problem.segment_s(), &point).unwrap();
+        let models = |z: &[f64]| RecordingModel::new(&model.recordings[0], 0, &model.unknowns, z).unwrap();
+        let mut compared = 0;
+        for segment in &at.segments {
+            let (frames, state) = (segment.frames(), segment.start_state());
+            let Some(linear) = models(&point).linearize(frames, &state) else { continue };
+            for (i, unknown) in model.unknowns.0.iter().enumerate() {
+                let [above, below] = [CHANGE, -CHANGE].map(|change| {
+                    let mut moved = point.clone();
+                    moved[i] += change;
+                    models(&moved).whitened_residuals(frames, &state)
+                });
+                let (Some(above), Some(below)) = (above, below) else { continue };
+                let found = (above - below) / (2.0 * CHANGE);
+                let exact = linear.by_unknown.column(i);
+                let off = (&found - exact).norm() / found.norm().max(1.0);
+                // (the stretch of the head's motion is that in the middle of the film)
+                let is_height =
+                    matches!(unknown.kind, UnknownKind::Camera { what: CameraUnknown::HeadAbove, .. });
+                let tolerance = if is_height { 0.1 } else { 0.005 };
+                assert!(off < tolerance, "{:?}: {off:.5}", unknown.kind);
+                compared += 1;
+            }
+        }
+        assert!(compared > 20, "{compared}");
+    }
 }

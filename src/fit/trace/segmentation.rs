@@ -188,7 +188,8 @@ fn recorded_motion(
 ) -> Option<RecordedMotion> {
     let start_s = film.times_s[frame] - film.lead_s();
     let head = scene.drive.motion_at(start_s - view.clock_s);
-    let (scale, upright_m) = (1.0 + view.scale, scene.linkage.upright_height_m());
+    let scale = 1.0 + view.scale;
+    let upright_m = scene.linkage.upright_height_m() + view.head_above_m;
     let along_m = |k: usize| film.head_m[k] - film.centre_m;
     // a head above sloping glass appears farther down the slope than the glass under it
     let slope =

@@ -65,6 +65,10 @@ pub struct Curvature {
     pub sd_per_m: f64,
     /// Standard deviation, over the frames, of the slope of the curved path, rad.
     pub slope_sd_rad: f64,
+    /// Angle of the path at its middle, rad. It differs from the mean angle where the tip spends more time at
+    /// one end of the path.
+    #[serde(skip)]
+    middle_angle_rad: f64,
 }
 
 /// Why a recording shows no tilt.
@@ -154,7 +158,8 @@ fn significant_curvature(line: &GlassLine, variance_m2: f64) -> Option<Curvature
     let per_m = 2.0 * line.bend_per_m;
     let slope_sd_rad = per_m.abs() * line.x_sd_m;
     let clear = per_m.abs() > CLEAR_DEVIATIONS * sd_per_m && slope_sd_rad * line.x_sd_m > LEAST_SAG_M;
-    clear.then_some(Curvature { per_m, sd_per_m, slope_sd_rad })
+    let middle_angle_rad = math::atan(line.middle_slope);
+    clear.then_some(Curvature { per_m, sd_per_m, slope_sd_rad, middle_angle_rad })
 }
 
 impl CameraTilt {
@@ -165,7 +170,8 @@ impl CameraTilt {
         let curvature = self.curvature?;
         let traces = recording.traces();
         let mut flat = traces.clone();
-        let (sin, cos) = (math::sin(self.angle_rad), math::cos(self.angle_rad));
+        let angle_rad = curvature.middle_angle_rad;
+        let (sin, cos) = (math::sin(angle_rad), math::cos(angle_rad));
         let [centre_x, centre_y] = self.centre_m;
         let along_glass = |x: f64, y: f64| {
             let (dx, dy) = (x - centre_x, y - centre_y);
@@ -174,7 +180,7 @@ impl CameraTilt {
         };
         let glass_y = |x: f64| {
             let dx = x - centre_x;
-            centre_y + math::tan(self.angle_rad) * dx + 0.5 * curvature.per_m * dx * dx
+            centre_y + math::tan(angle_rad) * dx + 0.5 * curvature.per_m * dx * dx
         };
         let columns = [
             (&mut flat.tip_x_m, &mut flat.tip_y_m, &traces.tip_x_m, &traces.tip_y_m),
@@ -248,7 +254,7 @@ impl TiltEffect {
     }
 
     fn curvature_finding(&self, tilt: &CameraTilt) -> Option<QualityFinding> {
-        let Curvature { per_m, sd_per_m, slope_sd_rad } = tilt.curvature?;
+        let Curvature { per_m, sd_per_m, slope_sd_rad, .. } = tilt.curvature?;
         let change = (per_m * tilt.travel_m).abs();
         if change < LEAST_TILT_RAD.max(CLEAR_DEVIATIONS * sd_per_m * tilt.travel_m) {
             return None;

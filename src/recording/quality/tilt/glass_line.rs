@@ -14,6 +14,9 @@ const LEAST_BEND: f64 = 1e-6;
 /// line, so that `slope` is the mean slope of a curved path.
 pub(super) struct GlassLine {
     pub slope: f64,
+    /// Slope of the curve at the middle of the path. It differs from `slope` where the tip spends more time
+    /// at one end of a curved path.
+    pub middle_slope: f64,
     pub bend_per_m: f64,
     pub centre_m: [f64; 2],
     /// Standard deviation of the positions along the sweep, m.
@@ -73,6 +76,7 @@ impl GlassLine {
         let spread = used().map(|p| math::powi(p.x_m - centre_m[0], 2)).sum::<f64>() / count;
         Self {
             slope,
+            middle_slope: slope - bend_per_m * lean,
             bend_per_m,
             centre_m,
             x_sd_m: spread.sqrt(),
