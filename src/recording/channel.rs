@@ -158,7 +158,9 @@ impl TrackPoints {
 
     /// Points from the frame `first` to the frame `last`.
     fn points_between(&self, first: f64, last: f64) -> &[(usize, f64)] {
-        &self.points[self.index_at_frame(first)..self.index_at_frame(last + 1.0)]
+        let first = self.index_at_frame(first);
+        // (the times of two close turns may be in the wrong order)
+        &self.points[first..self.index_at_frame(last + 1.0).max(first)]
     }
 }
 

@@ -136,8 +136,8 @@ const RELEASE_POWER: f64 = 3.0;
 /// Exponent of the tip's path before a hold: the tip decelerates to rest along a parabola.
 const HOLD_POWER: f64 = 2.0;
 
-/// An interval in which the tip rests, in frames (real numbers); an end that lies outside the recording is
-/// `None`.
+/// An interval in which the tip rests, in frames (real numbers). An end is `None` if it lies outside the
+/// recording, or if the tip rests up to the neighbouring turn of the head.
 pub(super) struct TipHold {
     pub start: Option<f64>,
     pub end: Option<f64>,
@@ -167,7 +167,7 @@ pub(super) fn longest_hold(
     if let Some(start) = hold.start {
         // the same backwards in time
         let [head, tip] = [head, tip].map(|track| track.points_between(last_turn, next_turn));
-        let origin = head.last()?.0.max(tip.last()?.0);
+        let origin = head.iter().chain(tip).map(|(frame, _)| *frame).max().unwrap_or(0);
         let [head, tip] = [head, tip].map(|points| {
             let reversed = points.iter().rev().map(|(frame, x)| (origin - frame, *x));
             reversed.collect::<Vec<_>>().into()
@@ -253,7 +253,8 @@ const RESTS: f64 = 0.3;
 /// Number of blocks after the supposed end of a rest in which the tip is compared with the head.
 const COMPARED_BLOCKS: usize = 8;
 
-/// Tracks in which the rest of a tip is sought whose marker moves a little: frame and position, m.
+/// Tracks of head and tip between two turns: frame and position, m. They show whether the tip still rests
+/// although its marker moves a little.
 struct MarkerRest<'a> {
     head: Cow<'a, [(usize, f64)]>,
     tip: Cow<'a, [(usize, f64)]>,
@@ -324,7 +325,7 @@ impl MarkerRest<'_> {
                 (fewest, leaves) = (wrong, k + 1);
             }
         }
-        let Some(after) = blocks.get(leaves) else { return None };
+        let after = blocks.get(leaves)?;
         let moves_on =
             blocks.get(leaves + COMPARED_BLOCKS).or(blocks.last()).map_or(to - 1, |block| block.end);
         if self.rests_between(after.first, moves_on) {

@@ -97,7 +97,9 @@ pub(super) fn summarise_motion(
 ) -> MotionSummary {
     let recording = &*recording.resample_to_grid();
     let (traces, rate_hz) = (recording.traces(), measured.frame_rate_hz);
-    let slope = tilt.map_or(0.0, |tilt| math::tan(tilt.angle_rad));
+    // (one slope cannot correct the deflection over curved glass, whose slope changes along the sweep)
+    let flat = tilt.and_then(|tilt| tilt.flatten_recording(recording));
+    let slope = tilt.filter(|_| flat.is_none()).map_or(0.0, |tilt| math::tan(tilt.angle_rad));
     let strokes = instants.reversals.len() + 1;
     let speeds = head_speeds_m_per_s(&traces.head_x_m, rate_hz, strokes);
     let turns: Vec<f64> = instants.reversals.iter().map(|turn| turn.reversal_s).collect();
@@ -110,7 +112,7 @@ pub(super) fn summarise_motion(
         median_speed_m_per_s: find_median(speeds.iter().copied()),
         stroke_s: between.or_else(|| stroke_of_cosine_s(&traces.head_x_m, rate_hz)),
         fastest_oscillation_hz: fastest_oscillation_hz(&Channel::Deflection.samples(recording), measured),
-        lag_frames: measure_lag_frames(traces, measured, slope),
+        lag_frames: measure_lag_frames(flat.as_ref().map_or(traces, Recording::traces), measured, slope),
     }
 }
 

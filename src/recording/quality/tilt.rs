@@ -65,8 +65,8 @@ pub struct Curvature {
     pub sd_per_m: f64,
     /// Standard deviation, over the frames, of the slope of the curved path, rad.
     pub slope_sd_rad: f64,
-    /// Angle of the path at its middle, rad. It differs from the mean angle where the tip spends more time at
-    /// one end of the path.
+    /// Angle of the path at its mean position, rad. It differs from the mean angle where the tip spends more
+    /// time at one end of the path.
     #[serde(skip)]
     middle_angle_rad: f64,
 }
@@ -301,35 +301,72 @@ impl TiltEffect {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recording::quality::measure_quality;
+    use crate::recording::quality::{measure_motion, measure_quality};
     use crate::recording::{FrameGrid, Traces};
 
-    /// A tip on a tilted arc, with a head 5 mm above the glass and 1 mm ahead of the tip. After flattening,
-    /// both distances are right to 0.5 um.
+    const FRAMES: usize = 1000;
+
+    /// A tip on a tilted arc, with a head above it. `lean_and_height` are the distances from tip to head, m,
+    /// and `along` is the position of the tip along the glass, m, in each frame.
+    fn film_on_arc(
+        per_m: f64,
+        along: impl Fn(usize) -> f64,
+        lean_and_height: impl Fn(usize) -> [f64; 2],
+    ) -> Recording {
+        let (radius, tilt_rad) = (1.0 / per_m, 0.006);
+        let at = |along: f64, height: f64| {
+            let angle = along / radius + tilt_rad;
+            let start = [radius * math::sin(tilt_rad), -radius * math::cos(tilt_rad)];
+            let from_centre = radius - height;
+            [from_centre * math::sin(angle) - start[0], -from_centre * math::cos(angle) - start[1]]
+        };
+        let tip = |axis: usize| (0..FRAMES).map(|i| Some(at(along(i), 0.0)[axis])).collect();
+        let head = |axis: usize| {
+            let place = |i: usize| {
+                let [lean, height] = lean_and_height(i);
+                at(along(i) + lean, height)[axis]
+            };
+            (0..FRAMES).map(|i| Some(place(i))).collect()
+        };
+        let traces = Traces {
+            tip_x_m: tip(0),
+            tip_y_m: tip(1),
+            head_x_m: head(0),
+            head_y_m: head(1),
+            ..Traces::default()
+        };
+        let grid = FrameGrid { start_s: 0.0, frame_rate_hz: 1e3, frames: FRAMES };
+        Recording::new("arc", grid, traces, true).unwrap()
+    }
+
+    /// The tip spends more time at the end of its path.
+    fn slow_down(i: usize) -> f64 {
+        0.04 * (1.0 - 2.0 * math::powi(1.0 - i as f64 / FRAMES as f64, 2))
+    }
+
+    /// The head sinks as the blade leans, in the same frame.
+    #[test]
+    fn tracks_over_curved_glass_have_no_lag() {
+        for per_m in [0.9, -1.5, 3.0] {
+            let lean = |i: usize| 1e-3 + 4e-4 * math::sin(0.3 * i as f64);
+            let recording =
+                film_on_arc(per_m, slow_down, |i| [lean(i), 5e-3 - 100.0 * math::powi(lean(i), 2)]);
+            let measured = measure_quality(&recording, None);
+            let motion = measure_motion(&recording, &measured, &ReversalInstants::find_instants(&recording));
+            assert_eq!(motion.lag_frames, None, "{per_m}");
+        }
+    }
+
+    /// A head 5 mm above the glass and 1 mm ahead of the tip. After flattening, both distances are right to
+    /// 0.5 um.
     #[test]
     fn a_recording_on_an_arc_is_flattened() {
-        for per_m in [0.9, -0.3] {
-            let (radius, tilt_rad) = (1.0 / per_m, 0.006);
-            let at = |along: f64, height: f64| {
-                let angle = along / radius + tilt_rad;
-                let start = [radius * math::sin(tilt_rad), -radius * math::cos(tilt_rad)];
-                let from_centre = radius - height;
-                [from_centre * math::sin(angle) - start[0], -from_centre * math::cos(angle) - start[1]]
-            };
-            let frames = 1000;
-            let along = |i: usize| 0.04 * (i as f64 / 500.0 - 1.0);
-            let column = |axis: usize, lean: f64, height: f64| {
-                (0..frames).map(|i| Some(at(along(i) + lean, height)[axis])).collect::<Vec<_>>()
-            };
-            let traces = Traces {
-                tip_x_m: column(0, 0.0, 0.0),
-                tip_y_m: column(1, 0.0, 0.0),
-                head_x_m: column(0, 1e-3, 5e-3),
-                head_y_m: column(1, 1e-3, 5e-3),
-                ..Traces::default()
-            };
-            let grid = FrameGrid { start_s: 0.0, frame_rate_hz: 1e3, frames };
-            let recording = Recording::new("arc", grid, traces, true).unwrap();
+        let evenly = |i: usize| 0.04 * (2.0 * i as f64 / FRAMES as f64 - 1.0);
+        for (per_m, along) in
+            [(0.9, evenly as fn(usize) -> f64), (-0.3, evenly), (0.9, slow_down), (-0.3, slow_down)]
+        {
+            let frames = FRAMES;
+            let recording = film_on_arc(per_m, along, |_| [1e-3, 5e-3]);
             let instants = ReversalInstants::find_instants(&recording);
             let tilt = measure_tilt(&recording, &instants, &measure_quality(&recording, None)).unwrap();
             let flat = tilt.flatten_recording(&recording).unwrap();

@@ -14,7 +14,7 @@ const LEAST_BEND: f64 = 1e-6;
 /// line, so that `slope` is the mean slope of a curved path.
 pub(super) struct GlassLine {
     pub slope: f64,
-    /// Slope of the curve at the middle of the path. It differs from `slope` where the tip spends more time
+    /// Slope of the curve at `centre_m`. It differs from `slope` where the tip spends more time
     /// at one end of a curved path.
     pub middle_slope: f64,
     pub bend_per_m: f64,
