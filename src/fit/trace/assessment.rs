@@ -26,7 +26,8 @@ pub struct UnknownEstimate {
     /// Estimated value, in the SI unit of the unknown.
     pub value: f64,
     /// Ends of the 95 % interval, in the SI unit of the unknown. The interval combines curvature, scatter of
-    /// the segments, profile and bias, and contains the estimates of other minima that fit nearly as well.
+    /// the segments, profile and bias. It also contains an interval of the same width by curvature around the
+    /// estimate at each other minimum that fits nearly as well.
     pub ends_95: [f64; 2],
     /// Standard deviation of the unknown's coordinate, including the bias.
     pub sd: f64,

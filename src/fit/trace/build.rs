@@ -254,12 +254,7 @@ fn camera_unknowns(film: usize, source: &TraceSource<'_>, data: &CameraObservati
     let along = match head {
         HeadSource::Scene => zero(CameraUnknown::OffsetX, along_m),
         HeadSource::Recording => {
-            // (the head of a tilted picture appears beside the tip under it)
-            let beside_m = linkage.upright_height_m() * math::sin(angle_rad);
-            CameraPrior {
-                start: along_m - beside_m,
-                ..normal(CameraUnknown::OffsetX, 0.0, doubt.offset_sd_m)
-            }
+            CameraPrior { start: along_m, ..normal(CameraUnknown::OffsetX, 0.0, doubt.offset_sd_m) }
         }
     };
     let drop = zero(CameraUnknown::OffsetDrop, drop_m);

@@ -193,7 +193,9 @@ impl CameraObservation {
     pub(super) fn guess_offsets_m(&self, tilt_rad: f64, linkage: &Linkage) -> [f64; 2] {
         let [first, last] = self.settings.frames;
         let apart = (last - first).div_ceil(GUESS_FRAMES).max(1);
-        let lean = |i: usize| Some(self.tip_x_m[i]? - self.head_m[i]);
+        // in a tilted picture, a recorded head appears beside the tip under it
+        let beside_m = if self.own_head { linkage.upright_height_m() * math::sin(tilt_rad) } else { 0.0 };
+        let lean = |i: usize| Some(self.tip_x_m[i]? - self.head_m[i] - beside_m);
         let level = |i: usize| Some(self.drop_m[i]? + tilt_rad * (self.head_m[i] - self.centre_m));
         let frames = || (first..last).step_by(apart);
         let mut leans: Vec<f64> = frames().filter_map(lean).collect();

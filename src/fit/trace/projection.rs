@@ -1,8 +1,8 @@
 //! Where the picture of a camera shows a blade on curved glass, with derivatives.
 //!
-//! The glass is an arc. At the middle of the film it makes the angle of the tilt with the x axis of the
-//! picture. The picture is not linear in tilt and curvature: on a blade 3 mm high with a slope of 0.04 rad,
-//! the terms of second order are as large as the tracking noise.
+//! The glass is an arc. At the mean position of the head it makes the angle of the tilt with the x axis of
+//! the picture. The picture is not linear in tilt and curvature: on a blade 3 mm high with a slope of
+//! 0.04 rad, the terms of second order are as large as the tracking noise.
 
 use super::unknowns::{CameraParameters, CameraUnknown};
 use portable_math as math;
@@ -13,8 +13,8 @@ pub(super) struct PictureGeometry {
     pub camera: CameraParameters,
     /// Height of the head of the upright blade, m.
     upright_m: f64,
-    /// Position of the head along the sweep at the middle of its path, m: in the picture if the recorded head
-    /// drives the model, otherwise its true position.
+    /// Mean position of the head along the sweep over the fitted frames, m: in the picture if the recorded
+    /// head drives the model, otherwise its true position.
     centre_m: f64,
     /// Sine and cosine of the tilt.
     tilt: [f64; 2],
@@ -35,8 +35,9 @@ pub(super) struct FrameProjection<'a> {
     geometry: &'a PictureGeometry,
     tip: PicturePoint,
     head: PicturePoint,
-    /// Position of the recorded head along the sweep in the picture, m, and the point of the model that is
-    /// there. `None` if the scene moves the head.
+    /// Position of the recorded head along the sweep in the picture, m, and the marker of the model's head on
+    /// an upright blade at this place, from which the distance of the tip counts. `None` if the scene moves
+    /// the head.
     seen_head: Option<(f64, PicturePoint)>,
     /// Sine and cosine of the angle of the lip.
     lip: [f64; 2],
@@ -71,9 +72,10 @@ impl PictureGeometry {
         }
     }
 
-    /// True position of the recorded head along the sweep, m, from the centre, if the picture shows it at
-    /// `seen_m`. Its height is taken as that of an upright blade: the smooth curve through the recorded
-    /// positions hardly follows the drop of a blade that flips.
+    /// True position of the recorded head along the glass, m, from the mean position, if the picture shows
+    /// its marker at `seen_m`. The marker is taken at the height of an upright blade: the smooth curve
+    /// through the recorded positions hardly follows the drop of a blade that flips. A marker at the hinge
+    /// of an upright blade at the mean position is seen at the mean position.
     pub(super) fn locate_head(&self, seen_m: f64) -> f64 {
         /// Number of steps of Newton's method. The first one leaves an error of a nanometre at usual angles.
         const STEPS: usize = 3;
@@ -95,8 +97,8 @@ impl PictureGeometry {
         self.camera.tilt_rad != 0.0 || self.camera.curvature_per_m != 0.0
     }
 
-    /// Relative change of the true motion of a recorded head per unit of a camera error, in the middle of the
-    /// film; `None` for an error that does not stretch the motion.
+    /// Relative change of the true motion of a recorded head per unit of a camera error, near the mean
+    /// position; `None` for an error that does not stretch the motion.
     pub(super) fn stretch_by(&self, what: CameraUnknown) -> Option<f64> {
         let CameraParameters { scale, curvature_per_m, .. } = self.camera;
         let below_centre = 1.0 - curvature_per_m * self.upright_head_m();

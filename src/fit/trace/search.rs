@@ -2,7 +2,7 @@
 
 use super::assessment::{TraceAssessment, assess_end};
 use super::iterate::{Iterate, TraceDescent, TraceSearchSettings};
-use super::levenberg_marquardt::{first_iterate, follow_stages, next_iterate, start_stage};
+use super::levenberg_marquardt::{first_iterate, next_iterate, start_stage};
 use super::lobes::{MAX_LOBES, find_lobes};
 use super::model::TraceModel;
 use super::normal_equations::recording_models;
@@ -56,13 +56,7 @@ pub fn search_trace(
     for start in 0..MAX_STARTS {
         let first_costs = found.descents.iter().filter_map(|descent| Some(descent.stages.first()?.cost));
         let limit = GIVE_UP_FACTOR * first_costs.fold(f64::INFINITY, f64::min);
-        let doubted = (start + 1 == MAX_STARTS)
-            .then(|| doubted_end(model, settings, seed, &found.descents).cloned())
-            .flatten();
-        let first = || match &doubted {
-            Some(end) => first_iterate(model, settings, &search_with_narrow_priors(model, settings, end)?),
-            None => first_of_start(model, settings, seed, start),
-        };
+        let first = || first_of_start(model, settings, seed, start);
         let (descent, stopped) = descend(model, settings, start, first, limit, journal);
         found.descents.push(descent);
         if stopped {
@@ -137,40 +131,6 @@ fn first_of_start(
     }
     let tried = (0..SCREENED).filter_map(|point| first(start + MAX_STARTS * point));
     tried.min_by(|a, b| a.cost.total_cmp(&b.cost))
-}
-
-/// The best end, if it explains most segments but not all, or if the constants there contradict their priors.
-fn doubted_end<'a>(
-    model: &TraceModel,
-    settings: &TraceSearchSettings,
-    seed: u64,
-    descents: &'a [TraceDescent],
-) -> Option<&'a Iterate> {
-    let end = descents.get(best_descent(descents))?.last_iterate()?;
-    let contradicts = || {
-        let search = SearchEnd::new(model, settings, seed, end);
-        search.is_some_and(|search| !prior_conflicts(&search).is_empty())
-    };
-    (!end.is_junk(model) && (end.count_bad_segments() > 0 || contradicts())).then_some(end)
-}
-
-/// End of a search from the point of `end` with narrower priors. They draw the constants out of a minimum
-/// that only constants far from their priors make possible.
-fn search_with_narrow_priors(
-    model: &TraceModel,
-    settings: &TraceSearchSettings,
-    end: &Iterate,
-) -> Option<Vec<f64>> {
-    /// Factor of the standard deviations of the priors.
-    const NARROWED: f64 = 0.25;
-    let mut narrow = model.clone();
-    let constants = narrow.unknowns.0.iter_mut().filter(|unknown| unknown.prior.is_some());
-    for unknown in constants.filter(|unknown| matches!(unknown.kind, UnknownKind::Parameter { .. })) {
-        unknown.prior = unknown.prior.map(|[mean, sd]| [mean, NARROWED * sd]);
-    }
-    let first = start_stage(&narrow, settings, (0, false), &end.point, &[])?;
-    let mut descent = follow_stages(&narrow, settings, first, &mut || Ok::<_, ()>(())).ok()?;
-    Some(descent.stages.pop()?.point)
 }
 
 /// Point at which a start begins, in the coordinates of the unknowns. Start 0 is in the middle of every

@@ -132,9 +132,12 @@ fn upright_slope(scene: &Scene, name: &str) -> Option<f64> {
     /// Relative change of the parameter; the height is linear in the lengths.
     const CHANGE: f64 = 1e-3;
     let value = scene.value(name)?;
-    let changed = scene.with_parameter(name, value * (1.0 + CHANGE)).ok()?;
+    // (one of the two may be outside of the range that a scene accepts)
+    let changed =
+        [CHANGE, -CHANGE].map(|change| (change, scene.with_parameter(name, value * (1.0 + change))));
+    let (change, changed) = changed.into_iter().find_map(|(change, scene)| Some((change, scene.ok()?)))?;
     let rise_m = changed.linkage.upright_height_m() - scene.linkage.upright_height_m();
-    (rise_m != 0.0).then(|| rise_m / (CHANGE * value))
+    (rise_m != 0.0).then(|| rise_m / (change * value))
 }
 
 /// Residuals of a segment, and the derivatives of the residuals with respect to the starting state and with
@@ -170,8 +173,8 @@ struct UnknownEffect {
     /// Change of the picture of the same run: kind of camera error, and derivative of the value of this error
     /// with respect to the coordinate of the unknown.
     picture: Option<(CameraUnknown, f64)>,
-    /// Shift of the whole run along the sweep, m, per coordinate. The motion of a recorded head is stretched
-    /// about its middle, and [`TangentDirection::DriveScale`] stretches it about zero.
+    /// Shift of head and tip along the sweep, m per coordinate: [`TangentDirection::DriveScale`] stretches
+    /// the motion of the head about zero, a camera error stretches it about the mean position.
     shift_m: f64,
 }
 
@@ -571,7 +574,7 @@ mod tests {
                 let found = (above - below) / (2.0 * CHANGE);
                 let exact = linear.by_unknown.column(i);
                 let off = (&found - exact).norm() / found.norm().max(1.0);
-                // (the stretch of the head's motion is that in the middle of the film)
+                // (the exact stretch changes along the sweep; the derivative has that at the mean position)
                 let is_height =
                     matches!(unknown.kind, UnknownKind::Camera { what: CameraUnknown::HeadAbove, .. });
                 let tolerance = if is_height { 0.1 } else { 0.005 };
