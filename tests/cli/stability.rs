@@ -70,7 +70,7 @@ fn a_fit_gives_intervals_to_the_numbers_of_its_scene() {
     }
     assert!(out.contains("goes on up to 0.277 m/s (0.276 to 0.278)"), "{out}");
     for (scene, fit, said) in [
-        (SCENE, fit.as_str(), "= 0.0018867387127297647, the estimate in"),
+        (SCENE, fit.as_str(), "= 0.0018867389443817122, the estimate in"),
         (SCENE, "fits/nothing", "no such fit"),
         (SCENE, "data", "result.json"),
     ] {
