@@ -138,24 +138,31 @@ fn the_zero_of_the_picture_does_not_matter() {
     }
 }
 
-/// On a windshield with a radius of one metre, the head appears nearer to the centre of the arc by its height
-/// times the slope of the glass, and rises towards the ends.
+/// On curved glass, the head appears nearer to the centre of the arc, and its height in the picture changes
+/// towards the ends. The second glass curves the other way. Its picture is also turned, and the marker of the
+/// head is above the hinge.
 #[test]
 fn a_curved_glass_does_not_matter() {
-    const RADIUS_M: f64 = 1.0;
     let whole = recording();
     let scene = scene();
     let glass_y_m = -(scene.linkage.l1_m + scene.linkage.l2_m);
-    let mut traces = whole.traces().clone();
-    let points = [(&mut traces.tip_x_m, &mut traces.tip_y_m), (&mut traces.head_x_m, &mut traces.head_y_m)];
-    for (xs, ys) in points {
-        for (x, y) in xs.iter_mut().flatten().zip(ys.iter_mut().flatten()) {
-            let (angle, from_centre) = (*x / RADIUS_M, RADIUS_M - (*y - glass_y_m));
-            *x = from_centre * angle.sin();
-            *y = glass_y_m + RADIUS_M - from_centre * angle.cos();
+    for (radius_m, tilt_rad, above_m) in [(1.0, 0.0_f64, 0.0), (-0.6, 0.03, 4e-4)] {
+        let mut traces = whole.traces().clone();
+        let points = [
+            (&mut traces.tip_x_m, &mut traces.tip_y_m, 0.0),
+            (&mut traces.head_x_m, &mut traces.head_y_m, above_m),
+        ];
+        for (xs, ys, above_m) in points {
+            for (x, y) in xs.iter_mut().flatten().zip(ys.iter_mut().flatten()) {
+                let (angle, from_centre) = (*x / radius_m, radius_m - (*y + above_m - glass_y_m));
+                let (along, up) = (from_centre * angle.sin(), radius_m - from_centre * angle.cos());
+                *x = along * tilt_rad.cos() - up * tilt_rad.sin();
+                *y = glass_y_m + along * tilt_rad.sin() + up * tilt_rad.cos();
+            }
         }
+        let result = fitted("", Recording::new("twin", whole.grid(), traces, true).unwrap());
+        assert_found(&result, &scene);
     }
-    assert_found(&fitted("", Recording::new("twin", whole.grid(), traces, true).unwrap()), &scene);
 }
 
 /// A preload that is five prior deviations off does not make a wrong value identified: the value of the scene
