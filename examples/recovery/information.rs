@@ -25,7 +25,7 @@ pub fn read_priors(model: &TraceModel) -> BTreeMap<String, f64> {
 }
 
 /// The end of a descent that starts at the values of the scene `truth`; `None` if the model does not run
-/// through every segment. Camera errors start at the values at which a search starts.
+/// through every segment, or if there is only one length of segments. Camera errors start at the values at which a search starts.
 pub fn descend_from(problem: &Problem, truth: &Scene) -> Option<(TraceModel, Iterate)> {
     let model = problem.trace_model()?.ok()?;
     let mut point = start_point(&model, 1, 0);
@@ -42,9 +42,10 @@ pub fn descend_from(problem: &Problem, truth: &Scene) -> Option<(TraceModel, Ite
         at
     };
     let short = follow(first_iterate(&model, &settings, &point)?);
-    // the last stage again, with segments that count to their end, as in a fit
-    let last = settings.segment_s.len().checked_sub(2)?;
-    let at = follow(Iterate { stage: last, whole: true, plain: false, settled: true, ..short });
+    // the last stage again, with segments that count to their end, as in a fit; it follows the end of the
+    // stage before it
+    let before_last = settings.segment_s.len().checked_sub(2)?;
+    let at = follow(Iterate { stage: before_last, whole: true, plain: false, settled: true, ..short });
     // otherwise the cost is not chi2, or the model cannot run through a segment
     (at.plain && chi2_per_dof(&model, &at).0.is_finite()).then_some((model, at))
 }

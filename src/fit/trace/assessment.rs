@@ -26,8 +26,8 @@ pub struct UnknownEstimate {
     /// Estimated value, in the SI unit of the unknown.
     pub value: f64,
     /// Ends of the 95 % interval, in the SI unit of the unknown. The interval combines curvature, scatter of
-    /// the segments, profile and bias. It also contains an interval of the same width by curvature around the
-    /// estimate at each other minimum that fits nearly as well.
+    /// the segments, profile and bias. If another minimum fits nearly as well, it also contains the value
+    /// there, plus and minus 1.96 standard deviations.
     pub ends_95: [f64; 2],
     /// Standard deviation of the unknown's coordinate, including the bias.
     pub sd: f64,
@@ -121,7 +121,7 @@ pub(super) fn assess_end(
         UnknownEstimate {
             kind: unknown.kind.clone(),
             value: unknown.value(z),
-            ends_95: [low, high].map(|end| unknown.value(end)),
+            ends_95: [low, high].map(|z| unknown.value(z)),
             sd: math::hypot(sd[i], bias),
             twins_95: None,
             by_heads: end.covariance.heads[(i, i)],

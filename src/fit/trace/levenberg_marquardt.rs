@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 /// Maximum number of outer steps (steps of the unknowns) in a phase.
-pub(super) const MAX_STEPS: usize = 60;
+pub(super) const MAX_STEPS: usize = 40;
 /// Maximum number of outer steps of a stage, after the first, whose iterates explain nothing. With a right
 /// model, the end of the stage before already fits well, so more steps would not help.
 const MAX_JUNK_STEPS: usize = 6;

@@ -35,9 +35,9 @@ pub(super) struct FrameProjection<'a> {
     geometry: &'a PictureGeometry,
     tip: PicturePoint,
     head: PicturePoint,
-    /// Position of the recorded head along the sweep in the picture, m, and the marker of the model's head on
-    /// an upright blade at this place, from which the distance of the tip counts. `None` if the scene moves
-    /// the head.
+    /// If the recorded head drives the model: where the recording shows the head along the sweep, m, and
+    /// where the model shows the marker of an upright blade at the same place. The distance of the tip counts
+    /// from the second and is added to the first. `None` if the scene moves the head.
     seen_head: Option<(f64, PicturePoint)>,
     /// Sine and cosine of the angle of the lip.
     lip: [f64; 2],
@@ -74,10 +74,10 @@ impl PictureGeometry {
 
     /// True position of the recorded head along the glass, m, from the mean position, if the picture shows
     /// its marker at `seen_m`. The marker is taken at the height of an upright blade: the smooth curve
-    /// through the recorded positions hardly follows the drop of a blade that flips. A marker at the hinge
-    /// of an upright blade at the mean position is seen at the mean position.
+    /// through the recorded positions hardly follows the drop of a blade that flips. The zero is chosen
+    /// so that a head at the mean position is seen there if its marker is at the hinge.
     pub(super) fn locate_head(&self, seen_m: f64) -> f64 {
-        /// Number of steps of Newton's method. The first one leaves an error of a nanometre at usual angles.
+        /// Number of steps of Newton's method. After the first, the error is a nanometre at usual angles.
         const STEPS: usize = 3;
         let from_centre_m = (seen_m - self.centre_m) / (1.0 + self.camera.scale);
         let target_m = from_centre_m - self.upright_m * self.tilt[0];

@@ -212,9 +212,8 @@ pub fn undersampled_mode(model: &TraceModel, at: &Iterate) -> Option<[f64; 2]> {
 fn best_descent(descents: &[TraceDescent]) -> usize {
     let rank = |descent: &TraceDescent| match descent.last_iterate() {
         // (without a segment, the cost is that of the priors alone)
-        Some(end) if end.segments.is_empty() => (Reverse(0), true, f64::INFINITY),
-        Some(end) => (Reverse(end.stage), !end.plain, end.cost),
-        None => (Reverse(0), true, f64::INFINITY),
+        Some(end) if !end.segments.is_empty() => (Reverse(end.stage), !end.plain, end.cost),
+        _ => (Reverse(0), true, f64::INFINITY),
     };
     let order = |a: &usize, b: &usize| {
         let [a, b] = [*a, *b].map(|at| rank(&descents[at]));

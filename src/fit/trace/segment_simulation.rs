@@ -162,8 +162,8 @@ pub(super) struct RecordingModel<'a> {
     effects: Vec<UnknownEffect>,
 }
 
-/// Effect of an unknown on the residuals of a recording. It is empty if the unknown belongs to another
-/// recording.
+/// Effect of an unknown on the residuals of a recording. It is empty if the unknown belongs to other
+/// recordings.
 #[derive(Default)]
 struct UnknownEffect {
     /// Changes of the run. Fields: index of the direction along which the run is differentiated, and
@@ -173,8 +173,8 @@ struct UnknownEffect {
     /// Change of the picture of the same run: kind of camera error, and derivative of the value of this error
     /// with respect to the coordinate of the unknown.
     picture: Option<(CameraUnknown, f64)>,
-    /// Shift of head and tip along the sweep, m per coordinate: [`TangentDirection::DriveScale`] stretches
-    /// the motion of the head about zero, a camera error stretches it about the mean position.
+    /// Shift of head and tip along the sweep, m per coordinate. [`TangentDirection::DriveScale`] stretches
+    /// the motion about zero; the shift moves the fixed point to the mean position.
     shift_m: f64,
 }
 
@@ -188,7 +188,6 @@ impl<'a> RecordingModel<'a> {
     ) -> Option<Self> {
         let film = &shoot.observation;
         let scene = unknowns.scene_at(shoot, number, z)?;
-        let view = unknowns.camera_at(number, z);
         let [neck, lip] = scene.linkage.angle_units();
         // (the neck of a slider does not turn)
         let mut directions: Vec<TangentDirection> = [
@@ -201,7 +200,7 @@ impl<'a> RecordingModel<'a> {
         .filter_map(|(unit, direction)| (unit > 0.0).then_some(direction))
         .collect();
         let states = TangentSeeds::new(&scene, &directions).ok()?;
-        let geometry = PictureGeometry::new(view, scene.linkage.upright_height_m(), film.centre_m);
+        let geometry = unknowns.geometry_at(shoot, number, z, &scene);
         let mut stretched = None;
         let mut effects = Vec::new();
         for (unknown, z) in unknowns.0.iter().zip(z) {
@@ -377,7 +376,7 @@ impl<'a> RecordingModel<'a> {
         let show = |(i, means): (usize, &[f64; 4])| self.project_frame(shot.first + i, *means);
         let shown: Vec<FrameProjection<'_>> = shot.means.iter().enumerate().map(show).collect();
         let by_means: Vec<[[f64; 2]; 4]> = shown.iter().map(FrameProjection::by_means).collect();
-        let mut residuals = self.model_minus_measured(&shot);
+        let mut residuals = self.subtract_measured(&shot, |i| shown[i].picture());
         let rows = residuals.len();
         let mut by_state = DMatrix::zeros(rows, STATES);
         // (derivatives by the state of a neck that does not turn are zero)
@@ -414,10 +413,19 @@ impl<'a> RecordingModel<'a> {
 
     /// Model minus measurement, m: first for the tip, frame by frame, then for the drop.
     fn model_minus_measured(&self, shot: &SegmentObservation) -> DVector<f64> {
+        self.subtract_measured(shot, |i| self.project_frame(shot.first + i, shot.means[i]).picture())
+    }
+
+    /// Like [`Self::model_minus_measured`], with the picture of the model in each frame of the segment.
+    fn subtract_measured(
+        &self,
+        shot: &SegmentObservation,
+        picture: impl Fn(usize) -> [f64; 2],
+    ) -> DVector<f64> {
         let mut found =
             DVector::zeros(self.observation.count_data(shot.first, shot.first + shot.means.len()));
         self.add_to_column(shot, found.as_mut_slice(), |i, seen| {
-            let shown = self.project_frame(shot.first + i, shot.means[i]).picture();
+            let shown = picture(i);
             [shown[0] - seen[0].unwrap_or(0.0), shown[1] - seen[1].unwrap_or(0.0)]
         });
         found
@@ -559,22 +567,23 @@ mod tests {
             }
         }
         let at = fit_states_at(&model, problem.segment_s(), &point).unwrap();
-        let models = |z: &[f64]| RecordingModel::new(&model.recordings[0], 0, &model.unknowns, z).unwrap();
+        let model_at = |z: &[f64]| RecordingModel::new(&model.recordings[0], 0, &model.unknowns, z).unwrap();
         let mut compared = 0;
         for segment in &at.segments {
             let (frames, state) = (segment.frames(), segment.start_state());
-            let Some(linear) = models(&point).linearize(frames, &state) else { continue };
+            let Some(linear) = model_at(&point).linearize(frames, &state) else { continue };
             for (i, unknown) in model.unknowns.0.iter().enumerate() {
                 let [above, below] = [CHANGE, -CHANGE].map(|change| {
                     let mut moved = point.clone();
                     moved[i] += change;
-                    models(&moved).whitened_residuals(frames, &state)
+                    model_at(&moved).whitened_residuals(frames, &state)
                 });
                 let (Some(above), Some(below)) = (above, below) else { continue };
                 let found = (above - below) / (2.0 * CHANGE);
                 let exact = linear.by_unknown.column(i);
                 let off = (&found - exact).norm() / found.norm().max(1.0);
-                // (the exact stretch changes along the sweep; the derivative has that at the mean position)
+                // (a higher marker stretches the motion differently along the sweep; the derivative uses the
+                // stretch at the mean position)
                 let is_height =
                     matches!(unknown.kind, UnknownKind::Camera { what: CameraUnknown::HeadAbove, .. });
                 let tolerance = if is_height { 0.1 } else { 0.005 };

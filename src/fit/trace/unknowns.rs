@@ -243,13 +243,23 @@ impl TraceUnknowns {
             }
         }
         if let Some(curve) = &shoot.observation.own_curve {
-            let upright_m = scene.linkage.upright_height_m();
-            let centre_m = shoot.observation.centre_m;
-            let geometry = PictureGeometry::new(self.camera_at(film, point), upright_m, centre_m);
-            let place_m = |seen_m: f64| centre_m + geometry.locate_head(seen_m);
+            let geometry = self.geometry_at(shoot, film, point, &scene);
+            let place_m = |seen_m: f64| shoot.observation.centre_m + geometry.locate_head(seen_m);
             scene.drive = Drive::Recorded(Arc::new(curve.map_positions(place_m)));
         }
         Some(scene)
+    }
+
+    /// The camera of a recording at a point, and the blade of `scene` that it films.
+    pub(super) fn geometry_at(
+        &self,
+        shoot: &TraceRecording,
+        film: usize,
+        point: &[f64],
+        scene: &Scene,
+    ) -> PictureGeometry {
+        let upright_m = scene.linkage.upright_height_m();
+        PictureGeometry::new(self.camera_at(film, point), upright_m, shoot.observation.centre_m)
     }
 
     /// A point of the unknowns `from` in these unknowns. Unknowns that only `self` has are taken from

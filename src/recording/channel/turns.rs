@@ -4,7 +4,6 @@ use super::{
     TrackPoints, index_at_frame, median_filter, median_of_three, median_position, noise_sd_m, value_range,
 };
 use portable_math as math;
-use std::borrow::Cow;
 
 /// Smallest distance that the head must move towards an extremum and away from it for the extremum to count
 /// as a turn, m: one pixel of the usual size, 20 um. Jitter of a resting head is smaller.
@@ -160,7 +159,7 @@ pub(super) fn longest_hold(
     let mut hold = holds.reduce(|best, hold| if hold.points > best.points { hold } else { best })?;
     let block_m = (BLOCK_TOLERANCES * tolerance_m).max(BLOCK_SHARE * lean_m);
     if let Some(end) = hold.end {
-        let [head, tip] = [head, tip].map(|track| track.points_between(last_turn, next_turn).into());
+        let [head, tip] = [head, tip].map(|track| track.points_between(last_turn, next_turn));
         let rest = MarkerRest { head, tip, tolerance_m, block_m };
         hold.end = rest.find_departure(end, next_turn, RELEASE_POWER);
     }
@@ -168,11 +167,9 @@ pub(super) fn longest_hold(
         // the same backwards in time
         let [head, tip] = [head, tip].map(|track| track.points_between(last_turn, next_turn));
         let origin = head.iter().chain(tip).map(|(frame, _)| *frame).max().unwrap_or(0);
-        let [head, tip] = [head, tip].map(|points| {
-            let reversed = points.iter().rev().map(|(frame, x)| (origin - frame, *x));
-            reversed.collect::<Vec<_>>().into()
-        });
-        let rest = MarkerRest { head, tip, tolerance_m, block_m };
+        let reversed = [head, tip]
+            .map(|points| points.iter().rev().map(|(frame, x)| (origin - frame, *x)).collect::<Vec<_>>());
+        let rest = MarkerRest { head: &reversed[0], tip: &reversed[1], tolerance_m, block_m };
         let origin = origin as f64;
         let found = rest.find_departure(origin - start, origin - last_turn, HOLD_POWER);
         hold.start = found.map(|frame| origin - frame);
@@ -256,8 +253,8 @@ const COMPARED_BLOCKS: usize = 8;
 /// Tracks of head and tip between two turns: frame and position, m. They show whether the tip still rests
 /// although its marker moves a little.
 struct MarkerRest<'a> {
-    head: Cow<'a, [(usize, f64)]>,
-    tip: Cow<'a, [(usize, f64)]>,
+    head: &'a [(usize, f64)],
+    tip: &'a [(usize, f64)],
     tolerance_m: f64,
     /// Motion of the head in a block, m.
     block_m: f64,
@@ -272,12 +269,12 @@ struct RestBlock {
 
 impl MarkerRest<'_> {
     fn head_at(&self, i: usize) -> f64 {
-        let at = index_at_frame(&self.head, self.tip[i].0 as f64);
-        median_of_three(&self.head, at.min(self.head.len() - 1))
+        let at = index_at_frame(self.head, self.tip[i].0 as f64);
+        median_of_three(self.head, at.min(self.head.len() - 1))
     }
 
     fn tip_at(&self, i: usize) -> f64 {
-        median_of_three(&self.tip, i)
+        median_of_three(self.tip, i)
     }
 
     /// Whether the tip moves between two points by less than [`RESTS`] of the motion of the head.
@@ -305,8 +302,8 @@ impl MarkerRest<'_> {
             return Some(end);
         }
         let points = self.tip.len();
-        let from = index_at_frame(&self.tip, end).min(points - 1);
-        let to = index_at_frame(&self.tip, last.max(0.0)).min(points);
+        let from = index_at_frame(self.tip, end).min(points - 1);
+        let to = index_at_frame(self.tip, last.max(0.0)).min(points);
         let near: Vec<RestBlock> = self.blocks(from, to).take(COMPARED_BLOCKS).collect();
         let still = near.iter().filter(|block| block.rests).count();
         let is_rest = near.len() == COMPARED_BLOCKS
@@ -345,7 +342,7 @@ impl MarkerRest<'_> {
         };
         let Some(outside) = (middle..points).find(left) else { return Some(end) };
         let place = line(self.head_at(outside));
-        Some(departure_frame(&self.tip, outside, Some(outside + 1), place, power))
+        Some(departure_frame(self.tip, outside, Some(outside + 1), place, power))
     }
 
     /// Least-squares line of the position of the tip over that of the head.

@@ -365,13 +365,12 @@ mod tests {
         for (per_m, along) in
             [(0.9, evenly as fn(usize) -> f64), (-0.3, evenly), (0.9, slow_down), (-0.3, slow_down)]
         {
-            let frames = FRAMES;
             let recording = film_on_arc(per_m, along, |_| [1e-3, 5e-3]);
             let instants = ReversalInstants::find_instants(&recording);
             let tilt = measure_tilt(&recording, &instants, &measure_quality(&recording, None)).unwrap();
             let flat = tilt.flatten_recording(&recording).unwrap();
             let of = |column: &[Option<f64>], i: usize| column[i].unwrap();
-            for i in 0..frames {
+            for i in 0..FRAMES {
                 let t = flat.traces();
                 let [lean, height] =
                     [of(&t.head_x_m, i) - of(&t.tip_x_m, i), of(&t.head_y_m, i) - of(&t.tip_y_m, i)];

@@ -260,8 +260,7 @@ mod tests {
         }
     }
 
-    /// A linear map is exact. A map whose slope changes by a hundredth over the motion is exact to rounding
-    /// errors of a tracker.
+    /// A linear map is exact. A map whose slope changes by a hundredth over the motion is exact to 10 nm.
     #[test]
     fn positions_are_mapped() {
         let spline = smoothed(&all(|t| 0.01 * (30.0 * t).sin()));
